@@ -1,0 +1,114 @@
+"""Every error that gcsplan raises on purpose, and the exit code that it ends in.
+
+::
+
+    GcsplanError                    70  our bug, if nothing below fits
+    ├── InputError     (ValueError)       2  bad input; carries every problem found, each with its place
+    │   └── UsageError                    2  wrong options on the command line
+    ├── NoMission      (RuntimeError)     3  no mission exists or was found; ``reason`` says which
+    ├── CheckFailed    (RuntimeError)     4  a check or a rehearsal found a violation, or could not judge
+    ├── VehicleRefused (ConnectionError)  5  the vehicle refused, or was refused by us
+    ├── LinkError      (ConnectionError)  6  the link is dead, or the outcome is unknown
+    └── ReadBackDiffers (RuntimeError)    7  what is on board is not what was sent
+
+A message says what was wanted, what was given, where, and what to do about it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+NoMissionReason = Literal["infeasible", "not_found", "time", "separation", "battery", "too_many_items"]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One mistake in the input: where it stands (``file: key.path``) and what to do about it."""
+
+    where: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.message}" if self.where else self.message
+
+
+class GcsplanError(Exception):
+    """Root of the tree. ``reason`` is a word for scripts, ``where`` the place, both may be empty."""
+
+    exit_code: ClassVar[int] = 70
+    default_reason: ClassVar[str] = "internal"
+
+    def __init__(self, message: str, *, where: str = "", reason: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.where = where
+        self.reason = reason or self.default_reason
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.message}" if self.where else self.message
+
+
+class InputError(GcsplanError, ValueError):
+    """Bad input of any kind; ``problems`` lists every mistake that was found."""
+
+    exit_code = 2
+    default_reason = "bad_input"
+
+    def __init__(self, message: str, *, where: str = "", reason: str = "", problems: Iterable[Problem] = ()) -> None:
+        super().__init__(message, where=where, reason=reason)
+        self.problems: tuple[Problem, ...] = tuple(problems) or (Problem(where, message),)
+
+    @classmethod
+    def of(cls, problems: Iterable[Problem], *, headline: str = "") -> InputError:
+        """Make one error of all ``problems`` (at least one), one a line."""
+        found = tuple(problems)
+        if len(found) == 1 and not headline:
+            return cls(found[0].message, where=found[0].where, problems=found)
+        head = headline or f"{len(found)} mistakes in the input"
+        return cls(head + ":\n" + "\n".join(f"  {p}" for p in found), problems=found)
+
+
+class UsageError(InputError):
+    """The command line's own words are off."""
+
+    default_reason = "usage"
+
+
+class NoMission(GcsplanError, RuntimeError):
+    """No path is better than a wrong one: names the binding constraint in words."""
+
+    exit_code = 3
+    default_reason = "not_found"
+
+    def __init__(self, message: str, *, reason: NoMissionReason, where: str = "") -> None:
+        super().__init__(message, where=where, reason=reason)
+
+
+class CheckFailed(GcsplanError, RuntimeError):
+    """A mission breaks a limit, or something in it could not be judged."""
+
+    exit_code = 4
+    default_reason = "violation"
+
+
+class VehicleRefused(GcsplanError, ConnectionError):
+    """The vehicle said no, or we would not send to it (armed, wrong autopilot, wrong place)."""
+
+    exit_code = 5
+    default_reason = "refused"
+
+
+class LinkError(GcsplanError, ConnectionError):
+    """Nobody answers, or the link died and the outcome of a transfer is unknown."""
+
+    exit_code = 6
+    default_reason = "unknown"
+
+
+class ReadBackDiffers(GcsplanError, RuntimeError):
+    """The mission read back from the vehicle is not the one that was sent."""
+
+    exit_code = 7
+    default_reason = "differs"

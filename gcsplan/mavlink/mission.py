@@ -1,0 +1,148 @@
+"""`Mission`: decoded wire items, the autopilot's manner, and home. The one thing that is checked, written and sent.
+
+Numbers are those of the wire: degrees times 1e7 as int32, everything else float32. Home is not among the items;
+`Mission.wire_items` puts it in front where the autopilot keeps it as item 0 (ArduPilot).
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gcsplan.errors import InputError
+from gcsplan.vehicle import Autopilot
+
+# Commands (MAV_CMD, common.xml) that gcsplan knows by name.
+WAYPOINT, LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, RTL, LAND, TAKEOFF = 16, 17, 18, 19, 20, 21, 22
+SPLINE_WAYPOINT, VTOL_TAKEOFF, VTOL_LAND, DELAY = 82, 84, 85, 93
+CONDITION_DELAY, DO_JUMP, DO_CHANGE_SPEED, DO_SET_HOME = 112, 177, 178, 179
+
+# Frames (MAV_FRAME). The _INT twins 5, 6, 11 are synonyms: written as 0, 3, 10, both are read.
+GLOBAL, NO_POSITION, RELATIVE, TERRAIN = 0, 2, 3, 10
+FRAME_SYNONYMS = {5: GLOBAL, 6: RELATIVE, 11: TERRAIN}
+
+# Kinds of list (MAV_MISSION_TYPE).
+MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
+
+
+def float32(value: float) -> float:
+    """The float32 nearest to ``value``, as the wire carries it; ``inf`` beyond its range."""
+    try:
+        return float(struct.unpack("<f", struct.pack("<f", value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+def degrees_e7(degrees: float) -> int:
+    """Degrees as the wire's integer: rounded, never truncated."""
+    return round(degrees * 1e7)
+
+
+@dataclass(frozen=True, slots=True)
+class MissionItem:
+    """One MISSION_ITEM_INT without its addresses and seq.
+
+    ``params`` are param1..param4; ``x``, ``y`` latitude and longitude times 1e7 (or raw numbers for commands
+    without a place); ``z`` metres in ``frame``. Params and z are rounded to float32 on the way in.
+    """
+
+    command: int
+    frame: int
+    params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    x: int = 0
+    y: int = 0
+    z: float = 0.0
+    autocontinue: bool = True
+
+    def __post_init__(self) -> None:
+        if len(self.params) != 4:
+            raise ValueError(f"an item has 4 params, given {len(self.params)}")
+        for name, value, low, high in (
+            ("command", self.command, 0, 65535), ("frame", self.frame, 0, 255),
+            ("x", self.x, -(2**31), 2**31 - 1), ("y", self.y, -(2**31), 2**31 - 1),
+        ):  # fmt: skip
+            if not low <= value <= high:
+                raise InputError(f"{name} of a mission item must lie within {low} … {high}, given {value}")
+        object.__setattr__(self, "params", tuple(float32(p) for p in self.params))
+        object.__setattr__(self, "z", float32(self.z))
+
+    @property
+    def wire(self) -> bytes:
+        """The numbers as bytes, so that NaN equals NaN: params, x, y, z, command, frame, autocontinue."""
+        return struct.pack(
+            "<4fiifHBB", *self.params, self.x, self.y, self.z, self.command, self.frame, self.autocontinue
+        )
+
+    @property
+    def lat_deg(self) -> float:
+        """Latitude of a located item, degrees."""
+        return self.x / 1e7
+
+    @property
+    def lon_deg(self) -> float:
+        """Longitude of a located item, degrees."""
+        return self.y / 1e7
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Where the vehicle arms: wire degrees and real altitude."""
+
+    lat_e7: int
+    lon_e7: int
+    amsl_m: float
+
+    @classmethod
+    def at(cls, lat_deg: float, lon_deg: float, amsl_m: float) -> Home:
+        """Home from degrees."""
+        return cls(degrees_e7(lat_deg), degrees_e7(lon_deg), float(amsl_m))
+
+    def as_item(self) -> MissionItem:
+        """ArduPilot's item 0."""
+        return MissionItem(WAYPOINT, GLOBAL, (0.0, 0.0, 0.0, 0.0), self.lat_e7, self.lon_e7, self.amsl_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """What one vehicle is to fly. ``items`` do not hold home. ``name`` is the vehicle's."""
+
+    autopilot: Autopilot
+    home: Home
+    items: tuple[MissionItem, ...]
+    name: str = ""
+    sysid: int = 1
+
+    @property
+    def first_seq(self) -> int:
+        """Wire seq of ``items[0]``: 1 where home is item 0, else 0."""
+        return 1 if self.autopilot.is_ardupilot else 0
+
+    def wire_items(self) -> tuple[MissionItem, ...]:
+        """All items in wire order: seq is the index."""
+        return (self.home.as_item(), *self.items) if self.autopilot.is_ardupilot else self.items
+
+    @classmethod
+    def from_wire(
+        cls,
+        autopilot: Autopilot,
+        wire: Sequence[MissionItem],
+        *,
+        home: Home | None = None,
+        name: str = "",
+        sysid: int = 1,
+    ) -> Mission:
+        """A mission from items in wire order. On ArduPilot item 0 is home unless ``home`` overrides it.
+
+        Raises InputError where home is in neither.
+        """
+        items = tuple(wire)
+        if autopilot.is_ardupilot:
+            if items and home is None:
+                first = items[0]
+                home = Home(first.x, first.y, first.z)
+            items = items[1:]
+        if home is None:
+            raise InputError(f"a mission for {autopilot} needs a home, and there is none in its items")
+        return cls(autopilot, home, items, name, sysid)

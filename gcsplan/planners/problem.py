@@ -1,0 +1,77 @@
+"""What every planner is asked, and what it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.path import Path
+
+Objective = Literal["length", "energy"]
+
+
+@dataclass(frozen=True, slots=True)
+class Via:
+    """A point to pass; ``amsl_m`` None leaves its height free."""
+
+    east_m: float
+    north_m: float
+    amsl_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Said now and then while planning: seconds since the call, best cost so far, bound (either may be None)."""
+
+    elapsed_s: float
+    cost: float | None
+    lower_bound: float | None
+    phase: str = ""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Problem:
+    """From ``start`` to ``goal`` (east_m, north_m, amsl_m), past ``via`` in order.
+
+    ``limits`` already hold the margins for wire rounding, so a path that `Airspace.examine` passes under them
+    passes the final check too. Metres only: a planner never sees a degree.
+    """
+
+    airspace: Airspace
+    limits: Limits
+    start: tuple[float, float, float]
+    goal: tuple[float, float, float]
+    via: tuple[Via, ...] = ()
+    objective: Objective = "length"
+    vertical_j_per_m: float = 120.0
+    horizontal_j_per_m: float = 100.0
+    turn_radius_m: float = 0.0
+    seed: int = 1
+    gap_percent: float = 0.1
+    budget_s: float = 10.0
+    progress: Callable[[Progress], None] | None = None
+
+    def cost(self, path: Path) -> float:
+        """Metres or joules of ``path``, by the objective."""
+        if self.objective == "energy":
+            return path.energy_j(self.vertical_j_per_m, self.horizontal_j_per_m)
+        return path.length_m
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Solution:
+    """A path that `Airspace.examine` passes, and what is known about the best one.
+
+    ``lower_bound`` holds for every feasible path of the stated model, in the objective's unit; None where the
+    planner has none. ``stopped_by``: gap, exhausted, evaluations, time. ``notes`` are said to the user.
+    """
+
+    path: Path
+    lower_bound: float | None = None
+    stopped_by: str = "exhausted"
+    planning_s: float = 0.0
+    first_path_s: float = 0.0
+    notes: tuple[str, ...] = ()

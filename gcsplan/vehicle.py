@@ -1,0 +1,58 @@
+"""One aircraft: what it is, what it can do, and what a metre costs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from gcsplan.world.limits import Limits
+
+
+class Autopilot(StrEnum):
+    """Whose manners a mission is written for."""
+
+    ARDUCOPTER = "arducopter"
+    ARDUPLANE = "arduplane"
+    PX4 = "px4"
+
+    @property
+    def is_ardupilot(self) -> bool:
+        """True for the firmware family that keeps home as item 0."""
+        return self is not Autopilot.PX4
+
+
+@dataclass(frozen=True, slots=True)
+class Energy:
+    """Energy model of the krill paper, Table 1: R1 for every vertical metre, up or down, R2 for every horizontal one.
+
+    ``hover_w`` is the power of standing still; ``battery_j`` None: capacity is not judged; ``reserve`` is the
+    part of the battery that must be left at the end.
+    """
+
+    vertical_j_per_m: float = 120.0
+    horizontal_j_per_m: float = 100.0
+    hover_w: float = 0.0
+    battery_j: float | None = None
+    reserve: float = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """An airframe with its limits; speeds in m/s over ground (cruise) and vertically (climb, descent)."""
+
+    name: str
+    sysid: int
+    autopilot: Autopilot
+    limits: Limits
+    speed_min_m_s: float = 3.0
+    speed_max_m_s: float = 15.0
+    climb_m_s: float = 2.5
+    descent_m_s: float = 1.5
+    turn_radius_m: float = 0.0
+    energy: Energy = field(default_factory=Energy)
+    link: str | None = None
+
+    def leg_time_s(self, horizontal_m: float, rise_m: float, speed_m_s: float) -> float:
+        """Seconds for a straight leg: cruise speed, or slower where the climb or descent rate is the tight one."""
+        vertical_s = rise_m / self.climb_m_s if rise_m >= 0 else -rise_m / self.descent_m_s
+        return max(horizontal_m / speed_m_s, vertical_s)

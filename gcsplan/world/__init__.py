@@ -1,0 +1,1 @@
+"""The world in metres: frame, terrain, zones, limits, paths, and the exact check of legs."""

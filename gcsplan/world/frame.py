@@ -1,0 +1,87 @@
+"""The door between degrees and metres: the only importer of pyproj's plane transforms.
+
+Inside gcsplan a place is (east_m, north_m) on a transverse Mercator plane whose origin lies in the middle of
+the mission (scale 1 there), and a height is real altitude above mean sea level. The plane tangent to the
+ellipsoid is never used: its "up" is off by d²/2R, 7.8 m at 10 km.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pyproj import CRS, Transformer
+
+from gcsplan.errors import InputError
+
+FARTHEST_M = 150_000.0
+"""From the origin; there the plane's scale is off by 2.8e-4. Beyond it a mission is refused."""
+
+EARTH_RADIUS_M = 6_371_008.8  # mean radius R1 of WGS84 (IUGG)
+
+
+class Frame:
+    """One plane: ``to_plane`` and ``to_degrees`` are inverse to each other within a micrometre.
+
+    ``amsl_m`` is the altitude of ``up_m: 0`` in missions given in local metres.
+    """
+
+    def __init__(self, lat_deg: float, lon_deg: float, amsl_m: float = 0.0) -> None:
+        if not (abs(lat_deg) <= 85.0 and abs(lon_deg) <= 180.0):
+            raise InputError(
+                f"the origin of the frame must lie within ±85° latitude and ±180° longitude, given "
+                f"{lat_deg:g}, {lon_deg:g}"
+            )
+        self.lat_deg = float(lat_deg)
+        self.lon_deg = float(lon_deg)
+        self.amsl_m = float(amsl_m)
+        self.crs = CRS.from_proj4(
+            f"+proj=tmerc +lat_0={self.lat_deg!r} +lon_0={self.lon_deg!r} +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"
+        )
+        geographic = CRS.from_epsg(4326)
+        self._forward = Transformer.from_crs(geographic, self.crs, always_xy=True)
+        self._back = Transformer.from_crs(self.crs, geographic, always_xy=True)
+
+    def to_plane(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> NDArray[np.float64]:
+        """(..., 2) east_m, north_m of points in degrees (arrays of equal shape)."""
+        east, north = self._forward.transform(np.asarray(lon_deg, float), np.asarray(lat_deg, float))
+        return np.stack([np.asarray(east, float), np.asarray(north, float)], axis=-1)
+
+    def to_degrees(self, east_m: ArrayLike, north_m: ArrayLike) -> NDArray[np.float64]:
+        """(..., 2) latitude, longitude in degrees of points in the plane."""
+        lon, lat = self._back.transform(np.asarray(east_m, float), np.asarray(north_m, float))
+        return np.stack([np.asarray(lat, float), np.asarray(lon, float)], axis=-1)
+
+    def transformer_to(self, crs: Any) -> Transformer:
+        """From this plane to the horizontal part of a raster's ``crs``, (east_m, north_m) -> (x, y)."""
+        return Transformer.from_crs(self.crs, CRS.from_user_input(crs), always_xy=True)
+
+    def scale_at(self, distance_m: float) -> float:
+        """Largest scale of the plane within ``distance_m`` of the origin: ``1 + d²/2R²`` (Snyder 1987, eq. 8-11)."""
+        return 1.0 + 1.01 * distance_m**2 / (2.0 * EARTH_RADIUS_M**2)
+
+    def bow_m(self, start_deg: ArrayLike, end_deg: ArrayLike) -> NDArray[np.float64]:
+        """(N,) how far the line that is straight in degrees lies from the one straight in the plane, metres.
+
+        ``start_deg``, ``end_deg``: (N, 2) latitude, longitude. The bow is largest in the middle; 2 % are added
+        for its third-order part.
+        """
+        a, b = np.atleast_2d(np.asarray(start_deg, float)), np.atleast_2d(np.asarray(end_deg, float))
+        span = (b[:, 1] - a[:, 1] + 180.0) % 360.0 - 180.0
+        middle_deg = (a[:, 0] + 0.5 * (b[:, 0] - a[:, 0]), a[:, 1] + 0.5 * span)
+        pa, pb = self.to_plane(a[:, 0], a[:, 1]), self.to_plane(b[:, 0], b[:, 1])
+        return np.asarray(1.02 * np.linalg.norm(self.to_plane(*middle_deg) - 0.5 * (pa + pb), axis=-1))
+
+
+def centre_of(lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[float, float]:
+    """Middle of a set of points in degrees, safe across the antimeridian, rounded to 1e-4 degrees.
+
+    Rounded so that moving one point by a little does not change every number in every file.
+    """
+    lat, lon = np.asarray(lat_deg, float), np.asarray(lon_deg, float)
+    turned = (lon - lon[0] + 180.0) % 360.0 - 180.0
+    middle = lon[0] + 0.5 * (turned.min() + turned.max())
+    middle = (middle + 180.0) % 360.0 - 180.0
+    return round(float(0.5 * (lat.min() + lat.max())), 4), round(math.fmod(float(middle), 360.0), 4)

@@ -1,0 +1,34 @@
+"""What every leg of one vehicle is held to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Limits and errors of one vehicle; metres and degrees. ``None`` is no limit.
+
+    ``track_error_m`` and ``altitude_error_m`` widen every check: the aircraft may be that far from
+    the mission's line. Touching a limit is legal.
+    """
+
+    min_agl_m: float
+    max_agl_m: float | None = None
+    max_amsl_m: float | None = None
+    horizontal_clearance_m: float = 0.0
+    track_error_m: float = 0.0
+    altitude_error_m: float = 0.0
+    max_climb_deg: float = 90.0
+    max_descent_deg: float = 90.0
+
+    @property
+    def max_climb_slope(self) -> float:
+        """Rise over run of the steepest legal climb; ``inf`` for 90 degrees."""
+        return math.inf if self.max_climb_deg >= 90.0 else math.tan(math.radians(self.max_climb_deg))
+
+    @property
+    def max_descent_slope(self) -> float:
+        """Drop over run (positive) of the steepest legal descent; ``inf`` for 90 degrees."""
+        return math.inf if self.max_descent_deg >= 90.0 else math.tan(math.radians(self.max_descent_deg))

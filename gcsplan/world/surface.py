@@ -1,0 +1,144 @@
+"""The ground as one bilinear surface on its raster's own grid, reachable from the plane without a degree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+DEGREE = 6
+TERMS = tuple((i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i))
+
+
+@dataclass(frozen=True, eq=False)
+class GridMap:
+    """Plane to grid by one polynomial: (east_m, north_m) -> (col, row), 0 at the first node.
+
+    ``coefficients`` (TERMS, 2) over ``u^i v^j`` with ``u = (east_m - centre[0]) / scale_m`` and ``v`` likewise.
+    ``error_m`` bounds its distance from the true projection inside the fitted box.
+    """
+
+    coefficients: Floats
+    centre: tuple[float, float]
+    scale_m: float
+    error_m: float
+
+    @classmethod
+    def fit(
+        cls, exact: Callable[[Floats, Floats], tuple[Floats, Floats]], box: tuple[float, float, float, float]
+    ) -> GridMap:
+        """Fit ``exact(east_m, north_m) -> (col, row)`` over ``box`` (west, south, east, north)."""
+        west, south, east, north = box
+        centre = (0.5 * (west + east), 0.5 * (south + north))
+        scale_m = max(0.5 * (east - west), 0.5 * (north - south), 1.0)
+        t = np.cos(np.pi * (np.arange(17) + 0.5) / 17)
+        e, n = (a.ravel() for a in np.meshgrid(centre[0] + scale_m * t, centre[1] + scale_m * t))
+        col, row = exact(e, n)
+        basis = _basis((e - centre[0]) / scale_m, (n - centre[1]) / scale_m)
+        coefficients, *_ = np.linalg.lstsq(basis, np.stack([col, row], axis=-1), rcond=None)
+        fitted = cls(np.ascontiguousarray(coefficients), centre, scale_m, 0.0)
+        # The residual between the nodes is bounded on a lattice that none of them lies on, doubled.
+        f = np.linspace(-1.0, 1.0, 40)
+        e, n = (a.ravel() for a in np.meshgrid(centre[0] + scale_m * f, centre[1] + scale_m * f))
+        col, row = exact(e, n)
+        off = fitted(e, n) - np.stack([col, row], axis=-1)
+        metres = fitted.metres_per_cell(*centre)
+        return cls(fitted.coefficients, centre, scale_m, 2.0 * float(np.hypot(*(np.abs(off).max(axis=0) * metres))))
+
+    @classmethod
+    def affine(cls, west_m: float, north_m: float, dx_m: float, dy_m: float) -> GridMap:
+        """A grid in the plane itself: node (0, 0) at (west_m, north_m), rows going south."""
+        coefficients = np.zeros((len(TERMS), 2))
+        coefficients[TERMS.index((1, 0)), 0] = 1.0 / dx_m
+        coefficients[TERMS.index((0, 1)), 1] = -1.0 / dy_m
+        return cls(coefficients, (west_m, north_m), 1.0, 0.0)
+
+    def __call__(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
+        """(..., 2) col, row of points in the plane."""
+        u = (np.asarray(east_m, float) - self.centre[0]) / self.scale_m
+        v = (np.asarray(north_m, float) - self.centre[1]) / self.scale_m
+        return np.asarray(_basis(u, v) @ self.coefficients)
+
+    def jacobian(self, east_m: float, north_m: float) -> Floats:
+        """(2, 2) d(col, row) / d(east_m, north_m) at a point."""
+        u, v = (east_m - self.centre[0]) / self.scale_m, (north_m - self.centre[1]) / self.scale_m
+        du = np.array([i * u ** max(i - 1, 0) * v**j for i, j in TERMS]) / self.scale_m
+        dv = np.array([j * u**i * v ** max(j - 1, 0) for i, j in TERMS]) / self.scale_m
+        return np.stack([du @ self.coefficients, dv @ self.coefficients], axis=-1)
+
+    def metres_per_cell(self, east_m: float, north_m: float) -> Floats:
+        """(2,) length of one column step and of one row step, metres, at a point."""
+        return np.asarray(np.linalg.norm(np.linalg.inv(self.jacobian(east_m, north_m)), axis=0))
+
+    def to_plane(self, col: ArrayLike, row: ArrayLike) -> Floats:
+        """(..., 2) east_m, north_m of grid points, by Newton's method on the polynomial."""
+        target = np.stack(np.broadcast_arrays(np.asarray(col, float), np.asarray(row, float)), axis=-1)
+        inverse = np.linalg.inv(self.jacobian(*self.centre))
+        plane = np.asarray(self.centre) + (target - self(*self.centre)) @ inverse.T
+        for _ in range(8):
+            plane = plane + (target - self(plane[..., 0], plane[..., 1])) @ inverse.T
+        return np.asarray(plane)
+
+
+def _basis(u: Floats, v: Floats) -> Floats:
+    pu, pv = [np.ones_like(u)], [np.ones_like(v)]
+    for _ in range(DEGREE):
+        pu.append(pu[-1] * u)
+        pv.append(pv[-1] * v)
+    return np.stack([pu[i] * pv[j] for i, j in TERMS], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Ground and what stands on it.
+
+    ``ground_m`` (rows, cols): height of each node, AMSL metres; NaN is unknown, never ground; bilinear between
+    nodes. ``top_m``: ground plus obstacles (trees, buildings), the same array where there are none; it counts
+    for min AGL and clearance, not for max AGL. ``grid`` maps the plane to nodes. ``info`` is what the outputs
+    say of the source (``dem_sha256``, ``vertical_datum``, ``resolution_m``, ``bare_dem``).
+    """
+
+    ground_m: Floats
+    top_m: Floats
+    grid: GridMap
+    info: dict[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("ground_m", "top_m"):
+            a = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
+            if a.ndim != 2 or min(a.shape) < 2:
+                raise ValueError(f"{name} must be (rows >= 2, cols >= 2), given {a.shape}")
+            a.setflags(write=False)
+            object.__setattr__(self, name, a)
+        if self.ground_m.shape != self.top_m.shape:
+            raise ValueError(f"ground {self.ground_m.shape} and top {self.top_m.shape} differ in shape")
+
+    def ground_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
+        """Ground, AMSL metres, at points of the plane; NaN where unknown."""
+        return _bilinear(self.ground_m, self.grid(east_m, north_m))
+
+    def top_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
+        """Ground plus obstacles, AMSL metres, at points of the plane; NaN where unknown."""
+        return _bilinear(self.top_m, self.grid(east_m, north_m))
+
+
+def _bilinear(z: Floats, at: Floats) -> Floats:
+    rows, cols = z.shape
+    c, r = at[..., 0], at[..., 1]
+    inside = (c >= 0) & (c <= cols - 1) & (r >= 0) & (r <= rows - 1)
+    i = np.clip(np.where(inside, np.floor(c), 0).astype(np.intp), 0, cols - 2)
+    j = np.clip(np.where(inside, np.floor(r), 0).astype(np.intp), 0, rows - 2)
+    u, v = c - i, r - j
+
+    # A weight of zero must not let an unknown neighbour through as 0 · NaN.
+    def part(weight: Floats, height: Floats) -> Floats:
+        return np.where(weight == 0.0, 0.0, weight * height)
+
+    value = (
+        part((1 - u) * (1 - v), z[j, i]) + part(u * (1 - v), z[j, i + 1])
+        + part((1 - u) * v, z[j + 1, i]) + part(u * v, z[j + 1, i + 1])
+    )  # fmt: skip
+    return np.asarray(np.where(inside, value, np.nan))

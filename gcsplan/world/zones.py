@@ -1,0 +1,61 @@
+"""No-fly zones: cylinders and prisms with a floor and a ceiling, in the metres of the plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """A height above mean sea level, or one that follows the ground point by point."""
+
+    value_m: float
+    datum: Literal["amsl", "agl"]
+
+    def __str__(self) -> str:
+        return f"{self.value_m:g} m {self.datum.upper()}"
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A disc in the plane."""
+
+    east_m: float
+    north_m: float
+    radius_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon:
+    """A simple polygon in the plane: ``vertices`` (N, 2) east_m, north_m; not closed; counter-clockwise.
+
+    Holes are not kept: a hole in a no-fly polygon counts as no-fly.
+    """
+
+    vertices: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """A closed shape whose open inside, between ``floor`` and ``ceiling``, may not be flown.
+
+    ``floor`` None reaches down without end, ``ceiling`` None up without end.
+    """
+
+    name: str
+    shape: Circle | Polygon
+    floor: Level | None = None
+    ceiling: Level | None = None
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """West, south, east, north of the shape, metres."""
+        s = self.shape
+        if isinstance(s, Circle):
+            return (s.east_m - s.radius_m, s.north_m - s.radius_m, s.east_m + s.radius_m, s.north_m + s.radius_m)
+        low, high = s.vertices.min(axis=0), s.vertices.max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
