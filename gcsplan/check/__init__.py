@@ -1,0 +1,1 @@
+"""From a `Mission`, whoever made it, to one `Verdict`: safe, violations, or not judged."""

@@ -1,0 +1,216 @@
+"""`judge`: a mission, decoded as the autopilot stores it, held against a world and a vehicle's limits.
+
+What is checked is what is flown: wire numbers rounded as on board, the whole of every leg, widened by the track
+and altitude error and by the bow between the line straight in the plane and the one straight in degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gcsplan.check.flight import Flight, follow
+from gcsplan.check.verdict import Finding, LegFigures, Verdict
+from gcsplan.mavlink.autopilots import manner
+from gcsplan.mavlink.mission import Mission
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.airspace import Floats, LegReport, Legs, Violation
+from gcsplan.world.limits import Limits
+from gcsplan.world.world import World
+
+TERRAIN_ERROR_M = 30.0
+"""ArduPilot shifts all terrain by up to this when it arms; terrain-frame legs are judged with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Plane:
+    """The legs of all stretches in the plane; ``owner`` (N,) is the stretch of each leg."""
+
+    legs: Legs
+    owner: np.ndarray[tuple[int], np.dtype[np.intp]]
+
+
+def judge(
+    mission: Mission,
+    vehicle: Vehicle,
+    world: World,
+    *,
+    rtl_rel_home_m: float | None = None,
+    terrain_error_m: float = TERRAIN_ERROR_M,
+) -> Verdict:
+    """Judge ``mission`` for ``vehicle`` in ``world``; never raises for a mission that is merely unsafe."""
+    table = manner(mission.autopilot)
+    stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
+    flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    findings: list[Finding] = []
+    count = len(mission.wire_items())
+    if table.max_items is not None and count > table.max_items:
+        findings.append(
+            _finding(
+                0, "too_many_items", f"the mission has {count} items and {mission.autopilot} takes {table.max_items}",
+                float(count), float(table.max_items), float(count - table.max_items), "items",
+            )
+        )  # fmt: skip
+    if not flight.stretches:
+        flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle")
+        return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
+    plane = _legs(flight, vehicle.limits, world, terrain_error_m)
+    report = world.airspace.examine(plane.legs, vehicle.limits)
+    figures = _figures(flight, plane, report, vehicle, world)
+    findings += _findings(flight, plane, report, world)
+    if any(s.terrain for s in flight.stretches):
+        flight.notes.append(
+            f"terrain-frame legs depend on the terrain data in the vehicle; judged with {terrain_error_m:g} m of error"
+        )
+    verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
+    return _with_battery(verdict, vehicle)
+
+
+def _legs(flight: Flight, limits: Limits, world: World, terrain_error_m: float) -> _Plane:
+    places = np.array([(s.start, s.end) for s in flight.stretches])
+    plane = np.empty_like(places)
+    plane[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
+    plane[..., 2] = places[..., 2]
+    bow_m = world.frame.bow_m(places[:, 0, :2], places[:, 1, :2])
+    starts, ends, owner, track, height = [], [], [], [], []
+    for i, s in enumerate(flight.stretches):
+        cuts, deviation = _follow_ground(plane[i], world) if s.terrain else (plane[i], np.zeros(1))
+        starts.append(cuts[:-1])
+        ends.append(cuts[1:])
+        owner += [i] * (len(cuts) - 1)
+        track += [limits.track_error_m + bow_m[i] + s.reach_m] * (len(cuts) - 1)
+        height += list(limits.altitude_error_m + s.band_m + (terrain_error_m if s.terrain else 0.0) + deviation)
+    owners = np.array(owner, dtype=np.intp)
+    column = np.array([s.column for s in flight.stretches])[owners]
+    legs = Legs(np.concatenate(starts), np.concatenate(ends), column, np.array(track), np.array(height))
+    return _Plane(legs, owners)
+
+
+def _follow_ground(ends: Floats, world: World) -> tuple[Floats, Floats]:
+    """A terrain-frame leg as straight pieces, one for each DEM cell, and how far each piece is off, metres.
+
+    Height is interpolated above ground between the ends, and ground is a quadratic in each cell: the chord of a
+    quadratic is off by at most its middle's distance.
+    """
+    surface = world.airspace.surface
+    a, b = surface.grid(ends[:, 0], ends[:, 1])
+    cuts = [np.array([0.0, 1.0])]
+    for axis in (0, 1):
+        low, high = sorted((a[axis], b[axis]))
+        lines = np.arange(math.ceil(low), math.floor(high) + 1)
+        if high > low:
+            cuts.append((lines - a[axis]) / (b[axis] - a[axis]))
+    t = np.unique(np.clip(np.concatenate(cuts), 0.0, 1.0))
+    middle = 0.5 * (t[1:] + t[:-1])
+
+    def point(f: Floats) -> tuple[Floats, Floats]:
+        en = ends[0, :2] + f[:, None] * (ends[1, :2] - ends[0, :2])
+        return en, surface.ground_at(en[:, 0], en[:, 1])
+
+    _, ground_ends = point(np.array([0.0, 1.0]))
+    agl = ends[:, 2] - ground_ends
+    en, ground = point(t)
+    _, ground_middle = point(middle)
+    off = np.abs(ground_middle - 0.5 * (ground[1:] + ground[:-1]))
+    z = ground + agl[0] + t * (agl[1] - agl[0])
+    if np.isnan(z).any():  # unknown ground: examined as a straight leg, which reports the void
+        return ends, np.zeros(1)
+    return np.column_stack([en, z]), off
+
+
+def _figures(
+    flight: Flight, plane: _Plane, report: LegReport, vehicle: Vehicle, world: World
+) -> tuple[LegFigures, ...]:
+    energy = vehicle.energy
+    ground_end = world.airspace.surface.ground_at(plane.legs.end[:, 0], plane.legs.end[:, 1])
+    figures = []
+    for i, s in enumerate(flight.stretches):
+        mine = np.flatnonzero(plane.owner == i)
+        delta = plane.legs.end[mine] - plane.legs.start[mine]
+        run, rise = np.hypot(delta[:, 0], delta[:, 1]), delta[:, 2]
+        horizontal_m = float(run.sum())
+        agl = report.min_agl_m[mine]
+        known = ~np.isnan(agl)
+        low = int(mine[known][agl[known].argmin()]) if known.any() else int(mine[0])
+        f = float(report.min_agl_at[low]) if known.any() else 0.0
+        low_en = plane.legs.start[low, :2] + f * (plane.legs.end[low, :2] - plane.legs.start[low, :2])
+        near = int(mine[report.zone_clearance_m[mine].argmin()])
+        zone = int(report.nearest_zone[near])
+        steepest = mine[int(np.abs(report.climb_deg[mine]).argmax())]
+        hold_s = 0.0 if math.isinf(s.hold_s) else s.hold_s
+        lat, lon = world.frame.to_degrees(*low_en)
+        highest = report.max_agl_m[mine]
+        figures.append(
+            LegFigures(
+                seq=s.seq, kind=s.kind, start=s.start, end=s.end, column=s.column, on_path=s.on_path,
+                horizontal_m=horizontal_m,
+                length_m=float(np.hypot(run, rise).sum()),
+                climb_deg=float(report.climb_deg[steepest]),
+                agl_end_m=s.end[2] - float(ground_end[mine[-1]]),
+                min_agl_m=float(agl[known].min()) if known.any() else math.nan,
+                min_agl_at=(float(lat), float(lon)),
+                max_agl_m=float(highest[known].max()) if known.any() else math.nan,
+                zone_clearance_m=float(report.zone_clearance_m[near]),
+                nearest_zone=world.airspace.zones[zone].name if zone >= 0 else "",
+                energy_j=energy.vertical_j_per_m * float(np.abs(rise).sum())
+                + energy.horizontal_j_per_m * horizontal_m + energy.hover_w * hold_s,
+                time_s=sum(vehicle.leg_time_s(h, r, s.speed_m_s) for h, r in zip(run, rise, strict=True)) + hold_s,
+                hold_s=s.hold_s,
+            )
+        )  # fmt: skip
+    return tuple(figures)
+
+
+WORDS = {
+    "min_agl": "too low above ground",
+    "max_agl": "too high above ground",
+    "max_amsl": "above max_amsl_m",
+    "terrain_clearance": "too near to rising ground at flight level",
+    "zone": "inside no-fly zone",
+    "climb": "climbs too steeply",
+    "descent": "descends too steeply",
+    "coverage": "over ground that the terrain model does not know",
+}
+
+
+def _findings(flight: Flight, plane: _Plane, report: LegReport, world: World) -> list[Finding]:
+    """The worst violation of each kind and zone on each stretch, in the order flown."""
+    worst: dict[tuple[int, str, int], Violation] = {}
+    for v in report.violations:
+        key = (int(plane.owner[v.leg]), v.kind, v.zone)
+        if key not in worst or v.by > worst[key].by:
+            worst[key] = v
+    found = []
+    for (owner, kind, zone), v in sorted(worst.items(), key=lambda kv: kv[0][0]):
+        s = flight.stretches[owner]
+        lat, lon = (float(x) for x in world.frame.to_degrees(v.east_m, v.north_m))
+        name = world.airspace.zones[zone].name if zone >= 0 else ""
+        what = WORDS[kind] + (f" “{name}” or its clearance" if name else "")
+        numbers = f": {v.value:.2f} {v.unit}, limit {v.limit:.2f} {v.unit}" if kind not in ("coverage", "zone") else ""
+        by = f" (by {v.by:.2f} {v.unit})" if kind != "coverage" else ""
+        message = f"item {s.seq} ({s.kind}): {what}{numbers}{by} at {lat:.6f}, {lon:.6f}, {v.amsl_m:.1f} m AMSL"
+        found.append(Finding(s.seq, kind, message, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name))
+    return found
+
+
+def _with_battery(verdict: Verdict, vehicle: Vehicle) -> Verdict:
+    energy = vehicle.energy
+    if energy.battery_j is None:
+        return verdict
+    used, usable = verdict.energy_j, (1.0 - energy.reserve) * energy.battery_j
+    verdict = replace(verdict, battery_used_percent=100.0 * used / energy.battery_j)
+    if used <= usable:
+        return verdict
+    last = verdict.legs[-1]
+    message = (
+        f"battery: the flight needs {used:.0f} J and {usable:.0f} J may be used "
+        f"({energy.battery_j:.0f} J less {100 * energy.reserve:g} % reserve)"
+    )
+    finding = _finding(last.seq, "battery", message, used, usable, used - usable, "J")
+    return replace(verdict, findings=(*verdict.findings, finding))
+
+
+def _finding(seq: int, kind: str, message: str, value: float, limit: float, by: float, unit: str) -> Finding:
+    return Finding(seq, kind, message, math.nan, math.nan, math.nan, value, limit, by, unit)

@@ -1,0 +1,136 @@
+"""What a person reads: tables, progress, and the words around them, on standard error, never on standard output."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from gcsplan.check.verdict import Verdict
+    from gcsplan.delivery import Delivery
+    from gcsplan.pipeline import Plan
+
+console = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def number(value: float | None, decimals: int = 0, unit: str = "") -> str:
+    """A figure for a table; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:,.{decimals}f}{unit}".replace(",", "\u2009")
+
+
+def _table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
+    table = Table(
+        title=title, title_justify="left", box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0)
+    )
+    for name, right in columns:
+        table.add_column(name, justify="right" if right else "left", no_wrap=True)
+    return table
+
+
+def verdict_word(safe: bool | None) -> str:
+    """Safe, UNSAFE or not judged, coloured."""
+    return {True: "[green]safe[/]", False: "[bold red]UNSAFE[/]", None: "[yellow]not judged[/]"}[safe]
+
+
+def plan_table(plan: Plan) -> None:
+    """One row for each vehicle of a plan."""
+    columns = [("vehicle", False), ("items", True), ("length m", True), ("gap %", True), ("energy kJ", True),
+               ("battery %", True), ("lowest AGL m", True), ("nearest zone m", True), ("climb °", True),
+               ("time s", True), ("verdict", False)]  # fmt: skip
+    table = _table(f"[bold]{plan.source.name}[/]  planner {plan.planner}, objective {plan.objective}", columns)
+    for v in plan.vehicles:
+        verdict = v.verdict
+        lowest, nearest = verdict.lowest, verdict.nearest
+        gap = v.gap_percent
+        table.add_row(
+            v.name, str(len(v.mission.wire_items())), number(verdict.length_m), number(gap, 2),
+            number(verdict.energy_j / 1000), number(verdict.battery_used_percent),
+            number(lowest.min_agl_m if lowest else None, 1),
+            f"{number(nearest.zone_clearance_m, 1)} {nearest.nearest_zone}" if nearest else "–",
+            number(verdict.max_climb_deg, 1), number(verdict.arrive_s), verdict_word(verdict.safe),
+        )  # fmt: skip
+    console.print(table)
+    notes = [f"{v.name}: {n}" for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)]
+    say_notes([*plan.notes, *notes])
+    if plan.source.inputs.get("bare_dem"):
+        console.print("[yellow]bare DEM: trees, masts and wires are not in it[/]")
+
+
+def verdict_table(name: str, verdict: Verdict) -> None:
+    """One row for each flown stretch of a mission."""
+    columns = [("item", True), ("", False), ("leg m", True), ("to AMSL m", True), ("AGL m", True),
+               ("lowest AGL m", True), ("climb °", True), ("nearest zone m", True), ("energy kJ", True),
+               ("time s", True)]  # fmt: skip
+    table = _table(f"[bold]{name}[/]  {verdict_word(verdict.safe)}", columns)
+    bad = {f.seq for f in verdict.findings}
+    for leg in verdict.legs:
+        table.add_row(
+            str(leg.seq), leg.kind, number(leg.length_m), number(leg.end[2], 1), number(leg.agl_end_m, 1),
+            "–" if leg.column else number(leg.min_agl_m, 1), number(leg.climb_deg, 1),
+            f"{number(leg.zone_clearance_m)} {leg.nearest_zone}" if leg.nearest_zone else "–",
+            number(leg.energy_j / 1000, 1), number(leg.time_s), style="red" if leg.seq in bad else None,
+        )  # fmt: skip
+    console.print(table)
+    say_notes(verdict.notes)
+    if verdict.findings or verdict.not_judged:
+        console.print(verdict.describe(), style="red" if verdict.findings else "yellow", markup=False)
+
+
+def delivery_table(deliveries: Sequence[Delivery]) -> None:
+    """One row for each vehicle that something was sent to."""
+    columns = [("vehicle", False), ("link", False), ("items", True), ("outcome", False), ("read back", False),
+               ("s", True), ("retries", True)]  # fmt: skip
+    table = _table("[bold]upload[/]", columns)
+    for d in deliveries:
+        told = {"accepted": "[green]accepted[/]"}.get(d.outcome, f"[bold red]{d.outcome}[/]")
+        verified = "[green]verified[/]" if d.verified else "[bold red]not verified[/]"
+        link = f"{d.url} [bold yellow]simulated[/]" if d.simulated else d.url
+        table.add_row(d.vehicle, link, str(d.items), told, verified, number(d.seconds, 2), str(d.retries))
+    console.print(table)
+    for d in deliveries:
+        say_notes([f"{d.vehicle}: {w}" for w in d.warnings])
+        if d.message:
+            console.print(f"{d.vehicle}: {d.message}", style="red", markup=False)
+
+
+def say_notes(notes: Sequence[str]) -> None:
+    """Notes, each once, in the order given."""
+    for note in dict.fromkeys(notes):
+        console.print(f"note: {note}", style="dim", markup=False)
+
+
+@contextmanager
+def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, int, int], None]]:
+    """Bars for transfers, on a terminal only: call the result with (name, done, total)."""
+    if not console.is_terminal:
+        yield lambda name, done, total: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=console, transient=True) as bars:
+        tasks = {name: bars.add_task(name, total=None) for name in names}
+        yield lambda name, done, total: bars.update(tasks[name], completed=done, total=total)
+
+
+@contextmanager
+def planning_status() -> Iterator[Callable[[str, str], None]]:
+    """A status line while planning, on a terminal only: call the result with (vehicle, words)."""
+    if not console.is_terminal:
+        yield lambda who, words: None
+        return
+    with console.status("planning…") as status:
+        yield lambda who, words: status.update(f"planning {who}: {words}")
+
+
+def complain(message: str) -> None:
+    """One error message, nothing else."""
+    print(f"gcsplan: {message}", file=sys.stderr)

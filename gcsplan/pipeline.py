@@ -1,0 +1,295 @@
+"""The way of the data: mission file → world → path → mission → verdict → outputs → vehicles.
+
+Each step is one function that takes what the step before it gave. `plan` is what `from gcsplan import plan` gives.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from gcsplan.check.judge import judge
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import CheckFailed, InputError, NoMission
+from gcsplan.mavlink.autopilots import manner
+from gcsplan.mavlink.build import LONGEST_LEG_M, MARGINS, Margins, Order, build_mission
+from gcsplan.mavlink.mission import Mission
+from gcsplan.mission_file import MissionFile, VehicleRequest, load_mission
+from gcsplan.planners.problem import Problem, Progress, Solution, Via
+from gcsplan.planners.table import get as get_planner
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.world import World
+
+__all__ = ["Plan", "VehiclePlan", "load_mission", "plan", "world_of"]
+
+ATTEMPTS = 3
+"""Plans for one vehicle, each with three times the margins of the one before, until the decoded mission passes."""
+
+
+@dataclass(frozen=True, eq=False)
+class VehiclePlan:
+    """One vehicle's request and everything that became of it."""
+
+    request: VehicleRequest
+    problem: Problem
+    solution: Solution
+    mission: Mission
+    verdict: Verdict
+    speed_m_s: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The vehicle's name."""
+        return str(self.request.vehicle.name)
+
+    @property
+    def cost(self) -> float:
+        """Metres or joules of the path as it is flown, by the objective."""
+        return self.verdict.path_energy_j if self.problem.objective == "energy" else self.verdict.length_m
+
+    @property
+    def gap_percent(self) -> float | None:
+        """How far the flown path may be above the best, percent of the bound; None without a bound."""
+        bound = self.solution.lower_bound
+        return None if not bound else max(0.0, 100.0 * (self.cost / bound - 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A whole mission file, planned; ``planner`` is the one that was used."""
+
+    source: MissionFile
+    world: World
+    planner: str
+    objective: str
+    seed: int
+    vehicles: tuple[VehiclePlan, ...]
+    notes: tuple[str, ...] = ()
+
+
+def world_of(source: MissionFile) -> World:
+    """The frame and airspace of a mission file."""
+    return World(source.frame, Airspace(source.surface, source.zones, scale=source.airspace_scale))
+
+
+def plan(
+    source: MissionFile | str | FilePath,
+    *,
+    planner: str | None = None,
+    objective: str | None = None,
+    seed: int | None = None,
+    progress: Callable[[str, Progress], None] | None = None,
+) -> Plan:
+    """Plan every vehicle of a mission file; nothing is written or sent.
+
+    ``planner``, ``objective`` (length | energy) and ``seed`` override the file's. ``progress(vehicle, what)`` is
+    called now and then. Raises InputError for a bad file, NoMission where no safe mission exists or was found.
+    """
+    if not isinstance(source, MissionFile):
+        source = load_mission(source)
+    asked = source.planner
+    name = planner or asked.name
+    entry = get_planner(name)
+    goal = objective or asked.objective
+    if goal not in ("length", "energy"):
+        raise InputError(f"objective must be length or energy, given {goal!r}")
+    number = asked.seed if seed is None else seed
+    world = world_of(source)
+    vehicles = []
+    for request in source.vehicles:
+        vehicle_name = request.vehicle.name
+        tell = None if progress is None else lambda what, who=vehicle_name: progress(who, what)
+        vehicles.append(_plan_vehicle(source, request, world, entry.plan, goal, number, tell))
+    notes = list(source.notes)
+    if len(vehicles) > 1:
+        notes.append(
+            "each vehicle is planned alone: arrival times and the separation between vehicles are neither planned "
+            "nor judged"
+        )
+    return Plan(source, world, name, goal, number, tuple(vehicles), tuple(notes))
+
+
+def _plan_vehicle(
+    source: MissionFile,
+    request: VehicleRequest,
+    world: World,
+    run: Callable[[Problem], Solution],
+    objective: str,
+    seed: int,
+    progress: Callable[[Progress], None] | None,
+) -> VehiclePlan:
+    vehicle = request.vehicle
+    failed: Verdict | None = None
+    for attempt in range(ATTEMPTS):
+        factor = 3.0**attempt
+        margins = Margins(*(factor * x for x in (MARGINS.altitude_m, MARGINS.track_m, MARGINS.bow_m, MARGINS.slope)))
+        problem, notes = make_problem(source, request, world, objective, seed, margins, progress)
+        solution = _run(run, problem, vehicle, world)
+        order = Order(request.end, source.altitude_frame)
+        mission = build_mission(solution.path, world, vehicle, request.start_deg, order)
+        limit = manner(vehicle.autopilot).max_items
+        count = len(mission.wire_items())
+        if limit is not None and count > limit:
+            raise NoMission(
+                f"{vehicle.name}: the mission has {count} items and {vehicle.autopilot} takes {limit}: "
+                f"put the goal nearer, or plan it in stages",
+                reason="too_many_items",
+            )
+        verdict = judge(
+            mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=source.terrain_error_m
+        )
+        if not verdict.findings:
+            return VehiclePlan(request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes)
+        failed = verdict
+        if not any(f.seq > mission.first_seq for f in verdict.findings if f.kind != "battery"):
+            break  # no margin mends a battery or a take-off column
+    assert failed is not None
+    raise _unsafe(failed, vehicle)
+
+
+def _unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
+    """No mission: the one that was found does not pass as the autopilot would fly it."""
+    words = "\n".join(f"  {f.message}" for f in verdict.findings[:8])
+    if all(f.kind == "battery" for f in verdict.findings):
+        return NoMission(f"{vehicle.name}: {verdict.findings[0].message}", reason="battery")
+    return NoMission(
+        f"{vehicle.name}: a path was found, but the mission as {vehicle.autopilot} flies it breaks limits:\n{words}",
+        reason="infeasible",
+    )
+
+
+def make_problem(
+    source: MissionFile,
+    request: VehicleRequest,
+    world: World,
+    objective: str,
+    seed: int,
+    margins: Margins = MARGINS,
+    progress: Callable[[Progress], None] | None = None,
+) -> tuple[Problem, tuple[str, ...]]:
+    """The planner's question for one vehicle, with the wire's margins in its limits, and notes for the user.
+
+    The ends are in whole centimetres above home. A ``takeoff_agl_m`` that meets min AGL and the altitude error but
+    not the slope of the ground within the track error is raised, and a note says so; a lower one is bad input.
+    """
+    vehicle = request.vehicle
+    margins = replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
+    limits = _with_margins(vehicle.limits, margins, terrain=source.altitude_frame == "terrain", source=source)
+    air = world.airspace
+    datum = request.start[2]
+    notes: list[str] = []
+
+    def end_point(what: str, place: tuple[float, float, float], key: str, wanted_agl_m: float | None) -> float:
+        east, north, ground = place
+        low = float(air.floor_amsl(east, north, limits))
+        needed = limits.min_agl_m + vehicle.limits.altitude_error_m
+        if wanted_agl_m is not None and wanted_agl_m < needed - 1e-6:
+            raise InputError(
+                f"must be at least min_agl_m + altitude_error_m = {needed:g}, given {wanted_agl_m:g}: "
+                f"the path begins and ends there",
+                where=f"{source.path}: vehicles.{vehicle.name}.{key}",
+            )
+        if math.isinf(low):
+            raise NoMission(
+                f"{vehicle.name}: the ground within reach of the {what} is unknown to the terrain model",
+                reason="infeasible",
+            )
+        amsl = max(low, ground + (wanted_agl_m or 0.0))
+        amsl = datum + math.ceil((amsl - datum) * 100.0 - 1e-6) / 100.0
+        if wanted_agl_m is not None and amsl - ground > wanted_agl_m + 0.011:
+            notes.append(
+                f"{key} {wanted_agl_m:g} raised to {amsl - ground:.2f}: so far the ground rises within the track error"
+            )
+        return amsl
+
+    start_agl = request.takeoff_agl_m
+    goal_agl = request.approach_agl_m
+    if start_agl is None and request.start_amsl_m is not None and request.start_amsl_m > request.start[2]:
+        start_agl = request.start_amsl_m - request.start[2]
+    if goal_agl is None and request.goal_amsl_m is not None and request.goal_amsl_m > request.goal[2]:
+        goal_agl = request.goal_amsl_m - request.goal[2]
+    start_amsl = end_point("start", request.start, "takeoff_agl_m", start_agl)
+    goal_amsl = end_point("goal", request.goal, "approach_agl_m", goal_agl)
+    via = tuple(
+        Via(e, n, None if agl is None else float(air.surface.ground_at(e, n)) + agl) for e, n, agl in request.via
+    )
+    asked = source.planner
+    problem = Problem(
+        airspace=air,
+        limits=limits,
+        start=(request.start[0], request.start[1], start_amsl),
+        goal=(request.goal[0], request.goal[1], goal_amsl),
+        via=via,
+        objective="energy" if objective == "energy" else "length",
+        vertical_j_per_m=vehicle.energy.vertical_j_per_m,
+        horizontal_j_per_m=vehicle.energy.horizontal_j_per_m,
+        turn_radius_m=vehicle.turn_radius_m,
+        seed=seed,
+        gap_percent=asked.gap_percent,
+        budget_s=asked.budget_s,
+        progress=progress,
+    )
+    if vehicle.autopilot is Autopilot.ARDUPLANE:
+        notes.append(
+            "arduplane with turn_radius_m 0 is flown as a VTOL (QuadPlane): vertical take-off and landing; corners "
+            "are cut, so track_error_m must hold the turn radius"
+        )
+    return problem, tuple(notes)
+
+
+def _largest_bow_m(world: World) -> float:
+    """Bow of the longest leg that may be flown in this world (small in the papers' 100 m worlds)."""
+    surface = world.airspace.surface
+    rows, cols = surface.ground_m.shape
+    corners = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
+    north_m = float(corners[:, 1].max())
+    half_m = 0.5 * min(LONGEST_LEG_M, float(np.linalg.norm(np.ptp(corners, axis=0))))
+    ends = world.frame.to_degrees([-half_m, half_m], [north_m, north_m])
+    return float(world.frame.bow_m(ends[0], ends[1])[0]) + 1e-3
+
+
+def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: MissionFile) -> Limits:
+    """The limits a planner is held to: the vehicle's, less what the wire's rounding and the bow may take."""
+
+    def less(angle_deg: float) -> float:
+        return math.degrees(math.atan(math.tan(math.radians(angle_deg)) * (1.0 - margins.slope)))
+
+    return replace(
+        limits,
+        track_error_m=limits.track_error_m + margins.track_m + margins.bow_m,
+        altitude_error_m=limits.altitude_error_m + margins.altitude_m + (source.terrain_error_m if terrain else 0.0),
+        max_climb_deg=limits.max_climb_deg if limits.max_climb_deg >= 90 else less(limits.max_climb_deg),
+        max_descent_deg=limits.max_descent_deg if limits.max_descent_deg >= 90 else less(limits.max_descent_deg),
+    )
+
+
+def _run(run: Callable[[Problem], Solution], problem: Problem, vehicle: Vehicle, world: World) -> Solution:
+    try:
+        return run(problem)
+    except NoMission as refusal:
+        place = ""
+        east, north = getattr(refusal, "east_m", None), getattr(refusal, "north_m", None)
+        if east is not None and north is not None:
+            lat, lon = (float(x) for x in world.frame.to_degrees(east, north))
+            place = f" (at {lat:.6f}, {lon:.6f})"
+        reason = refusal.reason
+        raise NoMission(f"{vehicle.name}: {refusal.message}{place}", reason=reason) from refusal  # type: ignore[arg-type]
+
+
+def require_passing(verdicts: Mapping[str, Verdict], *, allow_unjudged: bool = False) -> None:
+    """Raise CheckFailed unless every verdict is safe (or merely unjudged, where that is allowed)."""
+    bad = {name: v for name, v in verdicts.items() if v.safe is False or (v.safe is None and not allow_unjudged)}
+    if bad:
+        broken = any(v.safe is False for v in bad.values())
+        lines = "\n".join(f"{name}:\n  " + v.describe().replace("\n", "\n  ") for name, v in bad.items())
+        raise CheckFailed(
+            f"{'limits are broken' if broken else 'not everything could be judged'}\n{lines}",
+            reason="violation" if broken else "not_judged",
+        )

@@ -1,0 +1,112 @@
+"""One picture of a plan: the map from above, and each vehicle's altitude profile."""
+
+from __future__ import annotations
+
+from pathlib import Path as FilePath
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LightSource
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle as CirclePatch
+from matplotlib.patches import Patch
+from matplotlib.patches import Polygon as PolygonPatch
+from numpy.typing import NDArray
+
+from gcsplan.check.verdict import Verdict
+from gcsplan.pipeline import Plan
+from gcsplan.world.world import World
+from gcsplan.world.zones import Circle, Zone
+
+TRACK_COLOURS = ("#d62728", "#1f77b4", "#9467bd", "#e377c2", "#17becf", "#bcbd22")
+ZONE_COLOUR = "#ff7f0e"
+PIXELS = 900
+
+
+def draw(plan: Plan) -> Figure:
+    """Map and profiles of ``plan``; everything in metres, labelled."""
+    rows = len(plan.vehicles)
+    figure = Figure(figsize=(11, 7.5 + 2.6 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(1 + rows, 1, height_ratios=[7.5] + [2.6] * rows)
+    _map(axes[0], plan)
+    for ax, vehicle, colour in zip(axes[1:], plan.vehicles, _colours(rows), strict=True):
+        _profile(ax, plan.world, vehicle.verdict, vehicle.request.vehicle.limits.min_agl_m, colour)
+        ax.set_title(f"{vehicle.name}: {vehicle.verdict.length_m:,.0f} m", loc="left", fontsize=10)
+    return figure
+
+
+def save(plan: Plan, file: FilePath) -> None:
+    """Write `draw`'s picture as PNG."""
+    draw(plan).savefig(file, dpi=110, metadata={"Software": None})
+
+
+def _colours(n: int) -> list[str]:
+    return [TRACK_COLOURS[i % len(TRACK_COLOURS)] for i in range(n)]
+
+
+def track_en(world: World, verdict: Verdict) -> NDArray[np.float64]:
+    """(N, 3) east_m, north_m, amsl_m of the flown stretches' ends, columns included."""
+    places = np.array([verdict.legs[0].start, *(leg.end for leg in verdict.legs)])
+    return np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
+
+
+def _map(ax: Axes, plan: Plan) -> None:
+    tracks = [track_en(plan.world, v.verdict) for v in plan.vehicles]
+    every = np.concatenate(tracks)[:, :2]
+    low, high = every.min(axis=0), every.max(axis=0)
+    pad = max(0.12 * float((high - low).max()), 50.0)
+    (west, south), (east, north) = low - pad, high + pad
+    columns = PIXELS
+    lines = max(2, round(PIXELS * (north - south) / (east - west)))
+    e, n = np.meshgrid(np.linspace(west, east, columns), np.linspace(north, south, lines))
+    ground = plan.world.airspace.surface.ground_at(e, n)
+    shown = np.where(np.isnan(ground), np.nanmin(ground), ground)
+    step = (east - west) / columns
+    shade = LightSource(azdeg=315, altdeg=40).hillshade(shown, vert_exag=1.5, dx=step, dy=step)
+    ax.imshow(shade, extent=(west, east, south, north), cmap="gray", vmin=0, vmax=1)
+    tint = ax.imshow(ground, extent=(west, east, south, north), cmap="terrain", alpha=0.45)
+    ax.figure.colorbar(tint, ax=ax, label="ground, m AMSL", shrink=0.8)
+    for zone in plan.world.airspace.zones:
+        ax.add_patch(_zone_patch(zone))
+        x0, y0, x1, y1 = zone.bounds
+        if x1 > west and x0 < east and y1 > south and y0 < north:
+            ax.annotate(_zone_words(zone), (0.5 * (x0 + x1), 0.5 * (y0 + y1)), ha="center", va="center", fontsize=7)
+    for vehicle, track, colour in zip(plan.vehicles, tracks, _colours(len(tracks)), strict=True):
+        ax.plot(track[:, 0], track[:, 1], color=colour, lw=2, label=vehicle.name, marker=".", ms=5)
+        ax.plot(*track[0, :2], "o", color=colour, ms=9, mec="white")
+        ax.plot(*track[-1, :2], "s", color=colour, ms=9, mec="white")
+    ax.set(xlim=(west, east), ylim=(south, north), xlabel="east, m", ylabel="north, m")
+    ax.set_aspect("equal")
+    handles, _ = ax.get_legend_handles_labels()
+    ax.legend(handles=[*handles, Patch(fc=ZONE_COLOUR, alpha=0.4, label="no-fly")], loc="upper right")
+    ax.set_title(f"{plan.source.name}: planner {plan.planner}", loc="left")
+
+
+def _zone_patch(zone: Zone) -> CirclePatch | PolygonPatch:
+    style = {"fc": ZONE_COLOUR, "ec": "#a04000", "alpha": 0.4, "lw": 1.2}
+    if isinstance(zone.shape, Circle):
+        return CirclePatch((zone.shape.east_m, zone.shape.north_m), zone.shape.radius_m, **style)
+    return PolygonPatch(zone.shape.vertices, **style)
+
+
+def _zone_words(zone: Zone) -> str:
+    if zone.floor is None and zone.ceiling is None:
+        return zone.name
+    return f"{zone.name}\n{zone.floor or 'ground'} – {zone.ceiling or 'unlimited'}"
+
+
+def _profile(ax: Axes, world: World, verdict: Verdict, min_agl_m: float, colour: str) -> None:
+    track = track_en(world, verdict)
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track[:, :2], axis=0).T))])
+    s = np.linspace(0.0, run[-1], 2000) if run[-1] > 0 else run
+    keep = np.concatenate([[True], np.diff(run) > 0])
+    east, north = (np.interp(s, run[keep], track[keep, i]) for i in (0, 1))
+    top = world.airspace.surface.top_at(east, north)
+    ax.fill_between(s / 1000, np.nanmin(top) - 20, top, color="#8c7b6b", lw=0, label="ground")
+    ax.plot(s / 1000, top + min_agl_m, color="#555555", lw=0.8, ls="--", label=f"min AGL {min_agl_m:g} m")
+    ax.plot(run / 1000, track[:, 2], color=colour, marker=".", lw=1.6, label="path")
+    ax.set(xlabel="distance, km", ylabel="m AMSL", xlim=(0, max(run[-1] / 1000, 1e-3)))
+    ax.grid(alpha=0.3)
+    ax.legend(loc="upper right", ncols=3, fontsize=8)
