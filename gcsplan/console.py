@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ if TYPE_CHECKING:
     from gcsplan.check.verdict import Verdict
     from gcsplan.delivery import Delivery
     from gcsplan.pipeline import Plan
+    from gcsplan.planners.problem import Progress
 
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -84,11 +84,11 @@ def verdict_table(name: str, verdict: Verdict) -> None:
         console.print(verdict.describe(), style="red" if verdict.findings else "yellow", markup=False)
 
 
-def delivery_table(deliveries: Sequence[Delivery]) -> None:
-    """One row for each vehicle that something was sent to."""
+def delivery_table(deliveries: Sequence[Delivery], title: str = "upload") -> None:
+    """One row for each vehicle that something was sent to, or compared with."""
     columns = [("vehicle", False), ("link", False), ("items", True), ("outcome", False), ("read back", False),
                ("s", True), ("retries", True)]  # fmt: skip
-    table = _table("[bold]upload[/]", columns)
+    table = _table(f"[bold]{title}[/]", columns)
     for d in deliveries:
         told = {"accepted": "[green]accepted[/]"}.get(d.outcome, f"[bold red]{d.outcome}[/]")
         verified = "[green]verified[/]" if d.verified else "[bold red]not verified[/]"
@@ -113,24 +113,41 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, int, int]
     if not console.is_terminal:
         yield lambda name, done, total: None
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import Progress as Bars
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, console=console, transient=True) as bars:
+    with Bars(*columns, console=console, transient=True) as bars:
         tasks = {name: bars.add_task(name, total=None) for name in names}
         yield lambda name, done, total: bars.update(tasks[name], completed=done, total=total)
 
 
 @contextmanager
-def planning_status() -> Iterator[Callable[[str, str], None]]:
-    """A status line while planning, on a terminal only: call the result with (vehicle, words)."""
+def planning_status() -> Iterator[Callable[[str, Progress], None]]:
+    """A status line while planning, on a terminal only: call the result with (vehicle, progress)."""
     if not console.is_terminal:
-        yield lambda who, words: None
+        yield lambda who, told: None
         return
     with console.status("planning…") as status:
-        yield lambda who, words: status.update(f"planning {who}: {words}")
+
+        def update(who: str, told: Progress) -> None:
+            cost = f", best {number(told.cost)}" if told.cost is not None else ""
+            bound = f", bound {number(told.lower_bound)}" if told.lower_bound is not None else ""
+            status.update(f"planning {who}: {told.phase}{cost}{bound}")
+
+        yield update
 
 
-def complain(message: str) -> None:
-    """One error message, nothing else."""
-    print(f"gcsplan: {message}", file=sys.stderr)
+def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
+    """The planners, one a row, on standard output: it is what was asked for."""
+    table = _table("", [("planner", False), ("what it does", False), ("paper", False), ("defaults", False)])
+    for row in rows:
+        defaults = row["defaults"]
+        words = ", ".join(f"{k} {v}" for k, v in defaults.items()) if isinstance(defaults, Mapping) else ""
+        table.add_row(str(row["name"]), str(row["summary"]), str(row["paper"]) or "–", words or "–")
+    Console(highlight=False, soft_wrap=True).print(table)
+
+
+def say(message: str) -> None:
+    """One line."""
+    console.print(message, markup=False)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 NoMissionReason = Literal["infeasible", "not_found", "time", "separation", "battery", "too_many_items"]
 
@@ -48,6 +48,17 @@ class GcsplanError(Exception):
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Python's own way calls the class with the message alone, and drops or misses the keywords.
+        return _revived, (type(self), self.args, self.__dict__)
+
+
+def _revived(kind: type[GcsplanError], args: tuple[object, ...], state: dict[str, object]) -> GcsplanError:
+    """An error that came from another process, as it was there."""
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(state)
+    return error
 
 
 class InputError(GcsplanError, ValueError):

@@ -63,8 +63,8 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
 
     The path begins above home at take-off altitude and ends above the goal. The result is not yet judged.
     """
-    home = Home.at(*home_deg, world.ground_amsl(round(home_deg[0] * 1e7) / 1e7, round(home_deg[1] * 1e7) / 1e7))
-    datum = world.ground_amsl(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
+    datum = world.ground_amsl(*(m.degrees_e7(x) / 1e7 for x in home_deg))
+    home = Home.at(*home_deg, round(datum, 2))
     points = _spaced(path.points, 2.0 * acceptance_radius_m(vehicle))
     terrain = order.altitude_frame == "terrain"
     if terrain:  # cut legs keep their height above ground between the ends, as they are flown

@@ -54,6 +54,11 @@ class Item:
 
 
 @dataclass(frozen=True, slots=True)
+class LegacyItem(Item):
+    """MISSION_ITEM (39), the old form: degrees as float32, some 0.4 m coarse; never taken for an `Item` that counts."""
+
+
+@dataclass(frozen=True, slots=True)
 class Ack:
     """MISSION_ACK (47); ``code`` is a MAV_MISSION_RESULT."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,9 +16,11 @@ from matplotlib.patches import Polygon as PolygonPatch
 from numpy.typing import NDArray
 
 from gcsplan.check.verdict import Verdict
-from gcsplan.pipeline import Plan
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Zone
+
+if TYPE_CHECKING:
+    from gcsplan.pipeline import Plan
 
 TRACK_COLOURS = ("#d62728", "#1f77b4", "#9467bd", "#e377c2", "#17becf", "#bcbd22")
 ZONE_COLOUR = "#ff7f0e"
@@ -85,10 +88,13 @@ def _map(ax: Axes, plan: Plan) -> None:
 
 
 def _zone_patch(zone: Zone) -> CirclePatch | PolygonPatch:
-    style = {"fc": ZONE_COLOUR, "ec": "#a04000", "alpha": 0.4, "lw": 1.2}
+    patch: CirclePatch | PolygonPatch
     if isinstance(zone.shape, Circle):
-        return CirclePatch((zone.shape.east_m, zone.shape.north_m), zone.shape.radius_m, **style)
-    return PolygonPatch(zone.shape.vertices, **style)
+        patch = CirclePatch((zone.shape.east_m, zone.shape.north_m), zone.shape.radius_m)
+    else:
+        patch = PolygonPatch(zone.shape.vertices)
+    patch.set(facecolor=ZONE_COLOUR, edgecolor="#a04000", alpha=0.4, linewidth=1.2)
+    return patch
 
 
 def _zone_words(zone: Zone) -> str:

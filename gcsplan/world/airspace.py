@@ -1,7 +1,17 @@
-"""CONTRACT (to be implemented): the exact check of legs."""
+"""The exact check of legs: every violation along the whole of every leg, never by sampling.
+
+What is tested is the leg as the grid sees it: between its ends, mapped to the DEM's own grid, straight in parts short
+enough that the bow against the line that is straight in the plane stays within centimetres, and that bow widens the
+leg. Legs, limits and zones are metres of the plane; the way there and back is `gcsplan.world.frame`'s.
+
+Exact are: the ground under the line, zones with levels above mean sea level, ceilings, angles. Conservative, to a
+few centimetres at most, are: what lies beside the line within its errors and clearance, and zones over ground.
+Touching a limit is legal; a micrometre is float noise.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -9,9 +19,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gcsplan.world._envelope import around
+from gcsplan.world._halo import Halo
+from gcsplan.world._judge import CLIMB, COVERAGE, DESCENT, MAX_AGL, MAX_AMSL, MIN_AGL, TERRAIN, Demands, judge
+from gcsplan.world._sweep import BOW_M, Field
+from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
+from gcsplan.world.tube import Band, Reaches, Tube, make_tube
 from gcsplan.world.zones import Zone
+
+__all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 
 Floats = NDArray[np.float64]
 Kind = Literal["min_agl", "max_agl", "max_amsl", "terrain_clearance", "zone", "climb", "descent", "coverage"]
@@ -23,7 +41,8 @@ class Legs:
 
     ``column`` (N,): take-off and landing columns, exempt from min AGL, climb angle and terrain clearance, never
     from zones, their clearance, ceilings, or DEM coverage. ``track_error_m``, ``altitude_error_m`` (N,): of each
-    leg, added to nothing else (the caller puts the limits' errors, bows and margins in).
+    leg, added to nothing else (the caller puts the limits' errors, bows and margins in). Kept as read-only copies or
+    views. Raises ValueError for other shapes, for numbers that are not finite, and for negative errors.
     """
 
     start: Floats
@@ -32,10 +51,30 @@ class Legs:
     track_error_m: Floats
     altitude_error_m: Floats
 
+    def __post_init__(self) -> None:
+        n = len(self.start)
+        for name, shape, dtype in (
+            ("start", (n, 3), np.float64), ("end", (n, 3), np.float64), ("column", (n,), np.bool_),
+            ("track_error_m", (n,), np.float64), ("altitude_error_m", (n,), np.float64),
+        ):  # fmt: skip
+            a: NDArray[np.generic] = np.ascontiguousarray(getattr(self, name), dtype=dtype).view()
+            if a.shape != shape:
+                raise ValueError(f"{name} of {n} legs must have the shape {shape}, given {a.shape}")
+            if not np.isfinite(a).all():
+                raise ValueError(f"{name} of a leg must be finite")
+            if name.endswith("error_m") and n and a.min() < 0.0:
+                raise ValueError(f"{name} of a leg must be 0 or more, given {a.min():g}")
+            a.setflags(write=False)
+            object.__setattr__(self, name, a)
+
     @classmethod
     def of_path(cls, points: ArrayLike, limits: Limits) -> Legs:
         """The legs between neighbours of ``points`` (N + 1, 3), with the errors of ``limits``, no columns."""
-        raise NotImplementedError
+        p = np.asarray(points, dtype=np.float64)
+        n = len(p) - 1
+        return cls(
+            p[:-1], p[1:], np.zeros(n, np.bool_), np.full(n, limits.track_error_m), np.full(n, limits.altitude_error_m)
+        )
 
     def __len__(self) -> int:
         return len(self.start)
@@ -46,7 +85,13 @@ class Violation:
     """One limit broken on one leg, at its worst point.
 
     ``fraction`` in [0, 1] along the leg; ``value`` what was found, ``limit`` what was wanted, ``by`` how far
-    off it is (> 0), in ``unit`` (m or deg); ``zone`` the zone's index, or -1.
+    off it is (> 0), in ``unit`` (m or deg); ``zone`` the zone's index, or -1. Errors and clearances are in ``value``:
+
+    - min_agl, max_agl, max_amsl: the height that is left, or reached, at the worst point within the leg's errors;
+    - terrain_clearance: lowest flight level over the highest ground within the clearance, against 0;
+    - zone: horizontal distance from the zone's shape, negative inside, against clearance plus track error;
+    - coverage: distance from unknown ground against the reach within which ground must be known;
+    - climb, descent: degrees.
     """
 
     leg: int
@@ -70,7 +115,8 @@ class LegReport:
     violations take them off); ``min_agl_at`` its fraction; ``max_agl_m`` highest above ground. NaN where the
     ground is unknown on the whole leg. ``climb_deg`` signed. ``zone_clearance_m``: horizontal distance, on the
     line itself, to the nearest zone whose height band the leg (widened by its altitude error) meets, ``inf``
-    where none, 0 inside; ``nearest_zone`` its index or -1.
+    where none, 0 inside; ``nearest_zone`` its index or -1. For a zone over ground it is a lower bound, made with the
+    lowest and highest ground under the zone, but where the leg keeps clear of it never less than was demanded.
     """
 
     min_agl_m: Floats
@@ -82,36 +128,6 @@ class LegReport:
     violations: tuple[Violation, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Tube:
-    """Room for an altitude profile over a ground track of legs, one piece after the other.
-
-    ``s_m`` (M + 1,): breakpoints, horizontal metres along the track. ``floor_m``, ``ceiling_m`` (M, 2): AMSL at
-    both ends of each piece, linear between (neighbouring pieces may jump); ``floor_m`` never below what
-    `Airspace.examine` demands, ``ceiling_m`` never above it; ``inf``/-inf where unbounded; floor +inf where
-    the ground is unknown. Zones are not in them: they stand in ``bands``.
-    """
-
-    s_m: Floats
-    floor_m: Floats
-    ceiling_m: Floats
-    bands: tuple[Band, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Band:
-    """The track is horizontally within reach of a zone from ``s0_m`` to ``s1_m`` (one span, perhaps of several):
-    fly at or below ``bottom_m`` or at or above ``top_m``; each (K, 2) over pieces with breakpoints ``s_m``
-    (K + 1,), conservative as in `Tube`; bottom -inf: cannot be underflown; top +inf: cannot be overflown."""
-
-    zone: int
-    s0_m: float
-    s1_m: float
-    s_m: Floats
-    bottom_m: Floats
-    top_m: Floats
-
-
 class Airspace:
     """A surface and its zones, ready to judge legs.
 
@@ -120,27 +136,174 @@ class Airspace:
     """
 
     def __init__(self, surface: Surface, zones: Sequence[Zone] = (), *, scale: float = 1.0) -> None:
+        if not 1.0 <= scale < 2.0:
+            raise ValueError(f"scale must be 1 or a little more, given {scale:g}")
         self.surface = surface
         self.zones = tuple(zones)
         self.scale = scale
+        self._field = Field.of(surface)
+        self._zones = zones_as_arrays(self.zones, surface, self._field, scale)
+        self._halos: dict[tuple[bool, int, int], Halo] = {}
 
     def examine(self, legs: Legs, limits: Limits) -> LegReport:
         """Every violation along the whole of every leg. ``limits``' own errors are not used: the legs carry them."""
-        raise NotImplementedError
+        n = len(legs)
+        ok, found = np.zeros(n, np.bool_), np.full((n, 5), np.nan)
+        worst, nearest = np.full((n, 7, 2), np.nan), np.full(n, -1, np.intp)
+        worst[:, :, 1] = 0.0
+        room = n + 64
+        while True:
+            hit, hit_at = np.zeros((room, 2), np.intp), np.zeros((room, 2))
+            hits = self._judge(legs, limits, True, ok, found, worst, nearest, hit, hit_at)
+            if hits <= room:
+                break
+            room = hits
+        return LegReport(
+            found[:, 0],
+            found[:, 1],
+            found[:, 2],
+            np.degrees(found[:, 3]),
+            found[:, 4],
+            nearest,
+            self._violations(legs, limits, found, worst, hit[:hits], hit_at[:hits]),
+        )
 
     def clear(self, legs: Legs, limits: Limits) -> NDArray[np.bool_]:
         """(N,) True where `examine` would find no violation; faster."""
-        raise NotImplementedError
+        ok = np.zeros(len(legs), np.bool_)
+        self._judge(legs, limits, False, ok, *_NOTHING)
+        return ok
 
     def floor_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:
         """Lowest legal altitude over points of the plane, for terrain (min AGL, clearance; errors of ``limits``
         added); conservative; +inf where unknown. Zones are not in it."""
-        raise NotImplementedError
+        reach = Reaches.of(limits, self._field, self.scale)
+        near, far = (self._around(1.0, east_m, north_m, r, reach) for r in (reach.near_m, reach.far_m))
+        floor = near + (limits.min_agl_m + limits.altitude_error_m)
+        if limits.horizontal_clearance_m > 0.0:
+            floor = np.maximum(floor, far + limits.altitude_error_m)
+        return np.where(np.isnan(floor), np.inf, floor)
 
     def ceiling_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:
         """Highest legal altitude over points (max AGL, max AMSL; errors taken off); conservative; -inf unknown."""
-        raise NotImplementedError
+        reach = Reaches.of(limits, self._field, self.scale)
+        ground = -self._around(-1.0, east_m, north_m, reach.near_m, reach)
+        ceiling = ground + ((math.inf if limits.max_agl_m is None else limits.max_agl_m) - limits.altitude_error_m)
+        if limits.max_amsl_m is not None:
+            ceiling = np.minimum(ceiling, limits.max_amsl_m - limits.altitude_error_m)
+        return np.where(np.isnan(ground), -np.inf, ceiling)
 
     def tube(self, track: ArrayLike, limits: Limits) -> Tube:
         """The tube over a ground track (N, 2) of points in the plane, errors of ``limits`` included."""
-        raise NotImplementedError
+        points = np.array(track, dtype=np.float64, order="C")
+        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
+            raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
+        return make_tube(points, limits, self._field, self._zones, self._halo, self.scale)
+
+    def _around(
+        self, sign: float, east_m: ArrayLike, north_m: ArrayLike, reach_m: float, reach: Reaches
+    ) -> Floats:
+        """Highest ``sign`` times height within reach of each point, margin included."""
+        e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
+        out = np.empty(e.size)
+        wide = reach_m + reach.spare_m
+        heights = self._field.top if sign > 0.0 else self._field.ground
+        points = np.stack([e.ravel(), n.ravel()], axis=-1)
+        around(self._field, heights, self._halo(sign > 0.0, wide), sign, points, wide, out)
+        return out.reshape(e.shape) + reach.margin_m(reach_m)
+
+    def _halo(self, of_top: bool, reach_m: float) -> Halo:
+        """The halo of top or ground for a reach, made once for each size in cells."""
+        f = self._field
+        of_top = of_top and self.surface.top_m is not self.surface.ground_m
+        key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))
+        if key not in self._halos:
+            self._halos[key] = Halo.around(f, f.top if of_top else f.ground, reach_m)
+        return self._halos[key]
+
+    def _judge(
+        self,
+        legs: Legs,
+        limits: Limits,
+        full: bool,
+        ok: NDArray[np.bool_],
+        found: Floats,
+        worst: Floats,
+        nearest: NDArray[np.intp],
+        hit: NDArray[np.intp],
+        hit_at: Floats,
+    ) -> int:
+        f = self._field
+        spare = 0.0 if f.affine else BOW_M + f.error_m
+        near_m = float(legs.track_error_m.max(initial=0.0)) * self.scale + spare
+        near = self._halo(True, near_m)
+        far = self._halo(True, near_m + limits.horizontal_clearance_m * self.scale)
+        return int(
+            judge(
+                f, near, far, self._halo(False, near_m), self._zones,
+                legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
+                _demands(limits, self.scale), full, ok, found, worst, nearest, hit, hit_at,
+            )
+        )  # fmt: skip
+
+    def _violations(
+        self, legs: Legs, limits: Limits, found: Floats, worst: Floats, hit: NDArray[np.intp], hit_at: Floats
+    ) -> tuple[Violation, ...]:
+        """Violations by leg, in the order of the kinds."""
+        out: list[Violation] = []
+        where, kinds = np.nonzero(worst[:, :, 0] > 0.0)
+        depth, fraction = worst[where, kinds, 0], worst[where, kinds, 1]
+        reach = (legs.track_error_m + limits.horizontal_clearance_m) * self.scale
+        for i, k, by, t in zip(where.tolist(), kinds.tolist(), depth.tolist(), fraction.tolist(), strict=True):
+            unit = "m"
+            if k in (CLIMB, DESCENT):
+                limit, by, unit = (
+                    (limits.max_climb_deg if k == CLIMB else limits.max_descent_deg), math.degrees(by), "deg",
+                )  # fmt: skip
+                value = limit + by
+            elif k == COVERAGE:
+                limit = float(reach[i])
+                value = max(limit - by, 0.0)
+            elif k == TERRAIN:
+                limit, value = 0.0, -by
+            elif k == MIN_AGL:
+                limit, value = limits.min_agl_m, limits.min_agl_m - by
+            else:
+                limit = float((limits.max_agl_m if k == MAX_AGL else limits.max_amsl_m) or 0.0)
+                value = limit + by
+            out.append(self._at(legs, i, _KINDS[k], t, value, limit, by, unit))
+        for (i, zone), (value, t) in zip(hit.tolist(), hit_at.tolist(), strict=True):
+            limit = float(reach[i])
+            out.append(self._at(legs, i, "zone", t, value, limit, max(limit - value, 1e-6), "m", zone))
+        out.sort(key=lambda v: v.leg)
+        return tuple(out)
+
+    @staticmethod
+    def _at(
+        legs: Legs, leg: int, kind: Kind, t: float, value: float, limit: float, by: float, unit: str, zone: int = -1
+    ) -> Violation:
+        a, b = legs.start[leg].tolist(), legs.end[leg].tolist()
+        e, n, h = (p + (q - p) * t for p, q in zip(a, b, strict=True))
+        return Violation(leg, kind, t, e, n, h, value, limit, by, unit, zone)
+
+
+_KINDS: dict[int, Kind] = {
+    MIN_AGL: "min_agl", TERRAIN: "terrain_clearance", MAX_AGL: "max_agl", MAX_AMSL: "max_amsl",
+    COVERAGE: "coverage", CLIMB: "climb", DESCENT: "descent",
+}  # fmt: skip
+
+_NOTHING = (
+    np.zeros((0, 5)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),
+)  # fmt: skip
+
+
+def _demands(limits: Limits, scale: float) -> Demands:
+    return Demands(
+        float(limits.min_agl_m),
+        math.inf if limits.max_agl_m is None else float(limits.max_agl_m),
+        math.inf if limits.max_amsl_m is None else float(limits.max_amsl_m),
+        float(limits.horizontal_clearance_m),
+        float(scale),
+        math.radians(limits.max_climb_deg),
+        math.radians(limits.max_descent_deg),
+    )

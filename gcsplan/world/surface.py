@@ -57,10 +57,11 @@ class GridMap:
         return cls(coefficients, (west_m, north_m), 1.0, 0.0)
 
     def __call__(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
-        """(..., 2) col, row of points in the plane."""
+        """(..., 2) col, row of points in the plane; not finite for points that are infinitely far away."""
         u = (np.asarray(east_m, float) - self.centre[0]) / self.scale_m
         v = (np.asarray(north_m, float) - self.centre[1]) / self.scale_m
-        return np.asarray(_basis(u, v) @ self.coefficients)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(_basis(u, v) @ self.coefficients)
 
     def jacobian(self, east_m: float, north_m: float) -> Floats:
         """(2, 2) d(col, row) / d(east_m, north_m) at a point."""
@@ -129,8 +130,9 @@ def _bilinear(z: Floats, at: Floats) -> Floats:
     rows, cols = z.shape
     c, r = at[..., 0], at[..., 1]
     inside = (c >= 0) & (c <= cols - 1) & (r >= 0) & (r <= rows - 1)
-    i = np.clip(np.where(inside, np.floor(c), 0).astype(np.intp), 0, cols - 2)
-    j = np.clip(np.where(inside, np.floor(r), 0).astype(np.intp), 0, rows - 2)
+    c, r = np.where(inside, c, 0.0), np.where(inside, r, 0.0)
+    i = np.clip(np.floor(c).astype(np.intp), 0, cols - 2)
+    j = np.clip(np.floor(r).astype(np.intp), 0, rows - 2)
     u, v = c - i, r - j
 
     # A weight of zero must not let an unknown neighbour through as 0 · NaN.

@@ -1,0 +1,327 @@
+"""Sending plans and files to vehicles: who gets what, over which link, and how it ended.
+
+One link for each URL; several vehicles on one URL are told apart by system id. ``sim`` starts a loopback vehicle for
+each UAV where the mission starts, and the results say *simulated*.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from gcsplan.check.judge import judge
+from gcsplan.check.verdict import Verdict
+from gcsplan.checking import Checked, split_name
+from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
+from gcsplan.mavlink import session
+from gcsplan.mavlink.autopilots import manner
+from gcsplan.mavlink.files import read_mission_file, write_plan, write_waypoints
+from gcsplan.mavlink.frames import signing_key
+from gcsplan.mavlink.link import Link
+from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, Mission
+from gcsplan.mavlink.results import UploadResult
+from gcsplan.mavlink.url import parse_url
+from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.pipeline import Plan, load_mission, world_of
+from gcsplan.sim.misbehaviour import Misbehaviour
+from gcsplan.sim.server import SimServer, serve
+from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.world import World
+
+SIM, LINK = "sim", "link"
+KINDS = {"mission": MISSION, "fence": FENCE, "rally": RALLY}
+ProgressCall = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the user allows."""
+
+    allow_armed: bool = False
+    ignore_position: bool = False
+    unchecked: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own)."""
+
+    name: str
+    url: str
+    mission: Mission
+    verdict: Verdict | None = None
+    vehicle: Vehicle | None = None
+    world: World | None = None
+    rtl_rel_home_m: float | None = None
+    terrain_error_m: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Delivery:
+    """How one upload or comparison ended. ``message`` is the error in words, empty if there is none."""
+
+    vehicle: str
+    url: str
+    outcome: str
+    verified: bool
+    items: int
+    seconds: float
+    retries: int = 0
+    simulated: bool = False
+    message: str = ""
+    warnings: tuple[str, ...] = ()
+    code: int = 0
+    details: Mapping[str, Any] | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: the fixed keys first."""
+        fixed = {
+            "url": self.url, "outcome": self.outcome, "verified": self.verified, "simulated": self.simulated,
+            "items": self.items, "seconds": self.seconds, "retries": self.retries,
+        }  # fmt: skip
+        more = {"message": self.message, "warnings": list(self.warnings)} | dict(self.details or {})
+        return fixed | {key: value for key, value in more.items() if value and key not in fixed}
+
+
+def targets(where: Sequence[str], vehicles: Sequence[Vehicle]) -> dict[str, str]:
+    """Vehicle name to URL (or `SIM`) of all ``--upload`` words; empty without any. Raises UsageError."""
+    by_name = {v.name: v for v in vehicles}
+    chosen: dict[str, str] = {}
+    single: dict[str, str] = {}
+    for word in where:
+        name, equals, url = word.partition("=")
+        if equals and re.fullmatch(r"[A-Za-z0-9_-]+", name):
+            if name not in by_name:
+                known = ", ".join(by_name)
+                raise UsageError(f"--upload {word}: the mission file has no vehicle {name!r}; it has {known}")
+            single[name] = url if url == SIM else parse_url(url).url
+        elif word == LINK:
+            missing = [v.name for v in vehicles if not v.link]
+            if missing:
+                raise UsageError(f"--upload link: {', '.join(missing)} has no `link` in the mission file")
+            chosen |= {v.name: parse_url(v.link or "").url for v in vehicles}
+        else:
+            url = SIM if word == SIM else parse_url(word).url
+            chosen |= dict.fromkeys(by_name, url)
+    return chosen | single
+
+
+def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[Job]:
+    """The uploads of a plan; vehicles without a target are left out."""
+    source = plan.source
+    return [
+        Job(
+            v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
+            source.terrain_error_m,
+        )
+        for v in plan.vehicles if v.name in where
+    ]  # fmt: skip
+
+
+def jobs_of_files(source: MissionFile, checked: Sequence[Checked], url: str) -> list[Job]:
+    """The uploads of checked files, all to one URL (`SIM` too)."""
+    world = world_of(source)
+    to = SIM if url == SIM else parse_url(url).url
+    return [
+        Job(
+            c.vehicle.name, to, c.mission, c.verdict, c.vehicle, world, c.request.rtl_rel_home_m,
+            source.terrain_error_m,
+        )
+        for c in checked
+    ]  # fmt: skip
+
+
+def unchecked_job(argument: str, url: str, sysid: int) -> Job:
+    """A file for ``--unchecked``; the vehicle itself says which autopilot it is where the file does not."""
+    name, file = split_name(argument)
+    endpoint = parse_url(url)
+    autopilot = None
+    if file.suffix.lower() != ".plan":
+        with _open(url) as link:
+            autopilot = _autopilot_of(link, sysid)
+    read = read_mission_file(file, autopilot=autopilot)
+    return Job(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
+
+
+def _open(url: str) -> Link:
+    """The link at ``url``, signed where the environment holds a key."""
+    return Link(url, key=signing_key())
+
+
+def _autopilot_of(link: Link, sysid: int) -> Autopilot:
+    state = session.discover(link, sysid)
+    for autopilot in Autopilot:
+        table = manner(autopilot)
+        if state.mav_autopilot == table.mav_autopilot and state.mav_type in table.mav_types:
+            return autopilot
+    raise VehicleRefused(
+        f"vehicle {sysid} calls itself {state.what}, and gcsplan knows {', '.join(Autopilot)}: give a .plan file, "
+        f"which names its autopilot"
+    )
+
+
+def deliver(jobs: Sequence[Job], options: Options, progress: ProgressCall | None = None) -> list[Delivery]:
+    """Upload every job, all at once, read back, compare, and check what was read back; in the order given."""
+    with ExitStack() as stack:
+        links: dict[str, Link] = {}
+        simulated = [job for job in jobs if job.url == SIM]
+        if simulated:
+            server = stack.enter_context(SimServer([_loopback(job) for job in simulated], "udpin:127.0.0.1:0"))
+            links[SIM] = stack.enter_context(Link(server.url_for_gcs))  # unsigned: it never leaves this machine
+        failed: dict[str, LinkError] = {}
+        for url in dict.fromkeys(job.url for job in jobs if job.url != SIM):
+            try:
+                links[url] = stack.enter_context(_open(url))
+            except LinkError as error:  # the other vehicles' links may be well
+                failed[url] = error
+        open_jobs = [job for job in jobs if job.url in links]
+        orders = [_order(job, links[job.url], options, progress) for job in open_jobs]
+        ended: dict[int, UploadResult | GcsplanError] = {
+            id(job): result for job, result in zip(open_jobs, session.upload_fleet(orders), strict=True)
+        }
+        for job in jobs:
+            ended.setdefault(id(job), failed.get(job.url) or LinkError("the link did not open"))
+        return [_delivery(job, ended[id(job)]) for job in jobs]
+
+
+def _order(job: Job, link: Link, options: Options, progress: ProgressCall | None) -> session.Order:
+    ground_m = None
+    if job.world is not None:
+        home = job.mission.home
+        ground_m = job.world.ground_amsl(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
+        ground_m = None if math.isnan(ground_m) else ground_m
+    settings = session.Options(
+        unchecked=options.unchecked or (job.verdict is not None and job.verdict.safe is None),
+        allow_armed=options.allow_armed,
+        ignore_position=options.ignore_position,
+        ground_amsl_m=ground_m,
+        rtl_rel_home_m=job.rtl_rel_home_m,
+        simulated=job.url == SIM,
+        listen_s=0.2 if job.url == SIM else session.Options().listen_s,
+    )
+    told = None if progress is None else lambda name, p: progress(name, p.done, p.total)
+    return session.Order(link, job.mission, job.verdict, settings, _judge_again(job), told)
+
+
+def _judge_again(job: Job) -> session.Judge | None:
+    """The check on what was read back: what a vehicle holds is what it will fly."""
+    if job.world is None or job.vehicle is None or job.verdict is None:
+        return None
+    world, vehicle, first = job.world, job.vehicle, job.verdict
+
+    def again(read_back: Mission) -> str | None:
+        # Home on board is where the vehicle stands now; altitudes count from where the mission was planned to start.
+        verdict = judge(
+            replace(read_back, home=job.mission.home), vehicle, world, rtl_rel_home_m=job.rtl_rel_home_m,
+            terrain_error_m=job.terrain_error_m,
+        )  # fmt: skip
+        if verdict.safe is True or (verdict.safe is None and first.safe is None):
+            return None
+        return verdict.describe()
+
+    return again
+
+
+def _loopback(job: Job, misbehave: Misbehaviour | None = None) -> LoopbackVehicle:
+    home = job.mission.home
+    return LoopbackVehicle(
+        job.mission.sysid, job.mission.autopilot, lat_deg=home.lat_e7 / 1e7, lon_deg=home.lon_e7 / 1e7,
+        amsl_m=home.amsl_m, misbehave=misbehave, name=job.name,
+    )  # fmt: skip
+
+
+def _delivery(job: Job, ended: UploadResult | GcsplanError) -> Delivery:
+    if isinstance(ended, GcsplanError):
+        outcome = "refused" if isinstance(ended, VehicleRefused) else "unknown"
+        return Delivery(
+            job.name, job.url, outcome, False, len(job.mission.wire_items()), 0.0, simulated=job.url == SIM,
+            message=str(ended), code=ended.exit_code,
+        )  # fmt: skip
+    error = ended.error()
+    return Delivery(
+        job.name, job.url if job.url == SIM else ended.url, ended.outcome, ended.verified, ended.items, ended.seconds,
+        ended.retries, ended.simulated, str(error) if error else "", ended.warnings,
+        error.exit_code if error else 0, ended.as_dict(),
+    )  # fmt: skip
+
+
+def exit_code(deliveries: Sequence[Delivery]) -> int:
+    """The worst of 7, 6, 5 (then 4): a fleet's exit code; 0 if all are verified."""
+    codes = {d.code for d in deliveries}
+    order = (ReadBackDiffers.exit_code, LinkError.exit_code, VehicleRefused.exit_code)
+    return next((c for c in order if c in codes), max(codes, default=0))
+
+
+def verify_file(file: Path, url: str, sysid: int) -> Delivery:
+    """Compare a file with what is on board; nothing is written to the vehicle."""
+    with _open(url) as link:
+        autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
+        read = read_mission_file(file, autopilot=autopilot)
+        mission = replace(read.mission, sysid=sysid)
+        job = Job(file.stem, link.url, mission)
+        done = _delivery(job, session.verify_mission(link, mission))
+    return replace(done, warnings=(*read.notes, *done.warnings))
+
+
+def download_to(url: str, sysid: int, file: Path) -> int:
+    """Write the mission on board to a `.waypoints` or `.plan` file; returns the number of its wire items."""
+    if file.suffix.lower() not in (".waypoints", ".plan"):
+        raise UsageError(f"-o {file}: a name that ends in .waypoints or .plan is wanted")
+    with _open(url) as link:
+        mission = session.download_mission(link, sysid, _autopilot_of(link, sysid), name=file.stem)
+    text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
+    part = file.with_name(f".{file.name}.part")
+    try:
+        part.write_text(text, encoding="utf-8", newline="\n")
+        part.replace(file)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise InputError(f"cannot be written: {error.strerror}", where=str(file)) from error
+    return len(mission.wire_items())
+
+
+def clear(url: str, sysid: int, kind: str) -> None:
+    """Clear one list on board and read back that it is empty."""
+    if kind not in KINDS:
+        raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
+    with _open(url) as link:
+        session.clear_mission(link, sysid, KINDS[kind]).raise_for_outcome()
+
+
+def loopback_vehicles(requests: Sequence[VehicleRequest], misbehave: str) -> list[LoopbackVehicle]:
+    """A loopback vehicle at the start of each of a mission file's vehicles."""
+    trouble = Misbehaviour.parse(misbehave)
+    return [
+        LoopbackVehicle(
+            r.vehicle.sysid, r.vehicle.autopilot, lat_deg=r.start_deg[0], lon_deg=r.start_deg[1], amsl_m=r.start[2],
+            misbehave=trouble, name=r.vehicle.name,
+        )
+        for r in requests
+    ]  # fmt: skip
+
+
+def simulate(
+    mission: Path | None, url: str, autopilot: str, sysid: int, misbehave: str, said: Callable[[str], None]
+) -> None:
+    """Serve loopback vehicles until interrupted; ``said`` hears where. Without a mission one stands near Jacksboro."""
+    if mission is not None:
+        vehicles = loopback_vehicles(load_mission(mission).vehicles, misbehave)
+    else:
+        try:
+            kind = Autopilot(autopilot)
+        except ValueError:
+            raise UsageError(f"--autopilot {autopilot}: one of {', '.join(Autopilot)} is wanted") from None
+        trouble = Misbehaviour.parse(misbehave)
+        vehicles = [LoopbackVehicle(sysid, kind, lat_deg=36.6, lon_deg=-84.38, amsl_m=471.0, misbehave=trouble)]
+
+    def ready(server: SimServer) -> None:
+        names = ", ".join(f"{v.name} (system {v.sysid}, {v.autopilot})" for v in vehicles)
+        said(f"simulating {names}; connect to {server.url_for_gcs}; Ctrl-C ends it")
+
+    serve(vehicles, url, on_ready=ready)

@@ -1,0 +1,121 @@
+"""`mission.geojson` (RFC 7946): tracks, way points and no-fly zones with the mission file's own property names.
+
+The zones can be read back as ``no_fly: [{file: mission.geojson}]``: they are the features with ``kind: no_fly``.
+Shapes that cross the antimeridian are cut there (section 3.1.9).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from gcsplan.export.rows import Floats, Track, outline_deg
+from gcsplan.world.frame import Frame
+from gcsplan.world.zones import Level, Zone
+
+Position = list[float]
+
+
+def write_geojson(name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame) -> str:
+    """The GeoJSON text of a mission called ``name``: a FeatureCollection; same input, same bytes.
+
+    Positions are longitude, latitude (and AMSL metres where the feature says so in ``amsl_m``); a zone's floor and
+    ceiling are the mission file's ``floor_agl_m``, ``floor_amsl_m``, ``ceiling_agl_m``, ``ceiling_amsl_m``.
+    """
+    features: list[dict[str, Any]] = []
+    for track in tracks:
+        features.append(_feature(_line(track), {"kind": "track", "vehicle": track.vehicle}))
+    for track in tracks:
+        for index, label in enumerate(track.labels):
+            if label:
+                lon, lat, amsl = _position(track.lon_deg[index], track.lat_deg[index], track.amsl_m[index])
+                about = {"kind": "waypoint", "vehicle": track.vehicle, "name": label, "amsl_m": amsl}
+                features.append(_feature({"type": "Point", "coordinates": [lon, lat, amsl]}, about))
+    for zone in zones:
+        about = {"kind": "no_fly", "name": zone.name, **_levels(zone)}
+        features.append(_feature(_area(outline_deg(zone, frame)), about))
+    return json.dumps({"type": "FeatureCollection", "name": name, "features": features}, ensure_ascii=False) + "\n"
+
+
+def _feature(geometry: dict[str, Any], properties: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+def _levels(zone: Zone) -> dict[str, float]:
+    def entry(side: str, level: Level | None) -> dict[str, float]:
+        return {} if level is None else {f"{side}_{level.datum}_m": float(level.value_m)}
+
+    return {**entry("floor", zone.floor), **entry("ceiling", zone.ceiling)}
+
+
+def _position(lon_deg: float, lat_deg: float, amsl_m: float | None = None) -> Position:
+    place = [round(float(lon_deg), 7), round(float(lat_deg), 7)]
+    return place if amsl_m is None else [*place, round(float(amsl_m), 2)]
+
+
+def _unwrapped(lon_deg: Floats) -> Floats:
+    """Longitudes without the jump at ±180°: each within half a turn of the one before."""
+    steps = (np.diff(lon_deg) + 180.0) % 360.0 - 180.0
+    return np.concatenate([lon_deg[:1], lon_deg[0] + np.cumsum(steps)])
+
+
+def _line(track: Track) -> dict[str, Any]:
+    points = np.stack([track.lon_deg, track.lat_deg, track.amsl_m], axis=-1)
+    points[:, 0] = _unwrapped(points[:, 0])
+    parts: list[list[Position]] = [[]]
+    turn = _turn(points[0, 0], points[1, 0])
+    for a, b in pairwise(points):
+        parts[-1].append(_position(a[0] - 360.0 * turn, a[1], a[2]))
+        beyond = _turn(b[0], a[0])
+        if beyond != turn:
+            seam = 180.0 + 360.0 * min(turn, beyond)
+            at = a + (b - a) * ((seam - a[0]) / (b[0] - a[0]))
+            parts[-1].append(_position(seam - 360.0 * turn, at[1], at[2]))
+            parts.append([_position(seam - 360.0 * beyond, at[1], at[2])])
+            turn = beyond
+    parts[-1].append(_position(points[-1, 0] - 360.0 * turn, points[-1, 1], points[-1, 2]))
+    if len(parts) == 1:
+        return {"type": "LineString", "coordinates": parts[0]}
+    return {"type": "MultiLineString", "coordinates": parts}
+
+
+def _turn(lon_deg: float, towards_deg: float) -> int:
+    """In which turn round the Earth an unwrapped longitude lies; on the seam, the side of ``towards_deg``."""
+    turn = int(np.floor((lon_deg + 180.0) / 360.0))
+    on_seam = (lon_deg + 180.0) % 360.0 == 0.0
+    return turn - 1 if on_seam and towards_deg < lon_deg else turn
+
+
+def _area(ring: Floats) -> dict[str, Any]:
+    points = np.stack([_unwrapped(np.append(ring[:, 1], ring[0, 1]))[:-1], ring[:, 0]], axis=-1)
+    low, high = points[:, 0].min(), points[:, 0].max()
+    polygons = []
+    for turn in range(_turn(low, high), _turn(high, low) + 1):
+        west, east = 360.0 * turn - 180.0, 360.0 * turn + 180.0
+        part = _clip(_clip(points, west, keep_east=True), east, keep_east=False)
+        corners = [_position(lon - 360.0 * turn, lat) for lon, lat in part]
+        if len({lon for lon, _ in corners}) >= 2:  # more than a hair's breadth beyond the seam
+            polygons.append([[*corners, corners[0]]])
+    if len(polygons) == 1:
+        return {"type": "Polygon", "coordinates": polygons[0]}
+    return {"type": "MultiPolygon", "coordinates": polygons}
+
+
+def _clip(points: Floats, lon_deg: float, *, keep_east: bool) -> Floats:
+    """The part of a ring on one side of a meridian (Sutherland and Hodgman 1974)."""
+    side = (points[:, 0] - lon_deg) * (1.0 if keep_east else -1.0)
+    if (side >= 0).all():
+        return points
+    kept = []
+    for i in range(len(points)):
+        j = (i + 1) % len(points)
+        if side[i] >= 0:
+            kept.append(points[i])
+        if side[i] * side[j] < 0:
+            at = points[i] + (points[j] - points[i]) * (side[i] / (side[i] - side[j]))
+            kept.append(np.array([lon_deg, at[1]]))
+    return np.array(kept).reshape(-1, 2)

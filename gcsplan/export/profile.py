@@ -1,0 +1,42 @@
+"""`profile.csv`: a row for each item, for spreadsheets and scripts."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable
+
+from gcsplan.export.rows import ItemRow
+
+COLUMNS: tuple[tuple[str, str, int], ...] = (
+    ("lat", "lat_deg", 7),
+    ("lon", "lon_deg", 7),
+    ("amsl_m", "amsl_m", 3),
+    ("agl_m", "agl_m", 3),
+    ("min_agl_on_leg_m", "min_agl_on_leg_m", 3),
+    ("leg_m", "leg_m", 3),
+    ("climb_deg", "climb_deg", 3),
+    ("energy_j", "energy_j", 1),
+    ("cumulative_energy_j", "cumulative_energy_j", 1),
+    ("time_s", "time_s", 2),
+)
+"""Column, field of `ItemRow`, decimals; after vehicle, seq and command."""
+
+
+def write_profile(rows: Iterable[ItemRow]) -> str:
+    """The CSV text: a header and a line for each of ``rows``; LF, a point for the decimals, empty where unknown."""
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(["vehicle", "seq", "command", *(name for name, _, _ in COLUMNS)])
+    for row in rows:
+        numbers = [_cell(getattr(row, key), decimals) for _, key, decimals in COLUMNS]
+        table.writerow([row.vehicle, row.seq, row.command, *numbers])
+    return out.getvalue()
+
+
+def _cell(value: float | None, decimals: int) -> str:
+    if value is None or not math.isfinite(value):
+        return ""
+    text = f"{value:.{decimals}f}"
+    return text.lstrip("-") if float(text) == 0.0 else text

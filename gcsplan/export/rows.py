@@ -1,0 +1,87 @@
+"""What the writers are handed: a row for each item, a track for each vehicle, and the outline of a zone in degrees."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.world.frame import Frame
+from gcsplan.world.zones import Circle, Level, Zone
+
+Floats = NDArray[np.float64]
+
+CIRCLE_CORNERS = 72
+OUTLINE_MARGIN_M = 0.02
+"""Corners are written to 1e-7 degrees (11 mm); a circle's outline keeps this much outside it, so it still holds it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ItemRow:
+    """One mission item in numbers; None or NaN where there is none (a command without a place, unknown ground)."""
+
+    vehicle: str
+    seq: int
+    command: str
+    lat_deg: float | None = None
+    lon_deg: float | None = None
+    amsl_m: float | None = None
+    agl_m: float | None = None
+    min_agl_on_leg_m: float | None = None
+    leg_m: float | None = None
+    climb_deg: float | None = None
+    energy_j: float | None = None
+    cumulative_energy_j: float | None = None
+    time_s: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The line that one vehicle flies: (N,) degrees and AMSL metres, N >= 2, straight between neighbours.
+
+    ``labels`` (N,): a word for each point (its item's command), empty for points that are no items.
+    """
+
+    vehicle: str
+    lat_deg: Floats
+    lon_deg: Floats
+    amsl_m: Floats
+    labels: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        columns = [np.asarray(getattr(self, name), float) for name in ("lat_deg", "lon_deg", "amsl_m")]
+        shapes = {c.shape for c in columns}
+        if len(shapes) != 1 or columns[0].ndim != 1 or len(columns[0]) < 2:
+            raise ValueError(f"a track has at least two points in columns of equal length, given shapes {shapes}")
+        if not all(np.isfinite(c).all() for c in columns):
+            raise ValueError(f"a track is finite; that of {self.vehicle} is not")
+        if self.labels and len(self.labels) != len(columns[0]):
+            raise ValueError(f"{len(columns[0])} points need as many labels, given {len(self.labels)}")
+        for name, column in zip(("lat_deg", "lon_deg", "amsl_m"), columns, strict=True):
+            object.__setattr__(self, name, column)
+        if not self.labels:
+            object.__setattr__(self, "labels", ("",) * len(columns[0]))
+
+
+def outline_deg(zone: Zone, frame: Frame) -> Floats:
+    """(N, 2) latitude, longitude of the corners of ``zone``, counter-clockwise, not closed.
+
+    A circle becomes a polygon of `CIRCLE_CORNERS` corners that holds the whole of it.
+    """
+    shape = zone.shape
+    if isinstance(shape, Circle):
+        turn = 2.0 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
+        reach = (shape.radius_m + OUTLINE_MARGIN_M) / math.cos(math.pi / CIRCLE_CORNERS)
+        return frame.to_degrees(shape.east_m + reach * np.cos(turn), shape.north_m + reach * np.sin(turn))
+    return frame.to_degrees(shape.vertices[:, 0], shape.vertices[:, 1])
+
+
+def extent_words(zone: Zone) -> str:
+    """From where to where a zone reaches in height, in words."""
+
+    def words(level: Level | None, none: str) -> str:
+        return none if level is None else str(level)
+
+    return f"from {words(zone.floor, 'the ground')} to {words(zone.ceiling, 'unlimited height')}"

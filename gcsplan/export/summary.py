@@ -1,0 +1,67 @@
+"""`summary.json`: a plan in one JSON document, keys in the order of the contract, the same bytes for the same input."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+ORDER: dict[str, tuple[str, ...]] = {
+    "": ("name", "gcsplan", "planner", "objective", "seed", "inputs", "vehicles", "fleet"),
+    "inputs": ("dem_sha256", "vertical_datum", "resolution_m", "bare_dem", "zones_sha256"),
+    "vehicles": (
+        "name", "items", "length_m", "lower_bound_m", "gap_percent", "energy_j", "lower_bound_j",
+        "battery_used_percent", "min_agl_m", "min_agl_at", "min_zone_clearance_m", "nearest_zone", "max_climb_deg",
+        "speed_m_s", "depart_s", "arrive_s", "planning_s", "first_path_s", "stopped_by", "safe", "not_judged", "upload",
+    ),
+    "min_agl_at": ("leg", "lat", "lon"),
+    "upload": ("url", "outcome", "verified", "simulated", "items", "seconds", "retries"),
+    "fleet": ("mode", "order", "min_separation_m", "closest"),
+    "closest": ("vehicles", "time_s"),
+}  # fmt: skip
+"""Order of the known keys of each object, by the key that it stands under; others follow as they come."""
+
+CLOCKS = frozenset({"planning_s", "first_path_s", "upload"})
+"""Clock readings: different each time, so they stand in ``--json`` and upload.json only."""
+
+DECIMALS = (("_m_s", 3), ("_m", 3), ("_j", 1), ("_s", 3), ("_deg", 3), ("_percent", 3), ("lat", 7), ("lon", 7))
+OTHER_DECIMALS = 6
+
+
+def write_summary(summary: Mapping[str, Any], *, clocks: bool = False) -> str:
+    """The JSON text of ``summary``; NaN and infinity become null, numpy's numbers plain ones.
+
+    ``clocks`` keeps the clock readings. Floats are rounded by their unit; least values and lower bounds (``min_…``,
+    ``lower_bound_…``) downwards, so that none is told better than it is. Raises TypeError for what JSON has not.
+    """
+    return json.dumps(_plain(summary, "", clocks), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _plain(value: Any, key: str, clocks: bool) -> Any:
+    if isinstance(value, Mapping):
+        first = [k for k in ORDER.get(key, ()) if k in value]
+        keys = first + [k for k in value if k not in first]
+        return {str(k): _plain(value[k], str(k), clocks) for k in keys if clocks or k not in CLOCKS}
+    if isinstance(value, list | tuple):
+        return [_plain(v, key, clocks) for v in value]
+    if isinstance(value, str):
+        return str(value)
+    if value is None or isinstance(value, bool | int):
+        return value
+    if hasattr(value, "tolist"):  # numpy's scalars and arrays, without importing numpy for it
+        return _plain(value.tolist(), key, clocks)
+    if isinstance(value, float):
+        return _rounded(value, key)
+    raise TypeError(f"{key} holds a {type(value).__name__}, which JSON has not")
+
+
+def _rounded(value: float, key: str) -> float | None:
+    if not math.isfinite(value):
+        return None
+    decimals = next((n for suffix, n in DECIMALS if key.endswith(suffix)), OTHER_DECIMALS)
+    if key.startswith(("min_", "lower_bound")):
+        scaled = value * 10.0**decimals
+        # 60.0 that came out as 59.999999999999 is 60.0: what is smaller than the sixth place is noise.
+        value = math.floor(scaled + 1e-3) / 10.0**decimals if abs(scaled) < 1e15 else value
+    return round(value, decimals) + 0.0

@@ -1,0 +1,163 @@
+"""Bytes to MAVLink messages and back: framing, checksums, signatures. Garbage costs nothing but itself.
+
+pymavlink's own stream parser throws away as many bytes as a corrupted header claims, the good frames among them, and
+keeps its buffer for ever while it is never empty. Here a frame that does not check is one byte of garbage, and the
+buffer never holds more than one frame.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.errors import InputError
+from gcsplan.mavlink.messages import Address
+
+_MARKERS = re.compile(b"[\xfd\xfe]")
+_V2, _SIGNED = 0xFD, 0x01
+_SIGNING_EPOCH_S = 1_420_070_400  # 2015-01-01, in units of 10 µs from there
+KEY_VARIABLE = "GCSPLAN_SIGNING_KEY"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SigningKey:
+    """32 secret bytes. Never shown."""
+
+    secret: bytes
+
+    def __post_init__(self) -> None:
+        if len(self.secret) != 32:
+            raise InputError(f"a signing key has 32 bytes, given {len(self.secret)}")
+
+    def __repr__(self) -> str:
+        return "SigningKey(…)"
+
+
+def signing_key(file: Path | str | None = None, variable: str = KEY_VARIABLE) -> SigningKey | None:
+    """The key from ``file`` (32 raw bytes, or 64 hexadecimal digits), else from the environment (digits), else None.
+
+    Raises InputError for one that cannot be read or has another size; the message does not hold the key.
+    """
+    if file is not None:
+        try:
+            with open(file, "rb") as handle:
+                raw = handle.read(200)
+        except OSError as error:
+            raise InputError(f"cannot read the signing key: {error.strerror}", where=str(file)) from None
+        return SigningKey(raw) if len(raw) == 32 else _from_hex(raw, str(file))
+    text = os.environ.get(variable)
+    return _from_hex(text.encode(errors="replace"), f"environment variable {variable}") if text else None
+
+
+def _from_hex(raw: bytes, where: str) -> SigningKey:
+    if not re.fullmatch(rb"\s*[0-9A-Fa-f]{64}\s*", raw):
+        raise InputError("a signing key is 32 bytes, raw in a file or as 64 hexadecimal digits", where=where)
+    return SigningKey(bytes.fromhex(raw.decode().strip()))
+
+
+class Signing:
+    """The signing state that all parsers and the writer of one link share; without a key it signs nothing."""
+
+    def __init__(self, key: SigningKey | None = None, link_id: int = 0) -> None:
+        self.state = dialect.MAVLinkSigning()
+        if key is not None:
+            self.state.secret_key = key.secret
+            self.state.sign_outgoing = True
+            self.state.link_id = link_id
+            self.state.timestamp = int((time.time() - _SIGNING_EPOCH_S) * 1e5)
+
+    @property
+    def active(self) -> bool:
+        """Whether there is a key."""
+        return self.state.secret_key is not None
+
+
+class FrameParser:
+    """Messages out of bytes. ``bad`` counts frames that did not check, ``unsigned`` those without a valid signature."""
+
+    def __init__(self, signing: Signing | None = None) -> None:
+        self._mav = dialect.MAVLink(None)
+        self._mav.signing = (signing or Signing()).state
+        self._rest = b""
+        self.bad = 0
+        self.unsigned = 0
+
+    def feed(self, data: bytes, *, datagram: bool = False) -> list[Any]:
+        """Every message that ``data`` completes. A ``datagram`` ends with its last frame, a stream goes on."""
+        buffer = self._rest + data
+        messages: list[Any] = []
+        position, rest = 0, b""
+        while found := _MARKERS.search(buffer, position):
+            start = found.start()
+            length = _frame_length(buffer, start)
+            if length == 0:
+                position = start + 1
+                continue
+            if length < 0 or start + length > len(buffer):
+                rest = rest or buffer[start:]
+                if not datagram:
+                    break
+                position = start + 1  # a damaged length must not hide the frames behind it
+                continue
+            message = self._decode(buffer[start : start + length])
+            if message is None and not self._unknown_frame(buffer, start, length):
+                position = start + 1
+                continue
+            if message is not None:
+                messages.append(message)
+                rest = b""
+            position = start + length
+        self._rest = rest
+        return messages
+
+    def _decode(self, frame: bytes) -> Any:
+        """The message in a whole frame; None if it does not check or is of no kind that we know."""
+        before = self._mav.signing.badsig_count + self._mav.signing.reject_count
+        try:
+            message = self._mav.decode(bytearray(frame))
+        except dialect.MAVError as error:
+            self.bad += 1
+            refused = self._mav.signing.badsig_count + self._mav.signing.reject_count > before
+            self.unsigned += int(refused or "signature" in str(error))
+            return None
+        return None if message.get_type().startswith("UNKNOWN") else message
+
+    @staticmethod
+    def _unknown_frame(buffer: bytes, start: int, length: int) -> bool:
+        """Whether to pass over a frame of an unknown kind, whose checksum nobody here can check."""
+        v2 = buffer[start] == _V2
+        kind = int.from_bytes(buffer[start + 7 : start + 10], "little") if v2 else buffer[start + 5]
+        end = start + length
+        return kind not in dialect.mavlink_map and (end == len(buffer) or buffer[end] in (0xFD, 0xFE))
+
+
+def _frame_length(buffer: bytes, start: int) -> int:
+    """Bytes of the frame that begins at ``start``; -1: not yet known; 0: none begins here."""
+    if len(buffer) - start < 3:
+        return -1
+    if buffer[start] != _V2:
+        return int(buffer[start + 1]) + 8
+    flags = buffer[start + 2]
+    if flags & ~_SIGNED:
+        return 0  # flags that we do not know: by the standard, not ours to read
+    return int(buffer[start + 1]) + 12 + (13 if flags & _SIGNED else 0)
+
+
+class FrameWriter:
+    """Messages to bytes, with sequence numbers and signatures."""
+
+    def __init__(self, us: Address, signing: Signing | None = None) -> None:
+        self._mav = dialect.MAVLink(None, us.sysid, us.compid)
+        self._mav.signing = (signing or Signing()).state
+
+    def pack(self, message: Any) -> bytes:
+        """The frame of ``message``."""
+        frame: bytes = message.pack(self._mav)
+        self._mav.seq = (self._mav.seq + 1) % 256
+        return frame

@@ -1,0 +1,314 @@
+"""A link: one socket or serial port, the vehicles behind it, and the clock. The only place where time is read.
+
+Frames are routed by (system id, component id); every system is answered at the address where it was heard. `pump`
+runs any number of tasks on any number of links in one thread: a fleet takes as long as its slowest vehicle. A task is
+a generator that yields the time until which it may sleep, and is woken before that by what its vehicle sends.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.errors import GcsplanError
+from gcsplan.mavlink import wire
+from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing, SigningKey
+from gcsplan.mavlink.messages import Address, Packet
+from gcsplan.mavlink.transport import Peer, Transport, open_transport, wait_readable
+from gcsplan.mavlink.url import Endpoint, parse_url
+
+T = TypeVar("T")
+Steps = Generator[float, None, T]
+Clock = Callable[[], float]
+
+GCS = Address(255, 190)
+"""System and component id that ground stations use (MAV_COMP_ID_MISSIONPLANNER)."""
+
+_MOST_PEERS = 64
+_MOST_WAITING = 4096
+_FORGET_S = 10.0
+_IDLE_S = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """One message: who sent it (ids and address), and the pymavlink message itself."""
+
+    source: Address
+    peer: Peer
+    message: Any
+
+
+class Channel:
+    """What one system says on a link: an inbox, bounded, and a way to answer."""
+
+    def __init__(self, link: Link, sysid: int) -> None:
+        self.link = link
+        self.sysid = sysid
+        self.inbox: deque[Heard] = deque(maxlen=_MOST_WAITING)
+
+    def take(self) -> Iterable[Heard]:
+        """Everything that has come since the last time."""
+        while self.inbox:
+            yield self.inbox.popleft()
+
+    def send(self, message: Any, to: Address) -> bool:
+        """Send a pymavlink message."""
+        return self.link.send(message, to)
+
+    def send_packets(self, packets: Iterable[Packet]) -> None:
+        """Send mission messages."""
+        for packet in packets:
+            self.link.send(wire.encode(packet.message, packet.target), packet.target)
+
+
+class Link:
+    """An open link. Use it as a context manager, or `close` it.
+
+    ``us`` are our own ids; with ``key`` every frame is signed and unsigned ones are dropped; ``heartbeat_s`` is the
+    interval of our ground-station heartbeat, None for none. Raises InputError for a bad URL, LinkError if it does
+    not open.
+    """
+
+    def __init__(
+        self,
+        endpoint: Endpoint | str,
+        *,
+        us: Address = GCS,
+        key: SigningKey | None = None,
+        heartbeat_s: float | None = 1.0,
+        clock: Clock = time.monotonic,
+    ) -> None:
+        self.endpoint = parse_url(endpoint) if isinstance(endpoint, str) else endpoint
+        self.us = us
+        self.clock = clock
+        self._signing = Signing(key)
+        self._writer = FrameWriter(us, self._signing)
+        self._parsers: dict[Peer, FrameParser] = {}
+        self._heard_at: dict[Peer, float] = {}
+        self._routes: dict[Address | int, Peer] = {}
+        self._channels: dict[int, list[Channel]] = {}
+        self._heartbeat_s = heartbeat_s
+        self._next_heartbeat = clock()
+        self._bad = self._unsigned = 0
+        self.heard_systems: dict[int, float] = {}
+        self.transport: Transport = open_transport(self.endpoint)
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the socket or port."""
+        self.transport.close()
+
+    @property
+    def url(self) -> str:
+        """The link's URL in pymavlink's way."""
+        return self.endpoint.url
+
+    @property
+    def place(self) -> str:
+        """The address really used; tells the port if a free one was asked for."""
+        return self.transport.place
+
+    @property
+    def garbage(self) -> int:
+        """Frames that did not check."""
+        return self._bad + sum(parser.bad for parser in self._parsers.values())
+
+    @property
+    def unsigned(self) -> int:
+        """Frames that were dropped because their signature is missing or wrong."""
+        return self._unsigned + sum(parser.unsigned for parser in self._parsers.values())
+
+    def channel(self, sysid: int) -> Channel:
+        """A new inbox for one system id; `drop` it when done."""
+        channel = Channel(self, sysid)
+        self._channels.setdefault(sysid, []).append(channel)
+        return channel
+
+    def drop(self, channel: Channel) -> None:
+        """Forget ``channel``."""
+        mine = self._channels.get(channel.sysid, [])
+        if channel in mine:
+            mine.remove(channel)
+
+    def knows(self, to: Address) -> bool:
+        """Whether there is an address to send to."""
+        return self._peer(to) is not None
+
+    def send(self, message: Any, to: Address) -> bool:
+        """Send a pymavlink message where ``to`` was heard; False where nobody knows the way. sysid 0 is everybody."""
+        if to.sysid == 0:
+            peers = set(self._heard_at) | ({self.transport.default} - {None})
+            frame = self._writer.pack(message)
+            for each in peers:
+                self.transport.write(frame, each)
+            return bool(peers)
+        peer = self._peer(to)
+        if peer is None:
+            return False
+        self.transport.write(self._writer.pack(message), peer)
+        return True
+
+    def poll(self) -> None:
+        """Read what is there into the inboxes, and send our heartbeat if it is due."""
+        now = self.clock()
+        for peer, data in self.transport.read():
+            for message in self._parser(peer, now).feed(data, datagram=self.transport.datagrams):
+                self._route(peer, message, now)
+        self._beat(now)
+
+    @property
+    def next_heartbeat(self) -> float:
+        """When our next heartbeat is due; infinity without one."""
+        return self._next_heartbeat if self._heartbeat_s else float("inf")
+
+    def _peer(self, to: Address) -> Peer | None:
+        return self._routes.get(to) or self._routes.get(to.sysid) or self.transport.default
+
+    def _parser(self, peer: Peer, now: float) -> FrameParser:
+        parser = self._parsers.get(peer)
+        if parser is None:
+            if len(self._parsers) >= _MOST_PEERS:
+                self._forget(min(self._heard_at, key=lambda p: self._heard_at[p]))
+            parser = self._parsers[peer] = FrameParser(self._signing)
+        self._heard_at[peer] = now
+        return parser
+
+    def _forget(self, peer: Peer) -> None:
+        parser = self._parsers.pop(peer)
+        self._bad, self._unsigned = self._bad + parser.bad, self._unsigned + parser.unsigned
+        self._heard_at.pop(peer, None)
+        self._routes = {to: where for to, where in self._routes.items() if where != peer}
+
+    def _route(self, peer: Peer, message: Any, now: float) -> None:
+        source = Address(message.get_srcSystem(), message.get_srcComponent())
+        if source == self.us:
+            return  # our own voice, from a hub
+        self._routes[source] = peer
+        self._routes[source.sysid] = peer
+        self.heard_systems[source.sysid] = now
+        for channel in self._channels.get(source.sysid, ()):
+            channel.inbox.append(Heard(source, peer, message))
+
+    def _beat(self, now: float) -> None:
+        if not self._heartbeat_s or now < self._next_heartbeat:
+            return
+        self._next_heartbeat = now + self._heartbeat_s
+        for peer in [p for p, at in self._heard_at.items() if now - at > _FORGET_S]:
+            self._forget(peer)
+        gcs = dialect.MAV_TYPE_GCS
+        self.send(
+            dialect.MAVLink_heartbeat_message(gcs, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3),
+            Address(0, 0),
+        )
+
+
+class Driven(Protocol):
+    """A sans-IO machine as `drive` needs it."""
+
+    @property
+    def deadline(self) -> float | None: ...
+
+    def start(self, now: float) -> list[Packet]: ...
+
+    def receive(self, packet: Packet, now: float) -> list[Packet]: ...
+
+    def on_timer(self, now: float) -> list[Packet]: ...
+
+    def cancel(self, now: float) -> list[Packet]: ...
+
+
+def drive(
+    machine: Driven,
+    channel: Channel,
+    *,
+    watch: Callable[[Heard], None] | None = None,
+    progress: Callable[[], None] | None = None,
+) -> Steps[None]:
+    """The task that runs ``machine`` to its end; it is cancelled if the task is closed before (Ctrl-C)."""
+    clock = channel.link.clock
+    channel.send_packets(machine.start(clock()))
+    try:
+        while (deadline := machine.deadline) is not None:
+            yield deadline
+            for heard in channel.take():
+                if watch:
+                    watch(heard)
+                packet = wire.decode(heard.message)
+                if packet is not None:
+                    channel.send_packets(machine.receive(packet, clock()))
+            channel.send_packets(machine.on_timer(clock()))
+            if progress:
+                progress()
+    finally:
+        if machine.deadline is not None:
+            channel.send_packets(machine.cancel(clock()))
+
+
+class Job(Generic[T]):
+    """One task of `pump` with its result or error."""
+
+    def __init__(self, channel: Channel, steps: Steps[T]) -> None:
+        self.channel = channel
+        self.result: T | None = None
+        self.error: GcsplanError | None = None
+        self.ended = False
+        self.wake_at = float("-inf")
+        self._steps = steps
+
+    def advance(self) -> None:
+        """Run to the next pause."""
+        try:
+            self.wake_at = next(self._steps)
+        except StopIteration as stop:
+            self.result, self.ended = stop.value, True
+        except GcsplanError as error:
+            self.error, self.ended = error, True
+
+    def close(self) -> None:
+        """End it early; its machine says goodbye to the vehicle."""
+        self._steps.close()
+
+
+def pump(jobs: Sequence[Job[T]]) -> None:
+    """Run all ``jobs`` to their ends, together. Errors of gcsplan stay with their job; others end all of them."""
+    if not jobs:
+        return
+    links = list({id(job.channel.link): job.channel.link for job in jobs}.values())
+    clock = links[0].clock
+    try:
+        while True:
+            now = clock()
+            for job in jobs:
+                if not job.ended and (job.channel.inbox or now >= job.wake_at):
+                    job.advance()
+            waiting = [job.wake_at for job in jobs if not job.ended]
+            if not waiting:
+                return
+            due = min(*waiting, *(link.next_heartbeat for link in links))
+            wait_readable([link.transport for link in links], min(due - clock(), _IDLE_S))
+            for link in links:
+                link.poll()
+    finally:
+        for job in jobs:
+            job.close()
+
+
+def run(channel: Channel, steps: Steps[T]) -> T:
+    """Run one task to its end and return its result; raises what it raises."""
+    job = Job(channel, steps)
+    pump([job])
+    if job.error is not None:
+        raise job.error
+    result: T = job.result  # type: ignore[assignment]
+    return result

@@ -1,0 +1,138 @@
+"""Where a vehicle is reached: pymavlink's and MAVSDK's ways of writing it, and which direction was understood.
+
+========================================  =====================================================
+``udpin:HOST:PORT``, ``udp:…``            listens (``udp:`` listens, as in pymavlink)
+``udpout:HOST:PORT``                      sends
+``tcp:HOST:PORT``, ``tcpout:…``           connects
+``tcpin:HOST:PORT``                       waits for connections
+``/dev/ttyUSB0,57600``, ``COM3,57600``    serial port
+``serial:DEVICE:BAUD``                    serial port
+========================================  =====================================================
+
+All but the bare device names may be written with ``://``. IPv6 addresses stand in brackets.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from gcsplan.errors import InputError
+
+DEFAULT_BAUD = 57600
+FORMS = (
+    "udpin:HOST:PORT (listens; udp: is the same), udpout:HOST:PORT (sends), tcp:HOST:PORT (connects), "
+    "tcpin:HOST:PORT (waits), /dev/ttyUSB0,57600 or COM3,57600 or serial:DEVICE:BAUD; also with ://"
+)
+
+_SCHEMES: dict[str, tuple[Literal["udp", "tcp"], bool]] = {
+    "udp": ("udp", True),
+    "udpin": ("udp", True),
+    "udpout": ("udp", False),
+    "tcp": ("tcp", False),
+    "tcpout": ("tcp", False),
+    "tcpin": ("tcp", True),
+}
+_BARE_DEVICE = re.compile(r"(?P<device>/dev/[^,\s]+|(\\\\\.\\)?COM\d+)(,(?P<baud>[^,]*))?", re.IGNORECASE)
+_HERE = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
+_MOST_BAUD = 12_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """One end of a link. ``listens``: others come to us; else we go to them. ``host`` is empty for serial ports."""
+
+    kind: Literal["udp", "tcp", "serial"]
+    listens: bool
+    host: str
+    port: int
+    device: str = ""
+    baud: int = 0
+
+    @property
+    def place(self) -> str:
+        """Host and port, or device and baud rate."""
+        if self.kind == "serial":
+            return f"{self.device} at {self.baud} baud"
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+    @property
+    def url(self) -> str:
+        """Written in pymavlink's way."""
+        if self.kind == "serial":
+            return f"{self.device},{self.baud}"
+        return f"{self._scheme(self.listens)}:{self.place}"
+
+    def understood(self) -> str:
+        """One clause that says what will be done: ``udpout: sends to 127.0.0.1:14560``."""
+        if self.kind == "serial":
+            return f"serial: opens {self.place}"
+        if self.kind == "udp":
+            return f"udpin: listens on {self.place}" if self.listens else f"udpout: sends to {self.place}"
+        return f"tcpin: waits for connections on {self.place}" if self.listens else f"tcp: connects to {self.place}"
+
+    def other_direction(self) -> str:
+        """What to try if nobody answers: the same place the other way round."""
+        if self.kind == "serial":
+            return "another device or baud rate"
+        turned = self._scheme(not self.listens) + ":" + self.place
+        return f"{turned} ({'sends' if self.listens else 'listens'})" if self.kind == "udp" else turned
+
+    def _scheme(self, listens: bool) -> str:
+        return {("udp", True): "udpin", ("udp", False): "udpout", ("tcp", True): "tcpin"}.get(
+            (self.kind, listens), "tcp"
+        )
+
+
+def parse_url(text: str) -> Endpoint:
+    """Read ``text``; raises InputError that names the forms there are. Port 0 listens on any free port."""
+    given = text.strip()
+    bare = _BARE_DEVICE.fullmatch(given)
+    if bare:
+        return _serial(given, bare["device"], bare["baud"])
+    scheme, colon, rest = given.partition(":")
+    scheme = scheme.lower()
+    slashes = rest.startswith("//")
+    if scheme == "serial" and colon:
+        device, _, baud = (rest[2:] if slashes else rest).replace(",", ":").rpartition(":")
+        if not device:  # no baud rate given
+            device, baud = baud, ""
+        return _serial(given, device, baud or None)
+    if scheme not in _SCHEMES or not colon:
+        raise _wrong(given, "is not a link that we know")
+    kind, listens = _SCHEMES[scheme]
+    host, port = _host_and_port(given, rest[2:] if slashes else rest, listens)
+    if scheme == "udp" and slashes and host not in _HERE:
+        raise _wrong(given, f"may mean either direction: write udpin://{host}:{port} or udpout://{host}:{port}")
+    return Endpoint(kind, listens, host, port)
+
+
+def _host_and_port(given: str, rest: str, listens: bool) -> tuple[str, int]:
+    match = re.fullmatch(r"(\[(?P<v6>[0-9A-Fa-f:.%\w]+)\]|(?P<host>[^\[\]:/\s,]*)):(?P<port>\d{1,5})", rest)
+    if match is None and listens and re.fullmatch(r"\d{1,5}", rest):
+        match = re.fullmatch(r"(?P<v6>)(?P<host>)(?P<port>\d{1,5})", rest)
+    if match is None:
+        raise _wrong(given, "wants HOST:PORT after the colon, an IPv6 address in brackets")
+    port = int(match["port"])
+    if port > 65535 or (port == 0 and not listens):
+        raise _wrong(given, f"has port {port}; a port lies within 1 … 65535")
+    host = match["v6"] or match["host"] or ("0.0.0.0" if listens else "")
+    if not host:
+        raise _wrong(given, "sends to no host")
+    return host, port
+
+
+def _serial(given: str, device: str, baud: str | None) -> Endpoint:
+    if not device or any(c.isspace() or not c.isprintable() for c in device):
+        raise _wrong(given, "names no serial device")
+    if baud is None:
+        return Endpoint("serial", False, "", 0, device, DEFAULT_BAUD)
+    if not re.fullmatch(r"[0-9]{1,8}", baud) or not 0 < int(baud) <= _MOST_BAUD:
+        raise _wrong(given, f"has baud rate {baud!r}; a number such as 57600 or 115200 is wanted")
+    return Endpoint("serial", False, "", 0, device, int(baud))
+
+
+def _wrong(given: str, why: str) -> InputError:
+    shown = given if len(given) <= 80 else given[:77] + "…"
+    return InputError(f"link {shown!r} {why}. Known forms: {FORMS}", where="link")

@@ -1,0 +1,309 @@
+"""The only reader of the user's request: a mission file becomes vehicles, zones and a surface in metres.
+
+Every mistake is reported at once, each with file, key path, what was given and what is wanted. What stands where:
+`gcsplan.mission_schema` (keys), `gcsplan.mission_vehicles` (vehicles and limits), `gcsplan.mission_world` (points,
+terrain, zones); this module says in which order they are asked.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import Counter
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, get_args
+
+from gcsplan.errors import InputError, Problem
+from gcsplan.mission_request import AltitudeFrame, ArrivalRequest, MissionFile, PlannerRequest, VehicleRequest
+from gcsplan.mission_schema import (
+    TOP_KEYS,
+    ArrivalKeys,
+    FrameKeys,
+    LimitKeys,
+    PlannerKeys,
+    TerrainKeys,
+    VehicleKeys,
+    ZoneKeys,
+    nearest,
+    read_section,
+    shown,
+    unknown_keys,
+)  # fmt: skip
+from gcsplan.mission_stops import Stops, make_request
+from gcsplan.mission_vehicles import check_unique, make_arrival, make_vehicle
+from gcsplan.mission_world import (
+    covered,
+    make_box,
+    make_frame,
+    make_place,
+    make_spec,
+    make_zones,
+    settle_zones,
+)  # fmt: skip
+from gcsplan.strict_yaml import MAX_BYTES, read_yaml
+from gcsplan.world.frame import Frame
+from gcsplan.world.surface import Surface
+from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
+from gcsplan.world.zones import Zone
+from gcsplan.zone_draft import ZoneDraft, looks_swapped, place_zones, zones_sha256
+
+__all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
+
+TERRAIN_ERROR_M = 30.0
+"""How far a vehicle's own terrain may be shifted to fit its altitude at arming (ArduPilot's TERRAIN_OFS_MAX)."""
+
+
+def load_mission(
+    path: str | os.PathLike[str], *, text: str | None = None, planner_names: Collection[str] | None = None
+) -> MissionFile:
+    """Read and judge the mission file at ``path``; other files are found relative to it.
+
+    ``text`` stands for the file's content; ``planner_names`` for the table of planners. Raises InputError with every
+    problem that was found.
+    """
+    file = Path(path)
+    where = str(path)
+    raw = read_yaml(_text(file, where) if text is None else text, where=where)
+    if not isinstance(raw, dict):
+        raise InputError(f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}", where=where)
+    if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
+        raise InputError(f"this gcsplan reads version 1, given {shown(raw['version'])}", where=f"{where}: version")
+    return _Reading(file, where, raw, planner_names).mission()
+
+
+def _text(file: Path, where: str) -> str:
+    try:
+        if file.is_dir():
+            raise InputError("this is a folder; give a mission file (.yaml)", where=where)
+        size = file.stat().st_size
+        if size > MAX_BYTES:
+            raise InputError(f"a mission file has at most {MAX_BYTES} bytes, this one {size}", where=where)
+        return file.read_bytes().decode("utf-8-sig")
+    except InputError:
+        raise
+    except UnicodeDecodeError as why:
+        raise InputError(f"the file must be UTF-8 text, byte {why.start} is not", where=where) from None
+    except FileNotFoundError:
+        raise InputError("there is no such file", where=where) from None
+    except (OSError, ValueError) as why:
+        raise InputError(f"the file cannot be read: {why}", where=where) from None
+
+
+class _Reading:
+    """One pass over one file: the steps in order, and what has been found wrong so far."""
+
+    def __init__(self, file: Path, where: str, raw: dict[str, Any], planner_names: Collection[str] | None) -> None:
+        self.file, self.raw, self.planner_names = file, raw, planner_names
+        self.where = f"{where}: "
+        self.problems: list[Problem] = []
+        self.notes: list[str] = []
+        self.local = raw.get("frame") is not None
+
+    def mission(self) -> MissionFile:
+        raw, problems = self.raw, self.problems
+        problems += unknown_keys(raw, TOP_KEYS, self.where)
+        problems += [
+            Problem(self.where + key, "is missing" + ("; write `version: 1`" if key == "version" else ""))
+            for key in ("version", "terrain", "vehicles")
+            if raw.get(key) is None
+        ]
+        name = self._plain("name", str, self.file.stem)
+        altitude_frame: AltitudeFrame = self._choice("altitude_frame", get_args(AltitudeFrame), "relative")
+        terrain_error_m = self._terrain_error(altitude_frame)
+        frame_keys = self._section(FrameKeys, "frame")
+        terrain_keys = self._section(TerrainKeys, "terrain")
+        planner = self._planner()
+        stops = self._vehicles(terrain_keys, altitude_frame)
+        names = check_unique(self._list("vehicles"), f"{self.where}vehicles", problems)
+        arrival_keys = self._section(ArrivalKeys, "arrival")
+        arrival = make_arrival(arrival_keys, names, f"{self.where}arrival", problems)
+        drafts = self._zones()
+
+        spec = None if terrain_keys is None else make_spec(terrain_keys, self.file.parent)
+        terrain = None if spec is None else self._open(spec)
+        places = [p for s in stops for p in s.all]
+        if terrain is not None:
+            places = covered(places, terrain, problems)
+        frame: Frame | None = None
+        if places and (frame_keys is not None or not self.local):
+            frame = make_frame(places, frame_keys, problems, self.where)
+        zones: list[Zone] = []
+        requests: list[VehicleRequest] = []
+        surface: Surface | None = None
+        scale = 1.0
+        if frame is not None and terrain is not None:
+            placed, far = place_zones(drafts, frame)
+            self._far(far, frame)
+            box = make_box([p.in_plane(frame) for p in places], [z for _, z in placed], local=self.local)
+            scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
+            try:
+                surface = terrain.load(frame, box)
+            except InputError as why:
+                problems += why.problems
+            if surface is not None:
+                zones = settle_zones(placed, surface, problems)
+                good = set(places)
+                for s in stops:
+                    request = make_request(s, frame, surface, zones, good, problems)
+                    requests += [request] if request is not None else []
+        if problems or frame is None or surface is None:
+            raise InputError.of(problems)
+        info = surface.info
+        notes = info.get("notes", ())
+        self.notes += [str(n) for n in notes] if isinstance(notes, tuple) else []
+        inputs = {k: v for k, v in info.items() if k not in ("notes", "source")}
+        inputs["zones_sha256"] = zones_sha256(drafts)
+        return MissionFile(
+            name=name, path=self.file, stem=self.file.stem, frame=frame, surface=surface, zones=tuple(zones),
+            airspace_scale=scale, vehicles=tuple(requests), arrival=arrival, planner=planner,
+            altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
+            notes=tuple(dict.fromkeys(self.notes)),
+        )  # fmt: skip
+
+    # -- the plain keys ------------------------------------------------------------------------------------------
+
+    def _plain(self, key: str, kind: type[Any], default: Any) -> Any:
+        value = self.raw.get(key)
+        if value is None:
+            return default
+        if not isinstance(value, kind) or not value.strip() or len(value) > 300:
+            self.problems.append(
+                Problem(self.where + key, f"must be text, 300 characters at most, given {shown(value)}")
+            )
+            return default
+        return value
+
+    def _choice(self, key: str, choices: tuple[str, ...], default: str) -> Any:
+        value = self.raw.get(key)
+        if value is None or value in choices:
+            return value or default
+        near = nearest(value, choices) if isinstance(value, str) else ""
+        self.problems.append(
+            Problem(self.where + key, f"must be one of {', '.join(choices)}, given {shown(value)}{near}")
+        )
+        return default
+
+    def _terrain_error(self, altitude_frame: AltitudeFrame) -> float:
+        value = self.raw.get("terrain_error_m")
+        if value is None:
+            return TERRAIN_ERROR_M if altitude_frame == "terrain" else 0.0
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1000.0:
+            self.problems.append(
+                Problem(f"{self.where}terrain_error_m", f"must be a number from 0 to 1000, given {shown(value)}")
+            )
+            return TERRAIN_ERROR_M
+        if altitude_frame != "terrain":
+            self.notes.append("terrain_error_m counts with altitude_frame: terrain only")
+            return 0.0
+        return float(value)
+
+    def _section(self, kind: type[Any], key: str) -> Any:
+        value = self.raw.get(key)
+        return None if value is None else read_section(kind, value, self.where + key, self.problems)
+
+    def _list(self, key: str) -> list[Any]:
+        value = self.raw.get(key)
+        return value if isinstance(value, list) else []
+
+    # -- the sections --------------------------------------------------------------------------------------------
+
+    def _planner(self) -> PlannerRequest:
+        keys: PlannerKeys = self._section(PlannerKeys, "planner") or PlannerKeys()
+        known = self.planner_names
+        if known is None:
+            from gcsplan.planners.table import names
+
+            known = names()
+        if keys.name not in known:
+            near = nearest(keys.name, known) or f"; known are {', '.join(known)}"
+            self.problems.append(Problem(f"{self.where}planner.name", f"no planner is named {keys.name[:64]!r}{near}"))
+        plain = ("name", "objective", "seed", "gap_percent", "budget_s")
+        extras = {k: v for k, v in keys.given.items() if k not in plain and v is not None}
+        return PlannerRequest(keys.name, keys.objective, keys.seed, keys.gap_percent, keys.budget_s, extras)
+
+    def _vehicles(self, terrain: TerrainKeys | None, altitude_frame: AltitudeFrame) -> list[Stops]:
+        where = f"{self.where}vehicles"
+        value = self.raw.get("vehicles")
+        if value is not None and (not isinstance(value, list) or not value or len(value) > 255):
+            self.problems.append(Problem(where, f"must be a list of 1 to 255 vehicles, given {shown(value)}"))
+            return []
+        shared = self._section(LimitKeys, "limits") or LimitKeys()
+        # Where the shared limits are broken, a vehicle's own complaint of what it misses would be an echo.
+        broken = any(p.where.startswith(f"{self.where}limits") for p in self.problems)
+        if broken and shared.min_agl_m is None:
+            shared = LimitKeys(min_agl_m=0.0)
+        stops = []
+        for i, one in enumerate(self._list("vehicles")):
+            at = f"{where}[{i}]"
+            keys = read_section(VehicleKeys, one, at, self.problems)
+            if keys is None:
+                continue
+            obstacle_m = 0.0 if terrain is None else terrain.obstacle_height_m
+            vehicle = make_vehicle(keys, shared, at, self.problems, self.notes, local=self.local, obstacle_m=obstacle_m)
+            if altitude_frame == "terrain" and keys.autopilot == "px4":
+                self.problems.append(
+                    Problem(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")
+                )
+            start = make_place(keys.start, f"{at}.start", self.problems, local=self.local)
+            goal = make_place(keys.goal, f"{at}.goal", self.problems, local=self.local)
+            via = [make_place(p, f"{at}.via[{j}]", self.problems, local=self.local) for j, p in enumerate(keys.via)]
+            stops.append(Stops(keys, vehicle, start, goal, tuple(via)))
+        return stops
+
+    def _zones(self) -> list[ZoneDraft]:
+        where = f"{self.where}no_fly"
+        value = self.raw.get("no_fly")
+        if value is not None and not isinstance(value, list):
+            self.problems.append(Problem(where, f"must be a list of zones, given {shown(value)}"))
+        drafts: list[ZoneDraft] = []
+        inline: dict[str, int] = {}
+        for i, one in enumerate(self._list("no_fly")):
+            at = f"{where}[{i}]"
+            keys = read_section(ZoneKeys, one, at, self.problems)
+            if keys is None:
+                continue
+            if keys.name is not None and inline.setdefault(keys.name, i) != i:
+                first = inline[keys.name]
+                self.problems.append(
+                    Problem(f"{at}.name", f"{keys.name[:64]!r} is the name of no_fly[{first}] already")
+                )
+            drafts += make_zones(
+                keys, at, self.file.parent, f"no_fly[{i}]", self.problems, self.notes, local=self.local
+            )
+        # Names from other people's files may repeat; reports need them apart.
+        seen: Counter[str] = Counter()
+        for k, draft in enumerate(drafts):
+            seen[draft.name] += 1
+            if seen[draft.name] > 1:
+                drafts[k] = replace(draft, name=f"{draft.name} #{seen[draft.name]}")
+        return drafts
+
+    def _far(self, far: list[ZoneDraft], frame: Frame) -> None:
+        """Zones that lie too far away to matter: a slip in this file, but natural in a file of a whole country."""
+        left_out = 0
+        for draft in far:
+            if looks_swapped(draft, frame):
+                words = f"latitude and longitude of the zone {draft.name!r} look swapped"
+                self.problems.append(Problem(draft.where, words))
+            elif draft.where.startswith(self.where):
+                words = f"the zone {draft.name!r} lies too far from the mission to matter; is it the right place?"
+                self.problems.append(Problem(draft.where, words))
+            else:
+                left_out += 1
+        if left_out:
+            self.notes.append(f"{left_out} zone(s) of files lie too far away to matter and are left out")
+
+    def _open(self, spec: TerrainSpec) -> Terrain | None:
+        where = f"{self.where}terrain"
+        if spec.peaks and not self.local:
+            self.problems.append(
+                Problem(f"{where}.peaks", "peaks are in local metres: add `frame: {origin: [lat, lon], amsl_m: 0}`")
+            )
+            return None
+        try:
+            return open_terrain(spec, where=where)
+        except InputError as why:
+            self.problems += why.problems
+            return None

@@ -1,0 +1,143 @@
+"""Where one vehicle starts, passes and arrives, on the ground and among the zones that are really there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from gcsplan.errors import Problem
+from gcsplan.mission_request import VehicleRequest
+from gcsplan.mission_schema import VehicleKeys
+from gcsplan.mission_world import Place, zone_around
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.frame import Frame
+from gcsplan.world.surface import Surface
+from gcsplan.world.zones import Zone
+
+ON_GROUND_M = 0.5
+"""An ``up_m`` this near to the ground stands on it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stops:
+    """One vehicle's keys and places, None where they are no good."""
+
+    keys: VehicleKeys
+    vehicle: Vehicle | None
+    start: Place | None
+    goal: Place | None
+    via: tuple[Place | None, ...]
+
+    @property
+    def all(self) -> list[Place]:
+        """Those that are good so far."""
+        return [p for p in (self.start, self.goal, *self.via) if p is not None]
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """A start or goal: east, north, ground, and its height where it hangs above that."""
+
+    at: tuple[float, float, float]
+    amsl_m: float | None
+
+
+def make_request(
+    stops: Stops,
+    frame: Frame,
+    surface: Surface,
+    zones: Sequence[Zone],
+    good: Collection[Place],
+    problems: list[Problem],
+) -> VehicleRequest | None:
+    """A vehicle's request on its ground; None and ``problems`` where a place is on unknown ground or in a zone.
+
+    Only places in ``good`` are looked at: the others are in ``problems`` already.
+    """
+    before = len(problems)
+    keys, start, goal = stops.keys, None, None
+    if stops.start in good and stops.start is not None:
+        start = _end("start", stops.start, frame, surface, zones, keys.takeoff_agl_m, problems)
+    if stops.goal in good and stops.goal is not None:
+        goal = _end("goal", stops.goal, frame, surface, zones, keys.approach_agl_m, problems)
+    via = [_via(p, frame, surface, zones, problems) for p in stops.via if p is not None and p in good]
+    if len(problems) > before or stops.vehicle is None or stops.start is None or stops.goal is None:
+        return None
+    if start is None or goal is None:
+        return None
+    return VehicleRequest(
+        vehicle=stops.vehicle,
+        start=start.at,
+        goal=goal.at,
+        start_deg=stops.start.in_degrees(frame),
+        goal_deg=stops.goal.in_degrees(frame),
+        takeoff_agl_m=keys.takeoff_agl_m,
+        approach_agl_m=keys.approach_agl_m,
+        via=tuple(v for v in via if v is not None),
+        end=keys.end,
+        rtl_rel_home_m=keys.rtl_rel_home_m,
+        takeoff_heading_deg=keys.takeoff_heading_deg,
+        start_amsl_m=start.amsl_m,
+        goal_amsl_m=goal.amsl_m,
+    )
+
+
+def _ground(place: Place, frame: Frame, surface: Surface, problems: list[Problem]) -> tuple[float, float, float] | None:
+    """East, north and ground; None and a problem where the ground is unknown."""
+    east, north = place.in_plane(frame)
+    ground_m = float(surface.ground_at(east, north))
+    if math.isnan(ground_m):
+        words = "lies on a void or at the edge of the DEM, where the ground is unknown; give a DEM with data here"
+        problems.append(Problem(place.where, words))
+        return None
+    return east, north, ground_m
+
+
+def _end(
+    what: str,
+    place: Place,
+    frame: Frame,
+    surface: Surface,
+    zones: Sequence[Zone],
+    agl_m: float | None,
+    problems: list[Problem],
+) -> _End | None:
+    at = _ground(place, frame, surface, problems)
+    if at is None:
+        return None
+    east, north, ground_m = at
+    above_m = place.agl_m or 0.0
+    if place.up_m is not None:
+        above_m = frame.amsl_m + place.up_m - ground_m
+        if above_m < -ON_GROUND_M:
+            words = f"lies {-above_m:.2f} m under ground, which is at {ground_m:.2f} m AMSL"
+            problems.append(Problem(f"{place.where}.up_m", words))
+            return None
+        above_m = above_m if above_m > ON_GROUND_M else 0.0
+    if above_m > 0.0 and agl_m is not None:
+        key = "takeoff_agl_m" if what == "start" else "approach_agl_m"
+        problems.append(Problem(place.where, f"hangs {above_m:g} m above ground: leave {key} out"))
+    zone = zone_around(zones, east, north, ground_m + above_m, ground_m)
+    if zone is not None:
+        problems.append(Problem(place.where, f"the {what} lies inside the no-fly zone {zone.name!r}"))
+    return _End(at, ground_m + above_m if above_m > 0.0 else None)
+
+
+def _via(
+    place: Place, frame: Frame, surface: Surface, zones: Sequence[Zone], problems: list[Problem]
+) -> tuple[float, float, float | None] | None:
+    at = _ground(place, frame, surface, problems)
+    if at is None:
+        return None
+    east, north, ground_m = at
+    agl_m = place.agl_m if place.up_m is None else frame.amsl_m + place.up_m - ground_m
+    if agl_m is None:
+        # Any height will do, unless a zone takes all of them.
+        walls = [z for z in zones if z.floor is None and z.ceiling is None]
+        zone = zone_around(walls, east, north, ground_m, ground_m)
+    else:
+        zone = zone_around(zones, east, north, ground_m + agl_m, ground_m)
+    if zone is not None:
+        problems.append(Problem(place.where, f"lies inside the no-fly zone {zone.name!r}"))
+    return east, north, agl_m

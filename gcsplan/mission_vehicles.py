@@ -1,0 +1,169 @@
+"""Vehicles, limits and order of arrival out of the keys of a mission file: everything that needs no terrain."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import fields
+from typing import Any
+
+from gcsplan.errors import Problem
+from gcsplan.mission_request import ArrivalRequest
+from gcsplan.mission_schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest
+from gcsplan.vehicle import Autopilot, Energy, Vehicle
+from gcsplan.world.limits import Limits
+
+ERRORS = {"horizontal_clearance_m": 30.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
+"""What holds in a mission on the real Earth where the file does not say; in local metres they are 0."""
+
+PLANE_CLIMB_DEG = 15.0
+"""A fixed wing is never taken to climb at any angle."""
+
+SEPARATION_M = 30.0
+
+
+def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -> tuple[str, ...]:
+    """Find doubled names and system ids among the vehicles as written; returns the names.
+
+    Names differ by more than upper and lower case: they become file names.
+    """
+    names: dict[str, int] = {}
+    sysids: dict[int, int] = {}
+    for i, keys in enumerate(vehicles):
+        name, sysid = (keys.get("name"), keys.get("sysid")) if isinstance(keys, dict) else (None, None)
+        if isinstance(name, str):
+            first = names.setdefault(name.lower(), i)
+            if first != i:
+                problems.append(
+                    Problem(f"{where}[{i}].name", f"{name[:64]!r} is the name of vehicles[{first}] already")
+                )
+        if isinstance(sysid, int) and not isinstance(sysid, bool) and sysids.setdefault(sysid, i) != i:
+            problems.append(
+                Problem(f"{where}[{i}].sysid", f"{sysid} is the system id of vehicles[{sysids[sysid]}] already")
+            )
+    return tuple(k["name"] for k in vehicles if isinstance(k, dict) and isinstance(k.get("name"), str))
+
+
+def make_vehicle(
+    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Problem], notes: list[str],
+    *, local: bool, obstacle_m: float,
+) -> Vehicle | None:  # fmt: skip
+    """A vehicle with its limits merged: the file's, overridden by its own. None and ``problems`` where it is off.
+
+    ``obstacle_m``: obstacle height that holds everywhere, added to min AGL in what take-off must reach.
+    """
+    before = len(problems)
+    limits = _limits(keys, shared, where, problems, notes, local=local)
+    slow, fast = keys.speed_m_s
+    if slow > fast:
+        words = f"the slowest speed must not be above the fastest, given [{slow:g}, {fast:g}]"
+        problems.append(Problem(f"{where}.speed_m_s", words))
+    if keys.turn_radius_m > 0.0:
+        problems.append(
+            Problem(
+                f"{where}.turn_radius_m",
+                f"turns with a radius are not yet planned, given {keys.turn_radius_m:g}; use 0, and a track_error_m "
+                "that holds the turn radius",
+            )
+        )
+    if keys.end == "rtl" and keys.rtl_rel_home_m is None:
+        problems.append(
+            Problem(
+                f"{where}.rtl_rel_home_m",
+                "is missing: end: rtl needs the height above home that the vehicle returns at (its own parameter)",
+            )
+        )
+    if limits is not None:
+        _check_heights(keys, limits, where, problems, obstacle_m)
+    if len(problems) > before or limits is None:
+        return None
+    return Vehicle(
+        name=keys.name, sysid=keys.sysid, autopilot=Autopilot(keys.autopilot), limits=limits,
+        speed_min_m_s=slow, speed_max_m_s=fast, climb_m_s=keys.climb_m_s, descent_m_s=keys.descent_m_s,
+        turn_radius_m=keys.turn_radius_m, energy=Energy(**keys.energy.model_dump()), link=keys.link,
+    )  # fmt: skip
+
+
+def _limits(
+    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Problem], notes: list[str], *, local: bool
+) -> Limits | None:
+    names = tuple(LimitKeys.model_fields)
+    own = {k: v for k, v in keys.given.items() if k in names}
+    nested = keys.limits.given if keys.limits is not None else {}
+    for key in sorted(own.keys() & nested.keys()):
+        problems.append(Problem(f"{where}.{key}", f"stands in limits.{key} too; keep one"))
+    merged: dict[str, Any] = shared.given | nested | own
+    if merged.get("min_agl_m") is None:
+        problems.append(Problem(f"{where}.min_agl_m", "is missing; give it here or in limits"))
+        return None
+    for key, default in ERRORS.items():
+        if merged.get(key) is None:
+            merged[key] = 0.0 if local else default
+            if not local:
+                notes.append(f"{keys.name}: {key} is not given, {default:g} is taken")
+    if merged.get("max_climb_deg") is None:
+        merged["max_climb_deg"] = 90.0
+        if keys.autopilot == "arduplane":
+            merged["max_climb_deg"] = PLANE_CLIMB_DEG
+            notes.append(f"{keys.name}: max_climb_deg is not given, {PLANE_CLIMB_DEG:g} is taken for a plane")
+    if merged.get("max_descent_deg") is None:
+        merged["max_descent_deg"] = merged["max_climb_deg"]
+    return Limits(**{f.name: merged.get(f.name) for f in fields(Limits)})  # type: ignore[arg-type]
+
+
+def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list[Problem], obstacle_m: float) -> None:
+    """Room between min and max AGL, and take-off, approach and via heights within it."""
+    error_m = limits.altitude_error_m
+    low = limits.min_agl_m + error_m + obstacle_m
+    words = f"min_agl_m {limits.min_agl_m:g} + altitude_error_m {error_m:g}"
+    if obstacle_m > 0.0:
+        words += f" + obstacle_height_m {obstacle_m:g}"
+    high = float("inf")
+    if limits.max_agl_m is not None:
+        high = limits.max_agl_m - error_m
+        if limits.min_agl_m > limits.max_agl_m:
+            message = f"min_agl_m must not be above max_agl_m, given {limits.min_agl_m:g} and {limits.max_agl_m:g}"
+            problems.append(Problem(f"{where}.min_agl_m", message))
+            return
+        if low > high + 1e-9:
+            problems.append(
+                Problem(
+                    f"{where}.max_agl_m",
+                    f"leaves no room: {words} is above max_agl_m {limits.max_agl_m:g} - altitude_error_m {error_m:g}",
+                )
+            )
+            return
+    wanted = [("takeoff_agl_m", keys.takeoff_agl_m), ("approach_agl_m", keys.approach_agl_m)]
+    for i, point in enumerate(keys.via):
+        agl_m = (point[2] if len(point) > 2 else None) if isinstance(point, list) else point.agl_m
+        wanted.append((f"via[{i}]", agl_m))
+    for key, agl_m in wanted:
+        if agl_m is None:
+            continue
+        if agl_m < low - 1e-9:
+            problems.append(Problem(f"{where}.{key}", f"must be at least {low:g} m AGL ({words}), given {agl_m:g}"))
+        elif agl_m > high + 1e-9:
+            most = f"must be at most {high:g} m AGL (max_agl_m - altitude_error_m), given {agl_m:g}"
+            problems.append(Problem(f"{where}.{key}", most))
+
+
+def make_arrival(
+    keys: ArrivalKeys | None, names: Collection[str], where: str, problems: list[Problem]
+) -> ArrivalRequest | None:
+    """The order of arrival; ``names`` are the vehicles' as written."""
+    if keys is None:
+        return None
+    order = list(names) if keys.order is None else keys.order
+    for i, name in enumerate(order):
+        if name not in names:
+            problems.append(Problem(f"{where}.order[{i}]", f"no vehicle is named {name[:64]!r}{nearest(name, names)}"))
+        elif name in order[:i]:
+            problems.append(Problem(f"{where}.order[{i}]", f"{name!r} stands twice"))
+    missing = [n for n in names if n not in order]
+    if missing:
+        problems.append(Problem(f"{where}.order", f"must name every vehicle, missing: {', '.join(missing)[:200]}"))
+    if keys.mode == "sequence" and keys.interval_s is None:
+        problems.append(Problem(f"{where}.interval_s", "is missing: seconds between one arrival and the next"))
+    return ArrivalRequest(
+        keys.mode, tuple(order), keys.interval_s or 0.0,
+        SEPARATION_M if keys.separation_m is None else keys.separation_m,
+    )  # fmt: skip

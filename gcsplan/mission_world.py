@@ -1,0 +1,291 @@
+"""Where a mission takes place: its points, plane, piece of terrain, and zones, judged against each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from gcsplan.errors import InputError, Problem
+from gcsplan.mission_schema import FrameKeys, LocalPoint, TerrainKeys, ZoneKeys
+from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
+from gcsplan.world.peaks import Peak
+from gcsplan.world.surface import Surface
+from gcsplan.world.terrain import Terrain, TerrainSpec
+from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.zone_draft import Bounds, ZoneDraft, check_degrees, circle, polygon
+from gcsplan.zone_files import read_zones
+
+Floats = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+
+MARGIN_M, MARGIN_PART, MARGIN_MOST_M = 3000.0, 1.0, 25_000.0
+"""Room for detours around a mission's points: metres, or this part of their extent if that is more."""
+
+LOCAL_MARGIN_M, LOCAL_MARGIN_PART = 50.0, 0.5
+
+_MANY_NODES = 250_000
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A point as it was written: degrees, or metres of the local frame with a height above its zero or ground."""
+
+    where: str
+    degrees: tuple[float, float] | None = None
+    metres: tuple[float, float] | None = None
+    up_m: float | None = None
+    agl_m: float | None = None
+
+    def in_plane(self, frame: Frame) -> tuple[float, float]:
+        """East and north, metres."""
+        if self.metres is not None:
+            return self.metres
+        assert self.degrees is not None
+        east, north = frame.to_plane(*self.degrees)
+        return float(east), float(north)
+
+    def in_degrees(self, frame: Frame) -> tuple[float, float]:
+        """Latitude and longitude; as they were written, where they were."""
+        if self.degrees is not None:
+            return self.degrees
+        assert self.metres is not None
+        lat, lon = frame.to_degrees(*self.metres)
+        return float(lat), float(lon)
+
+
+def make_place(point: list[float] | LocalPoint, where: str, problems: list[Problem], *, local: bool) -> Place | None:
+    """A point of the file; None and ``problems`` where it cannot be a place."""
+    if isinstance(point, LocalPoint):
+        if not local:
+            problems.append(Problem(where, "local metres need `frame: {origin: [lat, lon], amsl_m: …}` in the mission"))
+            return None
+        return Place(where, None, (point.east_m, point.north_m), point.up_m, point.agl_m)
+    degrees = (point[0], point[1])
+    if not check_degrees(degrees, where, problems):
+        return None
+    return Place(where, degrees, agl_m=point[2] if len(point) > 2 else None)
+
+
+def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
+    """The terrain as `gcsplan.world.terrain` takes it; paths are made relative to the mission file's folder."""
+    dem = () if keys.dem is None else (keys.dem,) if isinstance(keys.dem, str) else tuple(keys.dem)
+    return TerrainSpec(
+        dem=tuple(d if d.startswith("sample:") else str(folder / d) for d in dem),
+        vertical_datum=keys.vertical_datum,
+        geoid_grid=None if keys.geoid_grid is None else str(folder / keys.geoid_grid),
+        crs=keys.crs,
+        height_unit=keys.height_unit,
+        flat_m=keys.flat_m,
+        peaks=tuple(Peak(p.center[0], p.center[1], p.height_m, p.decay_m[0], p.decay_m[1]) for p in keys.peaks or ()),
+        obstacle_height_m=keys.obstacle_height_m,
+        canopy=None if keys.canopy is None else str(folder / keys.canopy),
+        canopy_nodata_m=keys.canopy_nodata_m,
+    )
+
+
+def covered(places: Sequence[Place], terrain: Terrain, problems: list[Problem]) -> list[Place]:
+    """The places that the DEM holds; the others go to ``problems``, with a guess at swapped numbers."""
+    good = []
+    for place in places:
+        if place.degrees is None or terrain.covers(*place.degrees):
+            good.append(place)
+            continue
+        lat, lon = place.degrees
+        if abs(lon) <= 90.0 and terrain.covers(lon, lat):
+            message = f"latitude and longitude look swapped: the DEM holds [{lon:g}, {lat:g}], not [{lat:g}, {lon:g}]"
+        else:
+            message = f"{lat:g}, {lon:g} lies outside the DEM, where the ground is unknown; add the tile of this place"
+        problems.append(Problem(place.where, message))
+    return good
+
+
+def make_frame(places: Sequence[Place], keys: FrameKeys | None, problems: list[Problem], where: str) -> Frame | None:
+    """The mission's plane; None and ``problems`` where the points are too far apart for one."""
+    try:
+        if keys is not None:
+            frame = Frame(keys.origin[0], keys.origin[1], keys.amsl_m)
+        else:
+            points = np.array([p.degrees for p in places if p.degrees is not None])
+            frame = Frame(*centre_of(points[:, 0], points[:, 1]))
+    except InputError as why:
+        problems.append(Problem(f"{where}frame.origin" if keys is not None else places[0].where, why.message))
+        return None
+    away = [(math.hypot(*p.in_plane(frame)), p) for p in places]
+    if all(d <= FARTHEST_M for d, _ in away):
+        return frame
+    distance, place = max(away, key=lambda x: math.inf if math.isnan(x[0]) else x[0])
+    what = "from the frame's origin" if keys is not None else "from the middle of the mission's points"
+    far = f"lies {distance / 1000:.0f} km" if math.isfinite(distance) else "lies too far"
+    problems.append(Problem(place.where, f"{far} {what}, more than {FARTHEST_M / 1000:.0f} km; is it the right place?"))
+    return None
+
+
+def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, local: bool) -> Box:
+    """The piece of the plane that a planner may need: the points with room for detours, and around near zones."""
+    p = np.asarray(points, float)
+    low, high = p.min(axis=0), p.max(axis=0)
+    least, part = (LOCAL_MARGIN_M, LOCAL_MARGIN_PART) if local else (MARGIN_M, MARGIN_PART)
+    extent = float((high - low).max())
+    # A way round a ridge may be as long as the mission itself: the map's border must not be what forbids it.
+    margin = max(least, min(part * extent, MARGIN_MOST_M), 0.25 * extent)
+    box = np.array([*(low - margin), *(high + margin)])
+    grown = box.copy()
+    for zone in zones:
+        west, south, east, north = zone.bounds
+        if west < box[2] and east > box[0] and south < box[3] and north > box[1]:
+            grown[:2] = np.minimum(grown[:2], (west - least, south - least))
+            grown[2:] = np.maximum(grown[2:], (east + least, north + least))
+    # A zone as large as a country must not load a country's DEM.
+    grown[:2] = np.maximum(grown[:2], low - 3.0 * margin)
+    grown[2:] = np.minimum(grown[2:], high + 3.0 * margin)
+    return float(grown[0]), float(grown[1]), float(grown[2]), float(grown[3])
+
+
+def make_zones(
+    keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[str], *, local: bool
+) -> list[ZoneDraft]:
+    """The zones of one entry of ``no_fly``: one, or all of a file's."""
+    kinds = [k for k in ("center", "polygon", "file") if getattr(keys, k) is not None]
+    if len(kinds) != 1:
+        given = " and ".join(kinds) or "none"
+        problems.append(Problem(where, f"give one of center (with radius_m), polygon and file, given {given}"))
+        return []
+    if keys.file is not None:
+        others = sorted(keys.given.keys() - {"file"})
+        problems += [Problem(f"{where}.{k}", "stands in the file itself, in a feature's properties") for k in others]
+        try:
+            found = read_zones(folder / keys.file, where=f"{where}.file")
+        except InputError as why:
+            problems += why.problems
+            return []
+        problems += found.problems
+        notes += found.notes
+        return found.zones
+    name = keys.name or fallback
+    bounds = Bounds(keys.floor_agl_m, keys.ceiling_agl_m, keys.floor_amsl_m, keys.ceiling_amsl_m)
+    before = len(problems)
+    points = [keys.center] if keys.center is not None else keys.polygon or []
+    at = [f"{where}.center"] if keys.center is not None else [f"{where}.polygon[{i}]" for i in range(len(points))]
+    places = [make_place(p, a, problems, local=local) for p, a in zip(points, at, strict=True)]
+    if len({isinstance(p, LocalPoint) for p in points}) > 1:
+        problems.append(Problem(f"{where}.polygon", "give all corners in degrees, or all in local metres"))
+    if keys.radius_m is None and keys.center is not None:
+        problems.append(Problem(f"{where}.radius_m", "is missing"))
+    if keys.radius_m is not None and keys.polygon is not None:
+        problems.append(Problem(f"{where}.radius_m", "belongs to a center, not to a polygon"))
+    if len(problems) > before:
+        return []
+    flat = [p.degrees or p.metres or (0.0, 0.0) for p in places if p is not None]
+    in_metres = isinstance(points[0], LocalPoint) if points else local
+    if keys.center is not None and keys.radius_m is not None:
+        draft = circle(name, where, flat[0], keys.radius_m, bounds, problems, local=in_metres)
+    else:
+        draft = polygon(name, where, flat, bounds, problems, local=in_metres)
+    return [draft] if draft is not None else []
+
+
+def settle_zones(placed: Sequence[tuple[ZoneDraft, Zone]], surface: Surface, problems: list[Problem]) -> list[Zone]:
+    """Zones with what the ground decides: one wholly under it goes to ``problems``, a floor that is nowhere above it
+    is no floor (nothing passes below the zone)."""
+    zones = []
+    for draft, zone in placed:
+        floor, ceiling = zone.floor, zone.ceiling
+        amsl = [level for level in (floor, ceiling) if level is not None and level.datum == "amsl"]
+        ground = _ground_under(zone, surface) if amsl else None
+        if ground is not None:
+            low, high = ground
+            if ceiling is not None and ceiling.datum == "amsl" and ceiling.value_m <= low:
+                problems.append(
+                    Problem(
+                        f"{draft.where}.ceiling_amsl_m",
+                        f"the zone {draft.name!r} lies wholly under ground: its ceiling is at {ceiling.value_m:g} m "
+                        f"AMSL, the lowest ground in it at {low:.1f} m",
+                    )
+                )
+            elif (bottom := _crossed(floor, ceiling, low, high)) is not None:
+                problems.append(
+                    Problem(
+                        draft.where,
+                        f"the floor of the zone {draft.name!r} is nowhere below its ceiling (at best {bottom:.1f} m "
+                        "above it)",
+                    )
+                )
+            if floor is not None and floor.datum == "amsl" and floor.value_m <= low:
+                zone = replace(zone, floor=None)
+        zones.append(zone)
+    return zones
+
+
+def zone_around(zones: Sequence[Zone], east_m: float, north_m: float, amsl_m: float, ground_m: float) -> Zone | None:
+    """The first zone with the point strictly inside; touching is outside."""
+    for zone in zones:
+        west, south, east, north = zone.bounds
+        if not (west < east_m < east and south < north_m < north):
+            continue
+        shape = zone.shape
+        if isinstance(shape, Circle):
+            inside = math.hypot(east_m - shape.east_m, north_m - shape.north_m) < shape.radius_m
+        else:
+            inside = bool(shapely.Polygon(shape.vertices).contains(shapely.Point(east_m, north_m)))
+        if (
+            inside
+            and (zone.floor is None or _amsl(zone.floor, ground_m) < amsl_m)
+            and (zone.ceiling is None or amsl_m < _amsl(zone.ceiling, ground_m))
+        ):
+            return zone
+    return None
+
+
+def _amsl(level: Level, ground_m: float) -> float:
+    return level.value_m + (ground_m if level.datum == "agl" else 0.0)
+
+
+def _crossed(floor: Level | None, ceiling: Level | None, low: float, high: float) -> float | None:
+    """How far a floor of one datum is above a ceiling of the other everywhere; None where it is not."""
+    if floor is None or ceiling is None or floor.datum == ceiling.datum:
+        return None
+    gap = floor.value_m - ceiling.value_m + (low if floor.datum == "agl" else -high)
+    return gap if gap >= 0.0 else None
+
+
+def _ground_under(zone: Zone, surface: Surface) -> tuple[float, float] | None:
+    """Lowest and highest known ground within a zone's outline; None where none is known.
+
+    A bilinear surface has its extremes over a region on its nodes inside and on the region's border.
+    """
+    shape = zone.shape
+    west, south, east, north = zone.bounds
+    if isinstance(shape, Circle):
+        turn = np.linspace(0.0, 2.0 * math.pi, 257)
+        border = np.stack(
+            [shape.east_m + shape.radius_m * np.cos(turn), shape.north_m + shape.radius_m * np.sin(turn)], axis=-1
+        )
+    else:
+        ring, following = shape.vertices, np.roll(shape.vertices, -1, axis=0)
+        pieces = max(1, 512 // len(ring))
+        f = (np.arange(pieces) / pieces)[:, None, None]
+        border = (ring + f * (following - ring)).reshape(-1, 2)
+    at = surface.grid([west, east, east, west], [south, south, north, north])
+    rows, cols = surface.ground_m.shape
+    c0, r0 = np.maximum(np.floor(at.min(axis=0)).astype(int), 0)
+    c1, r1 = np.minimum(np.ceil(at.max(axis=0)).astype(int) + 1, (cols, rows))
+    heights = surface.ground_at(border[:, 0], border[:, 1])
+    if c1 > c0 and r1 > r0:
+        block = surface.ground_m[r0:r1, c0:c1]
+        if block.size <= _MANY_NODES:
+            plane = surface.grid.to_plane(*np.meshgrid(np.arange(c0, c1), np.arange(r0, r1)))
+            if isinstance(shape, Circle):
+                inside = np.hypot(plane[..., 0] - shape.east_m, plane[..., 1] - shape.north_m) < shape.radius_m
+            else:
+                inside = shapely.contains_xy(shapely.Polygon(shape.vertices), plane[..., 0], plane[..., 1])
+            block = block[inside]
+        # Beyond that the whole rectangle is taken: its extremes enclose the true ones, so nothing is refused wrongly.
+        heights = np.concatenate([heights, block.ravel()])
+    heights = heights[np.isfinite(heights)]
+    return (float(heights.min()), float(heights.max())) if heights.size else None

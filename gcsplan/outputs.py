@@ -1,0 +1,156 @@
+"""What `plan` writes: every file of a plan as text, from one plan alone, the same bytes for the same plan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from gcsplan import __version__
+from gcsplan.check.verdict import LegFigures, Verdict
+from gcsplan.delivery import Delivery
+from gcsplan.export.geojson import write_geojson
+from gcsplan.export.kml import write_kml
+from gcsplan.export.profile import write_profile
+from gcsplan.export.rows import ItemRow, Track
+from gcsplan.export.summary import write_summary
+from gcsplan.mavlink.compare import command_name
+from gcsplan.mavlink.files import write_plan, write_waypoints
+from gcsplan.pipeline import Plan, VehiclePlan
+
+
+def outputs_of(plan: Plan) -> dict[str, str]:
+    """File name to text, of all that INTERFACE's ``plan -o DIR`` names but the report and the upload."""
+    tracks = [_track(v) for v in plan.vehicles]
+    frame, zones = plan.world.frame, plan.world.airspace.zones
+    files = {}
+    for v in plan.vehicles:
+        files[f"{v.name}.waypoints"] = write_waypoints(v.mission)
+        files[f"{v.name}.plan"] = write_plan(v.mission, vehicle=v.request.vehicle)
+    files["mission.kml"] = write_kml(plan.source.name, tracks, zones, frame)
+    files["mission.geojson"] = write_geojson(plan.source.name, tracks, zones, frame)
+    files["profile.csv"] = write_profile([row for v in plan.vehicles for row in item_rows(v.name, v.verdict)])
+    files["summary.json"] = write_summary(summary_of(plan))
+    return files
+
+
+def upload_text(plan: Plan, deliveries: Sequence[Delivery]) -> str:
+    """``upload.json``: the summary with the clock readings and each vehicle's upload."""
+    return write_summary(summary_of(plan, deliveries), clocks=True)
+
+
+def summary_of(plan: Plan, deliveries: Sequence[Delivery] = ()) -> dict[str, Any]:
+    """The summary of INTERFACE.md as plain values, clock readings included."""
+    uploads = {d.vehicle: d for d in deliveries}
+    arrival = plan.source.arrival
+    return {
+        "name": plan.source.name,
+        "gcsplan": __version__,
+        "planner": plan.planner,
+        "objective": plan.objective,
+        "seed": plan.seed,
+        "inputs": dict(plan.source.inputs),
+        "vehicles": [_vehicle(v, uploads.get(v.name)) for v in plan.vehicles],
+        "fleet": {
+            "mode": arrival.mode if arrival else "none",
+            "order": list(arrival.order) if arrival else [],
+            "min_separation_m": None,
+            "closest": None,
+        },
+        "notes": list(dict.fromkeys(plan.notes)),
+    }
+
+
+def _vehicle(v: VehiclePlan, delivery: Delivery | None) -> dict[str, Any]:
+    verdict = v.verdict
+    lowest, nearest = verdict.lowest, verdict.nearest
+    length = v.problem.objective == "length"
+    bound = v.solution.lower_bound
+    return {
+        "name": v.name,
+        "items": len(v.mission.wire_items()),
+        "length_m": verdict.length_m,
+        "lower_bound_m": bound if length else None,
+        "gap_percent": v.gap_percent,
+        "energy_j": verdict.path_energy_j,
+        "lower_bound_j": None if length else bound,
+        "flight_energy_j": verdict.energy_j,
+        "battery_used_percent": verdict.battery_used_percent,
+        "min_agl_m": lowest.min_agl_m if lowest else None,
+        "min_agl_at": {"leg": lowest.seq, "lat": lowest.min_agl_at[0], "lon": lowest.min_agl_at[1]} if lowest else None,
+        "min_zone_clearance_m": nearest.zone_clearance_m if nearest else None,
+        "nearest_zone": nearest.nearest_zone if nearest else None,
+        "max_climb_deg": verdict.max_climb_deg,
+        "speed_m_s": v.speed_m_s,
+        "depart_s": 0.0,
+        "arrive_s": verdict.arrive_s,
+        "planning_s": v.solution.planning_s,
+        "first_path_s": v.solution.first_path_s,
+        "stopped_by": v.solution.stopped_by,
+        "safe": verdict.safe,
+        "not_judged": list(verdict.not_judged),
+        "notes": list(dict.fromkeys((*v.notes, *v.solution.notes, *verdict.notes))),
+        "upload": delivery.as_dict() if delivery else None,
+    }
+
+
+def verdict_of(name: str, verdict: Verdict) -> dict[str, Any]:
+    """A verdict as plain values, for ``check --json``."""
+    lowest, nearest = verdict.lowest, verdict.nearest
+    return {
+        "file": name,
+        "vehicle": verdict.mission.name,
+        "safe": verdict.safe,
+        "items": len(verdict.mission.wire_items()),
+        "length_m": verdict.length_m,
+        "energy_j": verdict.energy_j,
+        "battery_used_percent": verdict.battery_used_percent,
+        "min_agl_m": lowest.min_agl_m if lowest else None,
+        "min_zone_clearance_m": nearest.zone_clearance_m if nearest else None,
+        "nearest_zone": nearest.nearest_zone if nearest else None,
+        "max_climb_deg": verdict.max_climb_deg,
+        "violations": [asdict(f) for f in verdict.findings],
+        "not_judged": list(verdict.not_judged),
+        "notes": list(verdict.notes),
+    }
+
+
+def item_rows(vehicle: str, verdict: Verdict) -> list[ItemRow]:
+    """A row for each wire item; the figures of all stretches that are flown for it."""
+    flown: dict[int, list[LegFigures]] = {}
+    for leg in verdict.legs:
+        flown.setdefault(leg.seq, []).append(leg)
+    home = verdict.legs[0].start if verdict.legs else None
+    rows, spent_j, clock_s = [], 0.0, 0.0
+    for seq, item in enumerate(verdict.mission.wire_items()):
+        name = command_name(item.command)
+        legs = flown.get(seq)
+        if not legs:
+            at_home = seq == 0 and verdict.mission.first_seq == 1 and home is not None
+            place = home if at_home and home else (None, None, None)
+            rows.append(ItemRow(vehicle, seq, name, place[0], place[1], place[2], 0.0 if at_home else None))
+            continue
+        energy_j = math.fsum(leg.energy_j for leg in legs)
+        spent_j += energy_j
+        clock_s += math.fsum(leg.time_s for leg in legs)
+        low = [leg.min_agl_m for leg in legs if not leg.column and not math.isnan(leg.min_agl_m)]
+        steep = max((leg.climb_deg for leg in legs), key=abs)
+        lat, lon, amsl = legs[-1].end
+        rows.append(
+            ItemRow(
+                vehicle, seq, name, lat, lon, amsl, legs[-1].agl_end_m, min(low) if low else None,
+                math.fsum(leg.length_m for leg in legs), steep, energy_j, spent_j, clock_s,
+            )
+        )  # fmt: skip
+    return rows
+
+
+def _track(v: VehiclePlan) -> Track:
+    legs = v.verdict.legs
+    places = np.array([legs[0].start, *(leg.end for leg in legs)])
+    commands = {seq: command_name(item.command) for seq, item in enumerate(v.mission.wire_items())}
+    labels = ("home", *(f"{leg.seq} {commands.get(leg.seq, '')}".strip() for leg in legs))
+    return Track(v.name, places[:, 0], places[:, 1], places[:, 2], labels)

@@ -1,0 +1,273 @@
+"""The world as a search sees it: a square lattice of nodes with floors, ceilings and zones on its edges.
+
+Floors and ceilings are those of `Airspace` on a lattice of half the spacing, so that every edge knows its ends
+and its middle; zones are tested against the whole line of an edge. A guide, never a judge: what comes out of a
+search is tested exactly along its line, and `Lattice.raise_floor` and `Lattice.widen_zone` tell the next search
+what the exact test knew better.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gcsplan.planners.problem import Problem
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.zones import Circle, Level, Zone
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+STEPS = np.array([(1, 0), (0, 1), (1, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1)], dtype=np.int64)
+"""Half of the 16 directions; edge ``node * 8 + k`` goes from ``node`` by ``STEPS[k]``."""
+
+SEEMS_M = 2.0
+"""Between samples a floor may be lower than a bilinear reading by about this."""
+
+LINK_DOORS = 9
+"""Places at which an edge between a terminal and a node is looked at."""
+
+
+@dataclass(eq=False, slots=True)
+class Lattice:
+    """Node (i, j) lies at (west_m + i·step_m, south_m + j·step_m) and has the number ``j·nx + i``.
+
+    ``floor_m``, ``ceiling_m`` (2·ny − 1, 2·nx − 1): AMSL on the half lattice. Bands (altitudes that a zone forbids
+    on an edge, from ``band_low`` to ``band_high``) of edge e stand at ``band_at[e] : band_at[e + 1]``, low first.
+    """
+
+    west_m: float
+    south_m: float
+    step_m: float
+    nx: int
+    ny: int
+    floor_m: Floats
+    ceiling_m: Floats
+    band_at: Ints
+    band_low: Floats
+    band_high: Floats
+    band_zone: Ints
+    reach_m: float
+
+    def seems_open(self, a: Floats, b: Floats) -> bool:
+        """False where the samples show that the straight line from ``a`` to ``b`` has no room under its ceiling.
+
+        Saves exact tests; what seems open may still be shut, and a line that is called shut only costs quality.
+        """
+        half = 0.5 * self.step_m
+        x, y = (a[0] - self.west_m) / half, (a[1] - self.south_m) / half
+        return bool(
+            _seems_open(self.floor_m, self.ceiling_m, x, y, (b[0] - self.west_m) / half, (b[1] - self.south_m) / half)
+        )
+
+    def node_places(self, nodes: Ints) -> Floats:
+        """(K, 2) places of nodes."""
+        j, i = np.divmod(nodes, self.nx)
+        return np.stack([self.west_m + i * self.step_m, self.south_m + j * self.step_m], axis=-1)
+
+    def widen_zone(self, zone: int, by_m: float) -> None:
+        """Widen what a zone forbids by ``by_m`` up and down; ``inf`` closes it."""
+        of = self.band_zone == zone
+        self.band_low[of] -= by_m
+        self.band_high[of] += by_m
+
+    def raise_floor(self, place: Floats, by_m: float) -> None:
+        """Raise the floor by ``by_m`` around a place, where the exact test found less room than the samples did."""
+        half = 0.5 * self.step_m
+        i, j = round((place[0] - self.west_m) / half), round((place[1] - self.south_m) / half)
+        self.floor_m[max(j - 1, 0) : max(j + 2, 0), max(i - 1, 0) : max(i + 2, 0)] += by_m
+
+
+@njit(cache=True)
+def _seems_open(floor: Floats, ceiling: Floats, x0: float, y0: float, x1: float, y1: float) -> bool:
+    n = int(max(abs(x1 - x0), abs(y1 - y0))) + 1
+    rows, cols = floor.shape
+    for k in range(n + 1):
+        x, y = x0 + (x1 - x0) * k / n, y0 + (y1 - y0) * k / n
+        i, j = int(x), int(y)
+        if i < 0 or j < 0 or i >= cols - 1 or j >= rows - 1:
+            continue  # not on the lattice: nothing is known
+        u, v = x - i, y - j
+        low = (1 - v) * ((1 - u) * floor[j, i] + u * floor[j, i + 1])
+        low += v * ((1 - u) * floor[j + 1, i] + u * floor[j + 1, i + 1])
+        high = (1 - v) * ((1 - u) * ceiling[j, i] + u * ceiling[j, i + 1])
+        high += v * ((1 - u) * ceiling[j + 1, i] + u * ceiling[j + 1, i + 1])
+        if low > high + SEEMS_M:
+            return False
+    return True
+
+
+def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_m: float, detour: float) -> Lattice:
+    """A lattice over ``box`` (west, south, east, north), of places whose detour from end to end is in bounds.
+
+    A place where (way from a terminal to it and on to the next) is longer than ``detour`` times the straight way is
+    left out for every pair of neighbouring terminals; ``inf`` keeps the whole box.
+    """
+    west, south, east, north = box
+    nx = max(2, math.ceil((east - west) / step_m) + 1)
+    ny = max(2, math.ceil((north - south) / step_m) + 1)
+    half = 0.5 * step_m
+    x: Floats = west + half * np.arange(2 * nx - 1, dtype=np.float64)
+    y: Floats = south + half * np.arange(2 * ny - 1, dtype=np.float64)
+    wanted = _within_detour(problem, x, y, detour, 2.0 * step_m)
+    shape = (len(y), len(x))
+    floor = np.full(shape, np.inf)
+    ceiling = np.full(shape, -np.inf)
+    jj, ii = np.nonzero(wanted)
+    air, limits = problem.airspace, problem.limits
+    floor[jj, ii] = air.floor_amsl(x[ii], y[jj], limits)
+    ceiling[jj, ii] = air.ceiling_amsl(x[ii], y[jj], limits)
+    reach = (limits.horizontal_clearance_m + limits.track_error_m) * air.scale
+    edges, lows, highs, zones = _edge_bands(air, limits, reach, west, south, step_m, nx, ny)
+    at = np.zeros(nx * ny * 8 + 1, np.int64)
+    np.cumsum(np.bincount(edges, minlength=nx * ny * 8), out=at[1:])
+    return Lattice(west, south, step_m, nx, ny, floor, ceiling, at, lows, highs, zones, reach)
+
+
+def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_m: float) -> NDArray[np.bool_]:
+    if math.isinf(detour):
+        return np.ones((len(y), len(x)), bool)
+    stops = terminals(problem)
+    out = np.zeros((len(y), len(x)), bool)
+    for a, b in pairwise(stops):
+        to = np.hypot(x[None, :] - a[0], y[:, None] - a[1]) + np.hypot(x[None, :] - b[0], y[:, None] - b[1])
+        out |= to <= detour * math.hypot(b[0] - a[0], b[1] - a[1]) + 2.0 * slack_m
+    return out
+
+
+def terminals(problem: Problem) -> list[tuple[float, float]]:
+    """Start, every via, goal: (east_m, north_m)."""
+    return [problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]]
+
+
+def _edge_bands(
+    air: Airspace, limits: Limits, reach: float, west: float, south: float, step: float, nx: int, ny: int
+) -> tuple[Ints, Floats, Floats, Ints]:
+    """Every (edge, low, high, zone) of every zone, by edge and then by low."""
+    edges, lows, highs, zones = [], [], [], []
+    for number, zone in enumerate(air.zones):
+        w, s, e, n = zone.bounds
+        far = reach + 2.0 * step
+        i0, i1 = max(0, math.floor((w - far - west) / step)), min(nx - 1, math.ceil((e + far - west) / step))
+        j0, j1 = max(0, math.floor((s - far - south) / step)), min(ny - 1, math.ceil((n + far - south) / step))
+        if i0 > i1 or j0 > j1:
+            continue
+        k, j, i = (a.ravel() for a in np.mgrid[0 : len(STEPS), j0 : j1 + 1, i0 : i1 + 1])
+        ends_i, ends_j = i + STEPS[k, 0], j + STEPS[k, 1]
+        inside = (ends_i >= 0) & (ends_i < nx) & (ends_j < ny)
+        a = np.stack([west + i * step, south + j * step], axis=-1)
+        b = np.stack([west + ends_i * step, south + ends_j * step], axis=-1)
+        hit = np.flatnonzero(inside & near_zone(a, b, zone, reach, air.scale))
+        if len(hit):
+            low, high = zone_levels(air, limits, zone, a[hit], b[hit])
+            edges.append((j[hit] * nx + i[hit]) * 8 + k[hit])
+            lows.append(low)
+            highs.append(high)
+            zones.append(np.full(len(hit), number))
+    if not edges:
+        return np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0, np.int64)
+    edge, low, high = np.concatenate(edges), np.concatenate(lows), np.concatenate(highs)
+    order = np.lexsort((low, edge))
+    return edge[order], low[order], high[order], np.concatenate(zones)[order]
+
+
+def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) -> NDArray[np.bool_]:
+    """(K,) True where a segment ``a``–``b`` (K, 2) comes within ``reach_m`` of a zone's shape in the plane.
+
+    A circle's radius is in real metres, ``scale`` metres of the plane each at most.
+    """
+    shape = zone.shape
+    if isinstance(shape, Circle):
+        centre = np.array([shape.east_m, shape.north_m])
+        d = b - a
+        t = np.clip(((centre - a) * d).sum(-1) / np.maximum((d * d).sum(-1), 1e-300), 0.0, 1.0)
+        off = a + t[:, None] * d - centre
+        return np.asarray(np.hypot(off[:, 0], off[:, 1]) < shape.radius_m * scale + reach_m)
+    import shapely  # most missions have no polygons
+
+    polygon = shapely.Polygon(shape.vertices)
+    shapely.prepare(polygon)
+    return np.asarray(shapely.dwithin(polygon, shapely.linestrings(np.stack([a, b], axis=1)), reach_m))
+
+
+def zone_levels(air: Airspace, limits: Limits, zone: Zone, a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """(K,) lowest and highest altitude that ``zone`` forbids over each segment ``a``–``b``, errors added."""
+    low, high = np.full(len(a), -np.inf), np.full(len(a), np.inf)
+    ground: Floats | None = None
+    if any(isinstance(x, Level) and x.datum == "agl" for x in (zone.floor, zone.ceiling)):
+        f = np.linspace(0.0, 1.0, 5)[:, None, None]
+        at = a + f * (b - a)
+        ground = air.surface.ground_at(at[..., 0], at[..., 1])
+    under: float | Floats
+    if zone.floor is not None:
+        under = 0.0 if zone.floor.datum == "amsl" or ground is None else _known(ground, -np.inf).min(axis=0)
+        low = np.broadcast_to(under + zone.floor.value_m, low.shape) - limits.altitude_error_m
+    if zone.ceiling is not None:
+        under = 0.0 if zone.ceiling.datum == "amsl" or ground is None else _known(ground, np.inf).max(axis=0)
+        high = np.broadcast_to(under + zone.ceiling.value_m, high.shape) + limits.altitude_error_m
+    return np.asarray(low), np.asarray(high)
+
+
+def _known(ground: Floats, unknown: float) -> Floats:
+    return np.where(np.isnan(ground), unknown, ground)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Links:
+    """Edges between terminals and nodes, a row for each way between the bands: ``node`` (K,), ``length_m`` (K,),
+    ``low_m``, ``high_m`` (K, LINK_DOORS) from the terminal to the node."""
+
+    node: Ints
+    length_m: Floats
+    low_m: Floats
+    high_m: Floats
+
+
+def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float]) -> Links:
+    """Links from a terminal to the nodes around it (within 2.1 steps)."""
+    x, y = (place[0] - lattice.west_m) / lattice.step_m, (place[1] - lattice.south_m) / lattice.step_m
+    jj, ii = (a.ravel() for a in np.mgrid[math.floor(y) - 2 : math.ceil(y) + 3, math.floor(x) - 2 : math.ceil(x) + 3])
+    keep = (ii >= 0) & (ii < lattice.nx) & (jj >= 0) & (jj < lattice.ny) & (np.hypot(ii - x, jj - y) <= 2.1)
+    node = (jj * lattice.nx + ii)[keep]
+    b = lattice.node_places(node)
+    a = np.broadcast_to(np.asarray(place), b.shape)
+    at = a[:, None] + np.linspace(0.0, 1.0, LINK_DOORS)[None, :, None] * (b - a)[:, None]
+    air, limits = problem.airspace, problem.limits
+    low = np.asarray(air.floor_amsl(at[..., 0], at[..., 1], limits))
+    high = np.asarray(air.ceiling_amsl(at[..., 0], at[..., 1], limits))
+    bands: list[list[tuple[float, float]]] = [[] for _ in node]
+    for zone in air.zones:
+        hit = np.flatnonzero(near_zone(a, b, zone, lattice.reach_m, air.scale))
+        if len(hit):
+            bottom, top = zone_levels(air, limits, zone, a[hit], b[hit])
+            for row, lo, hi in zip(hit, bottom, top, strict=True):
+                bands[row].append((float(lo), float(hi)))
+    rows, lows, highs = [], [], []
+    for k, found in enumerate(bands):
+        for gap_low, gap_high in gaps(found):
+            rows.append(k)
+            lows.append(np.maximum(low[k], gap_low))
+            highs.append(np.minimum(high[k], gap_high))
+    shape = (-1, LINK_DOORS)
+    length = np.hypot(*(b - a).T)
+    return Links(
+        node[rows].astype(np.int64), length[rows], np.array(lows).reshape(shape), np.array(highs).reshape(shape)
+    )
+
+
+def gaps(bands: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """What closed altitude intervals are left between open forbidden ``bands``, from below."""
+    out, low = [], -math.inf
+    for bottom, top in sorted(bands):
+        if bottom > low or (bottom == low and math.isfinite(low)):
+            out.append((low, bottom))
+        low = max(low, top)
+    if low < math.inf:
+        out.append((low, math.inf))
+    return out

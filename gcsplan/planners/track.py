@@ -1,0 +1,369 @@
+"""A ground track with its exact room above it, and the best altitude profile through that room.
+
+The tube comes from `Airspace.tube`, so what is decided here holds along the whole line and not at samples. A
+change of the track keeps the tube of what did not change: cut, join, and ask only for the new part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Literal
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.taut_string import Blocked, Profile, taut_string
+from gcsplan.world.airspace import Band, Tube
+
+Floats = NDArray[np.float64]
+
+KEEP_M = 1e-4
+"""Kept from floors and ceilings where there is room, so that rounding never decides."""
+
+ENDS_M = 1.0
+"""Tubes are conservative by less than this: whether start and goal themselves are legal is not read from a tube."""
+
+BRANCHES = 64
+"""Most over/under combinations that are tried for one track."""
+
+
+Sides = tuple[bool | None, ...]
+"""For each band of a tube: over it, under it, or not chosen."""
+
+
+@dataclass(frozen=True, slots=True)
+class Obstruction:
+    """Why a track has no legal profile, where along it, and by how much (metres); ``zone`` -1: terrain or limits."""
+
+    kind: Literal["pinched", "climb", "descent", "zone"]
+    s0_m: float
+    s1_m: float
+    by: float
+    zone: int = -1
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Flown:
+    """A legal profile over a track, what it costs, and for each band of the tube whether it is passed above."""
+
+    profile: Profile
+    cost: float
+    over: Sides
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Track:
+    """``points`` (N, 2); ``pinned`` (N,) vertices that must stay; ``pin_m`` (N,) their altitude, NaN where free."""
+
+    points: Floats
+    pinned: NDArray[np.bool_]
+    pin_m: Floats
+    s_m: Floats
+    tube: Tube
+
+    def place(self, s_m: float) -> Floats:
+        """(2,) the point ``s_m`` along the track."""
+        return np.array([np.interp(s_m, self.s_m, self.points[:, 0]), np.interp(s_m, self.s_m, self.points[:, 1])])
+
+
+def distances(points: Floats) -> Floats:
+    """(N,) metres along a track (N, 2)."""
+    d = np.diff(points, axis=0)
+    return np.concatenate([[0.0], np.cumsum(np.hypot(d[:, 0], d[:, 1]))])
+
+
+def make_track(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> Track:
+    """A track with its tube; points nearer than 1 mm to the one before are dropped (the pinned one is kept)."""
+    keep = np.ones(len(points), bool)
+    last = 0
+    for i in range(1, len(points)):
+        if np.hypot(*(points[i] - points[last])) < 1e-3:
+            if pinned[i] and not pinned[last]:
+                keep[last] = False
+                last = i
+            else:
+                keep[i] = False
+        else:
+            last = i
+    points, pinned, pin_m = points[keep], pinned[keep], pin_m[keep]
+    tube = problem.airspace.tube(points, problem.limits)
+    s = distances(points)
+    return Track(points, pinned, pin_m, s * (tube.s_m[-1] / s[-1]), tube)
+
+
+def replace_part(problem: Problem, track: Track, s0_m: float, s1_m: float, between: Floats) -> Track:
+    """The track with the part from ``s0_m`` to ``s1_m`` (no pinned vertex inside) replaced by points ``between``."""
+    inner = np.vstack([track.place(s0_m), between.reshape(-1, 2), track.place(s1_m)])
+    before, after = track.s_m < s0_m - 1e-6, track.s_m > s1_m + 1e-6
+    # An end of the part that is a vertex stays that very vertex, so that pins survive.
+    head = int(before.sum())
+    tail = len(track.s_m) - int(after.sum()) - 1
+    pins = np.zeros(len(inner), bool)
+    pin_m = np.full(len(inner), np.nan)
+    for k, i in ((0, head), (-1, tail)):
+        if abs(track.s_m[i] - (s0_m if k == 0 else s1_m)) <= 1e-6:
+            inner[k], pins[k], pin_m[k] = track.points[i], track.pinned[i], track.pin_m[i]
+    middle = problem.airspace.tube(inner, problem.limits)
+    parts = [cut(track.tube, 0.0, s0_m), middle, cut(track.tube, s1_m, float(track.tube.s_m[-1]))]
+    lengths = distances(inner)
+    shift = s0_m + lengths[-1] - s1_m
+    return Track(
+        np.vstack([track.points[before], inner, track.points[after]]),
+        np.concatenate([track.pinned[before], pins, track.pinned[after]]),
+        np.concatenate([track.pin_m[before], pin_m, track.pin_m[after]]),
+        np.concatenate([track.s_m[before], s0_m + lengths, track.s_m[after] + shift]),
+        join([p for p in parts if p is not None]),
+    )
+
+
+def cut(tube: Tube, s0_m: float, s1_m: float) -> Tube | None:
+    """The part of a tube between two places, its ``s_m`` from 0; None where it has no length."""
+    if s1_m - s0_m < 1e-6:
+        return None
+    s, (floor, ceiling) = _cut_pieces(tube.s_m, (tube.floor_m, tube.ceiling_m), s0_m, s1_m)
+    bands = []
+    for b in tube.bands:
+        low, high = max(float(b.s_m[0]), s0_m), min(float(b.s_m[-1]), s1_m)
+        if high - low > 0.0:
+            bs, (bottom, top) = _cut_pieces(b.s_m, (b.bottom_m, b.top_m), low, high)
+            bs = bs - s0_m
+            bands.append(Band(b.zone, float(bs[0]), float(bs[-1]), bs, bottom, top))
+    return Tube(s - s0_m, floor, ceiling, tuple(bands))
+
+
+def _cut_pieces(s: Floats, values: tuple[Floats, Floats], s0: float, s1: float) -> tuple[Floats, tuple[Floats, Floats]]:
+    i = min(max(int(np.searchsorted(s, s0, "right")) - 1, 0), len(s) - 2)
+    j = min(max(int(np.searchsorted(s, s1, "left")), i + 1), len(s) - 1)
+    out = s[i : j + 1].copy()
+    u = (s0 - out[0]) / (out[1] - out[0])
+    v = (s1 - out[-2]) / (out[-1] - out[-2])
+    out[0], out[-1] = s0, s1
+    cuts = []
+    for value in values:
+        part = value[i:j].copy()
+        first, last = value[i].copy(), value[j - 1].copy()
+        if u > 0.0 and np.isfinite(first).all():
+            part[0, 0] = first[0] + u * (first[1] - first[0])
+        if v < 1.0 and np.isfinite(last).all():
+            part[-1, 1] = last[0] + v * (last[1] - last[0])
+        cuts.append(part)
+    return out, (cuts[0], cuts[1])
+
+
+def join(tubes: Sequence[Tube]) -> Tube:
+    """One tube after the other. Bands of one zone that meet become one, so that it is passed on one side."""
+    if len(tubes) == 1:
+        return tubes[0]
+    offsets = np.concatenate([[0.0], np.cumsum([t.s_m[-1] for t in tubes])])
+    s = np.concatenate([tubes[0].s_m] + [t.s_m[1:] + o for t, o in zip(tubes[1:], offsets[1:], strict=False)])
+    floor = np.concatenate([t.floor_m for t in tubes])
+    ceiling = np.concatenate([t.ceiling_m for t in tubes])
+    bands: list[Band] = []
+    for t, o in zip(tubes, offsets, strict=False):
+        for b in t.bands:
+            moved = Band(b.zone, b.s0_m + o, b.s1_m + o, b.s_m + o, b.bottom_m, b.top_m)
+            for k in range(len(bands) - 1, -1, -1):
+                if bands[k].zone == b.zone:
+                    if abs(bands[k].s1_m - moved.s0_m) < 1e-6:
+                        a = bands[k]
+                        moved = Band(
+                            b.zone,
+                            a.s0_m,
+                            moved.s1_m,
+                            np.concatenate([a.s_m, moved.s_m[1:]]),
+                            np.concatenate([a.bottom_m, moved.bottom_m]),
+                            np.concatenate([a.top_m, moved.top_m]),
+                        )
+                        del bands[k]
+                    break
+            bands.append(moved)
+    return Tube(s, floor, ceiling, tuple(bands))
+
+
+def fly(problem: Problem, track: Track, below: float = np.inf, branches: int = BRANCHES) -> Flown | Obstruction:
+    """The cheapest legal profile over ``track``, each band passed above or below as is cheaper.
+
+    Best first over the sides of those bands only that the string runs into; bands it clears cost nothing. Before
+    the sides are tried one by one, all bands that are hit are passed on their nearer side at once; if that costs
+    less than ``below``, it is taken where ``branches`` is 0. A profile of ``below`` or more is not wanted: the
+    search stops there and reports what it ran into.
+    """
+    tube, limits = track.tube, problem.limits
+    ends = (problem.start[2], problem.goal[2])
+    room = _rooms(tube, track, *ends)
+    horizontal = float(room.s_m[-1])
+
+    def solve(over: Sides) -> Profile | Blocked:
+        low, high = room.between(over)
+        return taut_string(room.s_m, low, high, *ends, limits.max_climb_slope, limits.max_descent_slope)
+
+    def cost_of(p: Profile) -> float:
+        if problem.objective == "energy":
+            return problem.vertical_j_per_m * p.vertical_m + problem.horizontal_j_per_m * horizontal
+        return p.length_m
+
+    none: Sides = (None,) * len(tube.bands)
+    root = solve(none)
+    if isinstance(root, Blocked):
+        return Obstruction(root.kind, root.s0_m, root.s1_m, root.by)
+    first: Obstruction | None = None
+    open_set = [(cost_of(root), 0, none, root)]
+    count = 0
+    while open_set:
+        cost, _, over, profile = heappop(open_set)
+        if cost >= below:
+            break
+        hit = room.hits(profile, over)
+        if not hit:
+            return Flown(profile, cost, over)
+        deepest = max(hit, key=lambda h: h.depth_m)
+        band = tube.bands[deepest.band]
+        if first is None:
+            first = Obstruction("zone", band.s0_m, band.s1_m, deepest.depth_m, band.zone)
+        if branches == 0:
+            nearer = list(over)
+            for h in hit:
+                nearer[h.band] = h.nearer_over
+            found = solve(tuple(nearer))
+            if not isinstance(found, Blocked) and cost_of(found) < below:
+                heappush(open_set, (cost_of(found), -1, tuple(nearer), found))
+            if count == 4:
+                break
+            count += 1
+            continue
+        if count >= branches:
+            break
+        for side in (True, False):
+            choice = (*over[: deepest.band], side, *over[deepest.band + 1 :])
+            count += 1
+            found = solve(choice)
+            if not isinstance(found, Blocked):
+                heappush(open_set, (cost_of(found), count, choice, found))
+    return first or Obstruction("zone", 0.0, horizontal, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Hit:
+    """A band that a profile runs into, how deep, and whether over it is the nearer way out."""
+
+    band: int
+    depth_m: float
+    nearer_over: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Room:
+    """Doors at every breakpoint of a tube, its bands and the pins; for each band its doors' span and edges."""
+
+    s_m: Floats
+    low_m: Floats
+    high_m: Floats
+    spans: list[tuple[int, int]]
+    bottoms: list[Floats]
+    tops: list[Floats]
+
+    def between(self, over: Sides) -> tuple[Floats, Floats]:
+        """Doors with bands passed as chosen, narrowed by `KEEP_M` on both sides, or to their middle where there is
+        less room; the ends are exempt."""
+        low, high = self.low_m.copy(), self.high_m.copy()
+        for k, side in enumerate(over):
+            i, j = self.spans[k]
+            if side:
+                np.maximum(low[i:j], self.tops[k], out=low[i:j])
+            elif side is not None:
+                np.minimum(high[i:j], self.bottoms[k], out=high[i:j])
+        _narrow(low, high)
+        return low, high
+
+    def hits(self, profile: Profile, over: Sides) -> list[_Hit]:
+        """Bands without a side that ``profile`` does not clear."""
+        out = []
+        if any(side is None for side in over):
+            z = profile.at(self.s_m)
+            for k, side in enumerate(over):
+                if side is None:
+                    i, j = self.spans[k]
+                    up, down = float((self.tops[k] - z[i:j]).max()), float((z[i:j] - self.bottoms[k]).max())
+                    if up > 0.0 and down > 0.0:
+                        out.append(_Hit(k, min(up, down), up < down))
+        return out
+
+
+@njit(cache=True)
+def _narrow(low: Floats, high: Floats) -> None:
+    last = len(low) - 1
+    for i in range(last + 1):
+        if i in (0, last):
+            low[i] -= 1e-6
+            high[i] += 1e-6
+        elif high[i] - low[i] >= 2.0 * KEEP_M:
+            low[i] += KEEP_M
+            high[i] -= KEEP_M
+        elif high[i] >= low[i]:
+            low[i] = high[i] = 0.5 * (low[i] + high[i])
+
+
+def _rooms(tube: Tube, track: Track, z0: float, z1: float) -> _Room:
+    fixed = track.pinned & np.isfinite(track.pin_m)
+    s = tube.s_m
+    if tube.bands or fixed.any():
+        s = np.sort(np.concatenate([s, *(b.s_m for b in tube.bands), track.s_m[fixed]]))
+        s = s[np.concatenate([[True], s[1:] - s[:-1] > 1e-9])]
+    low = _edge(s, tube.s_m, tube.floor_m, True)
+    high = _edge(s, tube.s_m, tube.ceiling_m, False)
+    for at, z in zip(track.s_m[fixed], track.pin_m[fixed], strict=True):
+        k = int(np.argmin(np.abs(s - at)))
+        low[k], high[k] = max(low[k], z), min(high[k], z)
+    _forgive(low, high, 0, z0)
+    _forgive(low, high, -1, z1)
+    spans, bottoms, tops = [], [], []
+    for b in tube.bands:
+        i = int(np.searchsorted(s, b.s_m[0] - 1e-9))
+        j = int(np.searchsorted(s, b.s_m[-1] + 1e-9))
+        spans.append((i, j))
+        bottom = _edge(s[i:j], b.s_m, b.bottom_m, False) - KEEP_M
+        top = _edge(s[i:j], b.s_m, b.top_m, True) + KEEP_M
+        if i == 0:
+            _forgive(top, bottom, 0, z0)
+        if j == len(s):
+            _forgive(top, bottom, -1, z1)
+        bottoms.append(bottom)
+        tops.append(top)
+    return _Room(s, low, high, spans, bottoms, tops)
+
+
+def _forgive(low: Floats, high: Floats, k: int, z: float) -> None:
+    """Let an end at ``z`` be legal by a little, in place: a tube is conservative, and ends are judged elsewhere."""
+    if z < low[k] < z + ENDS_M:
+        low[k] = z
+    if z - ENDS_M < high[k] < z:
+        high[k] = z
+
+
+@njit(cache=True)
+def _edge(s: Floats, at: Floats, value: Floats, highest: bool) -> Floats:
+    """A piecewise-linear function with jumps at rising places ``s``: the higher (lower) limit where it jumps."""
+    out = np.empty(len(s))
+    pieces = len(value)
+    k = 0
+    for i in range(len(s)):
+        while k < pieces - 1 and at[k + 1] < s[i] - 1e-9:
+            k += 1
+        a, b = value[k, 0], value[k, 1]
+        width = at[k + 1] - at[k]
+        if s[i] >= at[k + 1] - 1e-9 or width <= 0.0:
+            v = b
+            if k < pieces - 1 and s[i] >= at[k + 1] - 1e-9:
+                v = max(b, value[k + 1, 0]) if highest else min(b, value[k + 1, 0])
+        elif s[i] <= at[k] + 1e-9 or a == b:
+            v = a
+        elif np.isinf(a) or np.isinf(b):
+            v = max(a, b) if highest else min(a, b)
+        else:
+            v = a + (b - a) * (s[i] - at[k]) / width
+        out[i] = v
+    return out

@@ -1,0 +1,299 @@
+"""What ArduPilot keeps of an item: 15 bytes each, so some numbers come back different from how they were sent.
+
+Source: ArduPilot 4.6, ``AP_Mission.cpp`` (`sanity_check_params`, `mavlink_int_to_mission_cmd`,
+`mission_cmd_to_mavlink_int`), ``MissionItemProtocol_Fence.cpp``, ``MissionItemProtocol_Rally.cpp``,
+``AC_PolyFence_loader.cpp`` and ``StorageManager.cpp``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from gcsplan.mavlink.mission import (
+    FENCE,
+    GLOBAL,
+    MISSION,
+    RALLY,
+    RELATIVE,
+    TERRAIN,
+    WAYPOINT,
+    Home,
+    MissionItem,
+    float32,
+)
+from gcsplan.sim.board import (
+    INVALID,
+    INVALID_PARAM1,
+    INVALID_X,
+    INVALID_Y,
+    INVALID_Z,
+    UNSUPPORTED,
+    UNSUPPORTED_FRAME,
+    Refused,
+)
+
+FLT_EPSILON = 1.1920929e-07
+
+
+# ── how one param is kept ─────────────────────────────────────────────────────────────────────────────────────────
+
+Keep = Callable[[float], float]
+
+
+def _whole(value: float) -> int:
+    """C's float to int32 on x86 and ARM as compiled for SITL: towards zero; what does not fit is INT_MIN."""
+    return int(value) if math.isfinite(value) and abs(value) < 2**31 else -(2**31)
+
+
+def _u8(value: float) -> float:
+    return float(_whole(value) & 0xFF)
+
+
+def _u16(value: float) -> float:
+    return float(_whole(value) & 0xFFFF)
+
+
+def _i8(value: float) -> float:
+    return float((_whole(value) + 0x80 & 0xFF) - 0x80)
+
+
+def _i16(value: float) -> float:
+    return float((_whole(value) + 0x8000 & 0xFFFF) - 0x8000)
+
+
+def _same(value: float) -> float:
+    return value
+
+
+def _zero(value: float) -> float:
+    return 0.0
+
+
+def _byte_capped(value: float) -> float:
+    return min(255.0, _u16(value))
+
+
+def _signed_u16(value: float) -> float:
+    return math.copysign(_u16(abs(value)), -1.0 if value < 0 else 1.0)
+
+
+def _sign(value: float) -> float:
+    return -1.0 if value < 0 else 1.0
+
+
+def _land_sign(value: float) -> float:
+    return -1.0 if value <= -FLT_EPSILON else 1.0
+
+
+def _positive(value: float) -> float:
+    return 1.0 if value > 0 else 0.0
+
+
+def _turns(value: float) -> float:
+    """Loiter turns: a byte; parts of one turn as 256ths."""
+    return _u8(value * 256.0) / 256.0 if 0 < value < 1 else _u8(min(255.0, value))
+
+
+def _turn_radius(value: float) -> float:
+    """Loiter radius of 18: a byte of metres, beyond 255 m of tens of metres; the sign is the direction."""
+    size = abs(value)
+    kept = _u8(size) if size <= 255 else 10.0 * _u8(min(255.0, float32(size * float32(0.1))))
+    return math.copysign(kept, -1.0 if value < 0 else 1.0)
+
+
+_NOTHING = (_zero, _zero, _zero, _zero)
+_FIRST_U16 = (_u16, _zero, _zero, _zero)
+
+# Commands with a place: latitude, longitude, altitude and frame are kept, and of the params what is said here.
+_LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
+    16: _FIRST_U16,  # waypoint: hold
+    17: (_zero, _zero, _signed_u16, _zero),  # loiter unlimited: radius
+    18: (_turns, _zero, _turn_radius, _positive),
+    19: (_u16, _zero, _sign, _positive),  # loiter time
+    21: (_u16, _zero, _zero, _land_sign),  # land: the yaw reads back as 1
+    22: _FIRST_U16,  # take-off
+    30: _FIRST_U16,
+    31: (_zero, _signed_u16, _zero, _positive),
+    82: _FIRST_U16,  # spline waypoint
+    84: _NOTHING,
+    85: _FIRST_U16,
+    92: _FIRST_U16,
+    94: (lambda p: float32(float32(0.01) * _u16(float32(p * 100.0))), _zero, _zero, _zero),
+    179: _FIRST_U16,  # set home
+    188: _NOTHING,
+    189: _NOTHING,
+    191: _NOTHING,
+    195: _FIRST_U16,
+    201: _FIRST_U16,
+}
+
+# Commands without one: they read back in frame 0 at 0, 0, 0.
+_PLACELESS: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
+    20: _NOTHING,  # return to launch
+    83: (_same, _same, _u8, _zero),
+    93: (_same, _i8, _i8, _i8),  # delay: seconds, or hours, minutes, seconds UTC
+    112: (_same, _zero, _zero, _zero),
+    114: (_same, _zero, _zero, _zero),
+    115: (_same, _same, _i8, _u8),
+    177: (_u16, _i16, _zero, _zero),  # jump
+    178: (_u8, _same, _same, _zero),  # change speed
+    181: (_u8, _u8, _zero, _zero),
+    182: (_u8, _i16, _same, _zero),
+    183: (_u8, _u16, _zero, _zero),
+    184: (_u8, _u16, _i16, _same),
+    197: _FIRST_U16,
+    206: (_same, _zero, _u8, _zero),
+    207: _FIRST_U16,
+    208: _FIRST_U16,
+    210: _FIRST_U16,
+    211: (_u8, _u8, _zero, _zero),
+    212: _FIRST_U16,
+    215: _FIRST_U16,
+    216: _FIRST_U16,
+    218: (_u16, _u8, _zero, _zero),
+    222: (_u16, _same, _same, _same),
+    600: (_u16, _zero, _zero, _zero),
+    601: (_u16, _i16, _zero, _zero),
+}
+
+_NAN_ALLOWED = {16: {3}, 17: {3}, 21: {3}, 22: {3}, 84: {3}, 85: {2, 3}}  # command: indices of params that may be NaN
+_FRAMES = {0: GLOBAL, 2: GLOBAL, 5: GLOBAL, 3: RELATIVE, 6: RELATIVE, 10: TERRAIN, 11: TERRAIN}
+_ALT_LIMIT_M = 83_000.0
+DO_JUMP = 177
+
+
+def keep_mission_item(item: MissionItem, *, plane: bool) -> MissionItem:
+    """``item`` as it will read back from a mission. Raises `Refused`."""
+    allowed = _NAN_ALLOWED.get(item.command, set())
+    for index, value in enumerate(item.params):
+        if math.isinf(value) or (math.isnan(value) and index not in allowed):
+            raise Refused(INVALID_PARAM1 + index)
+    if item.command in (0, 1):
+        raise Refused(INVALID)
+    if plane and item.command == 82:
+        raise Refused(UNSUPPORTED)
+    if item.command in _PLACELESS:
+        keeps = _PLACELESS[item.command]
+        return MissionItem(item.command, GLOBAL, _kept_params(keeps, item))
+    if item.command not in _LOCATED:
+        raise Refused(UNSUPPORTED)
+    keeps = _LOCATED[item.command]
+    if plane and item.command == WAYPOINT:
+        keeps = (_zero, _byte_capped, _byte_capped, _zero)
+    _need_place(item)
+    if math.isnan(item.z) or abs(item.z) >= _ALT_LIMIT_M:
+        raise Refused(INVALID_Z)
+    if item.frame not in _FRAMES:
+        raise Refused(UNSUPPORTED_FRAME)
+    return MissionItem(
+        item.command, _FRAMES[item.frame], _kept_params(keeps, item), item.x, item.y, in_whole_centimetres(item.z)
+    )
+
+
+def _kept_params(keeps: tuple[Keep, Keep, Keep, Keep], item: MissionItem) -> tuple[float, float, float, float]:
+    first, second, third, fourth = (keep(value) for keep, value in zip(keeps, item.params, strict=True))
+    return first, second, third, fourth
+
+
+def _need_place(item: MissionItem) -> None:
+    # Compared in float32, so that the limit is soft by some units.
+    if float32(abs(item.x)) > 9e8:
+        raise Refused(INVALID_X)
+    if float32(abs(item.y)) > 1.8e9:
+        raise Refused(INVALID_Y)
+
+
+def in_whole_centimetres(altitude_m: float) -> float:
+    """An altitude through ArduPilot's storage: times 100 in float32, cut to whole cm, back times 0.01 in float32."""
+    return float32(float32(0.01) * int(float32(float32(altitude_m) * 100.0)))
+
+
+def home_item(home: Home) -> MissionItem:
+    """Item 0 as it reads back: the vehicle's home, whatever was sent."""
+    return MissionItem(WAYPOINT, GLOBAL, x=home.lat_e7, y=home.lon_e7, z=in_whole_centimetres(home.amsl_m))
+
+
+# ── fences ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+_VERTEX = {5001, 5002}
+_CIRCLE = {5003, 5004}
+_RETURN_POINT = 5000
+
+
+def keep_fence_item(item: MissionItem) -> MissionItem:
+    """One fence item as it will read back, as far as it can be judged alone. Raises `Refused`.
+
+    Frame 2 is refused, the altitude is dropped, the frame reads back as 0 and autocontinue as 0.
+    """
+    if item.frame not in _FRAMES or item.frame == 2:
+        raise Refused(UNSUPPORTED_FRAME)
+    first = item.params[0]
+    if item.command in _VERTEX:
+        if first > 255:
+            raise Refused(INVALID_PARAM1)
+        kept = _u8(first)
+    elif item.command in _CIRCLE:
+        # A radius within a millimetre above whole metres is kept as an integer.
+        kept = float(int(first)) if 0 < first < 2**31 and first - int(first) < 0.001 else first
+    elif item.command == _RETURN_POINT:
+        kept = 0.0
+    else:
+        raise Refused(UNSUPPORTED)
+    return MissionItem(item.command, GLOBAL, (kept, 0.0, 0.0, 0.0), item.x, item.y, 0.0, autocontinue=False)
+
+
+def fence_is_valid(items: Sequence[MissionItem], storage_bytes: int) -> bool:
+    """The check of the whole fence at the end of an upload: whole polygons, positive radii, places, room."""
+    left, polygon, needed, returns = 0, (0, 0.0), 5, 0
+    for item in items:
+        first = item.params[0]
+        if item.command in _VERTEX:
+            if first < 3 or (left and polygon != (item.command, first)):
+                return False
+            if not left:
+                left, polygon = int(first), (item.command, first)
+                needed += 2
+            left -= 1
+            needed += 8
+        else:
+            returns += item.command == _RETURN_POINT
+            circle = item.command in _CIRCLE
+            # A NaN radius fails here too (it has crashed a build with floating point traps).
+            if left or returns > 1 or (circle and not first >= FLT_EPSILON):
+                return False
+            needed += 13 if circle else 9
+        if float32(abs(item.x)) > 9e8 or float32(abs(item.y)) > 1.8e9:
+            return False
+    return left == 0 and needed <= storage_bytes
+
+
+# ── rally points ──────────────────────────────────────────────────────────────────────────────────────────────────
+
+
+def keep_rally_item(item: MissionItem) -> MissionItem:
+    """A rally point as it will read back: whole metres, no params, autocontinue 0. Raises `Refused`."""
+    if item.command != 5100:
+        raise Refused(UNSUPPORTED)
+    _need_place(item)
+    if item.z < -32768 or item.z > 32767:
+        raise Refused(INVALID_Z)
+    if item.frame not in _FRAMES or item.frame == 2:
+        raise Refused(UNSUPPORTED_FRAME)
+    return MissionItem(
+        item.command, _FRAMES[item.frame], (0.0, 0.0, 0.0, 0.0), item.x, item.y, _i16(item.z), autocontinue=False
+    )
+
+
+# ── room ──────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+
+def most_items(mission_type: int, *, plane: bool) -> int:
+    """The longest list that COUNT may announce: storage of a 16 KB board, 15 bytes an item (8 a fence point)."""
+    copter = {MISSION: 650, FENCE: 70, RALLY: 46}
+    return {MISSION: 655, FENCE: 84, RALLY: 50}[mission_type] if plane else copter[mission_type]
+
+
+def fence_storage_bytes(*, plane: bool) -> int:
+    """Room for the fence: 42 circles on Copter."""
+    return 672 if plane else 560

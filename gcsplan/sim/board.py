@@ -1,0 +1,82 @@
+"""What both autopilots' protocol machines share: the board that survives a reboot, ACK codes, phases.
+
+Two rules hold for both machines. (1) What happens on a message is looked up in the machine's table under
+(phase, kind of message); a pair that is not in the table is ignored, as the autopilot ignores it. (2) A handler returns
+what goes out as ``(addressee, message)`` pairs and sends nothing itself.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import Protocol
+
+from gcsplan.mavlink.messages import Address, MissionMessage
+from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, Home, MissionItem, float32
+
+# MAV_MISSION_RESULT.
+ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
+INVALID_PARAM1, INVALID_PARAM2, INVALID_PARAM3, INVALID_PARAM4, INVALID_X, INVALID_Y, INVALID_Z = range(6, 13)
+INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
+
+Out = list[tuple[Address, MissionMessage]]
+
+
+class Refused(Exception):
+    """The autopilot does not take the item; ``code`` is the MAV_MISSION_RESULT that it answers."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(f"MAV_MISSION_RESULT {code}")
+        self.code = code
+
+
+class Phase(Enum):
+    """What a machine is doing."""
+
+    IDLE = auto()
+    RECEIVING = auto()  # an upload: it asks, the ground station answers
+    SENDING = auto()  # a download (PX4 alone keeps this state)
+
+
+def through_float(item: MissionItem) -> MissionItem:
+    """``item`` with its place rounded as MISSION_ITEM carries it: float32 degrees, about 0.4 m at 36°."""
+    x, y = (round(float32(float32(v) * float32(1e-7)) * 1e7) for v in (item.x, item.y))
+    return MissionItem(item.command, item.frame, item.params, x, y, item.z, item.autocontinue)
+
+
+@dataclass
+class Board:
+    """What survives a reboot, and what the aircraft is doing. On ArduPilot slot 0 of the mission is home's."""
+
+    home: Home
+    lists: dict[int, list[MissionItem]] = field(default_factory=lambda: {MISSION: [], FENCE: [], RALLY: []})
+    armed: bool = False
+    flying_mission: bool = False  # in AUTO or mission mode
+    booting: bool = False
+    uploads: int = 0  # finished uploads of a mission
+
+    def opaque_id(self, mission_type: int) -> int:
+        """A number that changes with the list."""
+        return zlib.crc32(b"".join(item.wire for item in self.lists.get(mission_type, [])))
+
+
+class Manner(Protocol):
+    """An autopilot's side of the protocol for all its lists."""
+
+    def receive(self, message: MissionMessage, sender: Address, now: float) -> Out:
+        """Answers to ``message``."""
+        ...
+
+    @property
+    def deadline(self) -> float | None:
+        """When `on_timer` wants to be called, or None."""
+        ...
+
+    def on_timer(self, now: float) -> Out:
+        """What is due at ``now``."""
+        ...
+
+    def reset(self) -> None:
+        """Forget every transfer, as a reboot does."""
+        ...

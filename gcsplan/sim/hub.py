@@ -1,0 +1,151 @@
+"""Vehicles and their listeners, without sockets: bytes from a client in, bytes to clients out, time handed in.
+
+An answer goes to the client that spoke. What a vehicle says unasked goes to every client that was heard of lately.
+"""
+
+from __future__ import annotations
+
+import logging
+import random
+from collections import OrderedDict
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
+
+from gcsplan.errors import UsageError
+from gcsplan.mavlink import wire
+from gcsplan.mavlink.frames import FrameParser, FrameWriter
+from gcsplan.mavlink.messages import Address, Packet
+from gcsplan.sim.telemetry import Message, Telemetry
+from gcsplan.sim.vehicle import LoopbackVehicle
+
+Client = Hashable
+Sent = list[tuple[Client, bytes]]
+
+MOST_CLIENTS = 16
+MOST_STATIONS = 64  # ground stations (system and component ids) whose whereabouts are remembered
+FORGOTTEN_AFTER_S = 60.0
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass
+class _Listener:
+    heard_at: float
+    parser: FrameParser = field(default_factory=FrameParser)
+
+
+class Hub:
+    """One or many vehicles behind one port. ``always`` is a client that is told everything from the start.
+
+    ``mishandled`` counts messages that raised: 0 unless there is a bug in here.
+    """
+
+    def __init__(self, vehicles: Sequence[LoopbackVehicle], *, always: Client | None = None) -> None:
+        ids = [v.sysid for v in vehicles]
+        if not ids or len(set(ids)) != len(ids):
+            raise UsageError(f"a simulator wants at least one vehicle and each system id once, given {ids}")
+        self._vehicles = [(v, Telemetry(v), random.Random(v.misbehave.seed + 1)) for v in vehicles]
+        self._always = always
+        self._listeners: OrderedDict[Client, _Listener] = OrderedDict()
+        self._whereabouts: OrderedDict[Address, Client] = OrderedDict()
+        self._writers: dict[Address, FrameWriter] = {}  # each source counts its own frames
+        self._next_second: float | None = None
+        self.mishandled = 0
+
+    @property
+    def clients(self) -> list[Client]:
+        """Who is told what a vehicle says unasked."""
+        heard = list(self._listeners)
+        return heard if self._always is None or self._always in self._listeners else [self._always, *heard]
+
+    def take(self, client: Client, data: bytes, now: float, *, datagram: bool = True) -> Sent:
+        """Take in what ``client`` sent: a whole datagram, or the next piece of a stream."""
+        self.welcome(client, now)
+        listener = self._listeners.pop(client)
+        listener.heard_at = now
+        self._listeners[client] = listener  # the one heard last stands last
+        while len(self._listeners) > MOST_CLIENTS:
+            self.forget(next(iter(self._listeners)))
+        sent: Sent = []
+        for message in listener.parser.feed(data, datagram=datagram):
+            try:
+                sent += self._handle(message, client, now)
+            except (ArithmeticError, ValueError, TypeError, LookupError, AttributeError):
+                # A simulator that others test against must outlive its own bugs; its tests look at the count.
+                self.mishandled += 1
+                _log.exception("cannot handle %s", message.get_type())
+        return sent
+
+    def _handle(self, message: Message, client: Client, now: float) -> Sent:
+        source = Address(message.get_srcSystem(), message.get_srcComponent())
+        if any(v.sysid == source.sysid for v, *_ in self._vehicles):
+            return []  # our own words, reflected
+        self._whereabouts[source] = client
+        self._whereabouts.move_to_end(source)
+        while len(self._whereabouts) > MOST_STATIONS:
+            self._whereabouts.popitem(last=False)
+        packet = wire.decode(message)
+        sent: Sent = []
+        for vehicle, telemetry, _ in self._vehicles:
+            if packet is not None:
+                sent += self._routed(vehicle.receive(packet, now), source, client)
+            else:
+                for answer in telemetry.answer(message, now):
+                    sent.append((client, self._frame(answer, vehicle.address)))
+        return sent
+
+    def _frame(self, message: Message, source: Address) -> bytes:
+        return self._writers.setdefault(source, FrameWriter(source)).pack(message)
+
+    def _routed(self, packets: Sequence[Packet], speaker: Address | None = None, client: Client | None = None) -> Sent:
+        sent: Sent = []
+        for packet in packets:
+            frame = self._frame(wire.encode(packet.message, packet.target), packet.source)
+            if packet.target == speaker:
+                sent.append((client, frame))
+            elif packet.target in self._whereabouts:
+                sent.append((self._whereabouts[packet.target], frame))
+            else:
+                sent += [(one, frame) for one in self.clients]
+        return sent
+
+    @property
+    def deadline(self) -> float | None:
+        """When `on_timer` wants to be called, or None before it was called first."""
+        due = (self._next_second, *(v.deadline for v, *_ in self._vehicles))
+        return min((at for at in due if at is not None), default=None)
+
+    def on_timer(self, now: float) -> Sent:
+        """What is due at ``now``; the first call starts the heartbeats."""
+        sent: Sent = []
+        for vehicle, *_ in self._vehicles:
+            sent += self._routed(vehicle.on_timer(now))
+        if self._next_second is None or now >= self._next_second:
+            # Not "+= 1": after a pause of the whole machine one heartbeat is due, not one for each second missed.
+            self._next_second = now + 1.0
+            sent += self._unasked(now)
+        return sent
+
+    def _unasked(self, now: float) -> Sent:
+        gone = [c for c, listener in self._listeners.items() if now - listener.heard_at > FORGOTTEN_AFTER_S]
+        for client in gone:
+            self.forget(client)
+        sent: Sent = []
+        for vehicle, telemetry, rng in self._vehicles:
+            for message in telemetry.each_second(now):
+                if rng.random() >= vehicle.misbehave.drop:
+                    frame = self._frame(message, vehicle.address)
+                    sent += [(client, frame) for client in self.clients]
+        return sent
+
+    def welcome(self, client: Client, now: float) -> None:
+        """A client that is there, though it may not have said a word: it does not wait a second for a heartbeat."""
+        if client not in self._listeners:
+            self._listeners[client] = _Listener(now)
+            self._next_second = now
+
+    def forget(self, client: Client) -> None:
+        """Drop a client that is gone."""
+        self._listeners.pop(client, None)
+        for station in [s for s, where in self._whereabouts.items() if where == client]:
+            del self._whereabouts[station]

@@ -1,0 +1,162 @@
+"""A small table of parameters, with the names, types and defaults of each autopilot, for those who ask.
+
+Sources: parameter lists of ArduCopter 4.6, ArduPlane 4.6 and PX4 1.15 (defaults of a quadrotor).
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+from gcsplan.vehicle import Autopilot
+
+INT32, REAL32 = 6, 9  # MAV_PARAM_TYPE
+INT8, INT16 = 2, 4
+_WHOLE = {INT8: (-(2**7), 2**7 - 1), INT16: (-(2**15), 2**15 - 1), INT32: (-(2**31), 2**31 - 1)}
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One value with its MAV_PARAM_TYPE."""
+
+    kind: int
+    value: float
+
+
+def _r(value: float) -> Parameter:
+    return Parameter(REAL32, value)
+
+
+def _i(value: int, kind: int = INT32) -> Parameter:
+    return Parameter(kind, value)
+
+
+_ARDUPILOT = {
+    "ARMING_CHECK": _i(1),
+    "BATT_FS_CRT_ACT": _i(0, INT8),
+    "BATT_FS_LOW_ACT": _i(0, INT8),
+    "FENCE_ACTION": _i(1, INT8),
+    "FENCE_ALT_MAX": _r(100.0),
+    "FENCE_ALT_MIN": _r(-10.0),
+    "FENCE_ENABLE": _i(0, INT8),
+    "FENCE_MARGIN": _r(2.0),
+    "FENCE_RADIUS": _r(300.0),
+    "FENCE_TOTAL": _i(0, INT8),
+    "MIS_OPTIONS": _i(0, INT16),
+    "MIS_RESTART": _i(0, INT8),
+    "MIS_TOTAL": _i(0, INT16),
+    "RALLY_TOTAL": _i(0, INT8),
+    "SYSID_MYGCS": _i(255, INT16),
+    "TERRAIN_ENABLE": _i(1, INT8),
+    "TERRAIN_SPACING": _i(100, INT16),
+}
+
+_TABLES: dict[Autopilot, dict[str, Parameter]] = {
+    Autopilot.ARDUCOPTER: {
+        **_ARDUPILOT,
+        "ANGLE_MAX": _i(3000, INT16),
+        "DISARM_DELAY": _i(10, INT8),
+        "FENCE_TYPE": _i(7, INT8),
+        "FS_GCS_ENABLE": _i(0, INT8),
+        "FS_THR_ENABLE": _i(1, INT8),
+        "LAND_SPEED": _i(50, INT16),
+        "RTL_ALT": _i(1500),
+        "RTL_ALT_FINAL": _i(0),
+        "RTL_ALT_TYPE": _i(0, INT8),
+        "RTL_LOIT_TIME": _i(5000),
+        "RTL_SPEED": _i(0),
+        "WPNAV_RADIUS": _r(200.0),
+        "WPNAV_SPEED": _r(1000.0),
+        "WPNAV_SPEED_DN": _r(150.0),
+        "WPNAV_SPEED_UP": _r(250.0),
+        "WP_NAVALT_MIN": _r(0.0),
+    },
+    Autopilot.ARDUPLANE: {
+        **_ARDUPILOT,
+        "AIRSPEED_CRUISE": _r(22.0),
+        "AIRSPEED_MAX": _i(22, INT16),
+        "AIRSPEED_MIN": _i(9, INT16),
+        "FENCE_TYPE": _i(7, INT8),
+        "FS_GCS_ENABL": _i(0, INT8),
+        "FS_LONG_ACTN": _i(0, INT8),
+        "Q_ENABLE": _i(0, INT8),
+        "RTL_ALTITUDE": _r(100.0),
+        "RTL_AUTOLAND": _i(0, INT8),
+        "RTL_RADIUS": _i(0, INT16),
+        "TECS_CLMB_MAX": _r(5.0),
+        "TECS_SINK_MAX": _r(5.0),
+        "TERRAIN_FOLLOW": _i(0),
+        "WP_LOITER_RAD": _i(60, INT16),
+        "WP_RADIUS": _i(90, INT16),
+    },
+    Autopilot.PX4: {
+        "COM_DL_LOSS_T": _i(10),
+        "COM_LOW_BAT_ACT": _i(0),
+        "GF_ACTION": _i(2),
+        "GF_MAX_HOR_DIST": _r(0.0),
+        "GF_MAX_VER_DIST": _r(0.0),
+        "MAV_SYS_ID": _i(1),
+        "MIS_TAKEOFF_ALT": _r(2.5),
+        "MIS_YAW_TMT": _r(-1.0),
+        "MPC_LAND_SPEED": _r(0.7),
+        "MPC_XY_CRUISE": _r(5.0),
+        "MPC_XY_VEL_MAX": _r(12.0),
+        "MPC_Z_VEL_MAX_DN": _r(1.5),
+        "MPC_Z_VEL_MAX_UP": _r(3.0),
+        "NAV_ACC_RAD": _r(10.0),
+        "NAV_DLL_ACT": _i(0),
+        "NAV_RCL_ACT": _i(2),
+        "RTL_DESCEND_ALT": _r(30.0),
+        "RTL_LAND_DELAY": _r(0.0),
+        "RTL_RETURN_ALT": _r(60.0),
+        "RTL_TYPE": _i(0),
+    },
+}
+
+
+class Parameters:
+    """The parameters of one vehicle, in alphabetical order as autopilots list them."""
+
+    def __init__(self, autopilot: Autopilot, sysid: int) -> None:
+        own_id = {} if autopilot is Autopilot.PX4 else {"SYSID_THISMAV": _i(sysid, INT16)}
+        self._table = dict(sorted({**_TABLES[autopilot], **own_id}.items()))
+        if autopilot is Autopilot.PX4:
+            self._table["MAV_SYS_ID"] = _i(sysid)
+        # PX4 puts an integer's bytes into the float field, ArduPilot its value.
+        self._bytewise = autopilot is Autopilot.PX4
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def names(self) -> list[str]:
+        """All names in order: a parameter's index is its place here."""
+        return list(self._table)
+
+    def value(self, name: str) -> float:
+        """The value; KeyError if there is none of that name."""
+        return self._table[name].value
+
+    def on_wire(self, name: str) -> tuple[float, int]:
+        """``(param_value, param_type)`` as PARAM_VALUE carries them."""
+        parameter = self._table[name]
+        if self._bytewise and parameter.kind != REAL32:
+            return float(struct.unpack("<f", struct.pack("<i", int(parameter.value)))[0]), parameter.kind
+        return parameter.value, parameter.kind
+
+    def set_from_wire(self, name: str, wire: float) -> bool:
+        """Take a PARAM_SET; False where the name is unknown or the value does not fit."""
+        parameter = self._table.get(name)
+        if parameter is None:
+            return False
+        value = wire
+        if self._bytewise and parameter.kind != REAL32:
+            value = float(struct.unpack("<i", struct.pack("<f", wire))[0])
+        if not -3.5e38 < value < 3.5e38:  # NaN and infinities
+            return False
+        if parameter.kind != REAL32:
+            low, high = _WHOLE[parameter.kind]
+            value = float(int(value))
+            if not low <= value <= high:
+                return False
+        self._table[name] = Parameter(parameter.kind, value)
+        return True

@@ -1,0 +1,126 @@
+"""What PX4 keeps of an item: floats as they are, but only the params that a command uses.
+
+Source: PX4 ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavlink_mission_item`) and ``navigation.h``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from gcsplan.mavlink.mission import FENCE, MISSION, NO_POSITION, RALLY, MissionItem, float32
+from gcsplan.sim.board import ERROR, INVALID_PARAM1, UNSUPPORTED, UNSUPPORTED_FRAME, Refused
+
+Keep = Callable[[float], float]
+
+
+def _same(value: float) -> float:
+    return value
+
+
+def _zero(value: float) -> float:
+    return 0.0
+
+
+def _positive(value: float) -> float:
+    return 1.0 if value > 0 else 0.0
+
+
+def _u16(value: float) -> float:
+    return float(int(value) & 0xFFFF) if math.isfinite(value) and abs(value) < 2**31 else 0.0
+
+
+def _i16(value: float) -> float:
+    return (_u16(value) + 32768.0) % 65536.0 - 32768.0
+
+
+def _heading(degrees: float) -> float:
+    """Degrees through radians in float32, wrapped to 0 … 2π: −90 comes back as 270, and 10 as 10.0 or its neighbour."""
+    radians = float32(degrees * float32(float32(math.pi) / 180.0))
+    if not math.isfinite(radians):
+        return math.nan
+    full = 2.0 * float32(math.pi)
+    if not 0.0 <= radians < full:
+        radians = float32(radians - float32(full * math.floor(radians / full)))
+    return float32(radians * float32(180.0 / float32(math.pi)))
+
+
+def _vertices(value: float) -> float:
+    return _u16(value + 0.5)
+
+
+_NOTHING = (_zero, _zero, _zero, _zero)
+_HEADING_ONLY = (_zero, _zero, _zero, _heading)
+
+# Commands with a place, in frames 0, 3, 5, 6: the params that come back.
+_LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
+    16: (_same, _same, _zero, _heading),  # waypoint: hold, acceptance radius
+    17: (_zero, _zero, _same, _heading),  # loiter unlimited
+    19: (_same, _positive, _same, _positive),  # loiter time
+    21: (_zero, _u16, _zero, _heading),  # land: precision
+    22: _HEADING_ONLY,  # take-off
+    31: (_positive, _same, _zero, _positive),
+    84: _HEADING_ONLY,
+    85: _HEADING_ONLY,
+    195: _NOTHING,
+    4501: _NOTHING,
+    5000: _NOTHING,
+    5001: (_vertices, _zero, _zero, _zero),
+    5002: (_vertices, _zero, _zero, _zero),
+    5003: (_same, _zero, _zero, _zero),
+    5004: (_same, _zero, _zero, _zero),
+    5100: _NOTHING,
+}
+
+# Commands that PX4 takes in frame 2 alone.
+_PLACELESS = frozenset({
+    20, 93, 112, 114, 177, 178, 179, 183, 187, 189, 197, 200, 201, 203, 204, 205, 206, 211, 212, 214, 260, 400,
+    530, 532, 534, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 42600,
+})  # fmt: skip
+
+_FENCE_AND_RALLY = frozenset({5001, 5002, 5003, 5004, 5100})
+_IN_INT_MODE = {0: 5, 5: 5, 3: 6, 6: 6}
+DO_JUMP, DO_SET_ROI = 177, 201
+
+
+def keep_item(item: MissionItem, mission_type: int) -> MissionItem:
+    """``item`` as it will read back in ITEM_INT: frames 0 and 3 come back as 5 and 6. Raises `Refused`."""
+    kept = _kept(item)
+    if mission_type == MISSION and item.command in _FENCE_AND_RALLY:
+        raise Refused(ERROR)
+    if mission_type == FENCE and item.command in (5001, 5002) and kept.params[0] < 3:
+        raise Refused(ERROR)
+    return kept
+
+
+def _kept(item: MissionItem) -> MissionItem:
+    if item.frame == NO_POSITION:
+        if item.command not in _PLACELESS:
+            raise Refused(UNSUPPORTED)
+        if item.command == DO_SET_ROI and item.params[0] not in (0.0, 1.0, 2.0):
+            raise Refused(INVALID_PARAM1)
+        params = item.params
+        if item.command == DO_JUMP:
+            params = (_i16(params[0]), _u16(params[1]), params[2], params[3])
+        # x and y pass through float32 here.
+        return MissionItem(
+            item.command, NO_POSITION, params, _through_float(item.x), _through_float(item.y), item.z, item.autocontinue
+        )
+    if item.frame not in _IN_INT_MODE:
+        raise Refused(UNSUPPORTED_FRAME)
+    if item.command not in _LOCATED:
+        raise Refused(UNSUPPORTED)
+    first, second, third, fourth = (
+        keep(value) for keep, value in zip(_LOCATED[item.command], item.params, strict=True)
+    )
+    frame = _IN_INT_MODE[item.frame]
+    return MissionItem(item.command, frame, (first, second, third, fourth), item.x, item.y, item.z, item.autocontinue)
+
+
+def _through_float(value: int) -> int:
+    return max(-(2**31), min(2**31 - 1, round(float32(value))))
+
+
+def most_items(mission_type: int) -> int:
+    """The longest list that COUNT may announce."""
+    return {MISSION: 2000, FENCE: 64, RALLY: 32}[mission_type]

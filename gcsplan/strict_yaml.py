@@ -1,0 +1,172 @@
+"""YAML as people mean it: the core schema of YAML 1.2, no tags, no duplicate keys, and bounds on everything.
+
+PyYAML alone reads ``5.0e6`` as text, ``no`` as False and ``12:30`` as 750, lets a key overwrite its twin in silence,
+and can be made to spend all memory on a few lines of aliases.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import yaml
+
+from gcsplan.errors import InputError
+
+MAX_BYTES = 5_000_000
+MAX_DEPTH = 40
+MAX_ALIASES = 200
+MAX_NODES = 500_000
+"""After every alias is followed."""
+
+_TAG = "tag:yaml.org,2002:"
+_PLAIN = "plain"
+_NULL = re.compile(r"(?:~|null|Null|NULL|)\Z")
+_BOOL = re.compile(r"(?:true|True|TRUE|false|False|FALSE)\Z")
+_INT = re.compile(r"(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)\Z")
+_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?\Z")
+_SPECIAL = re.compile(r"(?:[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
+
+_Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Loader(_Base):  # type: ignore[misc]
+    """Marks plain scalars with a tag of their own: what they mean is decided in `_scalar`."""
+
+    def resolve(self, kind: type[yaml.Node], value: str, implicit: Any) -> str:
+        if kind is yaml.ScalarNode:
+            return _PLAIN if implicit[0] else _TAG + "str"
+        return _TAG + ("seq" if kind is yaml.SequenceNode else "map")
+
+
+def read_yaml(text: str, *, where: str) -> Any:
+    """The one document in ``text``: dicts with text keys, lists, str, int, float, bool, None.
+
+    Raises InputError, with line and column, for anything that is not YAML, for tags, duplicate keys, and text beyond
+    the bounds of this module.
+    """
+    # Four bytes are the most that UTF-8 needs for a character.
+    if len(text) > MAX_BYTES:
+        raise InputError(f"the file has {len(text)} characters, more than {MAX_BYTES // 10**6} million", where=where)
+    try:
+        _measure(text, where)
+        node = yaml.compose(text, Loader=_Loader)
+        if node is None:
+            raise InputError("the file is empty", where=where)
+        _count(node, {}, where)
+        return _value(node, where)
+    except yaml.MarkedYAMLError as why:
+        mark = why.problem_mark or why.context_mark
+        problem = " ".join(x for x in (why.context, why.problem) if x)
+        hint = "; indent with spaces, not tabs" if mark is not None and "\t" in _line(text, mark.line) else ""
+        raise InputError(f"this is not YAML: {problem}{hint}", where=_place(where, mark)) from None
+    except (yaml.YAMLError, UnicodeError) as why:
+        raise InputError(f"this is not YAML: {str(why).splitlines()[0][:200]}", where=where) from None
+
+
+def _measure(text: str, where: str) -> None:
+    """Refuse bombs while they are still a stream of events: composing them would recurse without end."""
+    depth = nodes = aliases = 0
+    for event in yaml.parse(text, Loader=_Loader):
+        nodes += isinstance(event, yaml.NodeEvent)
+        aliases += isinstance(event, yaml.AliasEvent)
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        for what, count, most in (
+            ("levels deep", depth, MAX_DEPTH), ("aliases", aliases, MAX_ALIASES), ("values", nodes, MAX_NODES),
+        ):  # fmt: skip
+            if count > most:
+                raise InputError(f"the file has more than {most} {what}", where=_place(where, event.start_mark))
+
+
+def _count(node: yaml.Node, sizes: dict[int, int], where: str) -> int:
+    """Values below ``node`` with every alias followed; refuses loops and too many."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    known = sizes.get(id(node))
+    if known is not None:
+        if known < 0:
+            raise InputError("an alias holds itself", where=_place(where, node.start_mark))
+        return known
+    sizes[id(node)] = -1
+    children = node.value if isinstance(node, yaml.SequenceNode) else [x for pair in node.value for x in pair]
+    total = 1 + sum(_count(child, sizes, where) for child in children)
+    if total > MAX_NODES:
+        raise InputError(f"with its aliases followed the file has more than {MAX_NODES} values", where=where)
+    sizes[id(node)] = total
+    return total
+
+
+def _value(node: yaml.Node, where: str) -> Any:
+    if isinstance(node, yaml.SequenceNode):
+        _require_tag(node, "seq", where)
+        return [_value(child, where) for child in node.value]
+    if isinstance(node, yaml.MappingNode):
+        _require_tag(node, "map", where)
+        return _mapping(node, where)
+    return _scalar(node, where)
+
+
+def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    merged: dict[str, Any] = {}
+    for key_node, value_node in node.value:
+        key = _scalar(key_node, where) if isinstance(key_node, yaml.ScalarNode) else None
+        if not isinstance(key, str):
+            raise InputError(
+                f"a key must be a word, given {_shown(key_node)}", where=_place(where, key_node.start_mark)
+            )
+        if key == "<<" and key_node.tag == _PLAIN:
+            for part in value_node.value if isinstance(value_node, yaml.SequenceNode) else [value_node]:
+                if not isinstance(part, yaml.MappingNode):
+                    raise InputError("`<<` merges mappings only", where=_place(where, part.start_mark))
+                for k, v in _mapping(part, where).items():
+                    merged.setdefault(k, v)
+            continue
+        if key in found:
+            raise InputError(f"the key `{key}` stands twice; keep one", where=_place(where, key_node.start_mark))
+        found[key] = _value(value_node, where)
+    return merged | found
+
+
+def _scalar(node: yaml.Node, where: str) -> Any:
+    text = node.value
+    if node.tag != _PLAIN:  # quoted, a block of text, or with a tag of its own
+        _require_tag(node, "str", where)
+        return text
+    if _NULL.match(text):
+        return None
+    if _BOOL.match(text):
+        return text[0] in "tT"
+    if _INT.match(text):
+        if len(text) > 400:
+            raise InputError(f"a number of {len(text)} digits", where=_place(where, node.start_mark))
+        base = {"0o": 8, "0x": 16}.get(text[:2], 10)
+        return int(text, base)
+    if _FLOAT.match(text):
+        return float(text)
+    if _SPECIAL.match(text):
+        return math.nan if "n" in text.lower().replace("inf", "") else math.copysign(math.inf, -1 if "-" in text else 1)
+    return text
+
+
+def _require_tag(node: yaml.Node, kind: str, where: str) -> None:
+    if node.tag not in (_TAG + kind, "!"):
+        raise InputError(f"the tag {node.tag[:80]!r} is not allowed here; write the plain value",
+                         where=_place(where, node.start_mark))  # fmt: skip
+
+
+def _place(where: str, mark: Any) -> str:
+    return where if mark is None else f"{where}: line {mark.line + 1}, column {mark.column + 1}"
+
+
+def _line(text: str, number: int) -> str:
+    lines = text.splitlines()
+    return lines[number] if number < len(lines) else ""
+
+
+def _shown(node: yaml.Node) -> str:
+    return repr(node.value)[:60] if isinstance(node, yaml.ScalarNode) else "a list or a mapping"

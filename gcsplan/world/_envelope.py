@@ -1,0 +1,346 @@
+"""Kernels: bounds of a surface over and beside a ground track, and where a track is within reach of zones.
+
+The height under a straight line is a quadratic in each cell; it is cut until a chord, lifted by what the quadratic
+rises above it (or lowered by what it dips below), lies within `CHORD_M`. What lies beside the line, within reach, is
+bounded by reach times the steepest slope there, or by the highest and lowest node, whichever is tighter.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gcsplan.world._sweep import (
+    BOW_M,
+    SOURCES,
+    device,
+    kernel,
+    point_segment,
+    slab,
+    to_grid,
+)
+from gcsplan.world._sweep_terrain import EDGE, parts_of, unknown_near
+from gcsplan.world._sweep_zones import signed_distance
+
+CHORD_M = 0.05
+MOST_CUTS = 64  # of the line in one cell
+NEAR_UNKNOWN_M = 10.0  # pieces are cut to this beside unknown ground, so that little of the track is lost to it
+MOST_CELLS = 16  # looked at one by one for the slope beside a piece; more are bounded by the halo
+
+
+@device
+def steepest_in(f, z, halo, i, j, c0, r0, c1, r1):  # type: ignore[no-untyped-def]
+    """Steepest slope of the known cells that meet a box of the grid around a place in cell (i, j)."""
+    rows, cols = z.shape
+    i0, i1, j0, j1 = math.floor(c0), math.floor(c1), math.floor(r0), math.floor(r1)
+    if (i1 - i0 + 1) * (j1 - j0 + 1) > MOST_CELLS:
+        return abs(halo.slope[j, i])
+    square = 0.0
+    for jj in range(max(j0, 0), min(j1, rows - 2) + 1):
+        for ii in range(max(i0, 0), min(i1, cols - 2) + 1):
+            za = z[jj, ii]
+            kb, kc = z[jj, ii + 1] - za, z[jj + 1, ii] - za
+            kd = za - z[jj, ii + 1] - z[jj + 1, ii] + z[jj + 1, ii + 1]
+            if math.isnan(kb + kc + kd):
+                continue
+            u0, u1, v0, v1 = max(c0 - ii, 0.0), min(c1 - ii, 1.0), max(r0 - jj, 0.0), min(r1 - jj, 1.0)
+            gx = max(abs(kb + kd * v0), abs(kb + kd * v1)) / f.step_x
+            gy = max(abs(kc + kd * u0), abs(kc + kd * u1)) / f.step_y
+            square = max(square, gx * gx + gy * gy)
+    return math.sqrt(square)
+
+
+@device
+def put(rows, count, s, low0, low1, near0, near1, far0, far1):  # type: ignore[no-untyped-def]
+    """Add a piece that ends at ``s`` if there is room; the new number of pieces."""
+    if count < len(rows):
+        rows[count, 0] = s
+        rows[count, 1], rows[count, 2] = low0, low1
+        rows[count, 3], rows[count, 4] = near0, near1
+        rows[count, 5], rows[count, 6] = far0, far1
+    return count + 1
+
+
+@device
+def put_unknown(rows, count, s):  # type: ignore[no-untyped-def]
+    """Add a piece over unknown ground; the new number of pieces."""
+    return put(rows, count, s, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+
+
+@kernel
+def pieces(f, ground, top, under, beside, beyond, track, low_m, near_m, far_m, spare_m, rows, sources=SOURCES):  # type: ignore[no-untyped-def]
+    """Cut a ground track (N, 2) into pieces and bound the surface over each; their number.
+
+    Into ``rows``, as far as there is room: s at the end of the piece in metres along the track; lower bound of the
+    ground within ``low_m`` at both ends; upper bound of the top within ``near_m``; the same within ``far_m``. Linear
+    between; NaN where the ground within reach is unknown. ``under``, ``beside``, ``beyond``: halos of the ground and
+    of the top for the three reaches (each made for a little more than its reach). ``spare_m`` widens them all.
+    """
+    count = 0
+    s_start = 0.0
+    high_r, high_c = ground.shape
+    for leg in range(len(track) - 1):
+        e0, n0, e1, n1 = track[leg, 0], track[leg, 1], track[leg + 1, 0], track[leg + 1, 1]
+        length = math.hypot(e1 - e0, n1 - n0)
+        if length == 0.0:
+            continue
+        parts, bow = parts_of(f, e0, n0, e1, n1, BOW_M)
+        widen = bow + 2.0 * f.error_m + spare_m
+        cb, rb = to_grid(f, e0, n0)
+        for part in range(parts):
+            fa, fb = part / parts, (part + 1) / parts
+            c0, r0 = cb, rb
+            cb, rb = to_grid(f, e0 + (e1 - e0) * fb, n0 + (n1 - n0) * fb)
+            dc, dr = cb - c0, rb - r0
+            s0, run = s_start + fa * length, (fb - fa) * length
+            t, end = slab(c0, dc, -EDGE, high_c - 1.0 + EDGE, 0.0, 1.0)
+            t, end = slab(r0, dr, -EDGE, high_r - 1.0 + EDGE, t, end)
+            if not (t <= end and math.isfinite(dc) and math.isfinite(dr)):
+                count = put_unknown(rows, count, s0 + run)
+                continue
+            if t > 0.0:
+                count = put_unknown(rows, count, s0 + t * run)
+            at_c, at_r = c0 + t * dc, r0 + t * dr
+            i = int(math.floor(at_c)) if dc >= 0.0 else int(math.ceil(at_c)) - 1
+            j = int(math.floor(at_r)) if dr >= 0.0 else int(math.ceil(at_r)) - 1
+            i, j = min(max(i, 0), high_c - 2), min(max(j, 0), high_r - 2)
+            side_c, side_r = (1 if dc > 0.0 else 0), (1 if dr > 0.0 else 0)
+            last = False
+            while not last:
+                ii, jj = i, j
+                next_i, next_j = i + 2 * side_c - 1, j + 2 * side_r - 1
+                tx = (i + side_c - c0) / dc if dc != 0.0 and 0 <= next_i <= high_c - 2 else math.inf
+                ty = (j + side_r - r0) / dr if dr != 0.0 and 0 <= next_j <= high_r - 2 else math.inf
+                tb = max(min(min(tx, ty), end), t)
+                last = tb >= end
+                if tx <= ty:
+                    i = next_i
+                if ty <= tx:
+                    j = next_j
+                if tb <= t:
+                    continue
+                ga, gb, gc = ground[jj, ii], ground[jj, ii + 1] - ground[jj, ii], ground[jj + 1, ii] - ground[jj, ii]
+                gd = ground[jj + 1, ii + 1] - ground[jj, ii + 1] - gc
+                ta, tu, tv = top[jj, ii], top[jj, ii + 1] - top[jj, ii], top[jj + 1, ii] - top[jj, ii]
+                td = top[jj + 1, ii + 1] - top[jj, ii + 1] - tv
+                if math.isnan(gb + gc + gd + tu + tv + td):
+                    count = put_unknown(rows, count, s0 + tb * run)
+                    t = tb
+                    continue
+                turn = dc * dr * (tb - t) * (tb - t)
+                cuts = math.ceil(math.sqrt(0.25 * max(abs(gd * turn), abs(td * turn)) / CHORD_M))
+                edge = under.slope[jj, ii] < 0.0 or beside.slope[jj, ii] < 0.0 or beyond.slope[jj, ii] < 0.0
+                if edge:
+                    cuts = max(cuts, (tb - t) * run / NEAR_UNKNOWN_M)
+                cuts = min(max(int(math.ceil(cuts)), 1), MOST_CUTS)
+                g_bulge, t_bulge = 0.25 * gd * turn / (cuts * cuts), 0.25 * td * turn / (cuts * cuts)
+                u, v = min(max(c0 + t * dc - ii, 0.0), 1.0), min(max(r0 + t * dr - jj, 0.0), 1.0)
+                g0, t0 = ga + gb * u + gc * v + gd * u * v, ta + tu * u + tv * v + td * u * v
+                for k in range(cuts):
+                    pa, pb = t + (tb - t) * k / cuts, t + (tb - t) * (k + 1) / cuts
+                    wa, wb = c0 + pb * dc, r0 + pb * dr
+                    va, vb = c0 + pa * dc, r0 + pa * dr
+                    u, v = min(max(wa - ii, 0.0), 1.0), min(max(wb - jj, 0.0), 1.0)
+                    g1, t1 = ga + gb * u + gc * v + gd * u * v, ta + tu * u + tv * v + td * u * v
+                    # The chord and the quadratic: a positive bulge lies below the chord, a negative one above it.
+                    low0, low1 = g0 - max(g_bulge, 0.0), g1 - max(g_bulge, 0.0)
+                    up0, up1 = t0 - min(t_bulge, 0.0), t1 - min(t_bulge, 0.0)
+                    near0, near1, far0, far1 = up0, up1, up0, up1
+                    g0, t0 = g1, t1
+                    for which in range(3):
+                        reach = low_m if which == 0 else (near_m if which == 1 else far_m)
+                        reach += widen
+                        if reach <= 0.0:
+                            continue
+                        z = ground if which == 0 else top
+                        halo = under if which == 0 else (beside if which == 1 else beyond)
+                        lost = False
+                        if halo.slope[jj, ii] < 0.0:
+                            fa_, fb_ = fa + (fb - fa) * pa, fa + (fb - fa) * pb
+                            d, _ = unknown_near(
+                                f, z, halo, e0 + (e1 - e0) * fa_, n0 + (n1 - n0) * fa_,
+                                e0 + (e1 - e0) * fb_, n0 + (n1 - n0) * fb_, reach, ii, jj,
+                            )  # fmt: skip
+                            lost = d < reach
+                        x, y = reach / f.step_x, reach / f.step_y
+                        lift = reach * steepest_in(
+                            f, z, halo, ii, jj, min(va, wa) - x, min(vb, wb) - y, max(va, wa) + x, max(vb, wb) + y
+                        )
+                        if lost:
+                            lift = math.nan
+                        if which == 0:
+                            bound = halo.low[jj, ii]
+                            whole = min(low0, low1) - lift < bound
+                            low0, low1 = (bound, bound) if whole else (low0 - lift, low1 - lift)
+                        else:
+                            bound = halo.high[jj, ii]
+                            whole = max(up0, up1) + lift > bound
+                            if which == 1:
+                                near0, near1 = (bound, bound) if whole else (up0 + lift, up1 + lift)
+                            else:
+                                far0, far1 = (bound, bound) if whole else (up0 + lift, up1 + lift)
+                    count = put(rows, count, s0 + pb * run, low0, low1, near0, near1, far0, far1)
+                t = tb
+            if end < 1.0:
+                count = put_unknown(rows, count, s0 + run)
+        s_start += length
+    return count
+
+
+@kernel
+def around(f, z, halo, sign, points, reach_m, out, sources=SOURCES):  # type: ignore[no-untyped-def]
+    """Upper bound of ``sign·height`` within ``reach_m`` of each point (N, 2) of the plane; NaN where unknown.
+
+    The tightest of three: the gradient at the point where the disc lies in one cell; the highest corner of the cells'
+    parts in the disc's own box; the halo's. ``out`` (N,).
+    """
+    rows, cols = z.shape
+    for p in range(len(points)):
+        out[p] = math.nan
+        c, r = to_grid(f, points[p, 0], points[p, 1])
+        if not (-EDGE <= c <= cols - 1.0 + EDGE and -EDGE <= r <= rows - 1.0 + EDGE):
+            continue
+        i, j = min(max(int(math.floor(c)), 0), cols - 2), min(max(int(math.floor(r)), 0), rows - 2)
+        slope = halo.slope[j, i]
+        if slope == math.inf:
+            continue
+        u, v = min(max(c - i, 0.0), 1.0), min(max(r - j, 0.0), 1.0)
+        za = sign * z[j, i]
+        kb, kc = sign * z[j, i + 1] - za, sign * z[j + 1, i] - za
+        kd = za - sign * z[j, i + 1] - sign * z[j + 1, i] + sign * z[j + 1, i + 1]
+        h = za + kb * u + kc * v + kd * u * v
+        if reach_m <= 0.0:
+            out[p] = h
+            continue
+        if slope < 0.0:
+            d, _ = unknown_near(
+                f, z, halo, points[p, 0], points[p, 1], points[p, 0], points[p, 1], reach_m, i, j
+            )
+            if d < reach_m:
+                continue
+            slope = -slope
+        x, y = reach_m / f.step_x, reach_m / f.step_y
+        best = min(h + reach_m * slope, halo.high[j, i] if sign > 0.0 else -halo.low[j, i])
+        if x <= u <= 1.0 - x and y <= v <= 1.0 - y:
+            gx, gy = (kb + kd * v) / f.step_x, (kc + kd * u) / f.step_y
+            best = min(best, h + reach_m * math.sqrt(gx * gx + gy * gy) + 0.5 * abs(kd) * x * y)
+        i0, i1 = max(int(math.floor(c - x)), 0), min(int(math.floor(c + x)), cols - 2)
+        j0, j1 = max(int(math.floor(r - y)), 0), min(int(math.floor(r + y)), rows - 2)
+        if (i1 - i0 + 1) * (j1 - j0 + 1) <= MOST_CELLS:
+            most = -math.inf
+            for jj in range(j0, j1 + 1):
+                for ii in range(i0, i1 + 1):
+                    za = sign * z[jj, ii]
+                    kb, kc = sign * z[jj, ii + 1] - za, sign * z[jj + 1, ii] - za
+                    kd = za - sign * z[jj, ii + 1] - sign * z[jj + 1, ii] + sign * z[jj + 1, ii + 1]
+                    if math.isnan(kb + kc + kd):
+                        continue
+                    for k in range(4):
+                        u = min(max(c - x - ii, 0.0), 1.0) if k & 1 else max(min(c + x - ii, 1.0), 0.0)
+                        v = min(max(r - y - jj, 0.0), 1.0) if k & 2 else max(min(r + y - jj, 1.0), 0.0)
+                        most = max(most, za + kb * u + kc * v + kd * u * v)
+            best = min(best, most)
+        out[p] = best
+
+
+@kernel
+def spans(zs, track, reach_m, rows, sources=SOURCES):  # type: ignore[no-untyped-def]
+    """Where a ground track (N, 2) is within ``reach_m`` of zones: zone, leg, s0, s1 in ``rows``; their number."""
+    count = 0
+    s_start = 0.0
+    most = 1
+    for k in range(len(zs.circle)):
+        most = max(most, zs.first[k + 1] - zs.first[k])
+    parts = np.empty((most + 1, 2))
+    for leg in range(len(track) - 1):
+        e0, n0, e1, n1 = track[leg, 0], track[leg, 1], track[leg + 1, 0], track[leg + 1, 1]
+        de, dn = e1 - e0, n1 - n0
+        length = math.hypot(de, dn)
+        if length == 0.0:
+            continue
+        west, east, south, north = min(e0, e1), max(e0, e1), min(n0, n1), max(n0, n1)
+        for k in range(len(zs.circle)):
+            if (
+                zs.box[k, 0] - reach_m > east
+                or zs.box[k, 2] + reach_m < west
+                or zs.box[k, 1] - reach_m > north
+                or zs.box[k, 3] + reach_m < south
+            ):
+                continue
+            found = 0
+            radius = zs.circle[k, 2]
+            if radius >= 0.0:
+                middle = ((zs.circle[k, 0] - e0) * de + (zs.circle[k, 1] - n0) * dn) / length
+                aside = ((zs.circle[k, 0] - e0) * dn - (zs.circle[k, 1] - n0) * de) / length
+                half = (radius + reach_m) ** 2 - aside * aside
+                if half > 0.0:
+                    a, b = max(middle - math.sqrt(half), 0.0), min(middle + math.sqrt(half), length)
+                    if a < b:
+                        parts[0, 0], parts[0, 1] = a, b
+                        found = 1
+            else:
+                found = polygon_spans(zs, k, e0, n0, de / length, dn / length, length, reach_m, parts)
+            for m in range(found):
+                if count < len(rows):
+                    rows[count, 0], rows[count, 1] = k, leg
+                    rows[count, 2], rows[count, 3] = s_start + parts[m, 0], s_start + parts[m, 1]
+                count += 1
+        s_start += length
+    return count
+
+
+@device
+def polygon_spans(zs, k, e0, n0, ue, un, length, reach_m, parts):  # type: ignore[no-untyped-def]
+    """Merged parts [a, b] of a line, metres along it, within reach of a polygon; their number."""
+    found = 0
+    first, last = zs.first[k], zs.first[k + 1]
+    x0, y0 = zs.vertex[last - 1, 0] - e0, zs.vertex[last - 1, 1] - n0
+    sa, oa = x0 * ue + y0 * un, y0 * ue - x0 * un
+    for v in range(first, last):
+        x1, y1 = zs.vertex[v, 0] - e0, zs.vertex[v, 1] - n0
+        sb, ob = x1 * ue + y1 * un, y1 * ue - x1 * un
+        low, high = math.inf, -math.inf
+        # Along and aside of the line: the edge grown by a disc is a strip and two discs.
+        for s, o in ((sa, oa), (sb, ob)):
+            half = reach_m * reach_m - o * o
+            if half >= 0.0:
+                low, high = min(low, s - math.sqrt(half)), max(high, s + math.sqrt(half))
+        edge = math.hypot(sb - sa, ob - oa)
+        if edge > 0.0 and ob != oa:
+            # The strip's two sides cut the line where they lie beside the edge.
+            for side in (-reach_m, reach_m):
+                px, py = sa - side * (ob - oa) / edge, oa + side * (sb - sa) / edge
+                w = -py / (ob - oa)
+                if 0.0 <= w <= 1.0:
+                    low, high = min(low, px + w * (sb - sa)), max(high, px + w * (sb - sa))
+        low, high = max(low, 0.0), min(high, length)
+        if low <= high:
+            parts[found, 0], parts[found, 1] = low, high
+            found += 1
+        sa, oa = sb, ob
+    for m in range(1, found):
+        a, b = parts[m, 0], parts[m, 1]
+        q = m - 1
+        while q >= 0 and parts[q, 0] > a:
+            parts[q + 1, 0], parts[q + 1, 1] = parts[q, 0], parts[q, 1]
+            q -= 1
+        parts[q + 1, 0], parts[q + 1, 1] = a, b
+    # A gap between two parts is inside or outside as a whole; what is inside belongs to the span.
+    kept = 0
+    done = 0.0
+    for m in range(found + 1):
+        a, b = (parts[m, 0], parts[m, 1]) if m < found else (length, length)
+        if a > done:
+            middle = 0.5 * (done + a)
+            if signed_distance(zs, k, e0 + middle * ue, n0 + middle * un) < 0.0:
+                a = done
+        if m == found and a >= length:
+            break
+        if kept and a <= parts[kept - 1, 1]:
+            parts[kept - 1, 1] = max(parts[kept - 1, 1], b)
+        else:
+            parts[kept, 0], parts[kept, 1] = a, b
+            kept += 1
+        done = max(done, b)
+    return kept

@@ -1,0 +1,175 @@
+"""The kernel behind `Airspace.examine` and `Airspace.clear`: one for both, so that they cannot disagree."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+
+from gcsplan.world._sweep import SOURCES, TOUCH_M, device, kernel
+from gcsplan.world._sweep_terrain import sweep
+from gcsplan.world._sweep_zones import meets
+
+MIN_AGL, TERRAIN, MAX_AGL, MAX_AMSL, COVERAGE, CLIMB, DESCENT = range(7)
+ANGLE_RAD = 1e-9
+FEW_ZONES = 24  # up to so many boxes are looked through faster than the lattice
+
+
+class Demands(NamedTuple):
+    """Limits for the kernel; ``inf`` is no limit. ``clearance_m`` and track errors times ``scale`` are metres of the plane."""
+
+    min_agl_m: float
+    max_agl_m: float
+    max_amsl_m: float
+    clearance_m: float
+    scale: float
+    max_climb_rad: float
+    max_descent_rad: float
+
+
+@device
+def judge_terrain(f, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst):  # type: ignore[no-untyped-def]
+    """Ground, obstacles and ceilings of one leg; False at the first violation unless ``full``.
+
+    ``near``, ``far``: halos of the top for the track error and for the clearance; ``over``: of the ground for the track
+    error. ``worst[kind]``: depth (for coverage, how far unknown ground reaches in) and fraction. Lowest height above
+    top and where, then highest above ground, are left in ``out[8:11]``; the rest of ``out`` is `sweep`'s.
+    """
+    fine = True
+    track_m = track * want.scale
+    out[8], out[9], out[10] = math.nan, 0.0, math.nan
+    for kind in (MIN_AGL, TERRAIN, MAX_AGL):
+        z, halo, sign, need, reach = f.top, near, 1.0, want.min_agl_m + altitude, track_m
+        judged = True
+        if kind == MIN_AGL:
+            need = -math.inf if column else need
+        elif kind == TERRAIN:
+            if column or want.clearance_m <= 0.0:
+                continue
+            halo, need, reach = far, altitude, track_m + want.clearance_m * want.scale
+            # Where even the steepest slope does not lift the ground to the flight level, there is nothing to look for.
+            same = near.cols == far.cols and near.rows == far.rows
+            if same and out[0] - altitude >= (out[7] + want.clearance_m * want.scale) * out[6]:
+                continue
+        else:
+            z, halo, sign, need = f.ground, over, -1.0, altitude - want.max_agl_m
+            judged = want.max_agl_m < math.inf
+            if not (full or judged):
+                continue
+        good = sweep(f, z, halo, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full, out)
+        if not good and judged:
+            if not full:
+                return False
+            fine = False
+            if out[2] > TOUCH_M:
+                worst[kind, 0], worst[kind, 1] = out[2], out[3]
+            short = out[7] - out[4]
+            if (out[4] <= 0.0 or short > TOUCH_M) and not worst[COVERAGE, 0] >= short:
+                worst[COVERAGE, 0], worst[COVERAGE, 1] = max(short, TOUCH_M), out[5]
+        if kind == MIN_AGL and out[0] < math.inf:
+            out[8], out[9] = out[0], out[1]
+        elif kind == MAX_AGL and out[0] < math.inf:
+            out[10] = -out[0]
+    return fine
+
+
+@device
+def candidates(zs, west, south, east, north, seen, stamp, list_of):  # type: ignore[no-untyped-def]
+    """Number of zones whose boxes overlap a box, put into ``list_of`` once each."""
+    count = 0
+    zones = len(zs.circle)
+    lat = zs.lattice
+    cols, rows = int(lat[3]), int(lat[4])
+    few = zones <= FEW_ZONES
+    i0, i1, j0, j1 = 0, 0, 0, 0
+    if not few:
+        i0, i1 = int(max((west - lat[0]) * lat[2], 0.0)), int(min((east - lat[0]) * lat[2], cols - 1.0))
+        j0, j1 = int(max((south - lat[1]) * lat[2], 0.0)), int(min((north - lat[1]) * lat[2], rows - 1.0))
+    for j in range(j0, j1 + 1):
+        for i in range(i0, i1 + 1):
+            first, last = (0, zones) if few else (zs.bucket[j * cols + i], zs.bucket[j * cols + i + 1])
+            for m in range(first, last):
+                k = m if few else zs.near[m]
+                if zs.box[k, 0] < east and zs.box[k, 2] > west and zs.box[k, 1] < north and zs.box[k, 3] > south:
+                    if seen[k] != stamp:
+                        seen[k] = stamp
+                        list_of[count] = k
+                        count += 1
+    return count
+
+
+@kernel
+def judge(  # type: ignore[no-untyped-def]
+    f, near, far, over, zs, start, end, column, track, altitude, want, full, ok, found, worst, nearest, hit, hit_at,
+    sources=SOURCES,
+):  # fmt: skip
+    """Judge every leg: ``ok`` (n,). With ``full`` also, by leg:
+
+    ``found``: lowest height above top, its fraction, highest above ground, climb in radians, zone clearance;
+    ``worst`` (7, 2): depth (NaN where there is none) and fraction by kind; ``nearest`` zone. Zones that are broken go to
+    ``hit`` (leg, zone) and ``hit_at`` (signed distance, fraction) as far as there is room; their number is returned.
+    """
+    stack = np.empty((256, 8))
+    out = np.zeros(12)
+    none = np.zeros((7, 2))
+    zones = len(zs.circle)
+    seen, list_of = np.full(zones, -1), np.arange(zones)
+    hits = 0
+    for i in range(len(start)):
+        e0, n0, h0 = start[i, 0], start[i, 1], start[i, 2]
+        e1, n1, h1 = end[i, 0], end[i, 1], end[i, 2]
+        climb = math.atan2(h1 - h0, math.hypot(e1 - e0, n1 - n0))
+        over_top = max(h0, h1) + altitude[i] - want.max_amsl_m
+        up = 0.0 if column[i] else climb - want.max_climb_rad
+        down = 0.0 if column[i] else -climb - want.max_descent_rad
+        fine = not (up > ANGLE_RAD or down > ANGLE_RAD or over_top > TOUCH_M)
+        ok[i] = False
+        if not (fine or full):
+            continue
+        fine = (
+            judge_terrain(
+                f, near, far, over, column[i], e0, n0, h0, e1, n1, h1, track[i], altitude[i], want, stack, full, out,
+                worst[i] if full else none,
+            )
+            and fine
+        )  # fmt: skip
+        if not (fine or full):
+            continue
+        reach = (track[i] + want.clearance_m) * want.scale
+        west, east, south, north = min(e0, e1), max(e0, e1), min(n0, n1), max(n0, n1)
+        count = zones
+        if not full:
+            count = candidates(zs, west - reach, south - reach, east + reach, north + reach, seen, i, list_of)
+        best, which = math.inf, -1
+        for m in range(count):
+            k = list_of[m]
+            if full:
+                dx = max(zs.box[k, 0] - east, 0.0, west - zs.box[k, 2])
+                dy = max(zs.box[k, 1] - north, 0.0, south - zs.box[k, 3])
+                gap = math.sqrt(dx * dx + dy * dy)
+                if gap > 0.0 and gap >= best and gap >= reach:
+                    continue
+            broken, dist, at = meets(f, zs, k, e0, n0, h0, e1, n1, h1, altitude[i], reach, stack, full)
+            if broken:
+                fine = False
+                if not full:
+                    break
+                if hits < len(hit):
+                    hit[hits, 0], hit[hits, 1] = i, k
+                    hit_at[hits, 0], hit_at[hits, 1] = dist, at
+                hits += 1
+            if max(dist, 0.0) < best:
+                best, which = max(dist, 0.0), k
+        ok[i] = fine
+        if full:
+            found[i, 0], found[i, 1], found[i, 2], found[i, 3], found[i, 4] = out[8], out[9], out[10], climb, best
+            nearest[i] = which
+            if up > ANGLE_RAD:
+                worst[i, CLIMB, 0] = up
+            if down > ANGLE_RAD:
+                worst[i, DESCENT, 0] = down
+            if over_top > TOUCH_M:
+                worst[i, MAX_AMSL, 0], worst[i, MAX_AMSL, 1] = over_top, 1.0 if h1 >= h0 else 0.0
+    return hits

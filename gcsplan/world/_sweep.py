@@ -1,0 +1,282 @@
+"""What every kernel of the exact check shares: the surface as arrays, the map to its grid, and plane geometry.
+
+Kernels are compiled by numba and kept in its cache. numba notices a change of the file that a kernel stands in, but
+not of the files that it calls into; so each cached kernel takes `SOURCES`, a digest of all of them, as the default of
+its last parameter, which numba keeps as a part of the key.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gcsplan.world.surface import DEGREE, TERMS, GridMap, Surface
+
+Floats = NDArray[np.float64]
+
+TOUCH_M = 1e-6
+"""Float noise: a limit that is broken by less is touched, and touching is legal."""
+
+RESOLUTION_M = 0.005
+"""Height to which the branch and bound resolves what lies within reach; what it cannot tell apart, it refuses."""
+
+BOW_M = 0.05
+"""A leg is mapped to the grid in parts whose plane-straight and grid-straight lines lie within this."""
+
+SOURCES = hashlib.sha256(
+    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("_*.py")) if path.name != "__init__.py")
+).hexdigest()
+
+device = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+"""A function that only kernels call; without the wrappers that Python would need, it compiles faster."""
+
+kernel = njit(nogil=True, error_model="numpy", cache=True)
+"""What Python calls. Dividing by zero gives inf or NaN, as in numpy; NaN is unknown, so no fast math."""
+
+
+class Field(NamedTuple):
+    """A surface and its map for the kernels.
+
+    ``horner`` (28, 2): the map's coefficients, highest power first; ``linear`` (3, 2): constant, u, v, used alone
+    where the map is affine. Beyond ``half`` (of the fitted square, in u and v) the map is not to be trusted.
+    ``bend`` bounds the map's second derivative, cells taken as metres, 1/m: a line of length L bows by bend·L²/8 at
+    most, and the metric changes by bend·d over a distance d. ``step_x``, ``step_y``: metres of one column and one
+    row, a lower bound over the whole map: (step_x·Δcol)² + (step_y·Δrow)² <= distance².
+    """
+
+    ground: Floats
+    top: Floats
+    horner: Floats
+    linear: Floats
+    affine: bool
+    centre_e: float
+    centre_n: float
+    per_unit: float
+    half: float
+    bend: float
+    error_m: float
+    step_x: float
+    step_y: float
+
+    @classmethod
+    def of(cls, surface: Surface) -> Field:
+        """Arrays and bounds of ``surface``."""
+        grid = surface.grid
+        order = [TERMS.index((i, j)) for i in range(DEGREE, -1, -1) for j in range(DEGREE - i, -1, -1)]
+        higher = [k for k, (i, j) in enumerate(TERMS) if i + j > 1]
+        affine = not grid.coefficients[higher].any()
+        low = [TERMS.index(t) for t in ((0, 0), (1, 0), (0, 1))]
+        bend, step_x, step_y = _bounds(grid, affine)
+        return cls(
+            surface.ground_m,
+            surface.top_m,
+            _frozen(grid.coefficients[order]),
+            _frozen(grid.coefficients[low]),
+            affine,
+            float(grid.centre[0]),
+            float(grid.centre[1]),
+            1.0 / grid.scale_m,
+            math.inf if affine else 1.0 + 1e-9,
+            bend,
+            float(grid.error_m),
+            step_x,
+            step_y,
+        )
+
+
+def _frozen(a: Floats) -> Floats:
+    kept = np.array(a, dtype=np.float64, order="C")
+    kept.setflags(write=False)
+    return kept
+
+
+def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
+    """``bend``, ``step_x``, ``step_y`` of `Field`, from a lattice over the fitted square."""
+    f = np.linspace(-1.0, 1.0, 2 if affine else 33)
+    u, v = (a.ravel() for a in np.meshgrid(f, f))
+
+    def derivative(du: int, dv: int) -> Floats:
+        total = np.zeros((len(u), 2))
+        for k, (i, j) in enumerate(TERMS):
+            if i >= du and j >= dv:
+                factor = math.perm(i, du) * math.perm(j, dv) / grid.scale_m ** (du + dv)
+                total += factor * (u ** (i - du) * v ** (j - dv))[:, None] * grid.coefficients[k]
+        return total
+
+    jacobian = np.stack([derivative(1, 0), derivative(0, 1)], axis=-1)
+    inverse = np.linalg.inv(jacobian)
+    steps = np.array([_steps(m) for m in inverse])
+    if affine:
+        return 0.0, float(steps[:, 0].min()), float(steps[:, 1].min())
+    # Of a symmetric form the largest value over two directions is attained at two that are equal.
+    uu, uv, vv = (np.einsum("nij,nj->ni", inverse, derivative(*d)) for d in ((2, 0), (1, 1), (0, 2)))
+    turn = np.linspace(0.0, np.pi, 24, endpoint=False)
+    c, s = np.cos(turn)[:, None, None], np.sin(turn)[:, None, None]
+    bend = 1.1 * float(np.linalg.norm(c * c * uu + 2.0 * c * s * uv + s * s * vv, axis=-1).max())
+    spacing = grid.scale_m * (f[1] - f[0])
+    keep = 1.0 - bend * spacing
+    return bend, float(steps[:, 0].min()) * keep, float(steps[:, 1].min()) * keep
+
+
+def _steps(inverse: Floats) -> tuple[float, float]:
+    return steps_of.py_func(inverse[0, 0], inverse[0, 1], inverse[1, 0], inverse[1, 1])  # type: ignore[no-any-return]
+
+
+@device
+def steps_of(a: float, b: float, c: float, d: float):  # type: ignore[no-untyped-def]
+    """Steps of a column and of a row, metres, from d(east, north)/d(col, row); skew is taken off both."""
+    xx, yy, xy = a * a + c * c, b * b + d * d, abs(a * b + c * d)
+    k = math.sqrt(xx / yy)
+    return math.sqrt(max(xx - xy * k, 0.0)), math.sqrt(max(yy - xy / k, 0.0))
+
+
+@device
+def to_grid(f, e, n):  # type: ignore[no-untyped-def]
+    """Column and row of a point of the plane; NaN beyond the fitted square."""
+    u = (e - f.centre_e) * f.per_unit
+    v = (n - f.centre_n) * f.per_unit
+    if f.affine:
+        k = f.linear
+        return k[0, 0] + k[1, 0] * u + k[2, 0] * v, k[0, 1] + k[1, 1] * u + k[2, 1] * v
+    if not (abs(u) <= f.half and abs(v) <= f.half):
+        return math.nan, math.nan
+    h = f.horner
+    col, row = 0.0, 0.0
+    at = 0
+    for m in range(DEGREE + 1):
+        a, b = h[at, 0], h[at, 1]
+        at += 1
+        for _ in range(m):
+            a = a * v + h[at, 0]
+            b = b * v + h[at, 1]
+            at += 1
+        col = col * u + a
+        row = row * u + b
+    return col, row
+
+
+@device
+def plane_per_cell(f, e, n):  # type: ignore[no-untyped-def]
+    """d(east, north)/d(col, row) at a point: a, b, c, d of [[a, b], [c, d]]."""
+    u = (e - f.centre_e) * f.per_unit
+    v = (n - f.centre_n) * f.per_unit
+    cu, ru, cv, rv = 0.0, 0.0, 0.0, 0.0
+    if f.affine:
+        cu, ru, cv, rv = f.linear[1, 0], f.linear[1, 1], f.linear[2, 0], f.linear[2, 1]
+    else:
+        h = f.horner
+        col, row = 0.0, 0.0
+        at = 0
+        for m in range(DEGREE + 1):
+            a, b = h[at, 0], h[at, 1]
+            av, bv = 0.0, 0.0
+            at += 1
+            for _ in range(m):
+                av = av * v + a
+                bv = bv * v + b
+                a = a * v + h[at, 0]
+                b = b * v + h[at, 1]
+                at += 1
+            cu = cu * u + col
+            ru = ru * u + row
+            cv = cv * u + av
+            rv = rv * u + bv
+            col = col * u + a
+            row = row * u + b
+    k = 1.0 / ((cu * rv - cv * ru) * f.per_unit)
+    return rv * k, -cv * k, -ru * k, cu * k
+
+
+@device
+def box_distance(px, py, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
+    """Distance of a point from an upright box; 0 inside."""
+    dx = max(x0 - px, 0.0, px - x1)
+    dy = max(y0 - py, 0.0, py - y1)
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@device
+def point_segment(px, py, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Distance of a point from a segment, and where on it (0 … 1)."""
+    dx, dy = bx - ax, by - ay
+    square = dx * dx + dy * dy
+    t = 0.0
+    if square > 0.0:
+        t = min(max(((px - ax) * dx + (py - ay) * dy) / square, 0.0), 1.0)
+    ex, ey = ax + t * dx - px, ay + t * dy - py
+    return math.sqrt(ex * ex + ey * ey), t
+
+
+@device
+def slab(start, step, low, high, t0, t1):  # type: ignore[no-untyped-def]
+    """The part of [t0, t1] where start + t·step lies within [low, high]; empty where the first exceeds the second."""
+    if step == 0.0:
+        return (t0, t1) if low <= start <= high else (1.0, 0.0)
+    a, b = (low - start) / step, (high - start) / step
+    if a > b:
+        a, b = b, a
+    return max(t0, a), min(t1, b)
+
+
+@device
+def segment_box(ax, ay, bx, by, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
+    """Distance of a segment from an upright box, and where on the segment (0 … 1)."""
+    t0, t1 = slab(ax, bx - ax, x0, x1, 0.0, 1.0)
+    if t0 <= t1:
+        t0, t1 = slab(ay, by - ay, y0, y1, t0, t1)
+        if t0 <= t1:
+            return 0.0, 0.5 * (t0 + t1)
+    best, at = box_distance(ax, ay, x0, y0, x1, y1), 0.0
+    d = box_distance(bx, by, x0, y0, x1, y1)
+    if d < best:
+        best, at = d, 1.0
+    for k in range(4):
+        d, t = point_segment(x0 if k & 1 else x1, y0 if k & 2 else y1, ax, ay, bx, by)
+        if d < best:
+            best, at = d, t
+    return best, at
+
+
+@device
+def within(ax, ay, dx, dy, x0, y0, x1, y1, reach):  # type: ignore[no-untyped-def]
+    """The part [t0, t1] of a segment that lies within ``reach`` of an upright box; t0 > t1 where none does.
+
+    The box grown by a disc is the union of two boxes and four discs, and convex: the hull of the parts is exact.
+    """
+    t0, t1 = slab(ax, dx, x0 - reach, x1 + reach, 0.0, 1.0)
+    if t0 <= t1:
+        t0, t1 = slab(ay, dy, y0 - reach, y1 + reach, t0, t1)
+    if t0 > t1:
+        return 1.0, 0.0
+    sx, sy, ex, ey = ax + t0 * dx, ay + t0 * dy, ax + t1 * dx, ay + t1 * dy
+    if (x0 <= sx <= x1 or y0 <= sy <= y1) and (x0 <= ex <= x1 or y0 <= ey <= y1):
+        return t0, t1
+    low, high = 1.0, 0.0
+    a, b = slab(ax, dx, x0, x1, t0, t1)
+    if a <= b:
+        low, high = min(low, a), max(high, b)
+    a, b = slab(ay, dy, y0, y1, t0, t1)
+    if a <= b:
+        low, high = min(low, a), max(high, b)
+    square = dx * dx + dy * dy
+    for k in range(4):
+        px, py = (x0 if k & 1 else x1) - ax, (y0 if k & 2 else y1) - ay
+        if square <= 0.0:
+            if px * px + py * py <= reach * reach:
+                low, high = 0.0, 1.0
+            continue
+        middle = (px * dx + py * dy) / square
+        gx, gy = middle * dx - px, middle * dy - py
+        rest = reach * reach - gx * gx - gy * gy
+        if rest >= 0.0:
+            half = math.sqrt(rest / square)
+            a, b = max(middle - half, t0), min(middle + half, t1)
+            if a <= b:
+                low, high = min(low, a), max(high, b)
+    return low, high

@@ -1,0 +1,341 @@
+"""Kernels: a leg against no-fly zones.
+
+A zone whose levels are both above mean sea level is met exactly, by closed forms: the part of the leg at its heights,
+and that part's distance from its shape. Where a level follows the ground, branch and bound over pieces of cells finds
+the nearest point of the shape whose own heights, on its own ground, the leg meets.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from numpy.typing import NDArray
+
+from gcsplan.world._sweep import (
+    RESOLUTION_M,
+    TOUCH_M,
+    Floats,
+    device,
+    plane_per_cell,
+    point_segment,
+    segment_box,
+    slab,
+    steps_of,
+    to_grid,
+)
+from gcsplan.world._sweep_terrain import MOST_PIECES, SMALLEST_M, parts_of
+
+ACROSS_M = 0.02
+"""Size to which pieces are cut beside a zone whose levels follow the ground."""
+
+ZONE_BOW_M = 0.003
+
+
+class Zones(NamedTuple):
+    """The zones as arrays, (n,) or (n, k) by zone.
+
+    ``circle``: east, north, radius in metres of the plane; a negative radius marks a polygon, whose vertices are
+    ``vertex[first[k]:first[k + 1]]``. ``box``: west, south, east, north. ``level``: floor and ceiling, above mean sea
+    level or above ground as ``agl`` says; -inf and inf where there is none. ``band``: the same above mean sea level,
+    over the ground that the zone stands on (outer bounds). ``cell``: first and last column, first and last row that
+    the shape may touch. ``bucket``, ``near``: the zones of each square of a coarse lattice, whose ``lattice`` is west,
+    south, 1 / side, columns, rows.
+    """
+
+    circle: Floats
+    first: NDArray[np.int64]
+    vertex: Floats
+    box: Floats
+    level: Floats
+    agl: NDArray[np.bool_]
+    band: Floats
+    cell: NDArray[np.int64]
+    lattice: Floats
+    bucket: NDArray[np.int64]
+    near: NDArray[np.int64]
+
+
+@device
+def signed_distance(zs, k, e, n):  # type: ignore[no-untyped-def]
+    """Distance of a point from a zone's border, negative inside."""
+    radius = zs.circle[k, 2]
+    if radius >= 0.0:
+        return math.hypot(e - zs.circle[k, 0], n - zs.circle[k, 1]) - radius
+    best = math.inf
+    inside = False
+    a, b = zs.first[k], zs.first[k + 1]
+    x0, y0 = zs.vertex[b - 1, 0], zs.vertex[b - 1, 1]
+    for v in range(a, b):
+        x1, y1 = zs.vertex[v, 0], zs.vertex[v, 1]
+        d, _ = point_segment(e, n, x0, y0, x1, y1)
+        best = min(best, d)
+        if (y0 > n) != (y1 > n) and e < x0 + (n - y0) / (y1 - y0) * (x1 - x0):
+            inside = not inside
+        x0, y0 = x1, y1
+    return -best if inside else best
+
+
+@device
+def approach(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Least distance of a segment from a zone's shape and where on the segment; of a circle it is signed."""
+    radius = zs.circle[k, 2]
+    if radius >= 0.0:
+        d, t = point_segment(zs.circle[k, 0], zs.circle[k, 1], ax, ay, bx, by)
+        return d - radius, t
+    best, at = signed_distance(zs, k, ax, ay), 0.0
+    if best <= 0.0:
+        return 0.0, 0.0
+    dx, dy = bx - ax, by - ay
+    first, last = zs.first[k], zs.first[k + 1]
+    x0, y0 = zs.vertex[last - 1, 0], zs.vertex[last - 1, 1]
+    for v in range(first, last):
+        x1, y1 = zs.vertex[v, 0], zs.vertex[v, 1]
+        # Two segments that do not cross are nearest at an end of one of them.
+        d, _ = point_segment(bx, by, x0, y0, x1, y1)
+        if d < best:
+            best, at = d, 1.0
+        d, t = point_segment(x1, y1, ax, ay, bx, by)
+        if d < best:
+            best, at = d, t
+        cross = dx * (y1 - y0) - dy * (x1 - x0)
+        if cross != 0.0:
+            t = ((x0 - ax) * (y1 - y0) - (y0 - ay) * (x1 - x0)) / cross
+            s = ((x0 - ax) * dy - (y0 - ay) * dx) / cross
+            if 0.0 <= t <= 1.0 and 0.0 <= s <= 1.0:
+                return 0.0, t
+        x0, y0 = x1, y1
+    return best, at
+
+
+@device
+def enters(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Whether a segment passes through the open inside of a polygon, by more than touching it.
+
+    Between neighbours among its crossings with the edges and the feet of the vertices on it, the segment stays on one
+    side of every edge, and is as far from the border in the middle as anywhere, but for a factor.
+    """
+    first, last = zs.first[k], zs.first[k + 1]
+    dx, dy = bx - ax, by - ay
+    square = dx * dx + dy * dy
+    if square == 0.0:
+        return signed_distance(zs, k, ax, ay) < -TOUCH_M
+    events = np.empty(2 * (last - first))
+    count = 0
+    x0, y0 = zs.vertex[last - 1, 0], zs.vertex[last - 1, 1]
+    for v in range(first, last):
+        x1, y1 = zs.vertex[v, 0], zs.vertex[v, 1]
+        t = ((x1 - ax) * dx + (y1 - ay) * dy) / square
+        if 0.0 < t < 1.0:
+            events[count] = t
+            count += 1
+        cross = dx * (y1 - y0) - dy * (x1 - x0)
+        if cross != 0.0:
+            t = ((x0 - ax) * (y1 - y0) - (y0 - ay) * (x1 - x0)) / cross
+            if 0.0 < t < 1.0:
+                events[count] = t
+                count += 1
+        x0, y0 = x1, y1
+    t = 0.0
+    while t < 1.0:
+        following = 1.0
+        for q in range(count):
+            if t < events[q] < following:
+                following = events[q]
+        middle = 0.5 * (t + following)
+        if signed_distance(zs, k, ax + middle * dx, ay + middle * dy) < -TOUCH_M:
+            return True
+        t = following
+    return False
+
+
+@device
+def deepest_inside(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Greatest depth (>= 0) of a segment inside a polygon to a hundredth or 1 cm, and where on the segment."""
+    length = math.hypot(bx - ax, by - ay)
+    stack = np.empty((128, 2))
+    stack[0, 0], stack[0, 1] = 0.0, 1.0
+    size = 1
+    best, at = 0.0, 0.5
+    while size:
+        size -= 1
+        t0, t1 = stack[size, 0], stack[size, 1]
+        t = 0.5 * (t0 + t1)
+        depth = -signed_distance(zs, k, ax + t * (bx - ax), ay + t * (by - ay))
+        if depth > best:
+            best, at = depth, t
+        if depth + 0.5 * (t1 - t0) * length > best + max(0.01, 0.01 * best):
+            stack[size, 0], stack[size, 1] = t0, t
+            stack[size + 1, 0], stack[size + 1, 1] = t, t1
+            size += 2
+    return best, at
+
+
+@device
+def at_heights(h0, dh, floor_m, ceiling_m, altitude_m):  # type: ignore[no-untyped-def]
+    """The part of [0, 1] where h0 + t·dh, give or take ``altitude_m``, meets the open (floor, ceiling)."""
+    if not floor_m < ceiling_m:
+        return 1.0, 0.0
+    return slab(h0, dh, floor_m - altitude_m + TOUCH_M, ceiling_m + altitude_m - TOUCH_M, 0.0, 1.0)
+
+
+@device
+def nearest_conflict(f, zs, k, e0, n0, h0, e1, n1, h1, altitude_m, cutoff, stack, full):  # type: ignore[no-untyped-def]
+    """Least distance from a short segment to a point of a zone's shape at whose place it meets the zone's heights.
+
+    Found only below ``cutoff``, else inf; and where on the segment. Unknown ground: the zone is met at any height.
+    Without ``full`` the first one ends the search; with it the least is resolved to 1 cm or a hundredth.
+    """
+    z = f.ground
+    rows, cols = z.shape
+    dh = h1 - h0
+    length = math.hypot(e1 - e0, n1 - n0)
+    me, mn = 0.5 * (e0 + e1), 0.5 * (n0 + n1)
+    c0, r0 = to_grid(f, e0, n0)
+    c1, r1 = to_grid(f, e1, n1)
+    cm, rm = to_grid(f, me, mn)
+    if not math.isfinite(c0 + r0 + c1 + r1):
+        return 0.0, 0.5
+    slack = f.bend * length * length / 8.0 + f.error_m
+    a, b, c, d = plane_per_cell(f, me, mn)
+    sx, sy = steps_of(a, b, c, d)
+    keep = 1.0 - 1.1 * f.bend * (0.5 * length + cutoff) - 1e-9
+    sx *= keep
+    sy *= keep
+    wide_r, tall_r = (cutoff + slack) / sx, (cutoff + slack) / sy
+    i0 = max(int(math.floor(min(c0, c1) - wide_r)), zs.cell[k, 0])
+    i1 = min(int(math.floor(max(c0, c1) + wide_r)), zs.cell[k, 1])
+    j0 = max(int(math.floor(min(r0, r1) - tall_r)), zs.cell[k, 2])
+    j1 = min(int(math.floor(max(r0, r1) + tall_r)), zs.cell[k, 3])
+    floor_m, floor_agl = zs.level[k, 0], zs.agl[k, 0]
+    ceiling_m, ceiling_agl = zs.level[k, 1], zs.agl[k, 1]
+    x0, y0, x1, y1 = c0 * sx, r0 * sy, c1 * sx, r1 * sy
+    rise = abs(dh) / length if length > 0.0 else 0.0
+    best, at = math.inf, 0.5
+    worked = 0
+    for j in range(j0, j1 + 1):
+        for i in range(i0, i1 + 1):
+            known = 0 <= i < cols - 1 and 0 <= j < rows - 1
+            za, kb, kc, kd = 0.0, 0.0, 0.0, 0.0
+            if known:
+                za = z[j, i]
+                kb, kc = z[j, i + 1] - za, z[j + 1, i] - za
+                kd = za - z[j, i + 1] - z[j + 1, i] + z[j + 1, i + 1]
+                known = not math.isnan(kb + kc + kd)
+            # The whole cell goes through the same mill as its pieces: as the one child of nothing.
+            size = 0
+            u0, v0, um, vm, u1, v1, ul, vl = 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
+            children = 1
+            while True:
+                bar = min(cutoff, best - max(0.01, 0.01 * best)) if best < math.inf else cutoff
+                before = size
+                for _ in range(children):
+                    p, q = za + kb * u0 + kc * v0 + kd * u0 * v0, za + kb * um + kc * v0 + kd * um * v0
+                    s, t = za + kb * u0 + kc * vm + kd * u0 * vm, za + kb * um + kc * vm + kd * um * vm
+                    least, most = min(min(p, q), min(s, t)), max(max(p, q), max(s, t))
+                    t0, t1 = 0.0, 1.0
+                    if known:
+                        low, high = floor_m + (least if floor_agl else 0.0), ceiling_m + (most if ceiling_agl else 0.0)
+                        t0, t1 = at_heights(h0, dh, low, high, altitude_m)
+                    if t0 <= t1:
+                        dist, where = segment_box(
+                            x0 + t0 * (x1 - x0), y0 + t0 * (y1 - y0), x0 + t1 * (x1 - x0), y0 + t1 * (y1 - y0),
+                            (i + u0) * sx, (j + v0) * sy, (i + um) * sx, (j + vm) * sy,
+                        )  # fmt: skip
+                        dist -= slack
+                        if dist < bar:
+                            gc, gr = i + 0.5 * (u0 + um) - cm, j + 0.5 * (v0 + vm) - rm
+                            pe, pn = a * gc + b * gr, c * gc + d * gr
+                            hu, hv = 0.5 * (um - u0), 0.5 * (vm - v0)
+                            half = max(
+                                math.hypot(a * hu + b * hv, c * hu + d * hv),
+                                math.hypot(a * hu - b * hv, c * hu - d * hv),
+                            )
+                            off = 0.6 * f.bend * (pe * pe + pn * pn) + f.error_m + 1e-9
+                            if signed_distance(zs, k, me + pe, mn + pn) <= 1.001 * half + off:
+                                stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3] = u0, v0, um, vm
+                                stack[size, 4], stack[size, 5] = max(dist, 0.0), t0 + where * (t1 - t0)
+                                stack[size, 6] = most - least
+                                size += 1
+                    u0, v0, um, vm = ul, vl, u1, v1
+                if size == before + 2 and stack[before, 4] < stack[before + 1, 4]:
+                    for m in range(7):
+                        stack[before, m], stack[before + 1, m] = stack[before + 1, m], stack[before, m]
+                children = 0
+                while size:
+                    size -= 1
+                    if best < math.inf and not stack[size, 4] < best - max(0.01, 0.01 * best):
+                        continue
+                    u0, v0, u1, v1 = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
+                    wide, tall = (u1 - u0) * sx, (v1 - v0) * sy
+                    across = math.hypot(wide, tall)
+                    worked += 1
+                    if (
+                        (across <= ACROSS_M and stack[size, 6] + rise * across <= RESOLUTION_M)
+                        or across <= SMALLEST_M
+                        or worked > MOST_PIECES
+                    ):
+                        best, at = stack[size, 4], stack[size, 5]
+                        if not full or best <= 0.01 or worked > MOST_PIECES:
+                            return best, at
+                        continue
+                    um = 0.5 * (u0 + u1) if wide >= tall else u1
+                    vm = v1 if wide >= tall else 0.5 * (v0 + v1)
+                    ul, vl = (um, v0) if wide >= tall else (u0, vm)
+                    children = 2
+                    break
+                if children == 0:
+                    break
+    return best, at
+
+
+@device
+def meets(f, zs, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stack, full):  # type: ignore[no-untyped-def]
+    """Whether a leg breaks a zone; its signed distance from the shape at the worst point, and where on the leg.
+
+    Without a break the distance is the least at which the leg meets the zone's heights (for a zone over ground a lower
+    bound, never below ``reach``), inf where it does not.
+    """
+    t0, t1 = at_heights(h0, h1 - h0, zs.band[k, 0], zs.band[k, 1], altitude_m)
+    if t0 > t1:
+        return False, math.inf, 0.0
+    de, dn = e1 - e0, n1 - n0
+    ax, ay, bx, by = e0 + t0 * de, n0 + t0 * dn, e0 + t1 * de, n0 + t1 * dn
+    # Cheap bound by the shape's box.
+    dist, where = approach(zs, k, ax, ay, bx, by)
+    where = t0 + where * (t1 - t0)
+    polygon = zs.circle[k, 2] < 0.0
+    bound = reach - TOUCH_M
+    if polygon and bound <= 0.0 and dist <= 0.0:
+        if not enters(zs, k, ax, ay, bx, by):
+            return False, 0.0, where
+    elif not dist < bound:
+        return False, dist, where
+    if not (zs.agl[k, 0] or zs.agl[k, 1]):
+        if full and polygon and dist <= 0.0:
+            depth, where = deepest_inside(zs, k, ax, ay, bx, by)
+            dist, where = -depth, t0 + where * (t1 - t0)
+        return True, dist, where
+    # The levels follow the ground: look along the part that is near the zone's box.
+    cutoff = max(bound, SMALLEST_M)
+    t0, t1 = slab(e0, de, zs.box[k, 0] - reach - 1.0, zs.box[k, 2] + reach + 1.0, t0, t1)
+    if t0 <= t1:
+        t0, t1 = slab(n0, dn, zs.box[k, 1] - reach - 1.0, zs.box[k, 3] + reach + 1.0, t0, t1)
+    best, at = math.inf, 0.0
+    if t0 <= t1:
+        parts, _ = parts_of(f, e0 + t0 * de, n0 + t0 * dn, e0 + t1 * de, n0 + t1 * dn, ZONE_BOW_M)
+        for p in range(parts):
+            ta, tb = t0 + (t1 - t0) * p / parts, t0 + (t1 - t0) * (p + 1) / parts
+            d, w = nearest_conflict(
+                f, zs, k, e0 + ta * de, n0 + ta * dn, h0 + ta * (h1 - h0),
+                e0 + tb * de, n0 + tb * dn, h0 + tb * (h1 - h0), altitude_m, min(cutoff, best), stack, full,
+            )  # fmt: skip
+            if d < best:
+                best, at = d, ta + w * (tb - ta)
+                if not full:
+                    return True, best, at
+    if best < math.inf:
+        return True, min(best, signed_distance(zs, k, e0 + at * de, n0 + at * dn)), at
+    return False, max(dist, reach), where

@@ -1,0 +1,102 @@
+"""Zones as the kernels want them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.world._sweep import Field
+from gcsplan.world._sweep_zones import Zones
+from gcsplan.world.surface import Surface
+from gcsplan.world.zones import Circle, Level, Zone
+
+Floats = NDArray[np.float64]
+MOST_SQUARES = 128  # of the lattice, along one side
+
+
+def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale: float) -> Zones:
+    """Arrays of ``zones``; radii become metres of the plane, levels over ground are bounded over the zone's ground."""
+    n = len(zones)
+    circle = np.zeros((n, 3))
+    first = np.zeros(n + 1, np.int64)
+    vertices: list[Floats] = []
+    box, level, agl, band = np.zeros((n, 4)), np.zeros((n, 2)), np.zeros((n, 2), np.bool_), np.zeros((n, 2))
+    cell = np.zeros((n, 4), np.int64)
+    for k, zone in enumerate(zones):
+        shape = zone.shape
+        if isinstance(shape, Circle):
+            radius = shape.radius_m * scale
+            circle[k] = shape.east_m, shape.north_m, radius
+            box[k] = shape.east_m - radius, shape.north_m - radius, shape.east_m + radius, shape.north_m + radius
+        else:
+            v = np.asarray(shape.vertices, dtype=np.float64)
+            circle[k] = v[0, 0], v[0, 1], -1.0
+            vertices.append(v)
+            box[k] = *v.min(axis=0), *v.max(axis=0)
+        first[k + 1] = first[k] + (0 if isinstance(shape, Circle) else len(shape.vertices))
+        floor, ceiling = zone.floor or Level(-math.inf, "amsl"), zone.ceiling or Level(math.inf, "amsl")
+        level[k] = floor.value_m, ceiling.value_m
+        agl[k] = floor.datum == "agl", ceiling.datum == "agl"
+        if agl[k].any():
+            cell[k] = _cells(box[k], surface, field)
+            low, high = _ground_range(cell[k], surface.ground_m)
+        else:
+            low, high = 0.0, 0.0
+        band[k] = level[k] + np.where(agl[k], (low, high), 0.0)
+    lattice, bucket, near = _lattice(box)
+    return Zones(
+        circle, first, np.concatenate(vertices) if vertices else np.zeros((0, 2)), box, level, agl, band, cell,
+        lattice, bucket, near,
+    )  # fmt: skip
+
+
+def _cells(box: Floats, surface: Surface, field: Field) -> tuple[int, int, int, int]:
+    """First and last column and row of the cells that a box of the plane may touch; beyond the DEM too."""
+    f = np.linspace(0.0, 1.0, 9)
+    if not field.affine:  # beyond the fitted square the map says nothing, and no leg is judged there
+        middle = np.array([field.centre_e, field.centre_n, field.centre_e, field.centre_n])
+        box = np.clip(box, middle - 1.05 / field.per_unit, middle + 1.05 / field.per_unit)
+    east, north = box[0] + f * (box[2] - box[0]), box[1] + f * (box[3] - box[1])
+    e, n = (a.ravel() for a in np.meshgrid(east, north))
+    at = surface.grid(e, n)
+    # Between the lattice's points the map strays by its bend; one cell and a half more is far beyond that.
+    spare = 1.5 + field.bend * (box[2] - box[0] + box[3] - box[1]) ** 2 / min(field.step_x, field.step_y)
+    low, high = np.floor(at.min(axis=0) - spare), np.floor(at.max(axis=0) + spare)
+    low, high = np.maximum(low, -1e9), np.minimum(high, 1e9)
+    return int(low[0]), int(high[0]), int(low[1]), int(high[1])
+
+
+def _ground_range(cell: NDArray[np.int64], ground: Floats) -> tuple[float, float]:
+    """Lowest and highest node of the cells; without bound where one of them is unknown."""
+    rows, cols = ground.shape
+    i0, i1, j0, j1 = (int(c) for c in cell)
+    part = ground[max(j0, 0) : max(j1 + 2, 0), max(i0, 0) : max(i1 + 2, 0)]
+    if i0 < 0 or j0 < 0 or i1 > cols - 2 or j1 > rows - 2 or not part.size or np.isnan(part).any():
+        return -math.inf, math.inf
+    return float(part.min()), float(part.max())
+
+
+def _lattice(box: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+    """Coarse squares over all zones, and the zones of each, one after the other."""
+    if not len(box):
+        return np.array([0.0, 0.0, 1.0, 1.0, 1.0]), np.zeros(2, np.int64), np.zeros(0, np.int64)
+    west, south = box[:, 0].min(), box[:, 1].min()
+    wide, tall = box[:, 2].max() - west, box[:, 3].max() - south
+    side = max(wide, tall) / min(MOST_SQUARES, 2.0 * math.sqrt(len(box)) + 1.0)
+    side = max(side, 1.0)
+    cols, rows = int(wide / side) + 1, int(tall / side) + 1
+    corner = np.floor((box - (west, south, west, south)) / side).astype(np.int64)
+    corner[:, 0::2] = corner[:, 0::2].clip(0, cols - 1)
+    corner[:, 1::2] = corner[:, 1::2].clip(0, rows - 1)
+    members: list[list[int]] = [[] for _ in range(cols * rows)]
+    for k, (i0, j0, i1, j1) in enumerate(corner):
+        for j in range(j0, j1 + 1):
+            for i in range(i0, i1 + 1):
+                members[j * cols + i].append(k)
+    bucket = np.zeros(cols * rows + 1, np.int64)
+    bucket[1:] = np.cumsum([len(m) for m in members])
+    near = np.array([k for m in members for k in m], np.int64)
+    return np.array([west, south, 1.0 / side, cols, rows]), bucket, near

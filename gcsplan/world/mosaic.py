@@ -1,0 +1,284 @@
+"""Several tiles as one grid, and the window of it that a mission needs, on a plane-to-grid polynomial."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gcsplan.errors import InputError
+from gcsplan.world.datum import plane_to_raster
+from gcsplan.world.frame import Frame
+from gcsplan.world.raster import MAX_CELLS, Raster
+from gcsplan.world.surface import GridMap
+
+Floats = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+
+FIT_ERROR_M = 0.01
+"""The polynomial may misplace a node by this much at most."""
+
+ALIGNED_CELLS = 1e-3
+"""Tiles whose nodes are off a common grid by more than this part of a cell are refused."""
+
+_SPARE_CELLS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A rectangle of nodes: ``heights_m`` (rows, cols), NaN unknown; ``grid`` maps the plane to them.
+
+    ``x``, ``y``: coordinates of the columns and rows in the raster's own units.
+    """
+
+    heights_m: Floats
+    grid: GridMap
+    x: Floats
+    y: Floats
+    notes: tuple[str, ...]
+
+    @property
+    def plane_box(self) -> Box:
+        """West, south, east, north of all nodes in the plane."""
+        rows, cols = self.heights_m.shape
+        c, r = np.linspace(0, cols - 1, 33), np.linspace(0, rows - 1, 33)
+        border = np.concatenate([self.grid.to_plane(c, 0), self.grid.to_plane(c, rows - 1),
+                                 self.grid.to_plane(0, r), self.grid.to_plane(cols - 1, r)])  # fmt: skip
+        low, high = border.min(axis=0), border.max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """A tile's first node in the common grid, and its size."""
+
+    raster: Raster
+    col: int
+    row: int
+
+    def overlap(self, col: int, row: int, cols: int, rows: int) -> tuple[int, int, int, int] | None:
+        """Column, row, columns, rows shared with a window of the common grid; None where they do not meet."""
+        c0, c1 = max(col, self.col), min(col + cols, self.col + self.raster.cols)
+        r0, r1 = max(row, self.row), min(row + rows, self.row + self.raster.rows)
+        return (c0, r0, c1 - c0, r1 - r0) if c0 < c1 and r0 < r1 else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """The common grid, whose node 0, 0 is the first tile's first one at (x0, y0), and the tiles on it."""
+
+    x0: float
+    y0: float
+    dx: float
+    dy: float
+    tiles: tuple[_Placed, ...]
+
+    def grid_of(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Column and row of points in the raster's units."""
+        return np.asarray((x - self.x0) / self.dx), np.asarray((self.y0 - y) / self.dy)
+
+
+class Mosaic:
+    """Tiles with one coordinate system, one resolution and one grid. Raises InputError where they differ."""
+
+    def __init__(self, rasters: Sequence[Raster], *, where: str) -> None:
+        self.rasters = tuple(rasters)
+        self.where = where
+        first = self.rasters[0]
+        self.crs = first.crs
+        for other in self.rasters[1:]:
+            if other.crs.horizontal != first.crs.horizontal:
+                raise InputError(
+                    f"the tiles must share one coordinate system: {first.name} is in "
+                    f"{first.crs.horizontal.name!r}, {other.name} in {other.crs.horizontal.name!r}; gdalwarp one of "
+                    "them",
+                    where=where,
+                )
+            span = max(first.cols, first.rows, other.cols, other.rows)
+            if max(abs(other.dx / first.dx - 1.0), abs(other.dy / first.dy - 1.0)) * span > ALIGNED_CELLS:
+                raise InputError(
+                    f"the tiles must share one resolution: {first.name} has cells of {first.dx:g} × {first.dy:g}, "
+                    f"{other.name} of {other.dx:g} × {other.dy:g}; bring them together with gdalwarp -tr",
+                    where=where,
+                )
+            if other.vertical != first.vertical:
+                raise InputError(
+                    f"the tiles must share one vertical datum: {first.name} says {_datum(first)}, {other.name} "
+                    f"{_datum(other)}",
+                    where=where,
+                )
+        self._layout(0.0)  # tiles off the common grid are found before anything is read
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        """True where a place lies on some tile (which may still be void there)."""
+        try:
+            frame = Frame(lat_deg, lon_deg)
+            there, _ = plane_to_raster(frame, self.crs.horizontal, (0.0, 0.0, 0.0, 0.0), where=self.where)
+        except InputError:
+            return False
+        x, y = (float(v) for v in there.transform(0.0, 0.0))
+        if not (math.isfinite(x) and math.isfinite(y)):
+            return False
+        layout = self._layout(lon_deg)
+        col, row = layout.grid_of(self._near(np.asarray(x), lon_deg), np.asarray(y))
+        return any(
+            p.col - 0.5 <= col <= p.col + p.raster.cols - 0.5 and p.row - 0.5 <= row <= p.row + p.raster.rows - 0.5
+            for p in layout.tiles
+        )
+
+    def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0) -> Window:
+        """Nodes that cover ``box`` (west, south, east, north, plane metres) and ``spare_m`` around it.
+
+        Clipped to what the tiles hold; gaps between them are NaN, and where two of them hold one node the higher
+        height counts. Raises InputError where no tile meets the box, beyond `MAX_CELLS`, and where the plane cannot
+        be fitted to `FIT_ERROR_M`.
+        """
+        middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
+        there, accuracy_m = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
+        reference = float(frame.to_degrees(*middle)[1])
+
+        layout = self._layout(reference)
+        tiles = layout.tiles
+
+        def exact(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+            x, y = there.transform(east_m, north_m)
+            return layout.grid_of(self._near(np.asarray(x, float), reference), np.asarray(y, float))
+
+        wide = (box[0] - spare_m, box[1] - spare_m, box[2] + spare_m, box[3] + spare_m)
+        col, row = exact(*_lattice(wide))
+        if not (np.isfinite(col).all() and np.isfinite(row).all()):
+            raise InputError(
+                "the mission reaches beyond what the DEM's coordinate system can hold; gdalwarp the DEM to a system "
+                "made for this place",
+                where=self.where,
+            )
+        c0 = max(math.floor(col.min()) - _SPARE_CELLS, min(p.col for p in tiles))
+        c1 = min(math.ceil(col.max()) + _SPARE_CELLS + 1, max(p.col + p.raster.cols for p in tiles))
+        r0 = max(math.floor(row.min()) - _SPARE_CELLS, min(p.row for p in tiles))
+        r1 = min(math.ceil(row.max()) + _SPARE_CELLS + 1, max(p.row + p.raster.rows for p in tiles))
+        parts = [(p, o) for p in tiles if c1 - c0 > 1 and r1 - r0 > 1 and (o := p.overlap(c0, r0, c1 - c0, r1 - r0))]
+        if not parts or max(o[2] for _, o in parts) < 2 or max(o[3] for _, o in parts) < 2:
+            raise InputError(
+                f"the DEM ({', '.join(r.name for r in self.rasters[:4])}{', …' if len(self.rasters) > 4 else ''}) does "
+                f"not cover the mission, which lies around {frame.to_degrees(*middle)[0]:.4f}, {reference:.4f}; give "
+                "the tiles of this place",
+                where=self.where,
+            )
+        if (c1 - c0) * (r1 - r0) > MAX_CELLS:
+            raise InputError(
+                f"the mission needs {c1 - c0} × {r1 - r0} cells of the DEM, more than {MAX_CELLS // 10**6} million; "
+                "use a coarser DEM (gdalwarp -tr) or a smaller mission",
+                where=self.where,
+            )
+        x = layout.x0 + np.arange(c0, c1) * layout.dx
+        y = layout.y0 - np.arange(r0, r1) * layout.dy
+
+        def in_window(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+            c, r = exact(east_m, north_m)
+            return c - c0, r - r0
+
+        grid = GridMap.fit(in_window, _union(wide, _plane_box(there, x, y)))
+        if not grid.error_m <= FIT_ERROR_M:
+            raise InputError(
+                f"the mission is too wide for the DEM's coordinate system: its grid can be placed to "
+                f"{grid.error_m:.3g} m only, wanted {FIT_ERROR_M:g} m; gdalwarp the DEM to UTM, or plan a smaller "
+                "mission",
+                where=self.where,
+            )
+        heights, notes = _read(parts, c0, r0, c1 - c0, r1 - r0)
+        if accuracy_m < 0.0 or accuracy_m > 1.0:
+            good = "unknown" if accuracy_m < 0.0 else f"{accuracy_m:g} m"
+            notes.append(
+                f"the accuracy of the datum shift between WGS84 and {self.crs.horizontal.name} is {good}; "
+                "track_error_m should hold it"
+            )
+        return Window(heights, grid, x, y, tuple(notes))
+
+    def _near(self, x: Floats, lon_deg: float) -> Floats:
+        """Longitudes within half a turn of ``lon_deg``, so that the antimeridian is no edge; else as they are."""
+        return np.asarray(lon_deg + (x - lon_deg + 180.0) % 360.0 - 180.0) if self.crs.geographic else x
+
+    def _turn(self, raster: Raster, lon_deg: float) -> float:
+        """Whole turns that bring a tile's middle nearest to ``lon_deg``."""
+        middle = raster.west + 0.5 * raster.cols * raster.dx
+        return 360.0 * round((lon_deg - middle) / 360.0) if self.crs.geographic else 0.0
+
+    def _layout(self, lon_deg: float) -> _Layout:
+        """Every tile on the grid of the first one, all of them turned to where ``lon_deg`` is."""
+        first = self.rasters[0]
+        x0 = first.west + 0.5 * first.dx + self._turn(first, lon_deg)
+        y0 = first.north - 0.5 * first.dy
+        tiles = []
+        for raster in self.rasters:
+            nearest = self._turn(raster, lon_deg)
+            # A tile wider than half the globe may meet the mission on both of its sides.
+            wide = self.crs.geographic and raster.cols * raster.dx > 180.0
+            for turn in (nearest, nearest - 360.0, nearest + 360.0) if wide else (nearest,):
+                col = (raster.west + 0.5 * raster.dx + turn - x0) / first.dx
+                row = (y0 - (raster.north - 0.5 * raster.dy)) / first.dy
+                if max(abs(col - round(col)), abs(row - round(row))) <= ALIGNED_CELLS:
+                    tiles.append(_Placed(raster, round(col), round(row)))
+                elif turn == nearest:
+                    raise InputError(
+                        f"the tiles must lie on one grid: {raster.name} is off that of {first.name} by "
+                        f"{col - round(col):.3f} columns and {row - round(row):.3f} rows; gdalwarp them together",
+                        where=self.where,
+                    )
+        return _Layout(x0, y0, first.dx, first.dy, tuple(tiles))
+
+
+def _datum(raster: Raster) -> str:
+    return raster.vertical.name if raster.vertical is not None else "nothing"
+
+
+def _lattice(box: Box) -> tuple[Floats, Floats]:
+    f = np.linspace(0.0, 1.0, 33)
+    e, n = np.meshgrid(box[0] + f * (box[2] - box[0]), box[1] + f * (box[3] - box[1]))
+    return e.ravel(), n.ravel()
+
+
+def _plane_box(there: Any, x: Floats, y: Floats) -> Box:
+    """The plane's box around a window given by its columns' and rows' coordinates."""
+    xs, ys = np.meshgrid(x[np.linspace(0, len(x) - 1, 33).astype(int)], y[np.linspace(0, len(y) - 1, 33).astype(int)])
+    back = there.transform(xs.ravel(), ys.ravel(), direction="INVERSE")
+    e, n = (np.asarray(a, float) for a in back)
+    good = np.isfinite(e) & np.isfinite(n)
+    return float(e[good].min()), float(n[good].min()), float(e[good].max()), float(n[good].max())
+
+
+def _union(a: Box, b: Box) -> Box:
+    return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
+
+
+def _read(
+    parts: list[tuple[_Placed, tuple[int, int, int, int]]], c0: int, r0: int, cols: int, rows: int
+) -> tuple[Floats, list[str]]:
+    heights = np.full((rows, cols), np.nan)
+    differing, worst = 0, 0.0
+    for tile, (col, row, width, height) in parts:
+        new = tile.raster.read(col - tile.col, row - tile.row, width, height)
+        into = heights[row - r0 : row - r0 + height, col - c0 : col - c0 + width]
+        off = np.abs(into - new)
+        both = off > 0.0
+        if both.any():
+            differing += int(np.count_nonzero(both))
+            worst = max(worst, float(off[both].max()))
+        np.fmax(into, new, out=into)
+    notes = []
+    if differing:
+        notes.append(f"tiles differ where they overlap ({differing} nodes, {worst:g} m at most); the higher one counts")
+    unknown = int(np.count_nonzero(np.isnan(heights)))
+    if unknown:
+        notes.append(f"{unknown} of {heights.size} DEM nodes around the mission are unknown (void or no tile)")
+    return heights, notes
+
+
+def node_degrees(window: Window, to_wgs84: Any, cols: ArrayLike, rows: ArrayLike) -> tuple[Floats, Floats]:
+    """Latitude and longitude of the nodes ``rows`` × ``cols`` of a window, (len(rows), len(cols)) each."""
+    x, y = np.meshgrid(window.x[np.asarray(cols)], window.y[np.asarray(rows)])
+    lon, lat = to_wgs84.transform(x, y)
+    return np.asarray(lat, float), np.asarray(lon, float)

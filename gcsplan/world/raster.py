@@ -1,0 +1,282 @@
+"""One raster file: its header, and windows of it in metres with NaN for everything unknown.
+
+GDAL is let near three formats only, and only at files that exist: a path from a mission file must never become a
+web request. Heights belong to pixel centres, whatever AREA_OR_POINT says: GDAL's transform is that of the corners in
+either case.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.errors import InputError
+from gcsplan.world.datum import RasterCRS, VerticalDatum, take_apart
+
+Floats = NDArray[np.float64]
+Reader = Callable[[int, int, int, int], Floats]
+
+SAMPLE = "sample:jacksboro"
+MAX_CELLS = 200_000_000
+"""Of one window, and of one block of a file: 1.6 GB as float64."""
+
+LOWEST_M, HIGHEST_M = -500.0, 9000.0
+"""Ground outside of this is a void that nobody declared (-9999, -32768, 3.4e38): unknown."""
+
+UNITS_M = {
+    "": 1.0, "m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0,
+    "ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "international foot": 0.3048, "ft (international)": 0.3048,
+    "us-ft": 1200 / 3937, "us_ft": 1200 / 3937, "ftus": 1200 / 3937, "foot_us": 1200 / 3937,
+    "us survey foot": 1200 / 3937, "us survey feet": 1200 / 3937, "us foot": 1200 / 3937,
+    "dm": 0.1, "decimetre": 0.1, "decimeter": 0.1, "cm": 0.01, "centimetre": 0.01, "centimeter": 0.01,
+    "mm": 0.001, "millimetre": 0.001, "millimeter": 0.001, "km": 1000.0, "kilometre": 1000.0, "kilometer": 1000.0,
+}  # fmt: skip
+"""Metres in one unit of height, by the words that files use (lower case)."""
+
+_STRIP_CELLS = 4_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """A north-up raster's header; ``read(col, row, cols, rows)`` gives (rows, cols) float64, NaN where unknown.
+
+    ``west``, ``north`` are the outer corner in the raster's own units, ``dx``, ``dy`` > 0 the cell. ``read`` gives
+    metres but of the raster's own vertical datum; ``vertical`` is what the file says of that.
+    """
+
+    name: str
+    crs: RasterCRS
+    west: float
+    north: float
+    dx: float
+    dy: float
+    cols: int
+    rows: int
+    vertical: VerticalDatum | None
+    read: Reader
+    sha256: Callable[[], str]
+    notes: tuple[str, ...] = ()
+
+
+def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: str | None = None) -> Raster:
+    """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt, ESRI .asc).
+
+    ``crs`` overrides the file's; ``height_unit`` says what the file does not. Raises InputError for anything that is
+    not a readable, georeferenced, north-up raster of real numbers.
+    """
+    require_file(path, where=where)
+    try:
+        with _gdal(path) as dataset:
+            return _header(dataset, path, where=where, crs=crs, height_unit=height_unit)
+    except InputError:
+        raise
+    except Exception as why:
+        # GDAL and rasterio raise a wide choice of types on broken headers; all of them mean the same to the user.
+        raise InputError(_unreadable(path, why), where=where) from None
+
+
+def require_file(path: Path, *, where: str) -> None:
+    """Raise InputError unless ``path`` is a file that can be read and is not empty."""
+    try:
+        if path.is_dir():
+            raise InputError(f"{path} is a folder; give a file", where=where)
+        if not path.is_file():
+            raise InputError(f"{path} is not there (paths are relative to the mission file)", where=where)
+        with path.open("rb") as file:
+            if not file.read(1):
+                raise InputError(f"{path} is empty", where=where)
+    except (OSError, ValueError) as why:
+        raise InputError(f"{path} cannot be read: {why}", where=where) from None
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file's bytes, read in pieces."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def sample_jacksboro() -> Raster:
+    """The real 3 arc-second SRTM tile around Jacksboro, Tennessee, that comes with matplotlib (EGM96).
+
+    Its xmin … ymax are the edges of the cells and row 0 is the north (the file's "ymin" is the northern edge).
+    """
+    from matplotlib.cbook import get_sample_data
+
+    path = Path(str(get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)))
+    with np.load(path) as file:
+        heights = np.asarray(file["elevation"], float)
+        west, north, dx, dy = (float(file[k]) for k in ("xmin", "ymin", "dx", "dy"))
+    rows, cols = heights.shape
+
+    def read(col: int, row: int, width: int, height: int) -> Floats:
+        return heights[row : row + height, col : col + width].copy()
+
+    return Raster(
+        SAMPLE, take_apart("EPSG:4326", where=SAMPLE), west, north, dx, dy, cols, rows, VerticalDatum("EGM96"), read,
+        lambda: sha256_of(path),
+    )  # fmt: skip
+
+
+@contextmanager
+def _gdal(path: Path) -> Iterator[Any]:
+    """The dataset at ``path``, whatever GDAL's environment variables say about pixel corners."""
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning
+
+    with warnings.catch_warnings(), rasterio.Env(GTIFF_POINT_GEO_IGNORE=False, GDAL_PAM_ENABLED=True):
+        # Our own check of the georeference says more; the others are between rasterio and its own dependencies.
+        for category in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
+            warnings.simplefilter("ignore", category)
+        with rasterio.open(path.resolve(), driver=_driver(path)) as dataset:
+            yield dataset
+
+
+def _driver(path: Path) -> str:
+    """GDAL's word for the format, by the file's first bytes; never one that may follow links to elsewhere."""
+    with path.open("rb") as file:
+        magic = file.read(4)
+    if magic in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
+        return "GTiff"
+    return "SRTMHGT" if path.suffix.lower() == ".hgt" else "AAIGrid"
+
+
+def _unreadable(path: Path, why: Exception) -> str:
+    hint = ""
+    if path.suffix.lower() == ".hgt":
+        hint = "; an .hgt tile is named after its south-west corner (N36W085.hgt) and holds 1201 or 3601 posts a side"
+    elif path.suffix.lower() == ".zip":
+        hint = "; unpack it first"
+    cause = why.__cause__ or why  # rasterio says "see previous exception"
+    reason = (str(cause).strip() or type(cause).__name__).splitlines()[0][:200]
+    return (
+        f"{path} cannot be read as a GeoTIFF, an SRTM .hgt or an ESRI .asc grid ({reason}){hint}; "
+        "gdal_translate makes a GeoTIFF of other formats"
+    )
+
+
+def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_unit: str | None) -> Raster:
+    from rasterio.enums import ColorInterp
+
+    notes = []
+    if dataset.count < 1:
+        raise InputError(f"{path} holds no raster band", where=where)
+    if dataset.count > 1:
+        notes.append(f"{path.name} has {dataset.count} bands; the first is taken as the heights")
+    if dataset.colorinterp[0] in (ColorInterp.red, ColorInterp.palette) or "complex" in dataset.dtypes[0]:
+        raise InputError(f"{path} is a picture, not a raster of heights", where=where)
+    if math.prod(dataset.block_shapes[0]) > MAX_CELLS:
+        raise InputError(
+            f"{path} is stored in blocks of {dataset.block_shapes[0]} cells, too many to hold; rewrite it in tiles "
+            "(gdal_translate -co TILED=YES)",
+            where=where,
+        )
+    t = dataset.transform
+    geometry = (t.a, t.b, t.c, t.d, t.e, t.f)
+    if not all(math.isfinite(x) for x in geometry):
+        raise InputError(f"{path} has a broken georeference {geometry}", where=where)
+    if geometry == (1.0, 0.0, 0.0, 0.0, 1.0, 0.0):
+        raise InputError(
+            f"{path} has no georeference (which place a cell is); add one with gdal_edit.py -a_ullr, or gdalwarp it",
+            where=where,
+        )
+    if abs(t.b) > 1e-9 * abs(t.a) or abs(t.d) > 1e-9 * abs(t.e) or t.a <= 0 or t.e >= 0:
+        raise InputError(
+            f"{path} must be north-up (rows going south, columns east), its geotransform is {geometry}: "
+            "gdalwarp makes it so",
+            where=where,
+        )
+    text = crs if crs is not None else (dataset.crs.to_wkt() if dataset.crs else None)
+    if text is None:
+        raise InputError(
+            f"{path} does not say its coordinate system; add `crs:`, for example `crs: EPSG:4326` for degrees",
+            where=where,
+        )
+    if crs is not None and dataset.crs:
+        notes.append(f"{path.name}: `crs: {crs}` is used instead of the file's own coordinate system")
+    system = take_apart(text, where=where)
+    if system.geographic:
+        _require_degrees(t, dataset, path, where=where)
+    factor = _metres_in_unit(dataset.units[0], height_unit, system.vertical_unit_m, path, where=where)
+    scale, offset = float(dataset.scales[0]), float(dataset.offsets[0])
+    if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0.0:
+        raise InputError(f"{path} has a broken scale {scale} or offset {offset}", where=where)
+
+    def read(col: int, row: int, cols: int, rows: int) -> Floats:
+        try:
+            with _gdal(path) as opened:
+                return _window(opened, col, row, cols, rows, scale * factor, offset * factor)
+        except Exception as why:
+            raise InputError(_unreadable(path, why), where=where) from None
+
+    return Raster(
+        path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical, read,
+        lambda: sha256_of(path), tuple(notes),
+    )  # fmt: skip
+
+
+def _require_degrees(t: Any, dataset: Any, path: Path, *, where: str) -> None:
+    south = t.f + t.e * dataset.height
+    east = t.c + t.a * dataset.width
+    # Half a cell beyond the pole is where a global grid of posts ends.
+    if t.f > 90.0 - t.e or south < -90.0 + t.e or t.c < -540.0 or east > 540.0:
+        raise InputError(
+            f"{path} is in degrees but reaches from {t.c:g}, {south:g} to {east:g}, {t.f:g}: if it is in metres, "
+            "say its coordinate system with `crs:`",
+            where=where,
+        )
+
+
+def _metres_in_unit(band: str | None, given: str | None, vertical_m: float | None, path: Path, *, where: str) -> float:
+    stated: float | None = None
+    if band:
+        stated = UNITS_M.get(band.strip().lower())
+        if stated is None:
+            raise InputError(
+                f"{path} gives heights in {band!r}, which is not known; set its unit (gdal_edit.py -units m)",
+                where=where,
+            )
+    if vertical_m is not None:
+        if stated is not None and not math.isclose(stated, vertical_m, rel_tol=1e-9):
+            raise InputError(
+                f"{path} contradicts itself: its band is in {band}, its vertical datum counts {vertical_m:g} m; "
+                "correct it with gdal_edit.py",
+                where=where,
+            )
+        stated = vertical_m
+    if given is None:
+        return 1.0 if stated is None else stated
+    wanted = UNITS_M[given]
+    if stated is not None and not math.isclose(stated, wanted, rel_tol=1e-9):
+        raise InputError(
+            f"`height_unit: {given}` contradicts {path}, whose unit of height is {stated:g} m; remove the key",
+            where=where,
+        )
+    return wanted
+
+
+def _window(dataset: Any, col: int, row: int, cols: int, rows: int, scale: float, offset: float) -> Floats:
+    """(rows, cols) of ``raw * scale + offset``, metres; masked, non-finite and implausible cells are NaN."""
+    from rasterio.windows import Window
+
+    out = np.empty((rows, cols))
+    strip = max(1, _STRIP_CELLS // cols)
+    for first in range(0, rows, strip):
+        n = min(strip, rows - first)
+        raw = dataset.read(1, window=Window(col, row + first, cols, n), masked=True)
+        part = raw.data.astype(np.float64)
+        part[np.ma.getmaskarray(raw)] = np.nan
+        part[part == -32768.0] = np.nan  # the void of SRTM, declared or not, before a scale can hide it
+        with np.errstate(over="ignore", invalid="ignore"):
+            part = part * scale + offset
+            part[~((part >= LOWEST_M) & (part <= HIGHEST_M))] = np.nan
+        out[first : first + n] = part
+    return out

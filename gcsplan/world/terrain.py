@@ -1,0 +1,249 @@
+"""From what the user says of the terrain to the `Surface` that everything is planned over and checked against.
+
+`open_terrain` looks at headers only, so that a place can be asked for (`Terrain.covers`) before there is a plane;
+`load_terrain` reads the part that a mission needs. Unknown ground (voids, nodata, outside of every tile) stays NaN.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.errors import InputError
+from gcsplan.world.datum import GeoidGrid, VerticalDatum, to_wgs84, vertical_datum
+from gcsplan.world.frame import Frame
+from gcsplan.world.mosaic import Mosaic, Window, node_degrees
+from gcsplan.world.obstacles import canopy_on
+from gcsplan.world.peaks import Peak, flat_grid, peaks_grid
+from gcsplan.world.raster import SAMPLE, Raster, open_raster, require_file, sample_jacksboro, sha256_of
+from gcsplan.world.surface import Surface
+
+Floats = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+HeightUnit = Literal["m", "ft", "us_ft"]
+
+RASTER_SPARE_M = 3000.0
+"""Read around the box, so that the map's border is not the edge of what was asked for."""
+
+GEOID_STEP_M = 100.0
+"""The geoid is looked up this densely and linear between: it bends by less than a millimetre in that."""
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainSpec:
+    """What the ground is; paths are as they are opened (the mission file makes them relative to itself).
+
+    Either ``dem`` (paths of tiles, or ``sample:jacksboro`` alone), or ``flat_m`` with ``peaks`` on it (metres of a
+    local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` say what the rasters do not.
+    ``obstacle_height_m`` stands everywhere; ``canopy`` is a raster of heights above ground, whose nodata cells are
+    unknown unless ``canopy_nodata_m`` gives their height; where both are given the higher one counts.
+    """
+
+    dem: tuple[str, ...] = ()
+    vertical_datum: str | None = None
+    geoid_grid: str | None = None
+    crs: str | None = None
+    height_unit: HeightUnit | None = None
+    flat_m: float | None = None
+    peaks: tuple[Peak, ...] = ()
+    obstacle_height_m: float = 0.0
+    canopy: str | None = None
+    canopy_nodata_m: float | None = None
+
+
+class Terrain(Protocol):
+    """A terrain whose headers are read and found good."""
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        """True where a place lies on the terrain (which may still be void there)."""
+
+    def load(self, frame: Frame, box: Box) -> Surface:
+        """The surface over ``box`` (west, south, east, north, plane metres)."""
+
+
+def load_terrain(spec: TerrainSpec, frame: Frame, box: Box, *, where: str) -> Surface:
+    """The surface over ``box`` (west, south, east, north, plane metres); ``where`` names the spec in messages.
+
+    Raises InputError for every fault of the files, for a missing or contradictory datum, where the DEM does not meet
+    the box or holds nothing but voids there, and where the window would not fit into memory.
+    """
+    return open_terrain(spec, where=where).load(frame, box)
+
+
+def open_terrain(spec: TerrainSpec, *, where: str) -> Terrain:
+    """Open and judge every file of ``spec`` without reading heights. Raises InputError."""
+    if bool(spec.dem) == (spec.flat_m is not None or bool(spec.peaks)):
+        raise InputError("give either `dem` or `flat_m` and `peaks`", where=where)
+    return _RasterTerrain(spec, where) if spec.dem else _LocalTerrain(spec, where)
+
+
+def _at(where: str, key: str) -> str:
+    """``where`` is a place in a mission file, or an option of the command line, which has no keys."""
+    return where if where.startswith("-") else f"{where}.{key}" if where else key
+
+
+class _RasterTerrain:
+    def __init__(self, spec: TerrainSpec, where: str) -> None:
+        self._spec = spec
+        self._where = where
+        dem = _at(where, "dem")
+        if SAMPLE in spec.dem:
+            if len(spec.dem) > 1 or spec.crs or spec.height_unit:
+                raise InputError(f"{SAMPLE} stands alone: no other tile, no crs, no height_unit", where=dem)
+            rasters = [sample_jacksboro()]
+        elif any(d.startswith("sample:") for d in spec.dem):
+            raise InputError(f"the only sample is {SAMPLE}, given {spec.dem[0]}", where=dem)
+        else:
+            rasters = [_open(path, spec, dem, i, len(spec.dem)) for i, path in enumerate(spec.dem)]
+        self._mosaic = Mosaic(rasters, where=dem)
+        self._datum = vertical_datum(spec.vertical_datum, rasters[0].vertical, where=_at(where, "vertical_datum"))
+        self._geoid = _geoid(spec, self._datum, where)
+        self._canopy: Mosaic | None = None
+        if spec.canopy is not None:
+            # The canopy's heights are above ground: its vertical datum, if it names one, means nothing.
+            raster = open_raster(Path(spec.canopy), where=_at(where, "canopy"))
+            self._canopy = Mosaic([raster], where=_at(where, "canopy"))
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        return self._mosaic.covers(lat_deg, lon_deg)
+
+    def load(self, frame: Frame, box: Box) -> Surface:
+        spec, rasters = self._spec, self._mosaic.rasters
+        window = self._mosaic.window(frame, box, spare_m=RASTER_SPARE_M)
+        ground = window.heights_m
+        if np.isnan(ground).all():
+            raise InputError(
+                "the DEM holds nothing but voids around the mission; give one with data here",
+                where=_at(self._where, "dem"),
+            )
+        notes = [n for r in rasters for n in r.notes] + list(window.notes)
+        datum = self._datum.name
+        if self._datum.note:
+            notes.append(self._datum.note)
+        info: dict[str, object] = {}
+        if self._geoid is not None:
+            ground = ground - _geoid_heights(window, self._geoid, self._mosaic)
+            datum = f"{datum}, made AMSL with {self._geoid.path.name}"
+            info["geoid_sha256"] = sha256_of(self._geoid.path)
+        rows, cols = ground.shape
+        size = window.grid.metres_per_cell(*(0.5 * np.add(window.plane_box[:2], window.plane_box[2:])))
+        info |= {
+            "dem_sha256": _combined([r.sha256() for r in rasters]),
+            "vertical_datum": datum,
+            "resolution_m": _rounded(float(size.max())),
+            "bare_dem": spec.obstacle_height_m == 0.0 and spec.canopy is None,
+            "source": ", ".join(r.name for r in rasters),
+        }
+        top = ground
+        if spec.obstacle_height_m > 0.0:
+            top = ground + spec.obstacle_height_m
+        if self._canopy is not None and spec.canopy is not None:
+            unknown_m = np.nan if spec.canopy_nodata_m is None else spec.canopy_nodata_m
+            canopy = self._canopy.window(frame, window.plane_box)
+            trees = canopy_on(window, canopy, unknown_m=unknown_m)
+            top = ground + np.maximum(trees, spec.obstacle_height_m)
+            notes += [n for n in (*self._canopy.rasters[0].notes, *canopy.notes) if "DEM nodes" not in n]
+            blind = int(np.count_nonzero(np.isnan(trees) & ~np.isnan(ground)))
+            if blind:
+                notes.append(
+                    f"the canopy is unknown at {blind} of {rows * cols} DEM nodes, which cannot be flown over; "
+                    "canopy_nodata_m gives them a height"
+                )
+            info["canopy_sha256"] = self._canopy.rasters[0].sha256()
+        info["notes"] = tuple(notes)
+        return Surface(ground, top, window.grid, info)
+
+
+class _LocalTerrain:
+    """Flat ground and peaks: known everywhere."""
+
+    def __init__(self, spec: TerrainSpec, where: str) -> None:
+        self._spec = spec
+        for key in ("geoid_grid", "crs", "height_unit", "canopy", "canopy_nodata_m"):
+            if getattr(spec, key) is not None:
+                raise InputError(f"{key} belongs to a `dem`, not to flat ground and peaks", where=_at(where, key))
+        self._datum = vertical_datum(spec.vertical_datum or "AMSL", None, where=_at(where, "vertical_datum"))
+        if self._datum.ellipsoidal:
+            raise InputError("flat ground and peaks are above mean sea level", where=_at(where, "vertical_datum"))
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        return True
+
+    def load(self, frame: Frame, box: Box) -> Surface:
+        spec = self._spec
+        base = frame.amsl_m + (spec.flat_m or 0.0)
+        heights, grid = peaks_grid(base, spec.peaks, box) if spec.peaks else flat_grid(base, box)
+        canonical = json.dumps(
+            {"flat_m": spec.flat_m or 0.0, "peaks": [asdict(p) for p in spec.peaks], "amsl_m": frame.amsl_m},
+            sort_keys=True,
+        )
+        info: dict[str, object] = {
+            "dem_sha256": hashlib.sha256(canonical.encode()).hexdigest(),
+            "vertical_datum": self._datum.name,
+            "resolution_m": _rounded(float(grid.metres_per_cell(0.0, 0.0).max())) if spec.peaks else 0,
+            "bare_dem": spec.obstacle_height_m == 0.0,
+            "source": f"{len(spec.peaks)} peaks" if spec.peaks else "flat",
+            "notes": (self._datum.note,) if self._datum.note else (),
+        }
+        top = heights + spec.obstacle_height_m if spec.obstacle_height_m > 0.0 else heights
+        return Surface(heights, top, grid, info)
+
+
+def _open(path: str, spec: TerrainSpec, where: str, index: int, count: int) -> Raster:
+    at = f"{where}[{index}]" if count > 1 else where
+    return open_raster(Path(path), where=at, crs=spec.crs, height_unit=spec.height_unit)
+
+
+def _geoid(spec: TerrainSpec, datum: VerticalDatum, where: str) -> GeoidGrid | None:
+    at = _at(where, "geoid_grid")
+    if datum.ellipsoidal:
+        if spec.geoid_grid is None:
+            raise InputError(
+                f"heights above the ellipsoid ({datum.name}) must be converted to mean sea level; give the geoid with "
+                "`geoid_grid: FILE` (for example egm96_15.gtx, or us_nga_egm96_15.tif from cdn.proj.org)",
+                where=at,
+            )
+        require_file(Path(spec.geoid_grid), where=at)
+        return GeoidGrid(Path(spec.geoid_grid), where=at)
+    if spec.geoid_grid is not None:
+        raise InputError(
+            f"a geoid grid is for ellipsoidal heights, and these are {datum.name}: remove it, or say "
+            "`vertical_datum: WGS84`",
+            where=at,
+        )
+    return None
+
+
+def _geoid_heights(window: Window, geoid: GeoidGrid, mosaic: Mosaic) -> Floats:
+    """Geoid above the ellipsoid at each node, (rows, cols)."""
+    rows, cols = window.heights_m.shape
+    size = window.grid.metres_per_cell(*window.grid.centre)
+    c, r = (_sampled(n, max(1, int(GEOID_STEP_M / m))) for n, m in zip((cols, rows), size, strict=True))
+    lat, lon = node_degrees(window, to_wgs84(mosaic.crs.horizontal), c, r)
+    coarse = geoid.height_m(lat, lon)
+    along = np.stack([np.interp(np.arange(cols), c, line) for line in coarse])
+    below = np.searchsorted(r, np.arange(rows), side="right").clip(1, len(r) - 1) - 1
+    weight = ((np.arange(rows) - r[below]) / (r[below + 1] - r[below]))[:, None]
+    return np.asarray((1.0 - weight) * along[below] + weight * along[below + 1])
+
+
+def _sampled(count: int, step: int) -> NDArray[np.intp]:
+    """0, step, 2·step … and the last index."""
+    return np.unique(np.append(np.arange(0, count, step), count - 1))
+
+
+def _combined(hashes: Sequence[str]) -> str:
+    """The hash itself of one file; of several, the hash of their hashes in the order given."""
+    return hashes[0] if len(hashes) == 1 else hashlib.sha256("\n".join(hashes).encode()).hexdigest()
+
+
+def _rounded(metres: float) -> float:
+    """Whole metres; below ten, millimetres (the papers' worlds are fine-grained)."""
+    return round(metres) if metres >= 10.0 else round(metres, 3)

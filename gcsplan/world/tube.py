@@ -1,0 +1,174 @@
+"""Room for an altitude profile over a ground track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.world._envelope import pieces, spans
+from gcsplan.world._halo import Halo
+from gcsplan.world._sweep import BOW_M, Field
+from gcsplan.world._sweep_zones import Zones
+from gcsplan.world.limits import Limits
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Tube:
+    """Room for an altitude profile over a ground track of legs, one piece after the other.
+
+    ``s_m`` (M + 1,): breakpoints, horizontal metres along the track. ``floor_m``, ``ceiling_m`` (M, 2): AMSL at
+    both ends of each piece, linear between (neighbouring pieces may jump); ``floor_m`` never below what
+    `Airspace.examine` demands, ``ceiling_m`` never above it; ``inf``/-inf where unbounded; floor +inf where
+    the ground is unknown. Zones are not in them: they stand in ``bands``.
+    """
+
+    s_m: Floats
+    floor_m: Floats
+    ceiling_m: Floats
+    bands: tuple[Band, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """The track is horizontally within reach of a zone from ``s0_m`` to ``s1_m`` (one span, perhaps of several):
+    fly at or below ``bottom_m`` or at or above ``top_m``; each (K, 2) over pieces with breakpoints ``s_m``
+    (K + 1,), conservative as in `Tube`; bottom -inf: cannot be underflown; top +inf: cannot be overflown."""
+
+    zone: int
+    s0_m: float
+    s1_m: float
+    s_m: Floats
+    bottom_m: Floats
+    top_m: Floats
+
+
+ROOM_M = 0.02
+"""Reach beyond what is demanded, which takes up what the check loses between the plane and the grid."""
+
+MARGIN_M = 0.01
+"""Height beyond what is demanded: twice what the check's branch and bound resolves."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reaches:
+    """How far from a track the ground counts, metres of the plane: for its errors, and for its clearance."""
+
+    near_m: float
+    far_m: float
+    spare_m: float
+
+    @classmethod
+    def of(cls, limits: Limits, field: Field, scale: float) -> Reaches:
+        """Reaches of ``limits``; nothing is spared where the map is exact and nothing beside the line counts."""
+        near = limits.track_error_m * scale
+        far = near + limits.horizontal_clearance_m * scale if limits.horizontal_clearance_m > 0.0 else near
+        return cls(near, far, 0.0 if field.affine else ROOM_M + 2.0 * field.error_m)
+
+    def margin_m(self, reach_m: float) -> float:
+        """Height to keep from a bound within ``reach_m``."""
+        return MARGIN_M if reach_m + self.spare_m > 0.0 else 0.0
+
+
+def make_tube(
+    track: Floats,
+    limits: Limits,
+    field: Field,
+    zones: Zones,
+    halo: Callable[[bool, float], Halo],
+    scale: float,
+) -> Tube:
+    """The tube over ``track`` (N, 2); ``halo(of_top, reach_m)`` gives the surface's bounds. See `Tube`."""
+    reach = Reaches.of(limits, field, scale)
+    bow = 0.0 if field.affine else BOW_M + 2.0 * field.error_m
+    under = halo(False, reach.near_m + reach.spare_m + bow)
+    beside = halo(True, reach.near_m + reach.spare_m + bow)
+    beyond = halo(True, reach.far_m + reach.spare_m + bow)
+    rows = _pieces(field, under, beside, beyond, track, (reach.near_m, reach.near_m, reach.far_m), reach.spare_m)
+    error, near, far = limits.altitude_error_m, reach.margin_m(reach.near_m), reach.margin_m(reach.far_m)
+    floor = rows[:, 3:5] + (limits.min_agl_m + error + near)
+    if limits.horizontal_clearance_m > 0.0:
+        floor = np.maximum(floor, rows[:, 5:7] + (error + far))
+    unknown = np.isnan(floor)
+    ceiling = np.full_like(floor, np.inf)
+    if limits.max_agl_m is not None:
+        ceiling = np.where(unknown, -np.inf, rows[:, 1:3] + (limits.max_agl_m - error - near))
+    if limits.max_amsl_m is not None:
+        ceiling = np.minimum(ceiling, limits.max_amsl_m - error)
+    return Tube(
+        np.concatenate([[0.0], rows[:, 0]]),
+        np.where(unknown, np.inf, floor),
+        ceiling,
+        _bands(track, limits, field, zones, halo, reach),
+    )
+
+
+def _pieces(
+    field: Field, under: Halo, beside: Halo, beyond: Halo, track: Floats, reaches: tuple[float, float, float],
+    spare_m: float,
+) -> Floats:  # fmt: skip
+    room = 256
+    while True:
+        rows = np.empty((room, 7))
+        count = pieces(field, field.ground, field.top, under, beside, beyond, track, *reaches, spare_m, rows)
+        if count <= room:
+            return rows[:count]
+        room = count
+
+
+def _bands(
+    track: Floats, limits: Limits, field: Field, zones: Zones, halo: Callable[[bool, float], Halo], reach: Reaches
+) -> tuple[Band, ...]:
+    """One band for each span of the track within reach of a zone, by zone and way."""
+    far, error = reach.far_m, limits.altitude_error_m
+    rows = np.empty((64 + len(zones.circle), 4))
+    count = spans(zones, track, far + reach.spare_m, rows)
+    if count > len(rows):
+        rows = np.empty((count, 4))
+        spans(zones, track, far + reach.spare_m, rows)
+    rows = rows[:count]
+    rows = rows[np.lexsort((rows[:, 2], rows[:, 0]))]
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
+    out: list[Band] = []
+    at = 0
+    while at < len(rows):
+        zone, s0, s1 = int(rows[at, 0]), rows[at, 2], rows[at, 3]
+        at += 1
+        # A span that goes on into the next leg is one span.
+        while at < len(rows) and rows[at, 0] == zone and rows[at, 2] <= s1 + 1e-6:
+            s1 = max(s1, rows[at, 3])
+            at += 1
+        if zones.agl[zone].any():
+            around = halo(False, far + reach.spare_m + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
+            part = _between(track, length, s0, s1)
+            ground = _pieces(field, around, around, around, part, (far, far, far), reach.spare_m)
+            s = np.concatenate([[s0], s0 + ground[:, 0]])
+            low, high = ground[:, 1:3], ground[:, 3:5]
+        else:
+            s, low, high = np.array([s0, s1]), np.zeros((1, 2)), np.zeros((1, 2))
+        bottom, top = zones.level[zone]
+        margin = reach.margin_m(far)
+        # What is known of all the ground under the zone is a bound too; where ground is unknown there is no way past.
+        if zones.agl[zone, 0]:
+            low = np.fmax(low + (bottom - margin), zones.band[zone, 0])
+            low = np.where(np.isnan(ground[:, 1:3]), -np.inf, low)
+        else:
+            low = np.full_like(low, bottom)
+        if zones.agl[zone, 1]:
+            high = np.fmin(high + (top + margin), zones.band[zone, 1])
+            high = np.where(np.isnan(ground[:, 3:5]), np.inf, high)
+        else:
+            high = np.full_like(high, top)
+        out.append(Band(zone, float(s0), float(s1), s, low - error, high + error))
+    return tuple(out)
+
+
+def _between(track: Floats, length: Floats, s0: float, s1: float) -> Floats:
+    """The points of a track from ``s0`` to ``s1`` metres along it."""
+    inner = (length > s0) & (length < s1)
+    ends = [np.array([np.interp(s, length, track[:, k]) for k in range(2)]) for s in (s0, s1)]
+    return np.ascontiguousarray(np.vstack([ends[0], track[inner], ends[1]]))

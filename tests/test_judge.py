@@ -1,0 +1,171 @@
+"""A mission in, one verdict out: limits, errors, frames, battery, and what cannot be judged."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcsplan.check.judge import judge
+from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.build import Order, build_mission
+from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.vehicle import Autopilot, Energy, Vehicle
+from gcsplan.world.path import Path
+from gcsplan.world.world import World
+from gcsplan.world.zones import Circle, Level, Zone
+from tests.worlds import vehicle, world
+
+HOME_DEG = (36.6, -84.3)
+
+
+def mission_over(
+    where: World, points: list[list[float]], craft: Vehicle | None = None, **order: object
+) -> tuple[Mission, Vehicle]:
+    craft = craft or vehicle()
+    return build_mission(Path(np.array(points)), where, craft, HOME_DEG, Order(**order)), craft  # type: ignore[arg-type]
+
+
+def verdict_of(where: World, points: list[list[float]], craft: Vehicle | None = None, **order: object) -> Verdict:
+    mission, craft = mission_over(where, points, craft, **order)
+    return judge(mission, craft, where)
+
+
+HIGH_ENOUGH = [[0.0, 0, 366], [3000, 0, 366], [6000, 1000, 366]]
+
+
+def test_a_mission_above_every_limit_is_safe_and_its_figures_add_up() -> None:
+    verdict = verdict_of(world(), HIGH_ENOUGH)
+    assert verdict.safe is True
+    assert verdict.length_m == pytest.approx(3000 + math.hypot(3000, 1000), rel=1e-6)
+    assert verdict.lowest is not None
+    assert verdict.lowest.min_agl_m == pytest.approx(66.0, abs=0.01)
+    up_and_down = 120 * (66 + 66)
+    assert verdict.energy_j == pytest.approx(up_and_down + 100 * verdict.length_m, rel=1e-5)
+    flight_s = verdict.length_m / 15 + 66 / 2.5 + 66 / 1.5
+    assert verdict.time_s == pytest.approx(flight_s, rel=1e-5)
+    assert verdict.arrive_s == pytest.approx(flight_s - 66 / 1.5, rel=1e-5)
+
+
+def test_the_altitude_error_is_taken_off() -> None:
+    verdict = verdict_of(world(), [[0.0, 0, 366], [3000, 0, 364.9], [6000, 1000, 366]])
+    assert {f.kind for f in verdict.findings} == {"min_agl"}
+    assert verdict.findings[0].by == pytest.approx(0.1, abs=0.02)
+
+
+def test_a_hill_between_two_safe_way_points_is_found() -> None:
+    hill = world(lambda e, n: 300 + 120 * np.exp(-((e - 1500) ** 2 + n**2) / 1e5))
+    verdict = verdict_of(hill, [[0.0, 0, 366], [3000, 0, 366]])
+    finding = verdict.findings[0]
+    assert finding.kind == "min_agl"
+    assert finding.seq == 3
+    east, _ = hill.frame.to_plane(finding.lat_deg, finding.lon_deg)
+    assert abs(east - 1500) < 120
+
+
+def test_a_zone_its_clearance_and_its_name_are_in_the_finding() -> None:
+    mast = Zone("mast", Circle(1500, 100, 60), None, Level(100, "agl"))
+    craft = vehicle(horizontal_clearance_m=30)
+    verdict = verdict_of(world(zones=[mast]), [[0.0, 0, 366], [3000, 0, 366]], craft)
+    assert verdict.safe is True  # 40 m from its edge: 30 and 3 are wanted
+    verdict = verdict_of(world(zones=[mast]), [[0.0, 10, 366], [3000, 10, 366]], craft)
+    assert {f.zone for f in verdict.findings} == {"mast"}
+    assert "mast" in verdict.findings[0].message
+    over = verdict_of(world(zones=[mast]), [[0.0, 10, 406], [3000, 10, 406]], craft)
+    assert over.safe is True
+
+
+def test_take_off_columns_are_exempt_from_min_agl_and_not_from_zones() -> None:
+    hat = Zone("hat", Circle(0, 0, 50), Level(20, "agl"), Level(40, "agl"))
+    verdict = verdict_of(world(zones=[hat]), HIGH_ENOUGH)
+    assert {(f.kind, f.seq) for f in verdict.findings} == {("zone", 1)}
+
+
+def test_climb_is_held_to_the_airframe() -> None:
+    steep = [[0.0, 0, 366], [1000, 0, 500], [3000, 0, 500]]
+    assert verdict_of(world(), steep, vehicle(max_climb_deg=8)).safe is True
+    verdict = verdict_of(world(), steep, vehicle(max_climb_deg=7))
+    assert {f.kind for f in verdict.findings} == {"climb"}
+
+
+def test_leaving_the_terrain_model_is_a_violation() -> None:
+    small = world(half_m=2000)
+    assert "coverage" in {f.kind for f in verdict_of(small, [[0.0, 0, 366], [3000, 0, 366]]).findings}
+
+
+def test_what_ardupilot_stores_is_judged_not_what_was_meant() -> None:
+    mission, craft = mission_over(world(), HIGH_ENOUGH)
+    # 65.008 m is cut to 65.00 on board: legal with 65 wanted; 64.9999 becomes 64.99: not legal.
+    flat = replace(craft, limits=replace(craft.limits, track_error_m=0.0))
+
+    def flying_at(z: float) -> Verdict:
+        items = [replace(i, z=z) if i.command in (m.WAYPOINT, m.TAKEOFF) else i for i in mission.items]
+        return judge(replace(mission, items=tuple(items)), flat, world())
+
+    assert flying_at(65.008).safe is True
+    assert flying_at(64.9999).safe is False
+
+
+def test_the_battery_less_its_reserve_is_a_limit() -> None:
+    craft = replace(vehicle(), energy=Energy(120, 100, battery_j=700_000, reserve=0.2))
+    verdict = verdict_of(world(), HIGH_ENOUGH, craft)
+    assert [f.kind for f in verdict.findings] == ["battery"]
+    assert verdict.battery_used_percent == pytest.approx(100 * verdict.energy_j / 700_000)
+    enough = replace(vehicle(), energy=Energy(120, 100, battery_j=900_000, reserve=0.2))
+    assert verdict_of(world(), HIGH_ENOUGH, enough).safe is True
+
+
+def test_a_return_home_over_a_hill_is_judged_and_its_energy_counted() -> None:
+    hill = world(lambda e, n: 300 + 120 * np.exp(-((e - 1500) ** 2 + n**2) / 1e5))
+    around = [[0.0, 0, 366], [1500, 3000, 366], [3000, 0, 366]]
+    mission, craft = mission_over(hill, around, end="rtl")
+    low = judge(mission, craft, hill, rtl_rel_home_m=100)
+    assert {(f.kind, f.seq) for f in low.findings} == {("min_agl", mission.first_seq + len(mission.items) - 1)}
+    high = judge(mission, craft, hill, rtl_rel_home_m=200)
+    assert high.safe is True
+    assert high.energy_j > high.path_energy_j + 100 * 2990
+    unknown = judge(mission, craft, hill)
+    assert unknown.safe is None
+
+
+def test_terrain_following_is_judged_as_interpolated_with_the_terrain_error() -> None:
+    hill = world(lambda e, n: 300 + 200 * np.exp(-((e - 1500) ** 2 + n**2) / 4e5))
+    points = [[0.0, 0, 400], [3000, 0, 400]]
+    relative = verdict_of(hill, points)
+    assert relative.safe is False
+    follow = verdict_of(hill, points, altitude_frame="terrain")
+    assert follow.safe is True, follow.describe()
+    assert follow.lowest is not None
+    assert follow.lowest.min_agl_m == pytest.approx(99, abs=2)
+    steep = verdict_of(hill, points, vehicle(max_climb_deg=10), altitude_frame="terrain")
+    assert "climb" in {f.kind for f in steep.findings}
+    low = verdict_of(hill, [[0.0, 0, 390], [3000, 0, 390]], altitude_frame="terrain")
+    assert "min_agl" in {f.kind for f in low.findings}  # 90 m less 30 m and 5 m is not 60 m
+
+
+def test_a_mission_longer_than_the_autopilot_takes_is_a_violation() -> None:
+    mission, craft = mission_over(world(), HIGH_ENOUGH)
+    long = replace(mission, items=mission.items[:-1] + (mission.items[-2],) * 700)
+    assert "too_many_items" in {f.kind for f in judge(long, craft, world()).findings}
+
+
+def test_an_empty_mission_is_not_judged() -> None:
+    mission, craft = mission_over(world(), HIGH_ENOUGH)
+    assert judge(replace(mission, items=()), craft, world()).safe is None
+
+
+def test_a_jump_makes_the_verdict_not_judged() -> None:
+    mission, craft = mission_over(world(), HIGH_ENOUGH)
+    jump = MissionItem(m.DO_JUMP, m.NO_POSITION, (2, 2, 0, 0))
+    verdict = judge(replace(mission, items=(*mission.items[:3], jump, *mission.items[3:])), craft, world())
+    assert verdict.safe is None
+    assert any("177" in what for what in verdict.not_judged)
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_every_autopilot_is_judged(autopilot: Autopilot) -> None:
+    verdict = verdict_of(world(), HIGH_ENOUGH, vehicle(autopilot))
+    assert verdict.safe is True, verdict.describe()
