@@ -9,7 +9,6 @@ import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
-import click
 import typer
 
 from gcsplan.errors import CheckFailed, GcsplanError, InputError, NoMission, UsageError
@@ -335,18 +334,16 @@ def main() -> NoReturn:
         sys.exit(code if isinstance(code, int) else 0)
     except GcsplanError as error:
         fail(error, error.exit_code, error.reason, as_json, debug)
-    except click.exceptions.NoArgsIsHelpError as error:
-        print(error.format_message(), file=sys.stderr)
-        sys.exit(2)
-    except click.ClickException as error:
-        usage = UsageError(f"{error.format_message()} (see gcsplan --help)")
-        fail(usage, 2, "usage", as_json, debug)
-    except (KeyboardInterrupt, click.Abort):
+    except (KeyboardInterrupt, typer.Abort):
         fail(GcsplanError("interrupted"), 130, "interrupted", as_json, debug)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except Exception as error:  # the one place where a bug of ours becomes an exit code
+        told = getattr(error, "format_message", None)  # click's usage errors, whichever click typer brings along
+        if told is not None:
+            usage = type(error).__name__ != "NoArgsIsHelpError"
+            fail(UsageError(f"{told()} (see gcsplan --help)" if usage else told()), 2, "usage", as_json, debug)
         words = f"internal error, a bug in gcsplan: {type(error).__name__}: {error} (--debug shows where)"
         fail(GcsplanError(words), 70, "internal", as_json, debug)
 

@@ -13,10 +13,14 @@ from rich.table import Table
 if TYPE_CHECKING:
     from gcsplan.check.verdict import Verdict
     from gcsplan.delivery import Delivery
-    from gcsplan.pipeline import Plan
+    from gcsplan.pipeline import Plan, VehiclePlan
     from gcsplan.planners.problem import Progress
 
+PLAIN_WIDTH = 130  # of a log file or a pipe, where nobody says how wide it is
+
 console = Console(stderr=True, highlight=False, soft_wrap=True)
+if not console.is_terminal:
+    console.width = PLAIN_WIDTH
 
 
 def number(value: float | None, decimals: int = 0, unit: str = "") -> str:
@@ -41,27 +45,43 @@ def verdict_word(safe: bool | None) -> str:
 
 
 def plan_table(plan: Plan) -> None:
-    """One row for each vehicle of a plan."""
-    columns = [("vehicle", False), ("items", True), ("length m", True), ("gap %", True), ("energy kJ", True),
-               ("battery %", True), ("lowest AGL m", True), ("nearest zone m", True), ("climb °", True),
-               ("time s", True), ("verdict", False)]  # fmt: skip
-    table = _table(f"[bold]{plan.source.name}[/]  planner {plan.planner}, objective {plan.objective}", columns)
-    for v in plan.vehicles:
-        verdict = v.verdict
-        lowest, nearest = verdict.lowest, verdict.nearest
-        gap = v.gap_percent
-        table.add_row(
-            v.name, str(len(v.mission.wire_items())), number(verdict.length_m), number(gap, 2),
-            number(verdict.energy_j / 1000), number(verdict.battery_used_percent),
-            number(lowest.min_agl_m if lowest else None, 1),
-            f"{number(nearest.zone_clearance_m, 1)} {nearest.nearest_zone}" if nearest else "–",
-            number(verdict.max_climb_deg, 1), number(verdict.arrive_s), verdict_word(verdict.safe),
-        )  # fmt: skip
+    """A column for each vehicle of a plan, and the limit beside what was reached; for large fleets a row for each."""
+    many = len(plan.vehicles) > 4
+    rows = [_plan_row(v) for v in plan.vehicles]
+    title = f"[bold]{plan.source.name}[/]  planner {plan.planner}, objective {plan.objective}"
+    if many:
+        table = _table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
+        for row in rows:
+            table.add_row(*row.values())
+    else:
+        table = _table(title, [("", False), *((row["vehicle"], True) for row in rows)])
+        for name in list(rows[0])[1:]:
+            table.add_row(name, *(row[name] for row in rows))
     console.print(table)
     notes = [f"{v.name}: {n}" for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)]
     say_notes([*plan.notes, *notes])
     if plan.source.inputs.get("bare_dem"):
         console.print("[yellow]bare DEM: trees, masts and wires are not in it[/]")
+
+
+def _plan_row(v: VehiclePlan) -> dict[str, str]:
+    verdict = v.verdict
+    lowest, nearest = verdict.lowest, verdict.nearest
+    limits = v.request.vehicle.limits
+    climb = f" of {limits.max_climb_deg:g}" if limits.max_climb_deg < 90 else ""
+    return {
+        "vehicle": v.name,
+        "items": str(len(v.mission.wire_items())),
+        "length, m": number(verdict.length_m),
+        "above the bound, %": number(v.gap_percent, 2),
+        "energy, kJ": number(verdict.energy_j / 1000),
+        "battery, %": number(verdict.battery_used_percent),
+        "lowest AGL, m": f"{number(lowest.min_agl_m, 1)} of {limits.min_agl_m:g}" if lowest else "–",
+        "nearest zone, m": f"{number(nearest.zone_clearance_m, 1)} {nearest.nearest_zone}" if nearest else "–",
+        "steepest, °": f"{number(verdict.max_climb_deg, 1)}{climb}",
+        "time to goal, s": number(verdict.arrive_s),
+        "verdict": verdict_word(verdict.safe),
+    }
 
 
 def verdict_table(name: str, verdict: Verdict) -> None:
@@ -140,12 +160,17 @@ def planning_status() -> Iterator[Callable[[str, Progress], None]]:
 
 def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
     """The planners, one a row, on standard output: it is what was asked for."""
-    table = _table("", [("planner", False), ("what it does", False), ("paper", False), ("defaults", False)])
+    table = _table("planners", [("name", False)])
+    for name in ("what it does", "paper", "defaults"):
+        table.add_column(name)
     for row in rows:
         defaults = row["defaults"]
         words = ", ".join(f"{k} {v}" for k, v in defaults.items()) if isinstance(defaults, Mapping) else ""
         table.add_row(str(row["name"]), str(row["summary"]), str(row["paper"]) or "–", words or "–")
-    Console(highlight=False, soft_wrap=True).print(table)
+    out = Console(highlight=False)
+    if not out.is_terminal:
+        out.width = PLAIN_WIDTH
+    out.print(table)
 
 
 def say(message: str) -> None:

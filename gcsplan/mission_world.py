@@ -173,7 +173,7 @@ def make_zones(
     points = [keys.center] if keys.center is not None else keys.polygon or []
     at = [f"{where}.center"] if keys.center is not None else [f"{where}.polygon[{i}]" for i in range(len(points))]
     places = [make_place(p, a, problems, local=local) for p, a in zip(points, at, strict=True)]
-    if len({isinstance(p, LocalPoint) for p in points}) > 1:
+    if len(problems) == before and len({isinstance(p, LocalPoint) for p in points}) > 1:
         problems.append(Problem(f"{where}.polygon", "give all corners in degrees, or all in local metres"))
     if keys.radius_m is None and keys.center is not None:
         problems.append(Problem(f"{where}.radius_m", "is missing"))

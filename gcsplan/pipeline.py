@@ -188,7 +188,7 @@ def make_problem(
 
     def end_point(what: str, place: tuple[float, float, float], key: str, wanted_agl_m: float | None) -> float:
         east, north, ground = place
-        low = float(air.floor_amsl(east, north, limits))
+        low = _lowest_amsl(air, east, north, limits)
         needed = limits.min_agl_m + vehicle.limits.altitude_error_m
         if wanted_agl_m is not None and wanted_agl_m < needed - 1e-6:
             raise InputError(
@@ -242,6 +242,18 @@ def make_problem(
             "are cut, so track_error_m must hold the turn radius"
         )
     return problem, tuple(notes)
+
+
+def _lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) -> float:
+    """The lowest altitude that a path may begin or end with, in whichever direction it leaves; inf over unknown ground.
+
+    A path's room is bounded piece by piece (`Airspace.tube`), a little above what hovering at the point would need.
+    """
+    low = float(air.floor_amsl(east_m, north_m, limits))
+    for east, north in ((0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)):
+        tube = air.tube([(east_m, north_m), (east_m + east, north_m + north)], limits)
+        low = max(low, float(tube.floor_m.max()))
+    return low
 
 
 def _largest_bow_m(world: World) -> float:

@@ -58,7 +58,10 @@ def read_yaml(text: str, *, where: str) -> Any:
         return _value(node, where)
     except yaml.MarkedYAMLError as why:
         mark = why.problem_mark or why.context_mark
-        problem = " ".join(x for x in (why.context, why.problem) if x)
+        context = why.context
+        if context and why.context_mark is not None and mark is not why.context_mark:
+            context += f" (begun in line {why.context_mark.line + 1})"
+        problem = " ".join(x for x in (context, why.problem) if x)
         hint = "; indent with spaces, not tabs" if mark is not None and "\t" in _line(text, mark.line) else ""
         raise InputError(f"this is not YAML: {problem}{hint}", where=_place(where, mark)) from None
     except (yaml.YAMLError, UnicodeError) as why:
@@ -142,7 +145,7 @@ def _scalar(node: yaml.Node, where: str) -> Any:
     if _BOOL.match(text):
         return text[0] in "tT"
     if _INT.match(text):
-        if len(text) > 400:
+        if len(text) > 4000:  # int() has a limit of its own, a little above
             raise InputError(f"a number of {len(text)} digits", where=_place(where, node.start_mark))
         base = {"0o": 8, "0x": 16}.get(text[:2], 10)
         return int(text, base)

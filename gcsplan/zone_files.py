@@ -150,7 +150,10 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
     if geometry.get("type") in drawn and "radius_m" not in properties:
         return
     name = next((str(v) for k in ("name", "Name", "title") if (v := properties.get(k)) not in (None, "")), fallback)
+    before = len(found.problems)
     numbers = {k: _property(found, properties, k, where) for k in (*LEVEL_KEYS, "radius_m")}
+    if len(found.problems) > before:
+        return
     bounds = Bounds(**{k: numbers[k] for k in LEVEL_KEYS})
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     at = f"{where}.geometry.coordinates" if geometry is not feature else f"{where}.coordinates"

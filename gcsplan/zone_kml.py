@@ -66,7 +66,10 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     where = f"{found.path}: Placemark {number}" + (f" ({name[:60]})" if name else "")
     name = (name or f"{found.path.stem}[{number}]")[:200]
     data = _extended_data(placemark)
+    before = len(found.problems)
     numbers = {k: _number(found, data, k, where) for k in (*LEVEL_KEYS, "radius_m")}
+    if len(found.problems) > before:
+        return
     bounds = Bounds(**{k: numbers[k] for k in LEVEL_KEYS})
     shapes = [e for e in _walk(placemark, found.path, leaves=("Polygon", "Point")) if _kind(e) in _SHAPES]
     others = [_kind(e) for e in shapes if _kind(e) not in ("Polygon", "Point")]

@@ -305,6 +305,22 @@ def test_a_legacy_request_is_answered_in_the_old_form_with_float_degrees() -> No
         assert answer.item.frame == 3
 
 
+def test_ardupilot_denies_reading_during_an_upload_only_to_those_who_ask_in_the_new_form() -> None:
+    vehicle = a_vehicle()
+    upload(vehicle, a_mission(3))
+    say(vehicle, Count(3))
+    assert say(vehicle, Request(1)) == [Ack(14)]
+    assert type(say(vehicle, Request(1, legacy=True))[0]) is LegacyItem
+
+
+def test_ardupilots_fence_has_no_place_in_the_old_form() -> None:
+    vehicle = a_vehicle()
+    upload(vehicle, [circle(30.0)], FENCE)
+    (answer,) = say(vehicle, Request(0, FENCE, legacy=True))
+    assert isinstance(answer, LegacyItem)
+    assert (answer.item.x, answer.item.y, answer.item.params[0]) == (0, 0, 30.0)
+
+
 @BOTH
 def test_clear_all_empties_one_list_and_count_0_does_too(autopilot: Autopilot) -> None:
     for emptying in (ClearAll(), Count(0)):

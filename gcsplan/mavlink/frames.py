@@ -20,6 +20,7 @@ from gcsplan.errors import InputError
 from gcsplan.mavlink.messages import Address
 
 _MARKERS = re.compile(b"[\xfd\xfe]")
+_MARKER_BYTES = (0xFD, 0xFE)
 _V2, _SIGNED = 0xFD, 0x01
 _SIGNING_EPOCH_S = 1_420_070_400  # 2015-01-01, in units of 10 µs from there
 KEY_VARIABLE = "GCSPLAN_SIGNING_KEY"
@@ -105,36 +106,37 @@ class FrameParser:
                     break
                 position = start + 1  # a damaged length must not hide the frames behind it
                 continue
-            message = self._decode(buffer[start : start + length])
-            if message is None and not self._unknown_frame(buffer, start, length):
+            end = start + length
+            if _is_unknown_kind(buffer, start):
+                if end == len(buffer) and not datagram:
+                    rest = buffer[start:]  # what follows tells whether it is a frame
+                    break
+                position = end if end == len(buffer) or buffer[end] in _MARKER_BYTES else start + 1
+                continue
+            message = self._decode(buffer[start:end])
+            if message is None:
                 position = start + 1
                 continue
-            if message is not None:
-                messages.append(message)
-                rest = b""
-            position = start + length
+            messages.append(message)
+            position, rest = end, b""
         self._rest = rest
         return messages
 
     def _decode(self, frame: bytes) -> Any:
-        """The message in a whole frame; None if it does not check or is of no kind that we know."""
-        before = self._mav.signing.badsig_count + self._mav.signing.reject_count
+        """The message in a whole frame; None if it does not check."""
         try:
-            message = self._mav.decode(bytearray(frame))
+            return self._mav.decode(bytearray(frame))
         except dialect.MAVError as error:
             self.bad += 1
-            refused = self._mav.signing.badsig_count + self._mav.signing.reject_count > before
-            self.unsigned += int(refused or "signature" in str(error))
+            self.unsigned += int("signature" in str(error))
             return None
-        return None if message.get_type().startswith("UNKNOWN") else message
 
-    @staticmethod
-    def _unknown_frame(buffer: bytes, start: int, length: int) -> bool:
-        """Whether to pass over a frame of an unknown kind, whose checksum nobody here can check."""
-        v2 = buffer[start] == _V2
-        kind = int.from_bytes(buffer[start + 7 : start + 10], "little") if v2 else buffer[start + 5]
-        end = start + length
-        return kind not in dialect.mavlink_map and (end == len(buffer) or buffer[end] in (0xFD, 0xFE))
+
+def _is_unknown_kind(buffer: bytes, start: int) -> bool:
+    """Whether the message id is none that we know: then nobody here can check its checksum."""
+    if buffer[start] != _V2:
+        return buffer[start + 5] not in dialect.mavlink_map
+    return int.from_bytes(buffer[start + 7 : start + 10], "little") not in dialect.mavlink_map
 
 
 def _frame_length(buffer: bytes, start: int) -> int:

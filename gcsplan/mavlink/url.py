@@ -34,7 +34,7 @@ _SCHEMES: dict[str, tuple[Literal["udp", "tcp"], bool]] = {
     "tcpout": ("tcp", False),
     "tcpin": ("tcp", True),
 }
-_BARE_DEVICE = re.compile(r"(?P<device>/dev/[^,\s]+|(\\\\\.\\)?COM\d+)(,(?P<baud>[^,]*))?", re.IGNORECASE)
+_BARE_DEVICE = re.compile(r"(?P<device>/dev/[^,\s]+|(\\\\\.\\)?COM\d+)(,(?P<baud>[^,]*))?", re.I | re.A)
 _HERE = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
 _MOST_BAUD = 12_000_000
 
@@ -61,7 +61,8 @@ class Endpoint:
     def url(self) -> str:
         """Written in pymavlink's way."""
         if self.kind == "serial":
-            return f"{self.device},{self.baud}"
+            bare = _BARE_DEVICE.fullmatch(self.device)
+            return f"{self.device},{self.baud}" if bare else f"serial://{self.device}:{self.baud}"
         return f"{self._scheme(self.listens)}:{self.place}"
 
     def understood(self) -> str:
@@ -95,10 +96,8 @@ def parse_url(text: str) -> Endpoint:
     scheme = scheme.lower()
     slashes = rest.startswith("//")
     if scheme == "serial" and colon:
-        device, _, baud = (rest[2:] if slashes else rest).replace(",", ":").rpartition(":")
-        if not device:  # no baud rate given
-            device, baud = baud, ""
-        return _serial(given, device, baud or None)
+        match = re.fullmatch(r"(?P<device>.*?)([:,](?P<baud>[^:,]*))?", rest[2:] if slashes else rest)
+        return _serial(given, match["device"], match["baud"] or None) if match else _serial(given, "", None)
     if scheme not in _SCHEMES or not colon:
         raise _wrong(given, "is not a link that we know")
     kind, listens = _SCHEMES[scheme]
@@ -109,9 +108,9 @@ def parse_url(text: str) -> Endpoint:
 
 
 def _host_and_port(given: str, rest: str, listens: bool) -> tuple[str, int]:
-    match = re.fullmatch(r"(\[(?P<v6>[0-9A-Fa-f:.%\w]+)\]|(?P<host>[^\[\]:/\s,]*)):(?P<port>\d{1,5})", rest)
-    if match is None and listens and re.fullmatch(r"\d{1,5}", rest):
-        match = re.fullmatch(r"(?P<v6>)(?P<host>)(?P<port>\d{1,5})", rest)
+    match = re.fullmatch(r"(\[(?P<v6>[0-9A-Fa-f:.%\w]+)\]|(?P<host>[^\[\]:/\s,]*)):(?P<port>[0-9]{1,5})", rest)
+    if match is None and listens and re.fullmatch(r"[0-9]{1,5}", rest):
+        match = re.fullmatch(r"(?P<v6>)(?P<host>)(?P<port>[0-9]{1,5})", rest)
     if match is None:
         raise _wrong(given, "wants HOST:PORT after the colon, an IPv6 address in brackets")
     port = int(match["port"])

@@ -30,6 +30,10 @@ STEPS = np.array([(1, 0), (0, 1), (1, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2,
 SEEMS_M = 2.0
 """Between samples a floor may be lower than a bilinear reading by about this."""
 
+ENDS_M = 25.0
+"""Bounds over a line are conservative, in rough ground by this much at worst; so whether start and goal themselves are
+legal is not read from them."""
+
 LINK_DOORS = 9
 """Places at which an edge between a terminal and a node is looked at."""
 
@@ -229,8 +233,11 @@ class Links:
     high_m: Floats
 
 
-def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float]) -> Links:
-    """Links from a terminal to the nodes around it (within 2.1 steps)."""
+def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float], amsl_m: float | None) -> Links:
+    """Links from a terminal at ``amsl_m`` (None: any height) to the nodes around it (within 2.1 steps).
+
+    Whether the terminal itself is legal is judged elsewhere: its door here always holds ``amsl_m``.
+    """
     x, y = (place[0] - lattice.west_m) / lattice.step_m, (place[1] - lattice.south_m) / lattice.step_m
     jj, ii = (a.ravel() for a in np.mgrid[math.floor(y) - 2 : math.ceil(y) + 3, math.floor(x) - 2 : math.ceil(x) + 3])
     keep = (ii >= 0) & (ii < lattice.nx) & (jj >= 0) & (jj < lattice.ny) & (np.hypot(ii - x, jj - y) <= 2.1)
@@ -254,6 +261,10 @@ def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float]) -
             rows.append(k)
             lows.append(np.maximum(low[k], gap_low))
             highs.append(np.minimum(high[k], gap_high))
+    if amsl_m is not None:
+        for under, over in zip(lows, highs, strict=True):
+            if under[0] < amsl_m + ENDS_M and over[0] > amsl_m - ENDS_M:
+                under[0], over[0] = min(under[0], amsl_m), max(over[0], amsl_m)
     shape = (-1, LINK_DOORS)
     length = np.hypot(*(b - a).T)
     return Links(

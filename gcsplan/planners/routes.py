@@ -78,7 +78,9 @@ class Router:
         box, step = frame_of(problem, level)
         lattice = make_lattice(problem, box, step, level.detour)
         stops = terminals(problem)
-        return cls(problem, lattice, stops, [make_links(problem, lattice, s) for s in stops])
+        heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
+        links = [make_links(problem, lattice, s, z) for s, z in zip(stops, heights, strict=True)]
+        return cls(problem, lattice, stops, links)
 
     def way(self, cap_m: float = math.inf, weight: float = 0.0) -> Floats | None:
         """(N, 2) places of the best way over the lattice under ``cap_m``, through every stop; None if there is none."""

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from gcsplan.planners.lattice import ENDS_M
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.taut_string import Blocked, Profile, taut_string
 from gcsplan.world.airspace import Band, Tube
@@ -24,8 +25,8 @@ Floats = NDArray[np.float64]
 KEEP_M = 1e-4
 """Kept from floors and ceilings where there is room, so that rounding never decides."""
 
-ENDS_M = 1.0
-"""Tubes are conservative by less than this: whether start and goal themselves are legal is not read from a tube."""
+CLOSE_M, CLOSE_STEP_M, CLOSE_ROOM_M = 60.0, 4.0, 0.02
+"""Where a tube shuts an end in: so far from it the floor is read point by point, so often, with so much to spare."""
 
 BRANCHES = 64
 """Most over/under combinations that are tried for one track."""
@@ -194,7 +195,7 @@ def fly(problem: Problem, track: Track, below: float = np.inf, branches: int = B
     """
     tube, limits = track.tube, problem.limits
     ends = (problem.start[2], problem.goal[2])
-    room = _rooms(tube, track, *ends)
+    room = _rooms(problem, track)
     horizontal = float(room.s_m[-1])
 
     def solve(over: Sides) -> Profile | Blocked:
@@ -307,14 +308,20 @@ def _narrow(low: Floats, high: Floats) -> None:
             low[i] = high[i] = 0.5 * (low[i] + high[i])
 
 
-def _rooms(tube: Tube, track: Track, z0: float, z1: float) -> _Room:
+def _rooms(problem: Problem, track: Track) -> _Room:
+    tube, z0, z1 = track.tube, problem.start[2], problem.goal[2]
     fixed = track.pinned & np.isfinite(track.pin_m)
+    close = _close_to_ends(problem, tube)
     s = tube.s_m
-    if tube.bands or fixed.any():
-        s = np.sort(np.concatenate([s, *(b.s_m for b in tube.bands), track.s_m[fixed]]))
+    if tube.bands or len(close) or fixed.any():
+        s = np.sort(np.concatenate([s, *(b.s_m for b in tube.bands), track.s_m[fixed], close]))
         s = s[np.concatenate([[True], s[1:] - s[:-1] > 1e-9])]
     low = _edge(s, tube.s_m, tube.floor_m, True)
     high = _edge(s, tube.s_m, tube.ceiling_m, False)
+    if len(close):
+        near = np.flatnonzero((s <= CLOSE_M) | (s >= s[-1] - CLOSE_M))
+        east, north = (np.interp(s[near], track.s_m, track.points[:, i]) for i in range(2))
+        low[near] = np.minimum(low[near], problem.airspace.floor_amsl(east, north, problem.limits) + CLOSE_ROOM_M)
     for at, z in zip(track.s_m[fixed], track.pin_m[fixed], strict=True):
         k = int(np.argmin(np.abs(s - at)))
         low[k], high[k] = max(low[k], z), min(high[k], z)
@@ -334,6 +341,28 @@ def _rooms(tube: Tube, track: Track, z0: float, z1: float) -> _Room:
         bottoms.append(bottom)
         tops.append(top)
     return _Room(s, low, high, spans, bottoms, tops)
+
+
+def _close_to_ends(problem: Problem, tube: Tube) -> Floats:
+    """Places near an end to be looked at one by one, where the tube's floor is beyond what can be climbed to.
+
+    A tube bounds the floor over whole pieces. Start and goal lie on the floor more often than not, and a bound that
+    is a metre too high a few metres away would shut them in.
+    """
+    s, limits = tube.s_m, problem.limits
+    out = []
+    for z, slope, away in (
+        (problem.start[2], limits.max_climb_slope, s),
+        (problem.goal[2], limits.max_descent_slope, s[-1] - s),
+    ):
+        k = np.flatnonzero((away <= CLOSE_M) & (away > 0.0))
+        if np.isinf(slope) or not len(k):
+            continue
+        floor = np.maximum(tube.floor_m[np.maximum(k - 1, 0), 1], tube.floor_m[np.minimum(k, len(tube.floor_m) - 1), 0])
+        if (floor > z + slope * away[k]).any():
+            steps = np.arange(CLOSE_STEP_M, min(CLOSE_M, 0.5 * float(s[-1])), CLOSE_STEP_M)
+            out.append(steps if away is s else s[-1] - steps)
+    return np.concatenate(out) if out else np.zeros(0)
 
 
 def _forgive(low: Floats, high: Floats, k: int, z: float) -> None:

@@ -30,10 +30,12 @@ PIXELS = 900
 def draw(plan: Plan) -> Figure:
     """Map and profiles of ``plan``; everything in metres, labelled."""
     rows = len(plan.vehicles)
-    figure = Figure(figsize=(11, 7.5 + 2.6 * rows), layout="constrained")
+    west, south, east, north = _extent(plan)
+    map_inches = min(max(9.0 * (north - south) / (east - west) + 0.8, 2.5), 14.0)
+    figure = Figure(figsize=(11, map_inches + 2.6 * rows), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(1 + rows, 1, height_ratios=[7.5] + [2.6] * rows)
-    _map(axes[0], plan)
+    axes = figure.subplots(1 + rows, 1, height_ratios=[map_inches] + [2.6] * rows)
+    _map(axes[0], plan, (west, south, east, north))
     for ax, vehicle, colour in zip(axes[1:], plan.vehicles, _colours(rows), strict=True):
         _profile(ax, plan.world, vehicle.verdict, vehicle.request.vehicle.limits.min_agl_m, colour)
         ax.set_title(f"{vehicle.name}: {vehicle.verdict.length_m:,.0f} m", loc="left", fontsize=10)
@@ -55,12 +57,17 @@ def track_en(world: World, verdict: Verdict) -> NDArray[np.float64]:
     return np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
 
 
-def _map(ax: Axes, plan: Plan) -> None:
-    tracks = [track_en(plan.world, v.verdict) for v in plan.vehicles]
-    every = np.concatenate(tracks)[:, :2]
+def _extent(plan: Plan) -> tuple[float, float, float, float]:
+    """West, south, east, north of all tracks with room around."""
+    every = np.concatenate([track_en(plan.world, v.verdict) for v in plan.vehicles])[:, :2]
     low, high = every.min(axis=0), every.max(axis=0)
     pad = max(0.12 * float((high - low).max()), 50.0)
-    (west, south), (east, north) = low - pad, high + pad
+    return float(low[0] - pad), float(low[1] - pad), float(high[0] + pad), float(high[1] + pad)
+
+
+def _map(ax: Axes, plan: Plan, extent: tuple[float, float, float, float]) -> None:
+    tracks = [track_en(plan.world, v.verdict) for v in plan.vehicles]
+    west, south, east, north = extent
     columns = PIXELS
     lines = max(2, round(PIXELS * (north - south) / (east - west)))
     e, n = np.meshgrid(np.linspace(west, east, columns), np.linspace(north, south, lines))
@@ -70,7 +77,7 @@ def _map(ax: Axes, plan: Plan) -> None:
     shade = LightSource(azdeg=315, altdeg=40).hillshade(shown, vert_exag=1.5, dx=step, dy=step)
     ax.imshow(shade, extent=(west, east, south, north), cmap="gray", vmin=0, vmax=1)
     tint = ax.imshow(ground, extent=(west, east, south, north), cmap="terrain", alpha=0.45)
-    ax.figure.colorbar(tint, ax=ax, label="ground, m AMSL", shrink=0.8)
+    ax.figure.colorbar(tint, ax=ax, label="ground, m AMSL")
     for zone in plan.world.airspace.zones:
         ax.add_patch(_zone_patch(zone))
         x0, y0, x1, y1 = zone.bounds

@@ -82,7 +82,7 @@ class _ArduPilotList:
             (Phase.RECEIVING, Item): self._take,
             (Phase.RECEIVING, LegacyItem): self._take,
             (Phase.RECEIVING, RequestList): self._deny,
-            (Phase.RECEIVING, Request): self._deny,
+            (Phase.RECEIVING, Request): self._tell_item_or_deny,
             (Phase.RECEIVING, ClearAll): self._clear_while_receiving,
             # ACK is ignored in both phases: an upload cannot be cancelled from the ground.
         }
@@ -229,6 +229,13 @@ class _ArduPilotList:
             return [(sender, self._ack(ERROR))]
         else:
             return [(sender, self._ack(INVALID_SEQUENCE))]
-        if message.legacy:
-            return [(sender, LegacyItem(message.seq, through_float(item), self._type))]
-        return [(sender, Item(message.seq, item, self._type))]
+        if not message.legacy:
+            return [(sender, Item(message.seq, item, self._type))]
+        if self._type != MISSION:
+            # It sends fence and rally points with 1e-7 degrees in the fields of degrees: no place on earth, here 0, 0.
+            item = MissionItem(item.command, item.frame, item.params, z=item.z, autocontinue=item.autocontinue)
+        return [(sender, LegacyItem(message.seq, through_float(item), self._type))]
+
+    def _tell_item_or_deny(self, message: Request, sender: Address, now: float) -> Out:
+        # Only the new kind of request is denied during an upload.
+        return self._tell_item(message, sender, now) if message.legacy else self._deny(message, sender, now)

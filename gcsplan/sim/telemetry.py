@@ -107,7 +107,10 @@ class Telemetry:
             | mav.MAV_SYS_STATUS_SENSOR_GPS
             | mav.MAV_SYS_STATUS_PREARM_CHECK
         )
-        return mav.MAVLink_sys_status_message(sensors, sensors, sensors, 100, 12600, 50, 98, 0, 0, 0, 0, 0, 0)
+        fence = mav.MAV_SYS_STATUS_GEOFENCE  # there and whole, not enabled
+        return mav.MAVLink_sys_status_message(
+            sensors | fence, sensors, sensors | fence, 100, 12600, 50, 98, 0, 0, 0, 0, 0, 0
+        )
 
     def _gps_raw_int(self, now: float) -> Message:
         home = self._vehicle.home

@@ -245,14 +245,13 @@ def around(f, z, halo, sign, points, reach_m, out, sources=SOURCES):  # type: ig
 
 
 @kernel
-def spans(zs, track, reach_m, rows, sources=SOURCES):  # type: ignore[no-untyped-def]
-    """Where a ground track (N, 2) is within ``reach_m`` of zones: zone, leg, s0, s1 in ``rows``; their number."""
+def spans(zs, track, within_m, over_ground_m, rows, parts, sources=SOURCES):  # type: ignore[no-untyped-def]
+    """Where a ground track (N, 2) is within reach of zones: zone, leg, s0, s1 in ``rows``; their number.
+
+    The reach is ``within_m``, or ``over_ground_m`` for a zone with a level over ground.
+    """
     count = 0
     s_start = 0.0
-    most = 1
-    for k in range(len(zs.circle)):
-        most = max(most, zs.first[k + 1] - zs.first[k])
-    parts = np.empty((most + 1, 2))
     for leg in range(len(track) - 1):
         e0, n0, e1, n1 = track[leg, 0], track[leg, 1], track[leg + 1, 0], track[leg + 1, 1]
         de, dn = e1 - e0, n1 - n0
@@ -261,6 +260,7 @@ def spans(zs, track, reach_m, rows, sources=SOURCES):  # type: ignore[no-untyped
             continue
         west, east, south, north = min(e0, e1), max(e0, e1), min(n0, n1), max(n0, n1)
         for k in range(len(zs.circle)):
+            reach_m = over_ground_m if zs.agl[k, 0] or zs.agl[k, 1] else within_m
             if (
                 zs.box[k, 0] - reach_m > east
                 or zs.box[k, 2] + reach_m < west

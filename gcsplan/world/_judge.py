@@ -30,7 +30,7 @@ class Demands(NamedTuple):
 
 
 @device
-def judge_terrain(f, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst):  # type: ignore[no-untyped-def]
+def judge_terrain(f, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst, leg):  # type: ignore[no-untyped-def]
     """Ground, obstacles and ceilings of one leg; False at the first violation unless ``full``.
 
     ``near``, ``far``: halos of the top for the track error and for the clearance; ``over``: of the ground for the track
@@ -64,10 +64,10 @@ def judge_terrain(f, near, far, over, column, e0, n0, h0, e1, n1, h1, track, alt
                 return False
             fine = False
             if out[2] > TOUCH_M:
-                worst[kind, 0], worst[kind, 1] = out[2], out[3]
+                worst[leg, kind, 0], worst[leg, kind, 1] = out[2], out[3]
             short = out[7] - out[4]
-            if (out[4] <= 0.0 or short > TOUCH_M) and not worst[COVERAGE, 0] >= short:
-                worst[COVERAGE, 0], worst[COVERAGE, 1] = max(short, TOUCH_M), out[5]
+            if (out[4] <= 0.0 or short > TOUCH_M) and not worst[leg, COVERAGE, 0] >= short:
+                worst[leg, COVERAGE, 0], worst[leg, COVERAGE, 1] = max(short, TOUCH_M), out[5]
         if kind == MIN_AGL and out[0] < math.inf:
             out[8], out[9] = out[0], out[1]
         elif kind == MAX_AGL and out[0] < math.inf:
@@ -103,7 +103,7 @@ def candidates(zs, west, south, east, north, seen, stamp, list_of):  # type: ign
 @kernel
 def judge(  # type: ignore[no-untyped-def]
     f, near, far, over, zs, start, end, column, track, altitude, want, full, ok, found, worst, nearest, hit, hit_at,
-    sources=SOURCES,
+    stack, out, seen, list_of, sources=SOURCES,
 ):  # fmt: skip
     """Judge every leg: ``ok`` (n,). With ``full`` also, by leg:
 
@@ -111,11 +111,7 @@ def judge(  # type: ignore[no-untyped-def]
     ``worst`` (7, 2): depth (NaN where there is none) and fraction by kind; ``nearest`` zone. Zones that are broken go to
     ``hit`` (leg, zone) and ``hit_at`` (signed distance, fraction) as far as there is room; their number is returned.
     """
-    stack = np.empty((256, 8))
-    out = np.zeros(12)
-    none = np.zeros((7, 2))
     zones = len(zs.circle)
-    seen, list_of = np.full(zones, -1), np.arange(zones)
     hits = 0
     for i in range(len(start)):
         e0, n0, h0 = start[i, 0], start[i, 1], start[i, 2]
@@ -131,7 +127,7 @@ def judge(  # type: ignore[no-untyped-def]
         fine = (
             judge_terrain(
                 f, near, far, over, column[i], e0, n0, h0, e1, n1, h1, track[i], altitude[i], want, stack, full, out,
-                worst[i] if full else none,
+                worst, i,
             )
             and fine
         )  # fmt: skip

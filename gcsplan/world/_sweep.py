@@ -33,10 +33,10 @@ SOURCES = hashlib.sha256(
     b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("_*.py")) if path.name != "__init__.py")
 ).hexdigest()
 
-device = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+device = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
 """A function that only kernels call; without the wrappers that Python would need, it compiles faster."""
 
-kernel = njit(nogil=True, error_model="numpy", cache=True)
+kernel = njit(nogil=True, error_model="numpy", cache=True, _nrt=False)
 """What Python calls. Dividing by zero gives inf or NaN, as in numpy; NaN is unknown, so no fast math."""
 
 

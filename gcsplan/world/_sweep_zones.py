@@ -56,6 +56,7 @@ class Zones(NamedTuple):
     lattice: Floats
     bucket: NDArray[np.int64]
     near: NDArray[np.int64]
+    scratch: Floats
 
 
 @device
@@ -111,7 +112,7 @@ def approach(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
 
 
 @device
-def enters(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def enters(zs, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-def]
     """Whether a segment passes through the open inside of a polygon, by more than touching it.
 
     Between neighbours among its crossings with the edges and the feet of the vertices on it, the segment stays on one
@@ -122,7 +123,6 @@ def enters(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
     square = dx * dx + dy * dy
     if square == 0.0:
         return signed_distance(zs, k, ax, ay) < -TOUCH_M
-    events = np.empty(2 * (last - first))
     count = 0
     x0, y0 = zs.vertex[last - 1, 0], zs.vertex[last - 1, 1]
     for v in range(first, last):
@@ -152,10 +152,9 @@ def enters(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
 
 
 @device
-def deepest_inside(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def deepest_inside(zs, k, ax, ay, bx, by, stack):  # type: ignore[no-untyped-def]
     """Greatest depth (>= 0) of a segment inside a polygon to a hundredth or 1 cm, and where on the segment."""
     length = math.hypot(bx - ax, by - ay)
-    stack = np.empty((128, 2))
     stack[0, 0], stack[0, 1] = 0.0, 1.0
     size = 1
     best, at = 0.0, 0.5
@@ -309,13 +308,13 @@ def meets(f, zs, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stack, full):  # 
     polygon = zs.circle[k, 2] < 0.0
     bound = reach - TOUCH_M
     if polygon and bound <= 0.0 and dist <= 0.0:
-        if not enters(zs, k, ax, ay, bx, by):
+        if not enters(zs, k, ax, ay, bx, by, zs.scratch):
             return False, 0.0, where
     elif not dist < bound:
         return False, dist, where
     if not (zs.agl[k, 0] or zs.agl[k, 1]):
         if full and polygon and dist <= 0.0:
-            depth, where = deepest_inside(zs, k, ax, ay, bx, by)
+            depth, where = deepest_inside(zs, k, ax, ay, bx, by, stack)
             dist, where = -depth, t0 + where * (t1 - t0)
         return True, dist, where
     # The levels follow the ground: look along the part that is near the zone's box.

@@ -49,7 +49,7 @@ def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale
     lattice, bucket, near = _lattice(box)
     return Zones(
         circle, first, np.concatenate(vertices) if vertices else np.zeros((0, 2)), box, level, agl, band, cell,
-        lattice, bucket, near,
+        lattice, bucket, near, np.zeros(2 * max((len(v) for v in vertices), default=0)),
     )  # fmt: skip
 
 

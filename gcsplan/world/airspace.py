@@ -243,6 +243,7 @@ class Airspace:
                 f, near, far, self._halo(False, near_m), self._zones,
                 legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
                 _demands(limits, self.scale), full, ok, found, worst, nearest, hit, hit_at,
+                np.empty((256, 8)), np.zeros(12), np.full(len(self.zones), -1), np.arange(len(self.zones)),
             )
         )  # fmt: skip
 

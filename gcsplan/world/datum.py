@@ -215,9 +215,16 @@ def plane_to_raster(
     return one, accuracy_m
 
 
-def to_wgs84(horizontal: Any) -> Transformer:
+def to_wgs84(horizontal: Any, *, where: str) -> Transformer:
     """From a raster's coordinates to (longitude, latitude) on WGS84; good enough to look up a geoid."""
-    return Transformer.from_crs(horizontal, CRS.from_epsg(4326), always_xy=True)
+    try:
+        return Transformer.from_crs(horizontal, CRS.from_epsg(4326), always_xy=True)
+    except ProjError as why:
+        raise InputError(
+            f"there is no known way from {horizontal.name!r} to WGS84 ({_first_line(why)}); say what the coordinate "
+            "system is with `crs:`",
+            where=where,
+        ) from None
 
 
 def _named_by_user(given: str, *, where: str) -> VerticalDatum:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.errors import InputError
-from gcsplan.world.datum import plane_to_raster
+from gcsplan.world.datum import plane_to_raster, to_wgs84
 from gcsplan.world.frame import Frame
 from gcsplan.world.raster import MAX_CELLS, Raster
 from gcsplan.world.surface import GridMap
@@ -111,16 +111,12 @@ class Mosaic:
                     f"{_datum(other)}",
                     where=where,
                 )
+        self._degrees = to_wgs84(first.crs.horizontal, where=where)
         self._layout(0.0)  # tiles off the common grid are found before anything is read
 
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        """True where a place lies on some tile (which may still be void there)."""
-        try:
-            frame = Frame(lat_deg, lon_deg)
-            there, _ = plane_to_raster(frame, self.crs.horizontal, (0.0, 0.0, 0.0, 0.0), where=self.where)
-        except InputError:
-            return False
-        x, y = (float(v) for v in there.transform(0.0, 0.0))
+        """True where a place lies on some tile (which may still be void there); good to a few metres."""
+        x, y = (float(v) for v in self._degrees.transform(lon_deg, lat_deg, direction="INVERSE"))
         if not (math.isfinite(x) and math.isfinite(y)):
             return False
         layout = self._layout(lon_deg)
@@ -129,6 +125,15 @@ class Mosaic:
             p.col - 0.5 <= col <= p.col + p.raster.cols - 0.5 and p.row - 0.5 <= row <= p.row + p.raster.rows - 0.5
             for p in layout.tiles
         )
+
+    def node_degrees(self, window: Window, cols: ArrayLike, rows: ArrayLike) -> tuple[Floats, Floats]:
+        """Latitude and longitude of the nodes ``rows`` × ``cols`` of a window, (len(rows), len(cols)) each.
+
+        Good to a few metres (whatever datum shift PROJ has at hand): enough to look up a geoid, not to place a node.
+        """
+        x, y = np.meshgrid(window.x[np.asarray(cols)], window.y[np.asarray(rows)])
+        lon, lat = self._degrees.transform(x, y)
+        return np.asarray(lat, float), np.asarray(lon, float)
 
     def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0) -> Window:
         """Nodes that cover ``box`` (west, south, east, north, plane metres) and ``spare_m`` around it.
@@ -275,10 +280,3 @@ def _read(
     if unknown:
         notes.append(f"{unknown} of {heights.size} DEM nodes around the mission are unknown (void or no tile)")
     return heights, notes
-
-
-def node_degrees(window: Window, to_wgs84: Any, cols: ArrayLike, rows: ArrayLike) -> tuple[Floats, Floats]:
-    """Latitude and longitude of the nodes ``rows`` × ``cols`` of a window, (len(rows), len(cols)) each."""
-    x, y = np.meshgrid(window.x[np.asarray(cols)], window.y[np.asarray(rows)])
-    lon, lat = to_wgs84.transform(x, y)
-    return np.asarray(lat, float), np.asarray(lon, float)

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import InputError
-from gcsplan.world.datum import GeoidGrid, VerticalDatum, to_wgs84, vertical_datum
+from gcsplan.world.datum import GeoidGrid, VerticalDatum, vertical_datum
 from gcsplan.world.frame import Frame
-from gcsplan.world.mosaic import Mosaic, Window, node_degrees
+from gcsplan.world.mosaic import Mosaic, Window
 from gcsplan.world.obstacles import canopy_on
 from gcsplan.world.peaks import Peak, flat_grid, peaks_grid
 from gcsplan.world.raster import SAMPLE, Raster, open_raster, require_file, sample_jacksboro, sha256_of
@@ -226,7 +226,7 @@ def _geoid_heights(window: Window, geoid: GeoidGrid, mosaic: Mosaic) -> Floats:
     rows, cols = window.heights_m.shape
     size = window.grid.metres_per_cell(*window.grid.centre)
     c, r = (_sampled(n, max(1, int(GEOID_STEP_M / m))) for n, m in zip((cols, rows), size, strict=True))
-    lat, lon = node_degrees(window, to_wgs84(mosaic.crs.horizontal), c, r)
+    lat, lon = mosaic.node_degrees(window, c, r)
     coarse = geoid.height_m(lat, lon)
     along = np.stack([np.interp(np.arange(cols), c, line) for line in coarse])
     below = np.searchsorted(r, np.arange(rows), side="right").clip(1, len(r) - 1) - 1

@@ -54,6 +54,10 @@ MARGIN_M = 0.01
 """Height beyond what is demanded: twice what the check's branch and bound resolves."""
 
 
+ZONE_ROOM_M = 0.05
+"""The same, beside a zone whose levels follow the ground."""
+
+
 @dataclass(frozen=True, slots=True)
 class Reaches:
     """How far from a track the ground counts, metres of the plane: for its errors, and for its clearance."""
@@ -126,10 +130,12 @@ def _bands(
     """One band for each span of the track within reach of a zone, by zone and way."""
     far, error = reach.far_m, limits.altitude_error_m
     rows = np.empty((64 + len(zones.circle), 4))
-    count = spans(zones, track, far + reach.spare_m, rows)
+    wide = far + reach.spare_m, far + reach.spare_m + ZONE_ROOM_M
+    parts = np.empty((len(zones.scratch) // 2 + 1, 2))
+    count = spans(zones, track, *wide, rows, parts)
     if count > len(rows):
         rows = np.empty((count, 4))
-        spans(zones, track, far + reach.spare_m, rows)
+        spans(zones, track, *wide, rows, parts)
     rows = rows[:count]
     rows = rows[np.lexsort((rows[:, 2], rows[:, 0]))]
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
@@ -143,23 +149,22 @@ def _bands(
             s1 = max(s1, rows[at, 3])
             at += 1
         if zones.agl[zone].any():
-            around = halo(False, far + reach.spare_m + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
+            around = halo(False, wide[1] + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
             part = _between(track, length, s0, s1)
-            ground = _pieces(field, around, around, around, part, (far, far, far), reach.spare_m)
+            ground = _pieces(field, around, around, around, part, (wide[1],) * 3, 0.0)
             s = np.concatenate([[s0], s0 + ground[:, 0]])
             low, high = ground[:, 1:3], ground[:, 3:5]
         else:
             s, low, high = np.array([s0, s1]), np.zeros((1, 2)), np.zeros((1, 2))
         bottom, top = zones.level[zone]
-        margin = reach.margin_m(far)
         # What is known of all the ground under the zone is a bound too; where ground is unknown there is no way past.
         if zones.agl[zone, 0]:
-            low = np.fmax(low + (bottom - margin), zones.band[zone, 0])
+            low = np.fmax(low + (bottom - MARGIN_M), zones.band[zone, 0])
             low = np.where(np.isnan(ground[:, 1:3]), -np.inf, low)
         else:
             low = np.full_like(low, bottom)
         if zones.agl[zone, 1]:
-            high = np.fmin(high + (top + margin), zones.band[zone, 1])
+            high = np.fmin(high + (top + MARGIN_M), zones.band[zone, 1])
             high = np.where(np.isnan(ground[:, 3:5]), np.inf, high)
         else:
             high = np.full_like(high, top)

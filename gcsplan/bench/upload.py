@@ -1,0 +1,167 @@
+"""Upload to the same loopback vehicle by gcsplan and by MAVSDK, in turn, in one run.
+
+What is timed is the transfer alone, from COUNT to the final ACK, over UDP on this machine: MAVSDK's
+``upload_mission`` returns on the ACK, and so does our `Upload`. The time of a whole verified upload of ours (transfer,
+read-back and comparison) stands beside it. MAVSDK runs in a process of its own, for it logs to standard output.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from importlib.util import find_spec
+from typing import Any
+
+from gcsplan.errors import InputError, LinkError
+from gcsplan.mavlink.link import Link, drive
+from gcsplan.mavlink.link import run as run_steps
+from gcsplan.mavlink.messages import Address
+from gcsplan.mavlink.mission import RELATIVE, WAYPOINT, MissionItem
+from gcsplan.mavlink.transfer import Accepted, Upload, VerifiedUpload
+from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.vehicle import Autopilot
+
+VEHICLE = Address(1, 1)
+START = (36.6, -84.3, 300.0)
+PEER_WAIT_S = 180.0
+
+
+def items_of(count: int) -> tuple[MissionItem, ...]:
+    """A mission of ``count`` way points, PX4's manner (no home item)."""
+    return tuple(
+        MissionItem(WAYPOINT, RELATIVE, x=366_000_000 + 900 * i, y=-843_000_000 + 700 * (i % 7), z=60.0 + i % 40)
+        for i in range(count)
+    )
+
+
+def run(items: int = 600, runs: int = 5) -> dict[str, Any]:
+    """Seconds of each upload, in turn, and the ratio ours to MAVSDK's of the medians.
+
+    Raises InputError where MAVSDK is not installed, LinkError where an upload fails.
+    """
+    if find_spec("mavsdk") is None:
+        raise InputError("this benchmark needs MAVSDK: pip install 'gcsplan[test]'")
+    if not 1 <= items <= 2000 or not 1 <= runs <= 100:
+        raise InputError(f"1 to 2000 items and 1 to 100 runs are wanted, given {items} and {runs}")
+    mission = items_of(items)
+    ours, verified, theirs = [], [], []
+    vehicle = LoopbackVehicle(1, Autopilot.PX4, lat_deg=START[0], lon_deg=START[1], amsl_m=START[2])
+    with SimServer([vehicle], "udpin:127.0.0.1:0", process=True) as server:
+        host, port = server.address
+        peer = _Peer(f"udpout://{host}:{port}", mission)
+        try:
+            for _ in range(runs):
+                ours.append(_ours(server.url_for_gcs, mission, verify=False))
+                verified.append(_ours(server.url_for_gcs, mission, verify=True))
+                theirs.append(peer.upload())
+        finally:
+            peer.close()
+    ratios = [a / b for a, b in zip(ours, theirs, strict=True)]
+    return {
+        "items": items,
+        "runs": runs,
+        "gcsplan_s": statistics.median(ours),
+        "gcsplan_verified_s": statistics.median(verified),
+        "mavsdk_s": statistics.median(theirs),
+        "ratio": statistics.median(ratios),
+        "ratio_least": min(ratios),
+        "ratio_most": max(ratios),
+    }
+
+
+def report(result: dict[str, Any]) -> str:
+    """The result in words."""
+    return (
+        f"{result['items']} items to one loopback vehicle over UDP, median of {result['runs']} runs in turn\n"
+        f"  gcsplan, upload               {result['gcsplan_s']:8.3f} s\n"
+        f"  gcsplan, upload and read-back {result['gcsplan_verified_s']:8.3f} s\n"
+        f"  MAVSDK, upload                {result['mavsdk_s']:8.3f} s\n"
+        f"  ratio gcsplan / MAVSDK        {result['ratio']:8.2f}   "
+        f"({result['ratio_least']:.2f} … {result['ratio_most']:.2f} pair by pair)"
+    )
+
+
+def _ours(url: str, items: tuple[MissionItem, ...], *, verify: bool) -> float:
+    with Link(url) as link:
+        channel = link.channel(1)
+        upload = Upload(items, us=link.us, vehicle=VEHICLE)
+        proof = VerifiedUpload(items, Autopilot.PX4, us=link.us, vehicle=VEHICLE)
+        started = time.perf_counter()
+        run_steps(channel, drive(proof if verify else upload, channel))
+        took = time.perf_counter() - started
+    fine = proof.result is not None and proof.result.verified if verify else isinstance(upload.outcome, Accepted)
+    if not fine:
+        raise LinkError("our upload to the loopback vehicle failed")
+    return took
+
+
+class _Peer:
+    """MAVSDK's upload in a process of its own: one line in for each upload, its seconds out."""
+
+    def __init__(self, url: str, items: tuple[MissionItem, ...]) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _PEER, url, str(PEER_WAIT_S)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL, text=True, env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        )  # fmt: skip
+        rows = [(i.command, i.frame, *i.params, i.x, i.y, i.z) for i in items]
+        self._tell(json.dumps(rows))
+        self._expect("ready")
+
+    def _tell(self, line: str) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(line + "\n")
+        self._process.stdin.flush()
+
+    def _expect(self, what: str) -> str:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline().strip()
+        if not line.startswith(what):
+            raise LinkError(f"MAVSDK did not get {what}: {line or 'its process ended'}")
+        return line
+
+    def upload(self) -> float:
+        """One upload; its seconds."""
+        self._tell("upload")
+        return float(self._expect("took").split()[1])
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.communicate()
+
+
+_PEER = """
+import json, os, sys, threading, time
+from mavsdk import ComponentType, Configuration, ConnectionResult, Mavsdk
+from mavsdk.plugins.mission_raw.mission_raw import MissionItem, MissionRaw
+
+out = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)
+threading.Timer(float(sys.argv[2]), lambda: os._exit(1)).start()
+
+def say(words):
+    out.write(words + "\\n")
+    out.flush()
+
+rows = json.loads(sys.stdin.readline())
+mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+if mavsdk.add_any_connection(sys.argv[1]) != ConnectionResult.SUCCESS:
+    say("cannot open " + sys.argv[1])
+    os._exit(1)
+system = mavsdk.first_autopilot(15.0)
+if system is None:
+    say("no autopilot heard")
+    os._exit(1)
+raw = MissionRaw(system)
+items = [MissionItem(seq, r[1], r[0], int(seq == 0), 1, *r[2:6], r[6], r[7], r[8], 0) for seq, r in enumerate(rows)]
+say("ready")
+for line in sys.stdin:
+    started = time.perf_counter()
+    raw.upload_mission(items)
+    say(f"took {time.perf_counter() - started}")
+"""
