@@ -75,6 +75,7 @@ def plan(
     from gcsplan import delivery, outputs, pipeline
     from gcsplan.console import delivery_table, plan_table, planning_status, say, transfer_progress
     from gcsplan.export.outdir import add_output, retire_outputs, write_outputs
+    from gcsplan.sim.loopback import loopback_fleet
 
     directory = out or Path(mission.stem)
     try:
@@ -102,7 +103,7 @@ def plan(
         jobs = delivery.jobs_of(planned, targets)
         options = delivery.Options(allow_armed=allow_armed, ignore_position=ignore_position)
         with transfer_progress([job.name for job in jobs]) as moved_on:
-            deliveries = delivery.deliver(jobs, options, moved_on)
+            deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
         add_output(directory, "upload.json", outputs.upload_text(planned, deliveries))
         if not as_json:
             delivery_table(deliveries)
@@ -159,6 +160,7 @@ def upload(
     """
     from gcsplan import checking, delivery, pipeline
     from gcsplan.console import delivery_table, say_notes, transfer_progress, verdict_table
+    from gcsplan.sim.loopback import loopback_fleet
 
     if (mission is None) == (not unchecked):
         raise UsageError("give either --mission FILE, in whose world the files are checked, or --unchecked")
@@ -176,7 +178,7 @@ def upload(
     else:
         jobs = [delivery.unchecked_job(name, to, sysid) for name in files]
     with transfer_progress([job.name for job in jobs]) as moved_on:
-        deliveries = delivery.deliver(jobs, options, moved_on)
+        deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
     if as_json:
         emit({"vehicles": [{"name": d.vehicle} | d.as_dict() for d in deliveries]})
     else:
@@ -255,10 +257,33 @@ def sim(
 
     Ctrl-C ends it.
     """
-    from gcsplan import delivery
     from gcsplan.console import say
+    from gcsplan.sim.misbehaviour import Misbehaviour
+    from gcsplan.sim.server import SimServer, serve
+    from gcsplan.sim.vehicle import LoopbackVehicle
+    from gcsplan.vehicle import Autopilot
 
-    delivery.simulate(mission, listen, autopilot, sysid, misbehave, say)
+    trouble = Misbehaviour.parse(misbehave)
+    if mission is not None:
+        from gcsplan.pipeline import load_mission
+
+        stands = [
+            (r.vehicle.sysid, r.vehicle.autopilot, r.start_deg, r.start[2]) for r in load_mission(mission).vehicles
+        ]
+    elif autopilot in list(Autopilot):
+        stands = [(sysid, Autopilot(autopilot), (36.6, -84.38), 471.0)]  # a valley of the sample terrain
+    else:
+        raise UsageError(f"--autopilot {autopilot}: one of {', '.join(Autopilot)} is wanted")
+    vehicles = [
+        LoopbackVehicle(number, kind, lat_deg=place[0], lon_deg=place[1], amsl_m=amsl_m, misbehave=trouble)
+        for number, kind, place, amsl_m in stands
+    ]
+
+    def ready(server: SimServer) -> None:
+        names = ", ".join(f"system {v.sysid} ({v.autopilot})" for v in vehicles)
+        say(f"simulating {names}; connect to {server.url_for_gcs}; Ctrl-C ends it")
+
+    serve(vehicles, listen, on_ready=ready)
 
 
 @app.command()

@@ -1,7 +1,7 @@
 """Sending plans and files to vehicles: who gets what, over which link, and how it ended.
 
-One link for each URL; several vehicles on one URL are told apart by system id. ``sim`` starts a loopback vehicle for
-each UAV where the mission starts, and the results say *simulated*.
+One link for each URL; several vehicles on one URL are told apart by system id. For ``sim`` the caller hands in what
+starts a loopback vehicle for each UAV where its mission starts; the results say *simulated*.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,17 +26,18 @@ from gcsplan.mavlink.link import Link
 from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, Mission
 from gcsplan.mavlink.results import UploadResult
 from gcsplan.mavlink.url import parse_url
-from gcsplan.mission_file import MissionFile, VehicleRequest
-from gcsplan.pipeline import Plan, load_mission, world_of
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer, serve
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.mission_file import MissionFile
+from gcsplan.pipeline import Plan, world_of
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
 SIM, LINK = "sim", "link"
+LISTEN_S = 1.5
+"""How long to listen for a second source of a system id's heartbeats, which come once a second."""
 KINDS = {"mission": MISSION, "fence": FENCE, "rally": RALLY}
 ProgressCall = Callable[[str, int, int], None]
+Simulator = Callable[[Sequence[Mission]], AbstractContextManager[str]]
+"""Starts a vehicle for each mission; the context is the URL where all of them answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +156,7 @@ def _open(url: str) -> Link:
 
 
 def _autopilot_of(link: Link, sysid: int) -> Autopilot:
-    state = session.discover(link, sysid)
+    state = session.discover(link, sysid, listen_s=LISTEN_S)
     for autopilot in Autopilot:
         table = manner(autopilot)
         if state.mav_autopilot == table.mav_autopilot and state.mav_type in table.mav_types:
@@ -166,14 +167,18 @@ def _autopilot_of(link: Link, sysid: int) -> Autopilot:
     )
 
 
-def deliver(jobs: Sequence[Job], options: Options, progress: ProgressCall | None = None) -> list[Delivery]:
+def deliver(
+    jobs: Sequence[Job], options: Options, progress: ProgressCall | None = None, *, simulator: Simulator | None = None
+) -> list[Delivery]:
     """Upload every job, all at once, read back, compare, and check what was read back; in the order given."""
     with ExitStack() as stack:
         links: dict[str, Link] = {}
         simulated = [job for job in jobs if job.url == SIM]
         if simulated:
-            server = stack.enter_context(SimServer([_loopback(job) for job in simulated], "udpin:127.0.0.1:0"))
-            links[SIM] = stack.enter_context(Link(server.url_for_gcs))  # unsigned: it never leaves this machine
+            if simulator is None:
+                raise UsageError("nothing here can simulate a vehicle")
+            url = stack.enter_context(simulator([job.mission for job in simulated]))
+            links[SIM] = stack.enter_context(Link(url))  # unsigned: it never leaves this machine
         failed: dict[str, LinkError] = {}
         for url in dict.fromkeys(job.url for job in jobs if job.url != SIM):
             try:
@@ -203,7 +208,7 @@ def _order(job: Job, link: Link, options: Options, progress: ProgressCall | None
         ground_amsl_m=ground_m,
         rtl_rel_home_m=job.rtl_rel_home_m,
         simulated=job.url == SIM,
-        listen_s=0.2 if job.url == SIM else session.Options().listen_s,
+        listen_s=0.0 if job.url == SIM else LISTEN_S,
     )
     told = None if progress is None else lambda name, p: progress(name, p.done, p.total)
     return session.Order(link, job.mission, job.verdict, settings, _judge_again(job), told)
@@ -226,14 +231,6 @@ def _judge_again(job: Job) -> session.Judge | None:
         return verdict.describe()
 
     return again
-
-
-def _loopback(job: Job, misbehave: Misbehaviour | None = None) -> LoopbackVehicle:
-    home = job.mission.home
-    return LoopbackVehicle(
-        job.mission.sysid, job.mission.autopilot, lat_deg=home.lat_e7 / 1e7, lon_deg=home.lon_e7 / 1e7,
-        amsl_m=home.amsl_m, misbehave=misbehave, name=job.name,
-    )  # fmt: skip
 
 
 def _delivery(job: Job, ended: UploadResult | GcsplanError) -> Delivery:
@@ -265,7 +262,7 @@ def verify_file(file: Path, url: str, sysid: int) -> Delivery:
         read = read_mission_file(file, autopilot=autopilot)
         mission = replace(read.mission, sysid=sysid)
         job = Job(file.stem, link.url, mission)
-        done = _delivery(job, session.verify_mission(link, mission))
+        done = _delivery(job, session.verify_mission(link, mission, options=session.Options(listen_s=LISTEN_S)))
     return replace(done, warnings=(*read.notes, *done.warnings))
 
 
@@ -274,7 +271,10 @@ def download_to(url: str, sysid: int, file: Path) -> int:
     if file.suffix.lower() not in (".waypoints", ".plan"):
         raise UsageError(f"-o {file}: a name that ends in .waypoints or .plan is wanted")
     with _open(url) as link:
-        mission = session.download_mission(link, sysid, _autopilot_of(link, sysid), name=file.stem)
+        autopilot = _autopilot_of(link, sysid)
+        mission = session.download_mission(
+            link, sysid, autopilot, name=file.stem, options=session.Options(listen_s=0.0)
+        )
     text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
     part = file.with_name(f".{file.name}.part")
     try:
@@ -291,37 +291,4 @@ def clear(url: str, sysid: int, kind: str) -> None:
     if kind not in KINDS:
         raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
     with _open(url) as link:
-        session.clear_mission(link, sysid, KINDS[kind]).raise_for_outcome()
-
-
-def loopback_vehicles(requests: Sequence[VehicleRequest], misbehave: str) -> list[LoopbackVehicle]:
-    """A loopback vehicle at the start of each of a mission file's vehicles."""
-    trouble = Misbehaviour.parse(misbehave)
-    return [
-        LoopbackVehicle(
-            r.vehicle.sysid, r.vehicle.autopilot, lat_deg=r.start_deg[0], lon_deg=r.start_deg[1], amsl_m=r.start[2],
-            misbehave=trouble, name=r.vehicle.name,
-        )
-        for r in requests
-    ]  # fmt: skip
-
-
-def simulate(
-    mission: Path | None, url: str, autopilot: str, sysid: int, misbehave: str, said: Callable[[str], None]
-) -> None:
-    """Serve loopback vehicles until interrupted; ``said`` hears where. Without a mission one stands near Jacksboro."""
-    if mission is not None:
-        vehicles = loopback_vehicles(load_mission(mission).vehicles, misbehave)
-    else:
-        try:
-            kind = Autopilot(autopilot)
-        except ValueError:
-            raise UsageError(f"--autopilot {autopilot}: one of {', '.join(Autopilot)} is wanted") from None
-        trouble = Misbehaviour.parse(misbehave)
-        vehicles = [LoopbackVehicle(sysid, kind, lat_deg=36.6, lon_deg=-84.38, amsl_m=471.0, misbehave=trouble)]
-
-    def ready(server: SimServer) -> None:
-        names = ", ".join(f"{v.name} (system {v.sysid}, {v.autopilot})" for v in vehicles)
-        said(f"simulating {names}; connect to {server.url_for_gcs}; Ctrl-C ends it")
-
-    serve(vehicles, url, on_ready=ready)
+        session.clear_mission(link, sysid, KINDS[kind], options=session.Options(listen_s=LISTEN_S)).raise_for_outcome()

@@ -57,7 +57,7 @@ def _form(value: Any) -> str:
 
 
 _Local = Annotated[LocalPoint, Tag("{east_m, north_m}")]
-Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Pair = Annotated[list[Metres], Field(min_length=2, max_length=2)]
 LatLon = Annotated[list[float], Field(min_length=2, max_length=2)]
 LatLonAgl = Annotated[list[float], Field(min_length=2, max_length=3)]
 Point = Annotated[Annotated[LatLon, Tag("[lat, lon]")] | _Local, Discriminator(_form)]

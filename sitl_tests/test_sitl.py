@@ -32,10 +32,7 @@ from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
 from sitl_tests import sitl
 
-pytestmark = [
-    pytest.mark.skipif(not sitl.wanted(), reason=sitl.WHY_SKIPPED),
-    pytest.mark.xdist_group("sitl"),  # one autopilot, one link: one worker
-]
+pytestmark = pytest.mark.skipif(not sitl.wanted(), reason=sitl.WHY_SKIPPED)
 
 COPTER = Autopilot.ARDUCOPTER
 UNCHECKED = Options(unchecked=True, listen_s=0.0)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from gcsplan import cli
+from gcsplan import cli, delivery
 from gcsplan.mavlink.files import read_mission_file
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
@@ -24,6 +24,7 @@ OUTPUTS = {"uav1.waypoints", "uav1.plan", "mission.kml", "mission.geojson", "pro
 def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
     """Call ``gcsplan ARGUMENTS`` in an empty directory; gives (exit code, standard output, standard error)."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)  # nobody else is on these links
 
     def call(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])

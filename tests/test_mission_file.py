@@ -722,7 +722,7 @@ def test_any_mutation_of_a_mission_loads_or_is_refused(seeds: list[Any], tmp_pat
             case "rename" if isinstance(at, dict):
                 at[str(last)[:-1]] = at.pop(last)
             case _:
-                at[last] = data.draw(JUNK)
+                at[last] = copy.deepcopy(data.draw(JUNK))
     try:
         mission = load(json.dumps(whole), tmp_path)
     except InputError as error:

@@ -459,6 +459,17 @@ def test_a_server_in_a_process_of_its_own() -> None:
         assert one.upload(some_items(20), sysid=3) == 0
 
 
+def test_a_fast_clock_asks_again_early() -> None:
+    with SimServer([a_vehicle()], "udpin:127.0.0.1:0", speedup=20.0) as server, station(server.address) as one:
+        one.say(wire.encode(Count(3), Address(1, 1)))
+        # Eight of its seconds later it gives up; at our pace that would take longer than we wait.
+        given_up = one.wait(lambda m: m.get_type() == "MISSION_ACK", within_s=5.0)
+        assert given_up.type == 15
+    for speedup in (0.0, float("nan"), 1e9):
+        with pytest.raises(UsageError, match="times as fast"):
+            SimServer([a_vehicle()], "udpin:127.0.0.1:0", speedup=speedup)
+
+
 def test_a_port_in_use_is_said() -> None:
     with SimServer([a_vehicle()], "udpin:127.0.0.1:0") as server:
         busy = f"udpin:127.0.0.1:{server.address[1]}"

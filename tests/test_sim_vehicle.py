@@ -508,12 +508,13 @@ def test_ardupilot_takes_a_fence_whole_or_not_at_all() -> None:
     assert say(vehicle, Request(43, FENCE)) == [Ack(13, FENCE)]
 
 
-def test_px4_keeps_fences_as_sent_and_wants_three_vertices() -> None:
+def test_px4_keeps_fences_without_their_frame_and_wants_three_vertices() -> None:
     vehicle = a_vehicle(PX4)
     ack = upload(vehicle, [circle(50.5), *vertices(3, 3)], FENCE)
     assert isinstance(ack, Ack)
     assert (ack.code, ack.mission_type) == (0, FENCE)
-    assert vehicle.items(FENCE)[0] == at(5004, 50.5, frame=6, z=9.0)
+    place = {"x": 366_000_000, "y": -843_800_000, "z": 9.0}
+    assert vehicle.items(FENCE)[0] == MissionItem(5004, 5, (50.5, 0.0, 0.0, 0.0), **place, autocontinue=False)
     assert upload(vehicle, vertices(2, 2), FENCE) == Ack(1, FENCE)
 
 

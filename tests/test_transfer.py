@@ -164,6 +164,13 @@ def test_invalid_sequence_is_not_the_end() -> None:
     assert upload.outcome == Accepted()
 
 
+def test_invalid_sequence_and_then_silence_is_unknown_and_no_refusal() -> None:
+    upload = upload_asked_for([0, 1])
+    says(upload, Ack(INVALID_SEQUENCE))
+    wait_out(upload)
+    assert isinstance(upload.outcome, Unknown)
+
+
 def test_an_error_in_the_middle_is_not_the_end_if_the_vehicle_goes_on() -> None:
     # PX4 says so of a COUNT that the network has doubled.
     upload = upload_asked_for([0])

@@ -42,6 +42,7 @@ LINK_DOORS = 9
 class Lattice:
     """Node (i, j) lies at (west_m + i·step_m, south_m + j·step_m) and has the number ``j·nx + i``.
 
+    ``walls`` (K, 3): east, north, radius within which no height is legal (round zones without floor and ceiling).
     ``floor_m``, ``ceiling_m`` (2·ny − 1, 2·nx − 1): AMSL on the half lattice. Bands (altitudes that a zone forbids
     on an edge, from ``band_low`` to ``band_high``) of edge e stand at ``band_at[e] : band_at[e + 1]``, low first.
     """
@@ -58,12 +59,15 @@ class Lattice:
     band_high: Floats
     band_zone: Ints
     reach_m: float
+    walls: Floats
 
     def seems_open(self, a: Floats, b: Floats) -> bool:
-        """False where the samples show that the straight line from ``a`` to ``b`` has no room under its ceiling.
+        """False where the straight line from ``a`` to ``b`` meets a wall, or samples that leave no room to fly.
 
         Saves exact tests; what seems open may still be shut, and a line that is called shut only costs quality.
         """
+        if _meets_wall(self.walls, a[0], a[1], b[0], b[1]):
+            return False
         half = 0.5 * self.step_m
         x, y = (a[0] - self.west_m) / half, (a[1] - self.south_m) / half
         return bool(
@@ -86,6 +90,18 @@ class Lattice:
         half = 0.5 * self.step_m
         i, j = round((place[0] - self.west_m) / half), round((place[1] - self.south_m) / half)
         self.floor_m[max(j - 1, 0) : max(j + 2, 0), max(i - 1, 0) : max(i + 2, 0)] += by_m
+
+
+@njit(cache=True)
+def _meets_wall(walls: Floats, x0: float, y0: float, x1: float, y1: float) -> bool:
+    dx, dy = x1 - x0, y1 - y0
+    square = max(dx * dx + dy * dy, 1e-300)
+    for k in range(len(walls)):
+        px, py = walls[k, 0] - x0, walls[k, 1] - y0
+        t = min(max((px * dx + py * dy) / square, 0.0), 1.0)
+        if (px - t * dx) ** 2 + (py - t * dy) ** 2 < walls[k, 2] ** 2 * (1.0 - 1e-9):
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -131,7 +147,14 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
     edges, lows, highs, zones = _edge_bands(air, limits, reach, west, south, step_m, nx, ny)
     at = np.zeros(nx * ny * 8 + 1, np.int64)
     np.cumsum(np.bincount(edges, minlength=nx * ny * 8), out=at[1:])
-    return Lattice(west, south, step_m, nx, ny, floor, ceiling, at, lows, highs, zones, reach)
+    walls = [
+        (z.shape.east_m, z.shape.north_m, z.shape.radius_m * air.scale + reach)
+        for z in air.zones
+        if isinstance(z.shape, Circle) and z.floor is None and z.ceiling is None
+    ]
+    return Lattice(
+        west, south, step_m, nx, ny, floor, ceiling, at, lows, highs, zones, reach, np.array(walls).reshape(-1, 3)
+    )
 
 
 def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_m: float) -> NDArray[np.bool_]:

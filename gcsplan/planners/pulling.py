@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,15 +70,26 @@ class Pulled:
         self, s0_m: float, s1_m: float, between: Floats = NO_POINTS, gain_m: float = 0.0
     ) -> tuple[Track, Flown] | None:
         """The track with a part replaced, if that is legal and saves at least ``gain_m`` metres of track."""
-        if self.guide is not None and not len(between):
-            t = self.track
-            if not self.guide.seems_open(t.place(s0_m), t.place(s1_m)):
-                return None
+        way = [self.track.place(s0_m), *between.reshape(-1, 2), self.track.place(s1_m)]
+        below = self.flown.cost - gain_m * self.unit
+        longer = sum(math.dist(a, b) for a, b in pairwise(way)) - (s1_m - s0_m)
+        if self._at_least(float(self.track.s_m[-1]) + longer) >= below:
+            return None
+        if self.guide is not None and not all(self.guide.seems_open(a, b) for a, b in pairwise(way)):
+            return None
         if not self.allowance.spend():
             return None
         new = replace_part(self.problem, self.track, s0_m, s1_m, between)
-        flown = fly(self.problem, new, self.flown.cost - gain_m * self.unit, branches=0)
+        flown = fly(self.problem, new, below, branches=0)
         return None if isinstance(flown, Obstruction) else (new, flown)
+
+    def _at_least(self, flat_m: float) -> float:
+        """No profile over a track of that length costs less."""
+        p = self.problem
+        rise = abs(p.goal[2] - p.start[2])
+        if p.objective == "energy":
+            return p.horizontal_j_per_m * flat_m + p.vertical_j_per_m * rise
+        return math.hypot(flat_m, rise)
 
     def keep(self, found: tuple[Track, Flown] | None) -> bool:
         """Go on from ``found``, if there is one."""

@@ -349,19 +349,18 @@ def _close_to_ends(problem: Problem, tube: Tube) -> Floats:
     A tube bounds the floor over whole pieces. Start and goal lie on the floor more often than not, and a bound that
     is a metre too high a few metres away would shut them in.
     """
-    s, limits = tube.s_m, problem.limits
+    limits, length = problem.limits, float(tube.s_m[-1])
     out = []
-    for z, slope, away in (
-        (problem.start[2], limits.max_climb_slope, s),
-        (problem.goal[2], limits.max_descent_slope, s[-1] - s),
+    for at_start, z, slope, away, floor in (
+        (True, problem.start[2], limits.max_climb_slope, tube.s_m[1:], tube.floor_m[:, 1]),
+        (False, problem.goal[2], limits.max_descent_slope, length - tube.s_m[-2::-1], tube.floor_m[::-1, 0]),
     ):
-        k = np.flatnonzero((away <= CLOSE_M) & (away > 0.0))
-        if np.isinf(slope) or not len(k):
+        if np.isinf(slope):
             continue
-        floor = np.maximum(tube.floor_m[np.maximum(k - 1, 0), 1], tube.floor_m[np.minimum(k, len(tube.floor_m) - 1), 0])
-        if (floor > z + slope * away[k]).any():
-            steps = np.arange(CLOSE_STEP_M, min(CLOSE_M, 0.5 * float(s[-1])), CLOSE_STEP_M)
-            out.append(steps if away is s else s[-1] - steps)
+        count = int(np.searchsorted(away, CLOSE_M, "right"))
+        if (floor[:count] > z + slope * away[:count]).any():
+            steps = np.arange(CLOSE_STEP_M, min(CLOSE_M, 0.5 * length), CLOSE_STEP_M)
+            out.append(steps if at_start else length - steps)
     return np.concatenate(out) if out else np.zeros(0)
 
 

@@ -88,8 +88,12 @@ def keep_item(item: MissionItem, mission_type: int) -> MissionItem:
     kept = _kept(item)
     if mission_type == MISSION and item.command in _FENCE_AND_RALLY:
         raise Refused(ERROR)
-    if mission_type == FENCE and item.command in (5001, 5002) and kept.params[0] < 3:
-        raise Refused(ERROR)
+    if mission_type == FENCE:
+        if item.command in (5001, 5002) and kept.params[0] < 3:
+            raise Refused(ERROR)
+        if kept.frame != NO_POSITION:
+            # A fence point has no room for "relative to home", nor for autocontinue.
+            return MissionItem(kept.command, 5, kept.params, kept.x, kept.y, kept.z, autocontinue=False)
     return kept
 
 

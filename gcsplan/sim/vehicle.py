@@ -137,6 +137,8 @@ class LoopbackVehicle:
     def receive(self, packet: Packet, now: float) -> list[Packet]:
         """Take one packet in and return what goes out at once."""
         out = self.on_timer(now)
+        if not self._is_for_us(packet.target):
+            return out
         self._received += 1
         if self.silent or not self.reachable(now):
             return out
@@ -177,8 +179,6 @@ class LoopbackVehicle:
 
     def _run(self, now: float) -> list[Packet]:
         for packet in self._inbound.due(now):
-            if not self._is_for_us(packet.target):
-                continue
             self._edit_before(packet.message)
             self._board.booting = self.booting(now)
             self._send(self._manner.receive(packet.message, packet.source, now), now)

@@ -9,19 +9,23 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from gcsplan.world._sweep import (
     BOW_M,
+    ERROR_M,
     SOURCES,
+    STEP_X,
+    STEP_Y,
     device,
     kernel,
+    parts_of,
     point_segment,
     slab,
     to_grid,
 )
-from gcsplan.world._sweep_terrain import EDGE, parts_of, unknown_near
-from gcsplan.world._sweep_zones import signed_distance
+from gcsplan.world._sweep_terrain import EDGE, unknown_near
+from gcsplan.world._sweep_zones import (
+    CEILING_AGL, EAST, EAST_E, FIRST, FLOOR_AGL, LAST, NORTH, NORTH_N, RADIUS, SOUTH_N, WEST_E, signed_distance,
+)  # fmt: skip
 
 CHORD_M = 0.05
 MOST_CUTS = 64  # of the line in one cell
@@ -30,12 +34,12 @@ MOST_CELLS = 16  # looked at one by one for the slope beside a piece; more are b
 
 
 @device
-def steepest_in(f, z, halo, i, j, c0, r0, c1, r1):  # type: ignore[no-untyped-def]
+def steepest_in(m, z, slopes, i, j, c0, r0, c1, r1):  # type: ignore[no-untyped-def]
     """Steepest slope of the known cells that meet a box of the grid around a place in cell (i, j)."""
     rows, cols = z.shape
     i0, i1, j0, j1 = math.floor(c0), math.floor(c1), math.floor(r0), math.floor(r1)
     if (i1 - i0 + 1) * (j1 - j0 + 1) > MOST_CELLS:
-        return abs(halo.slope[j, i])
+        return abs(slopes[j, i])
     square = 0.0
     for jj in range(max(j0, 0), min(j1, rows - 2) + 1):
         for ii in range(max(i0, 0), min(i1, cols - 2) + 1):
@@ -45,8 +49,8 @@ def steepest_in(f, z, halo, i, j, c0, r0, c1, r1):  # type: ignore[no-untyped-de
             if math.isnan(kb + kc + kd):
                 continue
             u0, u1, v0, v1 = max(c0 - ii, 0.0), min(c1 - ii, 1.0), max(r0 - jj, 0.0), min(r1 - jj, 1.0)
-            gx = max(abs(kb + kd * v0), abs(kb + kd * v1)) / f.step_x
-            gy = max(abs(kc + kd * u0), abs(kc + kd * u1)) / f.step_y
+            gx = max(abs(kb + kd * v0), abs(kb + kd * v1)) / m[STEP_X]
+            gy = max(abs(kc + kd * u0), abs(kc + kd * u1)) / m[STEP_Y]
             square = max(square, gx * gx + gy * gy)
     return math.sqrt(square)
 
@@ -69,7 +73,7 @@ def put_unknown(rows, count, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pieces(f, ground, top, under, beside, beyond, track, low_m, near_m, far_m, spare_m, rows, sources=SOURCES):  # type: ignore[no-untyped-def]
+def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, spare_m, rows, sources=SOURCES):  # type: ignore[no-untyped-def]
     """Cut a ground track (N, 2) into pieces and bound the surface over each; their number.
 
     Into ``rows``, as far as there is room: s at the end of the piece in metres along the track; lower bound of the
@@ -85,13 +89,13 @@ def pieces(f, ground, top, under, beside, beyond, track, low_m, near_m, far_m, s
         length = math.hypot(e1 - e0, n1 - n0)
         if length == 0.0:
             continue
-        parts, bow = parts_of(f, e0, n0, e1, n1, BOW_M)
-        widen = bow + 2.0 * f.error_m + spare_m
-        cb, rb = to_grid(f, e0, n0)
+        parts, bow = parts_of(m, length, BOW_M)
+        widen = bow + 2.0 * m[ERROR_M] + spare_m
+        cb, rb = to_grid(m, e0, n0)
         for part in range(parts):
             fa, fb = part / parts, (part + 1) / parts
             c0, r0 = cb, rb
-            cb, rb = to_grid(f, e0 + (e1 - e0) * fb, n0 + (n1 - n0) * fb)
+            cb, rb = to_grid(m, e0 + (e1 - e0) * fb, n0 + (n1 - n0) * fb)
             dc, dr = cb - c0, rb - r0
             s0, run = s_start + fa * length, (fb - fa) * length
             t, end = slab(c0, dc, -EDGE, high_c - 1.0 + EDGE, 0.0, 1.0)
@@ -159,13 +163,13 @@ def pieces(f, ground, top, under, beside, beyond, track, low_m, near_m, far_m, s
                         if halo.slope[jj, ii] < 0.0:
                             fa_, fb_ = fa + (fb - fa) * pa, fa + (fb - fa) * pb
                             d, _ = unknown_near(
-                                f, z, halo, e0 + (e1 - e0) * fa_, n0 + (n1 - n0) * fa_,
+                                m, z, halo.cols, halo.rows, e0 + (e1 - e0) * fa_, n0 + (n1 - n0) * fa_,
                                 e0 + (e1 - e0) * fb_, n0 + (n1 - n0) * fb_, reach, ii, jj,
                             )  # fmt: skip
                             lost = d < reach
-                        x, y = reach / f.step_x, reach / f.step_y
+                        x, y = reach / m[STEP_X], reach / m[STEP_Y]
                         lift = reach * steepest_in(
-                            f, z, halo, ii, jj, min(va, wa) - x, min(vb, wb) - y, max(va, wa) + x, max(vb, wb) + y
+                            m, z, halo.slope, ii, jj, min(va, wa) - x, min(vb, wb) - y, max(va, wa) + x, max(vb, wb) + y
                         )
                         if lost:
                             lift = math.nan
@@ -189,7 +193,7 @@ def pieces(f, ground, top, under, beside, beyond, track, low_m, near_m, far_m, s
 
 
 @kernel
-def around(f, z, halo, sign, points, reach_m, out, sources=SOURCES):  # type: ignore[no-untyped-def]
+def around(m, z, halo, sign, points, reach_m, out, sources=SOURCES):  # type: ignore[no-untyped-def]
     """Upper bound of ``sign·height`` within ``reach_m`` of each point (N, 2) of the plane; NaN where unknown.
 
     The tightest of three: the gradient at the point where the disc lies in one cell; the highest corner of the cells'
@@ -198,7 +202,7 @@ def around(f, z, halo, sign, points, reach_m, out, sources=SOURCES):  # type: ig
     rows, cols = z.shape
     for p in range(len(points)):
         out[p] = math.nan
-        c, r = to_grid(f, points[p, 0], points[p, 1])
+        c, r = to_grid(m, points[p, 0], points[p, 1])
         if not (-EDGE <= c <= cols - 1.0 + EDGE and -EDGE <= r <= rows - 1.0 + EDGE):
             continue
         i, j = min(max(int(math.floor(c)), 0), cols - 2), min(max(int(math.floor(r)), 0), rows - 2)
@@ -215,15 +219,15 @@ def around(f, z, halo, sign, points, reach_m, out, sources=SOURCES):  # type: ig
             continue
         if slope < 0.0:
             d, _ = unknown_near(
-                f, z, halo, points[p, 0], points[p, 1], points[p, 0], points[p, 1], reach_m, i, j
+                m, z, halo.cols, halo.rows, points[p, 0], points[p, 1], points[p, 0], points[p, 1], reach_m, i, j
             )
             if d < reach_m:
                 continue
             slope = -slope
-        x, y = reach_m / f.step_x, reach_m / f.step_y
+        x, y = reach_m / m[STEP_X], reach_m / m[STEP_Y]
         best = min(h + reach_m * slope, halo.high[j, i] if sign > 0.0 else -halo.low[j, i])
         if x <= u <= 1.0 - x and y <= v <= 1.0 - y:
-            gx, gy = (kb + kd * v) / f.step_x, (kc + kd * u) / f.step_y
+            gx, gy = (kb + kd * v) / m[STEP_X], (kc + kd * u) / m[STEP_Y]
             best = min(best, h + reach_m * math.sqrt(gx * gx + gy * gy) + 0.5 * abs(kd) * x * y)
         i0, i1 = max(int(math.floor(c - x)), 0), min(int(math.floor(c + x)), cols - 2)
         j0, j1 = max(int(math.floor(r - y)), 0), min(int(math.floor(r + y)), rows - 2)
@@ -245,7 +249,7 @@ def around(f, z, halo, sign, points, reach_m, out, sources=SOURCES):  # type: ig
 
 
 @kernel
-def spans(zs, track, within_m, over_ground_m, rows, parts, sources=SOURCES):  # type: ignore[no-untyped-def]
+def spans(zone, vertex, track, within_m, over_ground_m, rows, parts, sources=SOURCES):  # type: ignore[no-untyped-def]
     """Where a ground track (N, 2) is within reach of zones: zone, leg, s0, s1 in ``rows``; their number.
 
     The reach is ``within_m``, or ``over_ground_m`` for a zone with a level over ground.
@@ -259,20 +263,20 @@ def spans(zs, track, within_m, over_ground_m, rows, parts, sources=SOURCES):  # 
         if length == 0.0:
             continue
         west, east, south, north = min(e0, e1), max(e0, e1), min(n0, n1), max(n0, n1)
-        for k in range(len(zs.circle)):
-            reach_m = over_ground_m if zs.agl[k, 0] or zs.agl[k, 1] else within_m
+        for k in range(len(zone)):
+            reach_m = over_ground_m if zone[k, FLOOR_AGL] != 0.0 or zone[k, CEILING_AGL] != 0.0 else within_m
             if (
-                zs.box[k, 0] - reach_m > east
-                or zs.box[k, 2] + reach_m < west
-                or zs.box[k, 1] - reach_m > north
-                or zs.box[k, 3] + reach_m < south
+                zone[k, WEST_E] - reach_m > east
+                or zone[k, EAST_E] + reach_m < west
+                or zone[k, SOUTH_N] - reach_m > north
+                or zone[k, NORTH_N] + reach_m < south
             ):
                 continue
             found = 0
-            radius = zs.circle[k, 2]
+            radius = zone[k, RADIUS]
             if radius >= 0.0:
-                middle = ((zs.circle[k, 0] - e0) * de + (zs.circle[k, 1] - n0) * dn) / length
-                aside = ((zs.circle[k, 0] - e0) * dn - (zs.circle[k, 1] - n0) * de) / length
+                middle = ((zone[k, EAST] - e0) * de + (zone[k, NORTH] - n0) * dn) / length
+                aside = ((zone[k, EAST] - e0) * dn - (zone[k, NORTH] - n0) * de) / length
                 half = (radius + reach_m) ** 2 - aside * aside
                 if half > 0.0:
                     a, b = max(middle - math.sqrt(half), 0.0), min(middle + math.sqrt(half), length)
@@ -280,25 +284,25 @@ def spans(zs, track, within_m, over_ground_m, rows, parts, sources=SOURCES):  # 
                         parts[0, 0], parts[0, 1] = a, b
                         found = 1
             else:
-                found = polygon_spans(zs, k, e0, n0, de / length, dn / length, length, reach_m, parts)
-            for m in range(found):
+                found = polygon_spans(zone, vertex, k, e0, n0, de / length, dn / length, length, reach_m, parts)
+            for q in range(found):
                 if count < len(rows):
                     rows[count, 0], rows[count, 1] = k, leg
-                    rows[count, 2], rows[count, 3] = s_start + parts[m, 0], s_start + parts[m, 1]
+                    rows[count, 2], rows[count, 3] = s_start + parts[q, 0], s_start + parts[q, 1]
                 count += 1
         s_start += length
     return count
 
 
 @device
-def polygon_spans(zs, k, e0, n0, ue, un, length, reach_m, parts):  # type: ignore[no-untyped-def]
+def polygon_spans(zone, vertex, k, e0, n0, ue, un, length, reach_m, parts):  # type: ignore[no-untyped-def]
     """Merged parts [a, b] of a line, metres along it, within reach of a polygon; their number."""
     found = 0
-    first, last = zs.first[k], zs.first[k + 1]
-    x0, y0 = zs.vertex[last - 1, 0] - e0, zs.vertex[last - 1, 1] - n0
+    first, last = int(zone[k, FIRST]), int(zone[k, LAST])
+    x0, y0 = vertex[last - 1, 0] - e0, vertex[last - 1, 1] - n0
     sa, oa = x0 * ue + y0 * un, y0 * ue - x0 * un
     for v in range(first, last):
-        x1, y1 = zs.vertex[v, 0] - e0, zs.vertex[v, 1] - n0
+        x1, y1 = vertex[v, 0] - e0, vertex[v, 1] - n0
         sb, ob = x1 * ue + y1 * un, y1 * ue - x1 * un
         low, high = math.inf, -math.inf
         # Along and aside of the line: the edge grown by a disc is a strip and two discs.
@@ -333,7 +337,7 @@ def polygon_spans(zs, k, e0, n0, ue, un, length, reach_m, parts):  # type: ignor
         a, b = (parts[m, 0], parts[m, 1]) if m < found else (length, length)
         if a > done:
             middle = 0.5 * (done + a)
-            if signed_distance(zs, k, e0 + middle * ue, n0 + middle * un) < 0.0:
+            if signed_distance(zone, vertex, k, e0 + middle * ue, n0 + middle * un) < 0.0:
                 a = done
         if m == found and a >= length:
             break

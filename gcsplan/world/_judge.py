@@ -9,8 +9,8 @@ import numpy as np
 
 
 from gcsplan.world._sweep import SOURCES, TOUCH_M, device, kernel
-from gcsplan.world._sweep_terrain import sweep
-from gcsplan.world._sweep_zones import meets
+from gcsplan.world._sweep_terrain import DEPTH, DEPTH_AT, LOW, LOW_AT, REACH, STEEPEST, UNKNOWN, UNKNOWN_AT, sweep
+from gcsplan.world._sweep_zones import EAST_E, NORTH_N, SOUTH_N, WEST_E, meets
 
 MIN_AGL, TERRAIN, MAX_AGL, MAX_AMSL, COVERAGE, CLIMB, DESCENT = range(7)
 ANGLE_RAD = 1e-9
@@ -30,7 +30,7 @@ class Demands(NamedTuple):
 
 
 @device
-def judge_terrain(f, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst, leg):  # type: ignore[no-untyped-def]
+def judge_terrain(m, ground, top, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst, leg):  # type: ignore[no-untyped-def]
     """Ground, obstacles and ceilings of one leg; False at the first violation unless ``full``.
 
     ``near``, ``far``: halos of the top for the track error and for the clearance; ``over``: of the ground for the track
@@ -41,7 +41,7 @@ def judge_terrain(f, near, far, over, column, e0, n0, h0, e1, n1, h1, track, alt
     track_m = track * want.scale
     out[8], out[9], out[10] = math.nan, 0.0, math.nan
     for kind in (MIN_AGL, TERRAIN, MAX_AGL):
-        z, halo, sign, need, reach = f.top, near, 1.0, want.min_agl_m + altitude, track_m
+        z, halo, sign, need, reach = top, near, 1.0, want.min_agl_m + altitude, track_m
         judged = True
         if kind == MIN_AGL:
             need = -math.inf if column else need
@@ -51,36 +51,36 @@ def judge_terrain(f, near, far, over, column, e0, n0, h0, e1, n1, h1, track, alt
             halo, need, reach = far, altitude, track_m + want.clearance_m * want.scale
             # Where even the steepest slope does not lift the ground to the flight level, there is nothing to look for.
             same = near.cols == far.cols and near.rows == far.rows
-            if same and out[0] - altitude >= (out[7] + want.clearance_m * want.scale) * out[6]:
+            if same and out[LOW] - altitude >= (out[REACH] + want.clearance_m * want.scale) * out[STEEPEST]:
                 continue
         else:
-            z, halo, sign, need = f.ground, over, -1.0, altitude - want.max_agl_m
+            z, halo, sign, need = ground, over, -1.0, altitude - want.max_agl_m
             judged = want.max_agl_m < math.inf
             if not (full or judged):
                 continue
-        good = sweep(f, z, halo, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full, out)
+        extremes = halo.high if sign > 0.0 else halo.low
+        good = sweep(m, z, halo.slope, extremes, halo.cols, halo.rows, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full, out)
         if not good and judged:
             if not full:
                 return False
             fine = False
-            if out[2] > TOUCH_M:
-                worst[leg, kind, 0], worst[leg, kind, 1] = out[2], out[3]
-            short = out[7] - out[4]
-            if (out[4] <= 0.0 or short > TOUCH_M) and not worst[leg, COVERAGE, 0] >= short:
-                worst[leg, COVERAGE, 0], worst[leg, COVERAGE, 1] = max(short, TOUCH_M), out[5]
-        if kind == MIN_AGL and out[0] < math.inf:
-            out[8], out[9] = out[0], out[1]
-        elif kind == MAX_AGL and out[0] < math.inf:
-            out[10] = -out[0]
+            if out[DEPTH] > TOUCH_M:
+                worst[leg, kind, 0], worst[leg, kind, 1] = out[DEPTH], out[DEPTH_AT]
+            short = out[REACH] - out[UNKNOWN]
+            if (out[UNKNOWN] <= 0.0 or short > TOUCH_M) and not worst[leg, COVERAGE, 0] >= short:
+                worst[leg, COVERAGE, 0], worst[leg, COVERAGE, 1] = max(short, TOUCH_M), out[UNKNOWN_AT]
+        if kind == MIN_AGL and out[LOW] < math.inf:
+            out[8], out[9] = out[LOW], out[LOW_AT]
+        elif kind == MAX_AGL and out[LOW] < math.inf:
+            out[10] = -out[LOW]
     return fine
 
 
 @device
-def candidates(zs, west, south, east, north, seen, stamp, list_of):  # type: ignore[no-untyped-def]
+def candidates(zone, lat, bucket, near, west, south, east, north, seen, stamp, list_of):  # type: ignore[no-untyped-def]
     """Number of zones whose boxes overlap a box, put into ``list_of`` once each."""
     count = 0
-    zones = len(zs.circle)
-    lat = zs.lattice
+    zones = len(zone)
     cols, rows = int(lat[3]), int(lat[4])
     few = zones <= FEW_ZONES
     i0, i1, j0, j1 = 0, 0, 0, 0
@@ -89,10 +89,10 @@ def candidates(zs, west, south, east, north, seen, stamp, list_of):  # type: ign
         j0, j1 = int(max((south - lat[1]) * lat[2], 0.0)), int(min((north - lat[1]) * lat[2], rows - 1.0))
     for j in range(j0, j1 + 1):
         for i in range(i0, i1 + 1):
-            first, last = (0, zones) if few else (zs.bucket[j * cols + i], zs.bucket[j * cols + i + 1])
-            for m in range(first, last):
-                k = m if few else zs.near[m]
-                if zs.box[k, 0] < east and zs.box[k, 2] > west and zs.box[k, 1] < north and zs.box[k, 3] > south:
+            first, last = (0, zones) if few else (bucket[j * cols + i], bucket[j * cols + i + 1])
+            for q in range(first, last):
+                k = q if few else near[q]
+                if zone[k, WEST_E] < east and zone[k, EAST_E] > west and zone[k, SOUTH_N] < north and zone[k, NORTH_N] > south:
                     if seen[k] != stamp:
                         seen[k] = stamp
                         list_of[count] = k
@@ -102,7 +102,7 @@ def candidates(zs, west, south, east, north, seen, stamp, list_of):  # type: ign
 
 @kernel
 def judge(  # type: ignore[no-untyped-def]
-    f, near, far, over, zs, start, end, column, track, altitude, want, full, ok, found, worst, nearest, hit, hit_at,
+    m, ground, top, near, far, over, zs, start, end, column, track, altitude, want, full, ok, found, worst, nearest, hit, hit_at,
     stack, out, seen, list_of, sources=SOURCES,
 ):  # fmt: skip
     """Judge every leg: ``ok`` (n,). With ``full`` also, by leg:
@@ -111,7 +111,9 @@ def judge(  # type: ignore[no-untyped-def]
     ``worst`` (7, 2): depth (NaN where there is none) and fraction by kind; ``nearest`` zone. Zones that are broken go to
     ``hit`` (leg, zone) and ``hit_at`` (signed distance, fraction) as far as there is room; their number is returned.
     """
-    zones = len(zs.circle)
+    zone = zs.table
+    zone = zs.table
+    zones = len(zone)
     hits = 0
     for i in range(len(start)):
         e0, n0, h0 = start[i, 0], start[i, 1], start[i, 2]
@@ -126,7 +128,7 @@ def judge(  # type: ignore[no-untyped-def]
             continue
         fine = (
             judge_terrain(
-                f, near, far, over, column[i], e0, n0, h0, e1, n1, h1, track[i], altitude[i], want, stack, full, out,
+                m, ground, top, near, far, over, column[i], e0, n0, h0, e1, n1, h1, track[i], altitude[i], want, stack, full, out,
                 worst, i,
             )
             and fine
@@ -137,17 +139,21 @@ def judge(  # type: ignore[no-untyped-def]
         west, east, south, north = min(e0, e1), max(e0, e1), min(n0, n1), max(n0, n1)
         count = zones
         if not full:
-            count = candidates(zs, west - reach, south - reach, east + reach, north + reach, seen, i, list_of)
+            count = candidates(
+                zone, zs.lattice, zs.bucket, zs.near, west - reach, south - reach, east + reach, north + reach, seen, i, list_of
+            )
         best, which = math.inf, -1
-        for m in range(count):
-            k = list_of[m]
+        for q in range(count):
+            k = list_of[q]
             if full:
-                dx = max(zs.box[k, 0] - east, 0.0, west - zs.box[k, 2])
-                dy = max(zs.box[k, 1] - north, 0.0, south - zs.box[k, 3])
+                dx = max(zone[k, WEST_E] - east, 0.0, west - zone[k, EAST_E])
+                dy = max(zone[k, SOUTH_N] - north, 0.0, south - zone[k, NORTH_N])
                 gap = math.sqrt(dx * dx + dy * dy)
                 if gap > 0.0 and gap >= best and gap >= reach:
                     continue
-            broken, dist, at = meets(f, zs, k, e0, n0, h0, e1, n1, h1, altitude[i], reach, stack, full)
+            broken, dist, at = meets(
+                m, ground, zone, zs.vertex, zs.scratch, k, e0, n0, h0, e1, n1, h1, altitude[i], reach, stack, full
+            )
             if broken:
                 fine = False
                 if not full:

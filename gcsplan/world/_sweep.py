@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gcsplan.world.surface import DEGREE, TERMS, GridMap, Surface
+from gcsplan.world.surface import DEGREE, TERMS, GridMap
 
 Floats = NDArray[np.float64]
 
@@ -29,71 +29,46 @@ RESOLUTION_M = 0.005
 BOW_M = 0.05
 """A leg is mapped to the grid in parts whose plane-straight and grid-straight lines lie within this."""
 
-SOURCES = hashlib.sha256(
-    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("_*.py")) if path.name != "__init__.py")
-).hexdigest()
+SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("_*.py")))).hexdigest()
 
 device = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
-"""A function that only kernels call; without the wrappers that Python would need, it compiles faster."""
+"""A function that only kernels call. Nothing is allocated in it: counting references would cost more than the rest."""
 
 kernel = njit(nogil=True, error_model="numpy", cache=True, _nrt=False)
-"""What Python calls. Dividing by zero gives inf or NaN, as in numpy; NaN is unknown, so no fast math."""
+"""What Python calls. Dividing by zero gives inf or NaN, as in numpy; NaN is unknown, so there is no fast math."""
+
+# The map from the plane to the grid as one array, which is what kernels hand on: numbers by these places, then the
+# constant, the u and the v coefficients, used alone where the map is affine, then all of them, highest power first.
+AFFINE, CENTRE_E, CENTRE_N, PER_UNIT, HALF, BEND, ERROR_M, STEP_X, STEP_Y, LINEAR, HORNER = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 15
 
 
 class Field(NamedTuple):
-    """A surface and its map for the kernels.
+    """What the check knows of a surface's map to its grid.
 
-    ``horner`` (28, 2): the map's coefficients, highest power first; ``linear`` (3, 2): constant, u, v, used alone
-    where the map is affine. Beyond ``half`` (of the fitted square, in u and v) the map is not to be trusted.
     ``bend`` bounds the map's second derivative, cells taken as metres, 1/m: a line of length L bows by bend·L²/8 at
     most, and the metric changes by bend·d over a distance d. ``step_x``, ``step_y``: metres of one column and one
-    row, a lower bound over the whole map: (step_x·Δcol)² + (step_y·Δrow)² <= distance².
+    row, a lower bound over the whole map: (step_x·Δcol)² + (step_y·Δrow)² <= distance². ``packed``: all of it for the
+    kernels. Beyond the square that the map was fitted to it is not to be trusted, and nothing is known.
     """
 
-    ground: Floats
-    top: Floats
-    horner: Floats
-    linear: Floats
+    packed: Floats
     affine: bool
-    centre_e: float
-    centre_n: float
-    per_unit: float
-    half: float
     bend: float
     error_m: float
     step_x: float
     step_y: float
 
     @classmethod
-    def of(cls, surface: Surface) -> Field:
-        """Arrays and bounds of ``surface``."""
-        grid = surface.grid
+    def of(cls, grid: GridMap) -> Field:
+        """Bounds of ``grid``, and its numbers in the kernels' order."""
         order = [TERMS.index((i, j)) for i in range(DEGREE, -1, -1) for j in range(DEGREE - i, -1, -1)]
-        higher = [k for k, (i, j) in enumerate(TERMS) if i + j > 1]
-        affine = not grid.coefficients[higher].any()
         low = [TERMS.index(t) for t in ((0, 0), (1, 0), (0, 1))]
+        affine = not grid.coefficients[[k for k, (i, j) in enumerate(TERMS) if i + j > 1]].any()
         bend, step_x, step_y = _bounds(grid, affine)
-        return cls(
-            surface.ground_m,
-            surface.top_m,
-            _frozen(grid.coefficients[order]),
-            _frozen(grid.coefficients[low]),
-            affine,
-            float(grid.centre[0]),
-            float(grid.centre[1]),
-            1.0 / grid.scale_m,
-            math.inf if affine else 1.0 + 1e-9,
-            bend,
-            float(grid.error_m),
-            step_x,
-            step_y,
-        )
-
-
-def _frozen(a: Floats) -> Floats:
-    kept = np.array(a, dtype=np.float64, order="C")
-    kept.setflags(write=False)
-    return kept
+        head = [affine, *grid.centre, 1.0 / grid.scale_m, math.inf if affine else 1.0 + 1e-9, bend, grid.error_m, step_x, step_y]
+        packed = np.concatenate([head, grid.coefficients[low].ravel(), grid.coefficients[order].ravel()])
+        packed.setflags(write=False)
+        return cls(packed, affine, bend, float(grid.error_m), step_x, step_y)
 
 
 def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
@@ -137,60 +112,71 @@ def steps_of(a: float, b: float, c: float, d: float):  # type: ignore[no-untyped
 
 
 @device
-def to_grid(f, e, n):  # type: ignore[no-untyped-def]
+def to_grid(m, e, n):  # type: ignore[no-untyped-def]
     """Column and row of a point of the plane; NaN beyond the fitted square."""
-    u = (e - f.centre_e) * f.per_unit
-    v = (n - f.centre_n) * f.per_unit
-    if f.affine:
-        k = f.linear
-        return k[0, 0] + k[1, 0] * u + k[2, 0] * v, k[0, 1] + k[1, 1] * u + k[2, 1] * v
-    if not (abs(u) <= f.half and abs(v) <= f.half):
+    u = (e - m[CENTRE_E]) * m[PER_UNIT]
+    v = (n - m[CENTRE_N]) * m[PER_UNIT]
+    if m[AFFINE] != 0.0:
+        col = m[LINEAR] + m[LINEAR + 2] * u + m[LINEAR + 4] * v
+        return col, m[LINEAR + 1] + m[LINEAR + 3] * u + m[LINEAR + 5] * v
+    if not (abs(u) <= m[HALF] and abs(v) <= m[HALF]):
         return math.nan, math.nan
-    h = f.horner
     col, row = 0.0, 0.0
-    at = 0
-    for m in range(DEGREE + 1):
-        a, b = h[at, 0], h[at, 1]
-        at += 1
-        for _ in range(m):
-            a = a * v + h[at, 0]
-            b = b * v + h[at, 1]
-            at += 1
+    at = HORNER
+    for power in range(DEGREE + 1):
+        a, b = m[at], m[at + 1]
+        at += 2
+        for _ in range(power):
+            a = a * v + m[at]
+            b = b * v + m[at + 1]
+            at += 2
         col = col * u + a
         row = row * u + b
     return col, row
 
 
 @device
-def plane_per_cell(f, e, n):  # type: ignore[no-untyped-def]
+def plane_per_cell(m, e, n):  # type: ignore[no-untyped-def]
     """d(east, north)/d(col, row) at a point: a, b, c, d of [[a, b], [c, d]]."""
-    u = (e - f.centre_e) * f.per_unit
-    v = (n - f.centre_n) * f.per_unit
+    u = (e - m[CENTRE_E]) * m[PER_UNIT]
+    v = (n - m[CENTRE_N]) * m[PER_UNIT]
     cu, ru, cv, rv = 0.0, 0.0, 0.0, 0.0
-    if f.affine:
-        cu, ru, cv, rv = f.linear[1, 0], f.linear[1, 1], f.linear[2, 0], f.linear[2, 1]
+    if m[AFFINE] != 0.0:
+        cu, ru, cv, rv = m[LINEAR + 2], m[LINEAR + 3], m[LINEAR + 4], m[LINEAR + 5]
     else:
-        h = f.horner
         col, row = 0.0, 0.0
-        at = 0
-        for m in range(DEGREE + 1):
-            a, b = h[at, 0], h[at, 1]
-            av, bv = 0.0, 0.0
-            at += 1
-            for _ in range(m):
-                av = av * v + a
-                bv = bv * v + b
-                a = a * v + h[at, 0]
-                b = b * v + h[at, 1]
-                at += 1
-            cu = cu * u + col
-            ru = ru * u + row
-            cv = cv * u + av
-            rv = rv * u + bv
-            col = col * u + a
-            row = row * u + b
-    k = 1.0 / ((cu * rv - cv * ru) * f.per_unit)
+        at = HORNER
+        for power in range(DEGREE + 1):
+            a, b, av, bv = m[at], m[at + 1], 0.0, 0.0
+            at += 2
+            for _ in range(power):
+                av, bv = av * v + a, bv * v + b
+                a, b = a * v + m[at], b * v + m[at + 1]
+                at += 2
+            cu, ru = cu * u + col, ru * u + row
+            cv, rv = cv * u + av, rv * u + bv
+            col, row = col * u + a, row * u + b
+    k = 1.0 / ((cu * rv - cv * ru) * m[PER_UNIT])
     return rv * k, -cv * k, -ru * k, cu * k
+
+
+@device
+def parts_of(m, length, bow_m):  # type: ignore[no-untyped-def]
+    """Number of parts of a leg whose bow is at most ``bow_m``, and the bow of each."""
+    bow = m[BEND] * length * length / 8.0
+    parts = 1
+    if bow > bow_m:
+        parts = int(math.ceil(math.sqrt(bow / bow_m)))
+    return parts, bow / (parts * parts)
+
+
+@device
+def local_steps(m, e0, n0, e1, n1, around_m):  # type: ignore[no-untyped-def]
+    """Metres of a column and of a row, a lower bound within ``around_m`` of a segment."""
+    a, b, c, d = plane_per_cell(m, 0.5 * (e0 + e1), 0.5 * (n0 + n1))
+    sx, sy = steps_of(a, b, c, d)
+    keep = 1.0 - 1.1 * m[BEND] * (0.5 * math.hypot(e1 - e0, n1 - n0) + around_m) - 1e-9
+    return sx * keep, sy * keep
 
 
 @device

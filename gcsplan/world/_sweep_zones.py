@@ -15,18 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.world._sweep import (
+    BEND,
+    ERROR_M,
     RESOLUTION_M,
     TOUCH_M,
     Floats,
     device,
+    local_steps,
+    parts_of,
     plane_per_cell,
     point_segment,
     segment_box,
     slab,
-    steps_of,
     to_grid,
 )
-from gcsplan.world._sweep_terrain import MOST_PIECES, SMALLEST_M, parts_of
+from gcsplan.world._sweep_terrain import MOST_PIECES, SMALLEST_M
 
 ACROSS_M = 0.02
 """Size to which pieces are cut beside a zone whose levels follow the ground."""
@@ -34,25 +37,25 @@ ACROSS_M = 0.02
 ZONE_BOW_M = 0.003
 
 
-class Zones(NamedTuple):
-    """The zones as arrays, (n,) or (n, k) by zone.
+# A zone is a row of numbers by these places. Circle: east, north, radius in metres of the plane; a negative radius marks
+# a polygon, whose vertices are those from FIRST up to LAST. Box: west, south, east, north. Floor and ceiling are above
+# mean sea level, or above ground where the mark is not 0; -inf and inf where there is none. Band: the same above mean
+# sea level, over all the ground that the zone stands on. Cells: first and last column, first and last row that the
+# shape may touch.
+EAST, NORTH, RADIUS, FIRST, LAST, WEST_E, SOUTH_N, EAST_E, NORTH_N = 0, 1, 2, 3, 4, 5, 6, 7, 8
+FLOOR, FLOOR_AGL, CEILING, CEILING_AGL, BAND_LOW, BAND_HIGH, COL0, COL1, ROW0, ROW1 = 9, 10, 11, 12, 13, 14, 15, 16, 17, 18
+ZONE_NUMBERS = 19
 
-    ``circle``: east, north, radius in metres of the plane; a negative radius marks a polygon, whose vertices are
-    ``vertex[first[k]:first[k + 1]]``. ``box``: west, south, east, north. ``level``: floor and ceiling, above mean sea
-    level or above ground as ``agl`` says; -inf and inf where there is none. ``band``: the same above mean sea level,
-    over the ground that the zone stands on (outer bounds). ``cell``: first and last column, first and last row that
-    the shape may touch. ``bucket``, ``near``: the zones of each square of a coarse lattice, whose ``lattice`` is west,
-    south, 1 / side, columns, rows.
+
+class Zones(NamedTuple):
+    """The zones as arrays: ``table`` (n, `ZONE_NUMBERS`); ``vertex`` (v, 2) of all polygons, one after the other.
+
+    ``lattice``: a coarse one, as west, south, 1 / side, columns, rows; ``bucket``, ``near``: the zones of each of its
+    squares, ``near[bucket[k]:bucket[k + 1]]``. ``scratch``: room for the kernels, two numbers for each corner.
     """
 
-    circle: Floats
-    first: NDArray[np.int64]
+    table: Floats
     vertex: Floats
-    box: Floats
-    level: Floats
-    agl: NDArray[np.bool_]
-    band: Floats
-    cell: NDArray[np.int64]
     lattice: Floats
     bucket: NDArray[np.int64]
     near: NDArray[np.int64]
@@ -60,17 +63,17 @@ class Zones(NamedTuple):
 
 
 @device
-def signed_distance(zs, k, e, n):  # type: ignore[no-untyped-def]
+def signed_distance(zone, vertex, k, e, n):  # type: ignore[no-untyped-def]
     """Distance of a point from a zone's border, negative inside."""
-    radius = zs.circle[k, 2]
+    radius = zone[k, RADIUS]
     if radius >= 0.0:
-        return math.hypot(e - zs.circle[k, 0], n - zs.circle[k, 1]) - radius
+        return math.hypot(e - zone[k, EAST], n - zone[k, NORTH]) - radius
     best = math.inf
     inside = False
-    a, b = zs.first[k], zs.first[k + 1]
-    x0, y0 = zs.vertex[b - 1, 0], zs.vertex[b - 1, 1]
+    a, b = int(zone[k, FIRST]), int(zone[k, LAST])
+    x0, y0 = vertex[b - 1, 0], vertex[b - 1, 1]
     for v in range(a, b):
-        x1, y1 = zs.vertex[v, 0], zs.vertex[v, 1]
+        x1, y1 = vertex[v, 0], vertex[v, 1]
         d, _ = point_segment(e, n, x0, y0, x1, y1)
         best = min(best, d)
         if (y0 > n) != (y1 > n) and e < x0 + (n - y0) / (y1 - y0) * (x1 - x0):
@@ -80,20 +83,20 @@ def signed_distance(zs, k, e, n):  # type: ignore[no-untyped-def]
 
 
 @device
-def approach(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def approach(zone, vertex, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
     """Least distance of a segment from a zone's shape and where on the segment; of a circle it is signed."""
-    radius = zs.circle[k, 2]
+    radius = zone[k, RADIUS]
     if radius >= 0.0:
-        d, t = point_segment(zs.circle[k, 0], zs.circle[k, 1], ax, ay, bx, by)
+        d, t = point_segment(zone[k, EAST], zone[k, NORTH], ax, ay, bx, by)
         return d - radius, t
-    best, at = signed_distance(zs, k, ax, ay), 0.0
+    best, at = signed_distance(zone, vertex, k, ax, ay), 0.0
     if best <= 0.0:
         return 0.0, 0.0
     dx, dy = bx - ax, by - ay
-    first, last = zs.first[k], zs.first[k + 1]
-    x0, y0 = zs.vertex[last - 1, 0], zs.vertex[last - 1, 1]
+    first, last = int(zone[k, FIRST]), int(zone[k, LAST])
+    x0, y0 = vertex[last - 1, 0], vertex[last - 1, 1]
     for v in range(first, last):
-        x1, y1 = zs.vertex[v, 0], zs.vertex[v, 1]
+        x1, y1 = vertex[v, 0], vertex[v, 1]
         # Two segments that do not cross are nearest at an end of one of them.
         d, _ = point_segment(bx, by, x0, y0, x1, y1)
         if d < best:
@@ -112,21 +115,21 @@ def approach(zs, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
 
 
 @device
-def enters(zs, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-def]
+def enters(zone, vertex, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-def]
     """Whether a segment passes through the open inside of a polygon, by more than touching it.
 
     Between neighbours among its crossings with the edges and the feet of the vertices on it, the segment stays on one
     side of every edge, and is as far from the border in the middle as anywhere, but for a factor.
     """
-    first, last = zs.first[k], zs.first[k + 1]
+    first, last = int(zone[k, FIRST]), int(zone[k, LAST])
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
     if square == 0.0:
-        return signed_distance(zs, k, ax, ay) < -TOUCH_M
+        return signed_distance(zone, vertex, k, ax, ay) < -TOUCH_M
     count = 0
-    x0, y0 = zs.vertex[last - 1, 0], zs.vertex[last - 1, 1]
+    x0, y0 = vertex[last - 1, 0], vertex[last - 1, 1]
     for v in range(first, last):
-        x1, y1 = zs.vertex[v, 0], zs.vertex[v, 1]
+        x1, y1 = vertex[v, 0], vertex[v, 1]
         t = ((x1 - ax) * dx + (y1 - ay) * dy) / square
         if 0.0 < t < 1.0:
             events[count] = t
@@ -145,14 +148,14 @@ def enters(zs, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-def]
             if t < events[q] < following:
                 following = events[q]
         middle = 0.5 * (t + following)
-        if signed_distance(zs, k, ax + middle * dx, ay + middle * dy) < -TOUCH_M:
+        if signed_distance(zone, vertex, k, ax + middle * dx, ay + middle * dy) < -TOUCH_M:
             return True
         t = following
     return False
 
 
 @device
-def deepest_inside(zs, k, ax, ay, bx, by, stack):  # type: ignore[no-untyped-def]
+def deepest_inside(zone, vertex, k, ax, ay, bx, by, stack):  # type: ignore[no-untyped-def]
     """Greatest depth (>= 0) of a segment inside a polygon to a hundredth or 1 cm, and where on the segment."""
     length = math.hypot(bx - ax, by - ay)
     stack[0, 0], stack[0, 1] = 0.0, 1.0
@@ -162,7 +165,7 @@ def deepest_inside(zs, k, ax, ay, bx, by, stack):  # type: ignore[no-untyped-def
         size -= 1
         t0, t1 = stack[size, 0], stack[size, 1]
         t = 0.5 * (t0 + t1)
-        depth = -signed_distance(zs, k, ax + t * (bx - ax), ay + t * (by - ay))
+        depth = -signed_distance(zone, vertex, k, ax + t * (bx - ax), ay + t * (by - ay))
         if depth > best:
             best, at = depth, t
         if depth + 0.5 * (t1 - t0) * length > best + max(0.01, 0.01 * best):
@@ -181,35 +184,31 @@ def at_heights(h0, dh, floor_m, ceiling_m, altitude_m):  # type: ignore[no-untyp
 
 
 @device
-def nearest_conflict(f, zs, k, e0, n0, h0, e1, n1, h1, altitude_m, cutoff, stack, full):  # type: ignore[no-untyped-def]
+def nearest_conflict(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, cutoff, stack, full):  # type: ignore[no-untyped-def]
     """Least distance from a short segment to a point of a zone's shape at whose place it meets the zone's heights.
 
     Found only below ``cutoff``, else inf; and where on the segment. Unknown ground: the zone is met at any height.
     Without ``full`` the first one ends the search; with it the least is resolved to 1 cm or a hundredth.
     """
-    z = f.ground
     rows, cols = z.shape
     dh = h1 - h0
     length = math.hypot(e1 - e0, n1 - n0)
     me, mn = 0.5 * (e0 + e1), 0.5 * (n0 + n1)
-    c0, r0 = to_grid(f, e0, n0)
-    c1, r1 = to_grid(f, e1, n1)
-    cm, rm = to_grid(f, me, mn)
+    c0, r0 = to_grid(m, e0, n0)
+    c1, r1 = to_grid(m, e1, n1)
+    cm, rm = to_grid(m, me, mn)
     if not math.isfinite(c0 + r0 + c1 + r1):
         return 0.0, 0.5
-    slack = f.bend * length * length / 8.0 + f.error_m
-    a, b, c, d = plane_per_cell(f, me, mn)
-    sx, sy = steps_of(a, b, c, d)
-    keep = 1.0 - 1.1 * f.bend * (0.5 * length + cutoff) - 1e-9
-    sx *= keep
-    sy *= keep
+    slack = m[BEND] * length * length / 8.0 + m[ERROR_M]
+    a, b, c, d = plane_per_cell(m, me, mn)
+    sx, sy = local_steps(m, e0, n0, e1, n1, cutoff)
     wide_r, tall_r = (cutoff + slack) / sx, (cutoff + slack) / sy
-    i0 = max(int(math.floor(min(c0, c1) - wide_r)), zs.cell[k, 0])
-    i1 = min(int(math.floor(max(c0, c1) + wide_r)), zs.cell[k, 1])
-    j0 = max(int(math.floor(min(r0, r1) - tall_r)), zs.cell[k, 2])
-    j1 = min(int(math.floor(max(r0, r1) + tall_r)), zs.cell[k, 3])
-    floor_m, floor_agl = zs.level[k, 0], zs.agl[k, 0]
-    ceiling_m, ceiling_agl = zs.level[k, 1], zs.agl[k, 1]
+    i0 = max(int(math.floor(min(c0, c1) - wide_r)), int(zone[k, COL0]))
+    i1 = min(int(math.floor(max(c0, c1) + wide_r)), int(zone[k, COL1]))
+    j0 = max(int(math.floor(min(r0, r1) - tall_r)), int(zone[k, ROW0]))
+    j1 = min(int(math.floor(max(r0, r1) + tall_r)), int(zone[k, ROW1]))
+    floor_m, floor_agl = zone[k, FLOOR], zone[k, FLOOR_AGL] != 0.0
+    ceiling_m, ceiling_agl = zone[k, CEILING], zone[k, CEILING_AGL] != 0.0
     x0, y0, x1, y1 = c0 * sx, r0 * sy, c1 * sx, r1 * sy
     rise = abs(dh) / length if length > 0.0 else 0.0
     best, at = math.inf, 0.5
@@ -252,16 +251,16 @@ def nearest_conflict(f, zs, k, e0, n0, h0, e1, n1, h1, altitude_m, cutoff, stack
                                 math.hypot(a * hu + b * hv, c * hu + d * hv),
                                 math.hypot(a * hu - b * hv, c * hu - d * hv),
                             )
-                            off = 0.6 * f.bend * (pe * pe + pn * pn) + f.error_m + 1e-9
-                            if signed_distance(zs, k, me + pe, mn + pn) <= 1.001 * half + off:
+                            off = 0.6 * m[BEND] * (pe * pe + pn * pn) + m[ERROR_M] + 1e-9
+                            if signed_distance(zone, vertex, k, me + pe, mn + pn) <= 1.001 * half + off:
                                 stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3] = u0, v0, um, vm
                                 stack[size, 4], stack[size, 5] = max(dist, 0.0), t0 + where * (t1 - t0)
                                 stack[size, 6] = most - least
                                 size += 1
                     u0, v0, um, vm = ul, vl, u1, v1
                 if size == before + 2 and stack[before, 4] < stack[before + 1, 4]:
-                    for m in range(7):
-                        stack[before, m], stack[before + 1, m] = stack[before + 1, m], stack[before, m]
+                    for w in range(7):
+                        stack[before, w], stack[before + 1, w] = stack[before + 1, w], stack[before, w]
                 children = 0
                 while size:
                     size -= 1
@@ -291,44 +290,43 @@ def nearest_conflict(f, zs, k, e0, n0, h0, e1, n1, h1, altitude_m, cutoff, stack
 
 
 @device
-def meets(f, zs, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stack, full):  # type: ignore[no-untyped-def]
+def meets(m, z, zone, vertex, scratch, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stack, full):  # type: ignore[no-untyped-def]
     """Whether a leg breaks a zone; its signed distance from the shape at the worst point, and where on the leg.
 
     Without a break the distance is the least at which the leg meets the zone's heights (for a zone over ground a lower
     bound, never below ``reach``), inf where it does not.
     """
-    t0, t1 = at_heights(h0, h1 - h0, zs.band[k, 0], zs.band[k, 1], altitude_m)
+    t0, t1 = at_heights(h0, h1 - h0, zone[k, BAND_LOW], zone[k, BAND_HIGH], altitude_m)
     if t0 > t1:
         return False, math.inf, 0.0
     de, dn = e1 - e0, n1 - n0
     ax, ay, bx, by = e0 + t0 * de, n0 + t0 * dn, e0 + t1 * de, n0 + t1 * dn
-    # Cheap bound by the shape's box.
-    dist, where = approach(zs, k, ax, ay, bx, by)
+    dist, where = approach(zone, vertex, k, ax, ay, bx, by)
     where = t0 + where * (t1 - t0)
-    polygon = zs.circle[k, 2] < 0.0
+    polygon = zone[k, RADIUS] < 0.0
     bound = reach - TOUCH_M
     if polygon and bound <= 0.0 and dist <= 0.0:
-        if not enters(zs, k, ax, ay, bx, by, zs.scratch):
+        if not enters(zone, vertex, k, ax, ay, bx, by, scratch):
             return False, 0.0, where
     elif not dist < bound:
         return False, dist, where
-    if not (zs.agl[k, 0] or zs.agl[k, 1]):
+    if zone[k, FLOOR_AGL] == 0.0 and zone[k, CEILING_AGL] == 0.0:
         if full and polygon and dist <= 0.0:
-            depth, where = deepest_inside(zs, k, ax, ay, bx, by, stack)
+            depth, where = deepest_inside(zone, vertex, k, ax, ay, bx, by, stack)
             dist, where = -depth, t0 + where * (t1 - t0)
         return True, dist, where
     # The levels follow the ground: look along the part that is near the zone's box.
     cutoff = max(bound, SMALLEST_M)
-    t0, t1 = slab(e0, de, zs.box[k, 0] - reach - 1.0, zs.box[k, 2] + reach + 1.0, t0, t1)
+    t0, t1 = slab(e0, de, zone[k, WEST_E] - reach - 1.0, zone[k, EAST_E] + reach + 1.0, t0, t1)
     if t0 <= t1:
-        t0, t1 = slab(n0, dn, zs.box[k, 1] - reach - 1.0, zs.box[k, 3] + reach + 1.0, t0, t1)
+        t0, t1 = slab(n0, dn, zone[k, SOUTH_N] - reach - 1.0, zone[k, NORTH_N] + reach + 1.0, t0, t1)
     best, at = math.inf, 0.0
     if t0 <= t1:
-        parts, _ = parts_of(f, e0 + t0 * de, n0 + t0 * dn, e0 + t1 * de, n0 + t1 * dn, ZONE_BOW_M)
+        parts, _ = parts_of(m, (t1 - t0) * math.hypot(de, dn), ZONE_BOW_M)
         for p in range(parts):
             ta, tb = t0 + (t1 - t0) * p / parts, t0 + (t1 - t0) * (p + 1) / parts
             d, w = nearest_conflict(
-                f, zs, k, e0 + ta * de, n0 + ta * dn, h0 + ta * (h1 - h0),
+                m, z, zone, vertex, k, e0 + ta * de, n0 + ta * dn, h0 + ta * (h1 - h0),
                 e0 + tb * de, n0 + tb * dn, h0 + tb * (h1 - h0), altitude_m, min(cutoff, best), stack, full,
             )  # fmt: skip
             if d < best:
@@ -336,5 +334,5 @@ def meets(f, zs, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stack, full):  # 
                 if not full:
                     return True, best, at
     if best < math.inf:
-        return True, min(best, signed_distance(zs, k, e0 + at * de, n0 + at * dn)), at
+        return True, min(best, signed_distance(zone, vertex, k, e0 + at * de, n0 + at * dn)), at
     return False, max(dist, reach), where

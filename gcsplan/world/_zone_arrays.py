@@ -9,56 +9,57 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.world._sweep import Field
-from gcsplan.world._sweep_zones import Zones
+from gcsplan.world._sweep_zones import (
+    BAND_HIGH, BAND_LOW, CEILING, CEILING_AGL, COL0, COL1, EAST, EAST_E, FIRST, FLOOR, FLOOR_AGL, LAST, NORTH, NORTH_N,
+    RADIUS, ROW0, ROW1, SOUTH_N, WEST_E, ZONE_NUMBERS, Zones,
+)  # fmt: skip
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Level, Zone
 
 Floats = NDArray[np.float64]
+BOX = [WEST_E, SOUTH_N, EAST_E, NORTH_N]
 MOST_SQUARES = 128  # of the lattice, along one side
 
 
 def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale: float) -> Zones:
     """Arrays of ``zones``; radii become metres of the plane, levels over ground are bounded over the zone's ground."""
-    n = len(zones)
-    circle = np.zeros((n, 3))
-    first = np.zeros(n + 1, np.int64)
+    table = np.zeros((len(zones), ZONE_NUMBERS))
     vertices: list[Floats] = []
-    box, level, agl, band = np.zeros((n, 4)), np.zeros((n, 2)), np.zeros((n, 2), np.bool_), np.zeros((n, 2))
-    cell = np.zeros((n, 4), np.int64)
-    for k, zone in enumerate(zones):
+    corners = 0
+    for row, zone in zip(table, zones, strict=True):
         shape = zone.shape
+        row[FIRST] = row[LAST] = corners
         if isinstance(shape, Circle):
             radius = shape.radius_m * scale
-            circle[k] = shape.east_m, shape.north_m, radius
-            box[k] = shape.east_m - radius, shape.north_m - radius, shape.east_m + radius, shape.north_m + radius
+            row[[EAST, NORTH, RADIUS]] = shape.east_m, shape.north_m, radius
+            row[BOX] = shape.east_m - radius, shape.north_m - radius, shape.east_m + radius, shape.north_m + radius
         else:
             v = np.asarray(shape.vertices, dtype=np.float64)
-            circle[k] = v[0, 0], v[0, 1], -1.0
             vertices.append(v)
-            box[k] = *v.min(axis=0), *v.max(axis=0)
-        first[k + 1] = first[k] + (0 if isinstance(shape, Circle) else len(shape.vertices))
+            corners += len(v)
+            row[[EAST, NORTH, RADIUS, LAST]] = *v[0], -1.0, corners
+            row[BOX] = *v.min(axis=0), *v.max(axis=0)
         floor, ceiling = zone.floor or Level(-math.inf, "amsl"), zone.ceiling or Level(math.inf, "amsl")
-        level[k] = floor.value_m, ceiling.value_m
-        agl[k] = floor.datum == "agl", ceiling.datum == "agl"
-        if agl[k].any():
-            cell[k] = _cells(box[k], surface, field)
-            low, high = _ground_range(cell[k], surface.ground_m)
-        else:
-            low, high = 0.0, 0.0
-        band[k] = level[k] + np.where(agl[k], (low, high), 0.0)
-    lattice, bucket, near = _lattice(box)
+        row[[FLOOR, CEILING]] = row[[BAND_LOW, BAND_HIGH]] = floor.value_m, ceiling.value_m
+        row[[FLOOR_AGL, CEILING_AGL]] = floor.datum == "agl", ceiling.datum == "agl"
+        if row[FLOOR_AGL] or row[CEILING_AGL]:
+            cell = _cells(row[BOX], surface, field)
+            low, high = _ground_range(cell, surface.ground_m)
+            row[[COL0, COL1, ROW0, ROW1]] = cell
+            row[BAND_LOW] += low if row[FLOOR_AGL] else 0.0
+            row[BAND_HIGH] += high if row[CEILING_AGL] else 0.0
+    most = max((len(v) for v in vertices), default=0)
     return Zones(
-        circle, first, np.concatenate(vertices) if vertices else np.zeros((0, 2)), box, level, agl, band, cell,
-        lattice, bucket, near, np.zeros(2 * max((len(v) for v in vertices), default=0)),
-    )  # fmt: skip
+        table, np.concatenate(vertices) if vertices else np.zeros((0, 2)), *_lattice(table[:, BOX]), np.zeros(2 * most)
+    )
 
 
 def _cells(box: Floats, surface: Surface, field: Field) -> tuple[int, int, int, int]:
     """First and last column and row of the cells that a box of the plane may touch; beyond the DEM too."""
     f = np.linspace(0.0, 1.0, 9)
     if not field.affine:  # beyond the fitted square the map says nothing, and no leg is judged there
-        middle = np.array([field.centre_e, field.centre_n, field.centre_e, field.centre_n])
-        box = np.clip(box, middle - 1.05 / field.per_unit, middle + 1.05 / field.per_unit)
+        middle = np.array(surface.grid.centre * 2)
+        box = np.clip(box, middle - 1.05 * surface.grid.scale_m, middle + 1.05 * surface.grid.scale_m)
     east, north = box[0] + f * (box[2] - box[0]), box[1] + f * (box[3] - box[1])
     e, n = (a.ravel() for a in np.meshgrid(east, north))
     at = surface.grid(e, n)
@@ -69,10 +70,10 @@ def _cells(box: Floats, surface: Surface, field: Field) -> tuple[int, int, int, 
     return int(low[0]), int(high[0]), int(low[1]), int(high[1])
 
 
-def _ground_range(cell: NDArray[np.int64], ground: Floats) -> tuple[float, float]:
+def _ground_range(cell: tuple[int, int, int, int], ground: Floats) -> tuple[float, float]:
     """Lowest and highest node of the cells; without bound where one of them is unknown."""
     rows, cols = ground.shape
-    i0, i1, j0, j1 = (int(c) for c in cell)
+    i0, i1, j0, j1 = cell
     part = ground[max(j0, 0) : max(j1 + 2, 0), max(i0, 0) : max(i1 + 2, 0)]
     if i0 < 0 or j0 < 0 or i1 > cols - 2 or j1 > rows - 2 or not part.size or np.isnan(part).any():
         return -math.inf, math.inf

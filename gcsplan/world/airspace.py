@@ -141,7 +141,7 @@ class Airspace:
         self.surface = surface
         self.zones = tuple(zones)
         self.scale = scale
-        self._field = Field.of(surface)
+        self._field = Field.of(surface.grid)
         self._zones = zones_as_arrays(self.zones, surface, self._field, scale)
         self._halos: dict[tuple[bool, int, int], Halo] = {}
 
@@ -198,7 +198,7 @@ class Airspace:
         points = np.array(track, dtype=np.float64, order="C")
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
             raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
-        return make_tube(points, limits, self._field, self._zones, self._halo, self.scale)
+        return make_tube(points, limits, self.surface, self._field, self._zones, self._halo, self.scale)
 
     def _around(
         self, sign: float, east_m: ArrayLike, north_m: ArrayLike, reach_m: float, reach: Reaches
@@ -207,9 +207,9 @@ class Airspace:
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
         out = np.empty(e.size)
         wide = reach_m + reach.spare_m
-        heights = self._field.top if sign > 0.0 else self._field.ground
+        heights = self.surface.top_m if sign > 0.0 else self.surface.ground_m
         points = np.stack([e.ravel(), n.ravel()], axis=-1)
-        around(self._field, heights, self._halo(sign > 0.0, wide), sign, points, wide, out)
+        around(self._field.packed, heights, self._halo(sign > 0.0, wide), sign, points, wide, out)
         return out.reshape(e.shape) + reach.margin_m(reach_m)
 
     def _halo(self, of_top: bool, reach_m: float) -> Halo:
@@ -218,7 +218,7 @@ class Airspace:
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))
         if key not in self._halos:
-            self._halos[key] = Halo.around(f, f.top if of_top else f.ground, reach_m)
+            self._halos[key] = Halo.around(f, self.surface.top_m if of_top else self.surface.ground_m, reach_m)
         return self._halos[key]
 
     def _judge(
@@ -240,7 +240,7 @@ class Airspace:
         far = self._halo(True, near_m + limits.horizontal_clearance_m * self.scale)
         return int(
             judge(
-                f, near, far, self._halo(False, near_m), self._zones,
+                f.packed, self.surface.ground_m, self.surface.top_m, near, far, self._halo(False, near_m), self._zones,
                 legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
                 _demands(limits, self.scale), full, ok, found, worst, nearest, hit, hit_at,
                 np.empty((256, 8)), np.zeros(12), np.full(len(self.zones), -1), np.arange(len(self.zones)),

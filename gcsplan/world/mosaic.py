@@ -265,14 +265,15 @@ def _read(
     heights = np.full((rows, cols), np.nan)
     differing, worst = 0, 0.0
     for tile, (col, row, width, height) in parts:
-        new = tile.raster.read(col - tile.col, row - tile.row, width, height)
-        into = heights[row - r0 : row - r0 + height, col - c0 : col - c0 + width]
-        off = np.abs(into - new)
-        both = off > 0.0
-        if both.any():
-            differing += int(np.count_nonzero(both))
-            worst = max(worst, float(off[both].max()))
-        np.fmax(into, new, out=into)
+        for first, new in tile.raster.read(col - tile.col, row - tile.row, width, height):
+            top = row - r0 + first
+            into = heights[top : top + len(new), col - c0 : col - c0 + width]
+            off = np.abs(into - new)
+            both = off > 0.0
+            if both.any():
+                differing += int(np.count_nonzero(both))
+                worst = max(worst, float(off[both].max()))
+            np.fmax(into, new, out=into)
     notes = []
     if differing:
         notes.append(f"tiles differ where they overlap ({differing} nodes, {worst:g} m at most); the higher one counts")

@@ -23,7 +23,7 @@ from gcsplan.errors import InputError
 from gcsplan.world.datum import RasterCRS, VerticalDatum, take_apart
 
 Floats = NDArray[np.float64]
-Reader = Callable[[int, int, int, int], Floats]
+Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
 
 SAMPLE = "sample:jacksboro"
 MAX_CELLS = 200_000_000
@@ -47,8 +47,9 @@ _STRIP_CELLS = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """A north-up raster's header; ``read(col, row, cols, rows)`` gives (rows, cols) float64, NaN where unknown.
+    """A north-up raster's header, and how to read a window of it.
 
+    ``read(col, row, cols, rows)`` gives strips (first row within the window, heights (n, cols)), NaN where unknown.
     ``west``, ``north`` are the outer corner in the raster's own units, ``dx``, ``dy`` > 0 the cell. ``read`` gives
     metres but of the raster's own vertical datum; ``vertical`` is what the file says of that.
     """
@@ -117,8 +118,8 @@ def sample_jacksboro() -> Raster:
         west, north, dx, dy = (float(file[k]) for k in ("xmin", "ymin", "dx", "dy"))
     rows, cols = heights.shape
 
-    def read(col: int, row: int, width: int, height: int) -> Floats:
-        return heights[row : row + height, col : col + width].copy()
+    def read(col: int, row: int, width: int, height: int) -> Iterator[tuple[int, Floats]]:
+        yield 0, heights[row : row + height, col : col + width]
 
     return Raster(
         SAMPLE, take_apart("EPSG:4326", where=SAMPLE), west, north, dx, dy, cols, rows, VerticalDatum("EGM96"), read,
@@ -210,10 +211,10 @@ def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_uni
     if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0.0:
         raise InputError(f"{path} has a broken scale {scale} or offset {offset}", where=where)
 
-    def read(col: int, row: int, cols: int, rows: int) -> Floats:
+    def read(col: int, row: int, cols: int, rows: int) -> Iterator[tuple[int, Floats]]:
         try:
             with _gdal(path) as opened:
-                return _window(opened, col, row, cols, rows, scale * factor, offset * factor)
+                yield from _strips(opened, col, row, cols, rows, scale * factor, offset * factor)
         except Exception as why:
             raise InputError(_unreadable(path, why), where=where) from None
 
@@ -263,11 +264,12 @@ def _metres_in_unit(band: str | None, given: str | None, vertical_m: float | Non
     return wanted
 
 
-def _window(dataset: Any, col: int, row: int, cols: int, rows: int, scale: float, offset: float) -> Floats:
-    """(rows, cols) of ``raw * scale + offset``, metres; masked, non-finite and implausible cells are NaN."""
+def _strips(
+    dataset: Any, col: int, row: int, cols: int, rows: int, scale: float, offset: float
+) -> Iterator[tuple[int, Floats]]:
+    """Strips of ``raw * scale + offset``, metres; masked, non-finite and implausible cells are NaN."""
     from rasterio.windows import Window
 
-    out = np.empty((rows, cols))
     strip = max(1, _STRIP_CELLS // cols)
     for first in range(0, rows, strip):
         n = min(strip, rows - first)
@@ -278,5 +280,4 @@ def _window(dataset: Any, col: int, row: int, cols: int, rows: int, scale: float
         with np.errstate(over="ignore", invalid="ignore"):
             part = part * scale + offset
             part[~((part >= LOWEST_M) & (part <= HIGHEST_M))] = np.nan
-        out[first : first + n] = part
-    return out
+        yield first, part

@@ -129,7 +129,7 @@ class _RasterTerrain:
             notes.append(self._datum.note)
         info: dict[str, object] = {}
         if self._geoid is not None:
-            ground = ground - _geoid_heights(window, self._geoid, self._mosaic)
+            _take_off_geoid(window, self._geoid, self._mosaic)
             datum = f"{datum}, made AMSL with {self._geoid.path.name}"
             info["geoid_sha256"] = sha256_of(self._geoid.path)
         rows, cols = ground.shape
@@ -221,8 +221,8 @@ def _geoid(spec: TerrainSpec, datum: VerticalDatum, where: str) -> GeoidGrid | N
     return None
 
 
-def _geoid_heights(window: Window, geoid: GeoidGrid, mosaic: Mosaic) -> Floats:
-    """Geoid above the ellipsoid at each node, (rows, cols)."""
+def _take_off_geoid(window: Window, geoid: GeoidGrid, mosaic: Mosaic) -> None:
+    """Lower every node, in place, by the geoid's height above the ellipsoid there."""
     rows, cols = window.heights_m.shape
     size = window.grid.metres_per_cell(*window.grid.centre)
     c, r = (_sampled(n, max(1, int(GEOID_STEP_M / m))) for n, m in zip((cols, rows), size, strict=True))
@@ -230,8 +230,9 @@ def _geoid_heights(window: Window, geoid: GeoidGrid, mosaic: Mosaic) -> Floats:
     coarse = geoid.height_m(lat, lon)
     along = np.stack([np.interp(np.arange(cols), c, line) for line in coarse])
     below = np.searchsorted(r, np.arange(rows), side="right").clip(1, len(r) - 1) - 1
-    weight = ((np.arange(rows) - r[below]) / (r[below + 1] - r[below]))[:, None]
-    return np.asarray((1.0 - weight) * along[below] + weight * along[below + 1])
+    weight = (np.arange(rows) - r[below]) / (r[below + 1] - r[below])
+    for line, j, w in zip(window.heights_m, below, weight, strict=True):
+        line -= (1.0 - w) * along[j] + w * along[j + 1]
 
 
 def _sampled(count: int, step: int) -> NDArray[np.intp]:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from gcsplan.world._envelope import pieces, spans
 from gcsplan.world._halo import Halo
 from gcsplan.world._sweep import BOW_M, Field
-from gcsplan.world._sweep_zones import Zones
+from gcsplan.world._sweep_zones import BAND_HIGH, BAND_LOW, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
 from gcsplan.world.limits import Limits
+from gcsplan.world.surface import Surface
 
 Floats = NDArray[np.float64]
 
@@ -81,6 +82,7 @@ class Reaches:
 def make_tube(
     track: Floats,
     limits: Limits,
+    surface: Surface,
     field: Field,
     zones: Zones,
     halo: Callable[[bool, float], Halo],
@@ -92,7 +94,7 @@ def make_tube(
     under = halo(False, reach.near_m + reach.spare_m + bow)
     beside = halo(True, reach.near_m + reach.spare_m + bow)
     beyond = halo(True, reach.far_m + reach.spare_m + bow)
-    rows = _pieces(field, under, beside, beyond, track, (reach.near_m, reach.near_m, reach.far_m), reach.spare_m)
+    rows = _pieces(field, surface.ground_m, surface.top_m, under, beside, beyond, track, (reach.near_m, reach.near_m, reach.far_m), reach.spare_m)
     error, near, far = limits.altitude_error_m, reach.margin_m(reach.near_m), reach.margin_m(reach.far_m)
     floor = rows[:, 3:5] + (limits.min_agl_m + error + near)
     if limits.horizontal_clearance_m > 0.0:
@@ -107,35 +109,36 @@ def make_tube(
         np.concatenate([[0.0], rows[:, 0]]),
         np.where(unknown, np.inf, floor),
         ceiling,
-        _bands(track, limits, field, zones, halo, reach),
+        _bands(track, limits, surface, field, zones, halo, reach),
     )
 
 
 def _pieces(
-    field: Field, under: Halo, beside: Halo, beyond: Halo, track: Floats, reaches: tuple[float, float, float],
-    spare_m: float,
+    field: Field, ground: Floats, top: Floats, under: Halo, beside: Halo, beyond: Halo, track: Floats,
+    reaches: tuple[float, float, float], spare_m: float,
 ) -> Floats:  # fmt: skip
-    room = 256
+    room = 2048
     while True:
         rows = np.empty((room, 7))
-        count = pieces(field, field.ground, field.top, under, beside, beyond, track, *reaches, spare_m, rows)
+        count = pieces(field.packed, ground, top, under, beside, beyond, track, *reaches, spare_m, rows)
         if count <= room:
             return rows[:count]
         room = count
 
 
 def _bands(
-    track: Floats, limits: Limits, field: Field, zones: Zones, halo: Callable[[bool, float], Halo], reach: Reaches
-) -> tuple[Band, ...]:
+    track: Floats, limits: Limits, surface: Surface, field: Field, zones: Zones,
+    halo: Callable[[bool, float], Halo], reach: Reaches,
+) -> tuple[Band, ...]:  # fmt: skip
     """One band for each span of the track within reach of a zone, by zone and way."""
     far, error = reach.far_m, limits.altitude_error_m
-    rows = np.empty((64 + len(zones.circle), 4))
+    rows = np.empty((64 + len(zones.table), 4))
     wide = far + reach.spare_m, far + reach.spare_m + ZONE_ROOM_M
     parts = np.empty((len(zones.scratch) // 2 + 1, 2))
-    count = spans(zones, track, *wide, rows, parts)
+    count = spans(zones.table, zones.vertex, track, *wide, rows, parts)
     if count > len(rows):
         rows = np.empty((count, 4))
-        spans(zones, track, *wide, rows, parts)
+        spans(zones.table, zones.vertex, track, *wide, rows, parts)
     rows = rows[:count]
     rows = rows[np.lexsort((rows[:, 2], rows[:, 0]))]
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
@@ -148,23 +151,24 @@ def _bands(
         while at < len(rows) and rows[at, 0] == zone and rows[at, 2] <= s1 + 1e-6:
             s1 = max(s1, rows[at, 3])
             at += 1
-        if zones.agl[zone].any():
+        numbers = zones.table[zone]
+        bottom, top, agl = numbers[FLOOR], numbers[CEILING], numbers[[FLOOR_AGL, CEILING_AGL]]
+        if agl.any():
             around = halo(False, wide[1] + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
             part = _between(track, length, s0, s1)
-            ground = _pieces(field, around, around, around, part, (wide[1],) * 3, 0.0)
+            ground = _pieces(field, surface.ground_m, surface.ground_m, around, around, around, part, (wide[1],) * 3, 0.0)
             s = np.concatenate([[s0], s0 + ground[:, 0]])
             low, high = ground[:, 1:3], ground[:, 3:5]
         else:
             s, low, high = np.array([s0, s1]), np.zeros((1, 2)), np.zeros((1, 2))
-        bottom, top = zones.level[zone]
         # What is known of all the ground under the zone is a bound too; where ground is unknown there is no way past.
-        if zones.agl[zone, 0]:
-            low = np.fmax(low + (bottom - MARGIN_M), zones.band[zone, 0])
+        if agl[0]:
+            low = np.fmax(low + (bottom - MARGIN_M), numbers[BAND_LOW])
             low = np.where(np.isnan(ground[:, 1:3]), -np.inf, low)
         else:
             low = np.full_like(low, bottom)
-        if zones.agl[zone, 1]:
-            high = np.fmin(high + (top + MARGIN_M), zones.band[zone, 1])
+        if agl[1]:
+            high = np.fmin(high + (top + MARGIN_M), numbers[BAND_HIGH])
             high = np.where(np.isnan(ground[:, 3:5]), np.inf, high)
         else:
             high = np.full_like(high, top)

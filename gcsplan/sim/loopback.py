@@ -1,0 +1,28 @@
+"""Loopback vehicles for missions: each stands where its mission starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from gcsplan.mavlink.mission import Mission
+from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle import LoopbackVehicle
+
+
+@contextmanager
+def loopback_fleet(missions: Sequence[Mission]) -> Iterator[str]:
+    """A vehicle for each mission, on one free port of this machine; gives the URL where all of them answer."""
+    vehicles = [
+        LoopbackVehicle(
+            mission.sysid,
+            mission.autopilot,
+            lat_deg=mission.home.lat_e7 / 1e7,
+            lon_deg=mission.home.lon_e7 / 1e7,
+            amsl_m=mission.home.amsl_m,
+            name=mission.name,
+        )
+        for mission in missions
+    ]
+    with SimServer(vehicles, "udpin:127.0.0.1:0") as server:
+        yield server.url_for_gcs

@@ -1,0 +1,477 @@
+"""Sessions with loopback vehicles over UDP: found, asked, uploaded to, read back, and every way in which that fails."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+
+from gcsplan.errors import CheckFailed, GcsplanError, InputError, LinkError, ReadBackDiffers, VehicleRefused
+from gcsplan.mavlink.autopilots import altitude_of_cm
+from gcsplan.mavlink.compare import compare, faults
+from gcsplan.mavlink.frames import SigningKey
+from gcsplan.mavlink.link import Link
+from gcsplan.mavlink.messages import Address
+from gcsplan.mavlink.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
+from gcsplan.mavlink.parameters import judge_parameters
+from gcsplan.mavlink.preflight import preflight
+from gcsplan.mavlink.session import (
+    Options,
+    Order,
+    clear_mission,
+    discover,
+    download_items,
+    download_mission,
+    upload_fleet,
+    upload_items,
+    upload_mission,
+    verify_mission,
+)
+from gcsplan.mavlink.transfer import Progress, Timers
+from gcsplan.mavlink.watch import BOOT, CRITICAL, POWEROFF, STANDBY, UNINIT, VehicleState
+from gcsplan.sim.misbehaviour import Misbehaviour
+from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.vehicle import Autopilot
+
+COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
+HOME = Home.at(36.6, -84.38, 371.0)
+QUICK = Timers(response_s=0.15, item_s=0.05, silence_s=0.6, retries=3)
+OPTIONS = Options(unchecked=True, listen_s=0.0, standby_s=0.0, discover_s=5.0, read_parameters=False, timers=QUICK)
+
+
+def mission(autopilot: Autopilot = COPTER, count: int = 8, sysid: int = 1, bearing: int = 777) -> Mission:
+    z = altitude_of_cm(6500, autopilot)
+    items = tuple(
+        MissionItem(16, 3, (0.0, 0.0, 0.0, 0.0), 366_000_000 + 1000 * n, -843_800_000 + bearing * n, z + n)
+        for n in range(count)
+    )
+    return Mission(autopilot, HOME, items, f"uav{sysid}", sysid)
+
+
+def vehicle(autopilot: Autopilot = COPTER, sysid: int = 1, *, boot_s: float = 0.0, **trouble: Any) -> LoopbackVehicle:
+    return LoopbackVehicle(
+        sysid, autopilot, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.0, boot_s=boot_s, misbehave=Misbehaviour(**trouble)
+    )
+
+
+@contextlib.contextmanager
+def air(*vehicles: LoopbackVehicle, **link: Any) -> Iterator[Link]:
+    """An open link to ``vehicles``."""
+    with SimServer(vehicles, "udpin:127.0.0.1:0", speedup=10.0) as server, Link(server.url_for_gcs, **link) as opened:
+        yield opened
+    assert server.mishandled == 0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A verdict for the door."""
+
+    safe: bool | None
+    mission: Mission
+
+
+# -- the whole way ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_a_checked_mission_is_uploaded_and_verified(autopilot: Autopilot) -> None:
+    board, sent = vehicle(autopilot), mission(autopilot)
+    seen: list[tuple[str, Progress]] = []
+    judged: list[Mission] = []
+
+    def judge(read: Mission) -> None:
+        judged.append(read)
+
+    with air(board) as link:
+        result = upload_mission(
+            link, sent, verdict=Verdict(True, sent), options=replace(OPTIONS, unchecked=False, simulated=True),
+            judge=judge, progress=lambda name, progress: seen.append((name, progress)),
+        )  # fmt: skip
+        assert (result.outcome, result.verified, result.error()) == ("accepted", True, None)
+        assert result.url == link.url
+    assert not faults(compare(sent.wire_items(), board.items(), autopilot))
+    assert result.read_back == board.items()
+    assert judged == [result.mission]
+    assert result.mission is not None
+    assert (result.mission.home, result.mission.name, result.mission.sysid) == (sent.home, "uav1", 1)
+    assert seen[-1][0] == "uav1"
+    assert {p.phase for _, p in seen} == {"upload", "read back"}
+    told = json.loads(json.dumps(result.as_dict()))
+    assert {"url", "outcome", "verified", "simulated", "items", "seconds", "retries"} <= set(told)
+    assert (told["simulated"], told["items"]) == (True, len(sent.wire_items()))
+
+
+@pytest.mark.parametrize(
+    ("verdict", "words"),
+    [
+        (lambda m: None, "with its passing verdict"),
+        (lambda m: Verdict(False, m), "did not pass"),
+        (lambda m: Verdict(None, m), "could not be judged"),
+        (lambda m: Verdict(True, mission(count=7)), "another mission"),
+        (lambda m: Verdict(True, replace(m, sysid=2)), "another mission"),
+    ],
+)
+def test_nothing_is_sent_without_a_passing_verdict_of_this_mission(
+    verdict: Callable[[Mission], Verdict | None], words: str
+) -> None:
+    board, sent = vehicle(), mission()
+    with air(board) as link:
+        with pytest.raises(CheckFailed, match=words):
+            upload_mission(link, sent, verdict=verdict(sent), options=replace(OPTIONS, unchecked=False))
+        other = Order(link, sent, Verdict(True, sent), replace(OPTIONS, unchecked=False))
+        with pytest.raises(CheckFailed):
+            upload_fleet([other, Order(link, mission(sysid=3), verdict(sent), replace(OPTIONS, unchecked=False))])
+    assert board.items() == ()
+
+
+def test_the_read_back_is_checked_again() -> None:
+    with air(vehicle()) as link:
+        result = upload_mission(link, mission(), options=OPTIONS, judge=lambda read: "a hill in the way")
+    assert not result.verified
+    with pytest.raises(CheckFailed, match="a hill in the way"):
+        result.raise_for_outcome()
+
+
+@pytest.mark.parametrize(
+    ("trouble", "error", "words"),
+    [
+        ({"corrupt": 4}, ReadBackDiffers, "item 4 .*altitude"),
+        ({"corrupt": 3, "corrupt_field": "x"}, ReadBackDiffers, "item 3 .*latitude"),
+        ({"edit": 2}, ReadBackDiffers, "item 2 .*altitude"),
+        ({"refuse": 5, "refuse_code": 3}, VehicleRefused, "item 5: the command is not supported"),
+        ({"no_space": True}, VehicleRefused, "no space"),
+        ({"silent_after": 30}, LinkError, "unknown"),
+    ],
+)
+def test_what_goes_wrong_is_caught_and_named(trouble: dict[str, Any], error: type[GcsplanError], words: str) -> None:
+    with air(vehicle(**trouble)) as link:
+        result = upload_mission(link, mission(count=30), options=replace(OPTIONS, attempts=2))
+    assert not result.verified
+    assert result.on_board
+    with pytest.raises(error, match=words):
+        result.raise_for_outcome()
+
+
+def test_a_reboot_in_the_middle_is_survived() -> None:
+    board = vehicle(reboot_at=4, reboot_s=2.0)  # 0.2 s of ours
+    with air(board) as link:
+        result = upload_mission(link, mission(), options=OPTIONS)
+    assert result.verified
+    assert result.attempts > 1
+
+
+# -- before anything is sent --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("board", "sent", "reason", "words"),
+    [
+        (vehicle(armed=True), mission(), "armed", "--allow-armed"),
+        (vehicle(PX4), mission(COPTER), "wrong_autopilot", "written for ArduCopter, and the vehicle is PX4"),
+        (vehicle(PLANE), mission(COPTER), "wrong_autopilot", "fixed wing"),
+        (vehicle(boot_s=600.0), mission(), "not_ready", "booting"),
+        (vehicle(), replace(mission(), home=Home.at(36.6005, -84.38, 371.0)), "wrong_place", "56 m from"),
+        (vehicle(), replace(mission(), home=Home.at(36.6, -84.38, 351.0)), "wrong_height", r"\+20.0 m"),
+    ],
+)
+def test_a_vehicle_that_does_not_fit_gets_nothing(
+    board: LoopbackVehicle, sent: Mission, reason: str, words: str
+) -> None:
+    with air(board) as link, pytest.raises(VehicleRefused, match=words) as refused:
+        upload_mission(link, sent, options=OPTIONS)
+    assert refused.value.reason == reason
+    assert refused.value.exit_code == 5
+    assert board.items() == ()
+
+
+def test_what_may_be_overridden_is_taken_with_a_warning() -> None:
+    board, sent = vehicle(armed=True), replace(mission(), home=Home.at(40.0, -84.38, 371.0))
+    with air(board) as link:
+        result = upload_mission(link, sent, options=replace(OPTIONS, allow_armed=True, ignore_position=True))
+    assert result.verified
+    assert any("armed" in w for w in result.warnings)
+    assert any("home is" in w for w in result.warnings)
+
+
+def test_the_ground_that_the_caller_gives_counts() -> None:
+    sent = replace(mission(), home=Home.at(36.6, -84.38, 340.0))
+    with air(vehicle()) as link:
+        assert upload_mission(link, sent, options=replace(OPTIONS, ground_amsl_m=370.0)).verified
+
+
+def test_a_vehicle_that_is_booting_is_waited_for() -> None:
+    board = vehicle(boot_s=5.0)  # half a second of ours
+    with air(board) as link:
+        assert upload_mission(link, mission(), options=replace(OPTIONS, standby_s=8.0)).verified
+
+
+def test_two_vehicles_with_one_number_are_refused() -> None:
+    first, second = vehicle(), vehicle()
+    with Link("udpin:127.0.0.1:0") as link:
+        port = link.place.rsplit(":", 1)[1]
+        with (
+            SimServer([first], f"udpout:127.0.0.1:{port}", speedup=10.0),
+            SimServer([second], f"udpout:127.0.0.1:{port}", speedup=10.0),
+            pytest.raises(VehicleRefused, match="2 autopilots send heartbeats as system 1"),
+        ):
+            upload_mission(link, mission(), options=replace(OPTIONS, listen_s=0.5))
+    assert first.items() == second.items() == ()
+
+
+def test_a_dead_link_says_which_direction_was_tried_and_names_the_other() -> None:
+    with Link("udpin:127.0.0.1:0") as link, pytest.raises(LinkError) as dead:
+        discover(link, 1, 0.2)
+    assert "udpin: listens on 127.0.0.1" in str(dead.value)
+    assert "udpout:127.0.0.1" in str(dead.value)
+    assert dead.value.exit_code == 6
+
+
+def test_the_wrong_number_is_told_with_the_numbers_that_are_there() -> None:
+    with air(vehicle(sysid=7), vehicle(sysid=9)) as link, pytest.raises(LinkError, match="systems heard there: 7, 9"):
+        discover(link, 1, 0.5)
+
+
+def test_unsigned_frames_are_told_as_the_reason() -> None:
+    with air(vehicle(), key=SigningKey(bytes(32))) as link, pytest.raises(LinkError, match="signing key") as dead:
+        discover(link, 1, 0.5)
+    assert "00000000" not in str(dead.value)
+
+
+def test_a_vehicle_tells_what_it_is_and_where() -> None:
+    with air(vehicle(PX4)) as link:
+        state = discover(link, 1, listen_s=0.0)
+    assert (state.address, state.armed, state.system_status, state.sources) == (Address(1, 1), False, STANDBY, 1)
+    assert "PX4" in state.what
+    assert state.lat_deg == pytest.approx(36.6)
+    assert state.amsl_m == pytest.approx(371.0)
+    assert state.can(4) is True
+    assert state.can(512) is False
+
+
+# -- preflight alone ----------------------------------------------------------------------------------------------
+
+READY = VehicleState(Address(1, 1), 3, 2, False, STANDBY, 36.6, -84.38, 371.0, 4 | 512 | 16384 | 32768)
+
+
+def warnings_of(state: VehicleState, **more: Any) -> str:
+    return " / ".join(preflight(state, mission().wire_items(), COPTER, start=HOME, **more))
+
+
+def test_a_vehicle_that_fits_draws_no_warning() -> None:
+    assert warnings_of(READY) == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"mav_autopilot": 0, "mav_type": 0, "system_status": UNINIT}, "could not be checked"),
+        ({"mav_autopilot": 8, "mav_type": 2}, "calls itself"),
+        ({"mav_type": 0}, "does not say whether"),
+        ({"lat_deg": None, "lon_deg": None, "amsl_m": None}, "reports no position"),
+        ({"capabilities": None}, "capabilities"),
+        ({"capabilities": 0}, "MISSION_ITEM_INT"),
+        ({"system_status": CRITICAL}, "critical"),
+    ],
+)
+def test_what_is_not_reported_is_taken_with_a_warning(change: dict[str, Any], words: str) -> None:
+    assert words in warnings_of(replace(READY, **change))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"system_status": UNINIT}, "not_ready"),
+        ({"system_status": BOOT}, "not_ready"),
+        ({"system_status": POWEROFF}, "not_ready"),
+        ({"sources": 2}, "ambiguous"),
+        ({"armed": True}, "armed"),
+        ({"mav_type": 10}, "wrong_autopilot"),
+    ],
+)
+def test_what_speaks_against_an_upload_refuses_it(change: dict[str, Any], reason: str) -> None:
+    with pytest.raises(VehicleRefused) as refused:
+        warnings_of(replace(READY, **change))
+    assert refused.value.reason == reason
+
+
+def test_all_reasons_are_told_at_once() -> None:
+    state = replace(READY, armed=True, lat_deg=40.0, sources=3, system_status=BOOT)
+    with pytest.raises(VehicleRefused, match=r"3 autopilots.*booting.*armed.*m from the mission's start"):
+        warnings_of(state)
+
+
+def test_too_many_items_are_refused_before_they_are_sent() -> None:
+    with pytest.raises(VehicleRefused, match="at most 650 items and the list has 651"):
+        preflight(READY, mission(count=650).wire_items(), COPTER)
+
+
+def test_a_vehicle_without_a_fence_gets_none() -> None:
+    with pytest.raises(VehicleRefused, match="keeps no fence"):
+        preflight(replace(READY, capabilities=4), [MissionItem(5004, 0)], COPTER, mission_type=FENCE)
+
+
+@pytest.mark.parametrize(("north_m", "up_m", "fits"), [(29.0, 14.0, True), (31.0, 0.0, False), (0.0, -16.0, False)])
+def test_thirty_metres_aside_and_fifteen_in_height_are_allowed(north_m: float, up_m: float, fits: bool) -> None:
+    state = replace(READY, lat_deg=36.6 + north_m / 111_195.0, amsl_m=371.0 + up_m)
+    with contextlib.nullcontext() if fits else pytest.raises(VehicleRefused):
+        warnings_of(state)
+    assert warnings_of(state, ignore_position=True) == ""
+
+
+# -- parameters ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_return_and_failsafe_parameters_are_read_and_their_difference_reported(autopilot: Autopilot) -> None:
+    board = vehicle(autopilot)
+    with air(board) as link:
+        options = replace(OPTIONS, read_parameters=True, rtl_rel_home_m=333.0, expected_parameters={"NO_SUCH": 1.0})
+        result = upload_mission(link, mission(autopilot), options=options)
+    assert result.verified
+    words = " / ".join(result.warnings)
+    assert "was checked at 333 m" in words
+    assert "NO_SUCH could not be read" in words
+
+
+def test_parameters_that_fit_say_nothing() -> None:
+    values = {
+        "RTL_ALT": 6000.0,
+        "FENCE_ENABLE": 0.0,
+        "FS_THR_ENABLE": 1.0,
+        "FS_GCS_ENABLE": 1.0,
+        "BATT_FS_LOW_ACT": 2.0,
+    }
+    assert judge_parameters(values, mission(), rtl_rel_home_m=60.0) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({}, "no parameters could be read"),
+        ({"RTL_ALT": 1500.0}, "returns at 15 m above home (RTL_ALT); the return was checked at 60 m"),
+        ({"RTL_ALT_M": 15.0}, "returns at 15 m above home (RTL_ALT_M)"),
+        (
+            {"RTL_ALT": 6000.0, "FENCE_ENABLE": 1.0, "FENCE_TYPE": 1.0, "FENCE_ALT_MAX": 66.0},
+            "ends at 66 m (FENCE_ALT_MAX)",
+        ),
+        (
+            {"RTL_ALT": 6000.0, "FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0, "FENCE_RADIUS": 5.0},
+            "ends at 5 m (FENCE_RADIUS)",
+        ),
+        ({"RTL_RETURN_ALT": 60.0, "GF_ACTION": 1.0, "GF_MAX_VER_DIST": 50.0}, "ends at 50 m (GF_MAX_VER_DIST)"),
+        ({"RTL_RETURN_ALT": 60.0, "NAV_DLL_ACT": 0.0}, "no failsafe action on board for loss of the ground station"),
+    ],
+)
+def test_parameters_that_do_not_fit_are_told_in_words(values: dict[str, float], words: str) -> None:
+    assert words in " / ".join(judge_parameters(values, mission(), rtl_rel_home_m=60.0))
+
+
+def test_a_return_that_nobody_checked_is_told() -> None:
+    assert "was not checked" in judge_parameters({"RTL_ALT": 1500.0}, mission())[0]
+
+
+# -- fleets -------------------------------------------------------------------------------------------------------
+
+
+def test_a_fleet_on_one_port_takes_as_long_as_its_slowest_and_each_gets_its_own() -> None:
+    boards = [vehicle(COPTER if n % 2 else PX4, n) for n in range(1, 13)]
+    sent = [mission(board.autopilot, 10 + board.sysid, board.sysid, 700 + board.sysid) for board in boards]
+    with air(*boards) as link:
+        results = upload_fleet([Order(link, each, options=OPTIONS) for each in sent])
+    for board, each, result in zip(boards, sent, results, strict=True):
+        assert not isinstance(result, GcsplanError)
+        assert result.verified
+        assert result.sysid == board.sysid
+        assert not faults(compare(each.wire_items(), board.items(), board.autopilot))
+
+
+def test_a_fleet_on_several_links_keeps_the_errors_apart() -> None:
+    good, armed = vehicle(sysid=1), vehicle(sysid=2, armed=True)
+    with air(good) as first, air(armed) as second, Link("udpin:127.0.0.1:0") as dead:
+        began = time.monotonic()
+        results = upload_fleet([
+            Order(first, mission(sysid=1), options=OPTIONS),
+            Order(second, mission(sysid=2), options=OPTIONS),
+            Order(dead, mission(sysid=3), options=replace(OPTIONS, discover_s=0.5)),
+        ])  # fmt: skip
+        assert time.monotonic() - began < 5.0
+    assert getattr(results[0], "verified", False)
+    assert isinstance(results[1], VehicleRefused)
+    assert isinstance(results[2], LinkError)
+
+
+def test_two_missions_for_one_vehicle_are_refused() -> None:
+    with Link("udpin:127.0.0.1:0") as link, pytest.raises(InputError, match="same system id"):
+        upload_fleet([Order(link, mission(), options=OPTIONS), Order(link, mission(count=3), options=OPTIONS)])
+
+
+# -- download, verify, clear, fence, rally ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_what_was_uploaded_is_downloaded_verified_and_cleared(autopilot: Autopilot) -> None:
+    board, sent = vehicle(autopilot), mission(autopilot)
+    with air(board) as link:
+        upload_mission(link, sent, options=OPTIONS).raise_for_outcome()
+        read = download_mission(link, 1, autopilot, name="uav1", options=OPTIONS)
+        assert not faults(compare(sent.wire_items(), read.wire_items(), autopilot))
+        assert (read.home.lat_e7, read.home.lon_e7) == (HOME.lat_e7, HOME.lon_e7)
+        assert verify_mission(link, sent, options=OPTIONS).verified
+        other = verify_mission(link, mission(autopilot, 7), options=OPTIONS)
+        assert not other.verified
+        assert isinstance(other.error(), ReadBackDiffers)
+        assert clear_mission(link, 1, options=OPTIONS).verified
+        assert len(download_items(link, 1, options=OPTIONS)) <= 1
+    assert len(board.items()) <= 1
+
+
+def test_an_empty_vehicle_gives_an_empty_mission() -> None:
+    with air(vehicle()) as link:
+        assert download_mission(link, 1, COPTER, options=OPTIONS).items == ()
+        result = verify_mission(link, mission(), options=OPTIONS)
+        assert not result.verified
+
+
+@pytest.mark.parametrize("autopilot", [COPTER, PX4])
+def test_fence_and_rally_points_go_up_and_are_cleared_with_all(autopilot: Autopilot) -> None:
+    board = vehicle(autopilot)
+    fence = [MissionItem(5004, 3, (50.5 + n, 0.0, 0.0, 0.0), 366_000_000 + n, -843_800_000) for n in range(5)]
+    rally = [MissionItem(5100, 3, (0.0, 0.0, 0.0, 0.0), 366_000_000 + n, -843_800_000, 30.0) for n in range(4)]
+    with air(board) as link:
+        assert upload_items(link, 1, fence, autopilot, FENCE, options=OPTIONS).verified
+        assert upload_items(link, 1, rally, autopilot, RALLY, options=OPTIONS).verified
+        assert len(board.items(FENCE)) == 5
+        assert len(board.items(RALLY)) == 4
+        with pytest.raises(InputError, match="mission type 0"):
+            upload_items(link, 1, fence, autopilot, 0, options=OPTIONS)
+        assert clear_mission(link, 1, ALL, options=OPTIONS).verified
+    assert board.items(FENCE) == board.items(RALLY) == ()
+
+
+def test_an_armed_vehicle_is_not_cleared() -> None:
+    board = vehicle(armed=True)
+    board.load([HOME.as_item(), *mission().items])
+    with air(board) as link, pytest.raises(VehicleRefused, match="armed"):
+        clear_mission(link, 1, options=OPTIONS)
+    assert len(board.items()) == 9
+
+
+def test_a_mission_that_is_flown_is_not_cleared() -> None:
+    board = vehicle(armed=True)
+    board.load([HOME.as_item(), *mission().items])
+    board.flying_mission = True
+    with air(board) as link, pytest.raises(VehicleRefused, match="flown"):
+        clear_mission(link, 1, options=replace(OPTIONS, allow_armed=True))
+
+
+def test_a_vehicle_that_falls_silent_cannot_be_downloaded_from() -> None:
+    board = vehicle(silent_after=12)
+    board.load([HOME.as_item(), *mission(count=40).items])
+    with air(board) as link, pytest.raises(LinkError, match="could not be read"):
+        download_items(link, 1, options=OPTIONS)
