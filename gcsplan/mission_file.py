@@ -77,10 +77,11 @@ def _text(file: Path, where: str) -> str:
     try:
         if file.is_dir():
             raise InputError("this is a folder; give a mission file (.yaml)", where=where)
-        size = file.stat().st_size
-        if size > MAX_BYTES:
-            raise InputError(f"a mission file has at most {MAX_BYTES} bytes, this one {size}", where=where)
-        return file.read_bytes().decode("utf-8-sig")
+        with file.open("rb") as opened:  # not by its size: a pipe or a device has none
+            data = opened.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise InputError(f"a mission file has at most {MAX_BYTES} bytes, this one has more", where=where)
+        return data.decode("utf-8-sig")
     except InputError:
         raise
     except UnicodeDecodeError as why:
@@ -109,7 +110,7 @@ class _Reading:
             for key in ("version", "terrain", "vehicles")
             if raw.get(key) is None
         ]
-        name = self._plain("name", str, self.file.stem)
+        name = self._name()
         altitude_frame: AltitudeFrame = self._choice("altitude_frame", get_args(AltitudeFrame), "relative")
         terrain_error_m = self._terrain_error(altitude_frame)
         frame_keys = self._section(FrameKeys, "frame")
@@ -164,16 +165,14 @@ class _Reading:
 
     # -- the plain keys ------------------------------------------------------------------------------------------
 
-    def _plain(self, key: str, kind: type[Any], default: Any) -> Any:
-        value = self.raw.get(key)
+    def _name(self) -> str:
+        value = self.raw.get("name")
         if value is None:
-            return default
-        if not isinstance(value, kind) or not value.strip() or len(value) > 300:
-            self.problems.append(
-                Problem(self.where + key, f"must be text, 300 characters at most, given {shown(value)}")
-            )
-            return default
-        return value
+            return self.file.stem
+        if not isinstance(value, str) or not value.strip() or len(value) > 300:
+            words = f"must be text, 300 characters at most, given {shown(value)}"
+            self.problems.append(Problem(f"{self.where}name", words))
+        return str(value)
 
     def _choice(self, key: str, choices: tuple[str, ...], default: str) -> Any:
         value = self.raw.get(key)

@@ -28,8 +28,8 @@ from gcsplan.world.world import World
 
 __all__ = ["Plan", "VehiclePlan", "load_mission", "plan", "world_of"]
 
-ATTEMPTS = 3
-"""Plans for one vehicle, each with three times the margins of the one before, until the decoded mission passes."""
+ATTEMPTS = 4
+"""Plans for one vehicle, each with larger margins than the one before, until the decoded mission passes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,32 +126,43 @@ def _plan_vehicle(
     progress: Callable[[Progress], None] | None,
 ) -> VehiclePlan:
     vehicle = request.vehicle
-    failed: Verdict | None = None
-    for attempt in range(ATTEMPTS):
-        factor = 3.0**attempt
-        margins = Margins(*(factor * x for x in (MARGINS.altitude_m, MARGINS.track_m, MARGINS.bow_m, MARGINS.slope)))
+    margins, failed = MARGINS, None
+    for _ in range(ATTEMPTS):
         problem, notes = make_problem(source, request, world, objective, seed, margins, progress)
         solution = _run(run, problem, vehicle, world)
-        order = Order(request.end, source.altitude_frame)
-        mission = build_mission(solution.path, world, vehicle, request.start_deg, order)
-        limit = manner(vehicle.autopilot).max_items
-        count = len(mission.wire_items())
-        if limit is not None and count > limit:
-            raise NoMission(
-                f"{vehicle.name}: the mission has {count} items and {vehicle.autopilot} takes {limit}: "
-                f"put the goal nearer, or plan it in stages",
-                reason="too_many_items",
+        for spaced in (True, False):  # way points nearer than the acceptance radii are dropped where that is legal
+            order = Order(request.end, source.altitude_frame, spaced=spaced)
+            mission = build_mission(solution.path, world, vehicle, request.start_deg, order)
+            _require_room(mission, vehicle)
+            verdict = judge(
+                mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=source.terrain_error_m
             )
-        verdict = judge(
-            mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=source.terrain_error_m
-        )
-        if not verdict.findings:
-            return VehiclePlan(request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes)
+            if not verdict.findings:
+                return VehiclePlan(request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes)
         failed = verdict
         if not any(f.seq > mission.first_seq for f in verdict.findings if f.kind != "battery"):
             break  # no margin mends a battery or a take-off column
+        margins = _larger(margins, verdict, terrain=source.altitude_frame == "terrain")
     assert failed is not None
     raise _unsafe(failed, vehicle)
+
+
+def _require_room(mission: Mission, vehicle: Vehicle) -> None:
+    limit, count = manner(vehicle.autopilot).max_items, len(mission.wire_items())
+    if count > limit:
+        raise NoMission(
+            f"{vehicle.name}: the mission has {count} items and {vehicle.autopilot} takes {limit}: put the goal nearer, "
+            f"or plan it in stages",
+            reason="too_many_items",
+        )
+
+
+def _larger(margins: Margins, verdict: Verdict, *, terrain: bool) -> Margins:
+    """Margins for another attempt. Over sloping ground a terrain-frame leg is low all along, not at one hilltop."""
+    low_m = max((f.by for f in verdict.findings if f.kind == "min_agl"), default=0.0) if terrain else 0.0
+    return Margins(
+        3.0 * margins.altitude_m + 1.05 * low_m, 3.0 * margins.track_m, 3.0 * margins.bow_m, 3.0 * margins.slope
+    )
 
 
 def _unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:

@@ -46,7 +46,6 @@ def read_yaml(text: str, *, where: str) -> Any:
     Raises InputError, with line and column, for anything that is not YAML, for tags, duplicate keys, and text beyond
     the bounds of this module.
     """
-    # Four bytes are the most that UTF-8 needs for a character.
     if len(text) > MAX_BYTES:
         raise InputError(f"the file has {len(text)} characters, more than {MAX_BYTES // 10**6} million", where=where)
     try:

@@ -9,13 +9,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
 from gcsplan.errors import CheckFailed, GcsplanError, InputError, LinkError, ReadBackDiffers, VehicleRefused
 from gcsplan.mavlink.autopilots import altitude_of_cm
 from gcsplan.mavlink.compare import compare, faults
 from gcsplan.mavlink.frames import SigningKey
-from gcsplan.mavlink.link import Link
+from gcsplan.mavlink.link import Heard, Link
 from gcsplan.mavlink.messages import Address
 from gcsplan.mavlink.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
 from gcsplan.mavlink.parameters import judge_parameters
@@ -33,7 +34,7 @@ from gcsplan.mavlink.session import (
     verify_mission,
 )
 from gcsplan.mavlink.transfer import Progress, Timers
-from gcsplan.mavlink.watch import BOOT, CRITICAL, POWEROFF, STANDBY, UNINIT, VehicleState
+from gcsplan.mavlink.watch import BOOT, CRITICAL, POWEROFF, STANDBY, UNINIT, VehicleState, Watch
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -252,6 +253,44 @@ def test_a_vehicle_tells_what_it_is_and_where() -> None:
     assert state.amsl_m == pytest.approx(371.0)
     assert state.can(4) is True
     assert state.can(512) is False
+
+
+def beat(compid: int, kind: int, autopilot: int, peer: str = "a", now: float = 0.0) -> tuple[Heard, float]:
+    message = dialect.MAVLink_heartbeat_message(kind, autopilot, 0, 0, STANDBY, 3)
+    return Heard(Address(1, compid), peer, message), now
+
+
+def test_cameras_companions_and_ground_stations_are_no_rivals() -> None:
+    watch = Watch(1)
+    for compid, kind in ((100, 30), (154, 26), (191, 18), (190, 6)):
+        watch.note(*beat(compid, kind, 8))
+        assert watch.state(0.0) is None
+    watch.note(*beat(1, 2, 3))
+    state = watch.state(0.0)
+    assert state is not None
+    assert (state.address, state.sources) == (Address(1, 1), 1)
+
+
+def test_one_number_from_two_places_or_two_autopilots_under_one_number_are_counted() -> None:
+    watch = Watch(1)
+    watch.note(*beat(1, 2, 3, "a"))
+    watch.note(*beat(1, 2, 3, "b"))
+    assert getattr(watch.state(0.0), "sources", 0) == 2
+    watch.note(*beat(1, 2, 3, "b", 10.0))
+    assert getattr(watch.state(10.0), "sources", 0) == 1  # the other has long been silent
+    watch.note(*beat(2, 2, 12, "b", 10.0))
+    assert getattr(watch.state(10.0), "sources", 0) == 2
+
+
+def test_what_a_vehicle_says_is_kept_in_bounds() -> None:
+    watch = Watch(1)
+    for n in range(100):
+        text = dialect.MAVLink_statustext_message(6, f"text\x07 {n}".encode())
+        watch.note(Heard(Address(1, 1), "a", text), 0.0)
+        watch.note(*beat(1, 2, 3, f"peer {n}"))
+    assert watch.texts_since(98) == ("text 98", "text 99")
+    assert len(watch.texts_since(0)) == len(watch.texts) < 100
+    assert getattr(watch.state(0.0), "sources", 0) < 100
 
 
 # -- preflight alone ----------------------------------------------------------------------------------------------

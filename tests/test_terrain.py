@@ -673,9 +673,7 @@ def test_an_hgt_without_its_name_is_refused_with_the_cure(tmp_path: Path) -> Non
     assert "N36W085.hgt" in str(refusal(hgt(tmp_path / "tile.hgt", hills(1201, 1201))))
 
 
-@settings(
-    deadline=None, derandomize=True, max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(deadline=None, derandomize=True, max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_garbled_ascii_grid_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> None:
     number = st.sampled_from(["100", "0", "-1", "1e9", "99999999999", "nan", "inf", "0.002", "-84.6", "x", "", "36.4"])

@@ -44,11 +44,15 @@ MARGINS = Margins()
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What the mission around a path is to be; ``speed_m_s`` None is the fastest cruise."""
+    """What the mission around a path is to be; ``speed_m_s`` None is the fastest cruise.
+
+    ``spaced`` drops way points nearer to their neighbours than two acceptance radii.
+    """
 
     end: End = "land"
     altitude_frame: AltitudeFrame = "relative"
     speed_m_s: float | None = None
+    spaced: bool = True
 
 
 def acceptance_radius_m(vehicle: Vehicle) -> float:
@@ -65,7 +69,7 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
     """
     datum = world.ground_amsl(*(m.degrees_e7(x) / 1e7 for x in home_deg))
     home = Home.at(*home_deg, round(datum, 2))
-    points = _spaced(path.points, 2.0 * acceptance_radius_m(vehicle))
+    points = _spaced(path.points, 2.0 * acceptance_radius_m(vehicle) if order.spaced else 0.0)
     terrain = order.altitude_frame == "terrain"
     if terrain:  # cut legs keep their height above ground between the ends, as they are flown
         ground = world.airspace.surface.ground_at(points[:, 0], points[:, 1])

@@ -96,7 +96,7 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
         warnings += judge_parameters(
             values, mission, rtl_rel_home_m=options.rtl_rel_home_m, expected=options.expected_parameters
         )
-    said_before = len(watch.texts)
+    said_before = watch.said
     machine = VerifiedUpload(
         task.items,
         task.autopilot,
@@ -117,8 +117,7 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     after = watch.state(clock())
     if after and after.armed and not state.armed:
         warnings.append("the vehicle was armed by somebody during the upload")
-    texts = tuple(watch.texts)[min(said_before, len(watch.texts)) :]
-    return result_of(task, channel, machine.result, clock() - started, warnings, texts)
+    return result_of(task, channel, machine.result, clock() - started, warnings, watch.texts_since(said_before))
 
 
 def reading(channel: Channel, state: VehicleState, mission_type: int, options: Options) -> Steps[Download]:

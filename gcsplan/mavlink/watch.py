@@ -80,11 +80,15 @@ class _Source:
 
 
 class Watch:
-    """Collects what one system id says; ``note`` takes every message, `state` is what it amounts to."""
+    """Collects what one system id says; `note` takes every message, `state` is what it amounts to.
+
+    ``texts`` are the last things said to people, ``said`` counts all of them.
+    """
 
     def __init__(self, sysid: int) -> None:
         self.sysid = sysid
         self.texts: deque[str] = deque(maxlen=_MOST_TEXTS)
+        self.said = 0
         self._sources: dict[tuple[int, Peer], _Source] = {}
         self._place: tuple[float, float, float] | None = None
         self._place_from_fix = False
@@ -103,6 +107,11 @@ class Watch:
         }.get(heard.message.get_type())
         if handler:
             handler(heard, heard.message, now)
+
+    def texts_since(self, said: int) -> tuple[str, ...]:
+        """The texts, as far as they are kept, after the first ``said`` of them."""
+        new = min(self.said - said, len(self.texts))
+        return tuple(self.texts)[len(self.texts) - new :]
 
     def state(self, now: float) -> VehicleState | None:
         """The state now; None before an autopilot's heartbeat."""
@@ -142,6 +151,7 @@ class Watch:
 
     def _text(self, heard: Heard, m: Any, now: float) -> None:
         text = m.text if isinstance(m.text, str) else bytes(m.text).decode(errors="replace")
+        self.said += 1
         self.texts.append("".join(c for c in text if c.isprintable()).strip())
 
 

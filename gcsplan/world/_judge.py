@@ -9,7 +9,7 @@ import numpy as np
 
 
 from gcsplan.world._sweep import SOURCES, TOUCH_M, device, kernel
-from gcsplan.world._sweep_terrain import DEPTH, DEPTH_AT, LOW, LOW_AT, REACH, STEEPEST, UNKNOWN, UNKNOWN_AT, sweep
+from gcsplan.world._sweep_terrain import DEPTH, DEPTH_AT, LOW, LOW_AT, REACH, STEEPEST, UNKNOWN, UNKNOWN_AT, glance, sweep
 from gcsplan.world._sweep_zones import EAST_E, NORTH_N, SOUTH_N, WEST_E, meets
 
 MIN_AGL, TERRAIN, MAX_AGL, MAX_AMSL, COVERAGE, CLIMB, DESCENT = range(7)
@@ -58,8 +58,16 @@ def judge_terrain(m, ground, top, near, far, over, column, e0, n0, h0, e1, n1, h
             judged = want.max_agl_m < math.inf
             if not (full or judged):
                 continue
-        extremes = halo.high if sign > 0.0 else halo.low
-        good = sweep(m, z, halo.slope, extremes, halo.cols, halo.rows, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full, out)
+        sure = glance(m, z, halo.slope, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out)
+        good = sure > 0
+        if sure < 0 and judged:
+            return False
+        if not good:
+            extremes = halo.high if sign > 0.0 else halo.low
+            good = sweep(
+                m, z, halo.slope, extremes, halo.cols, halo.rows, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full,
+                out,
+            )  # fmt: skip
         if not good and judged:
             if not full:
                 return False

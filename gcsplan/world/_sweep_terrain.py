@@ -34,6 +34,7 @@ MOST_PIECES = 1_000_000
 
 SMALLEST_M = 1e-3
 EDGE = 1e-9  # columns or rows by which a leg along the border may seem to lie beyond it
+INSIDE = 1e-6  # columns or rows from the border within which the fast look leaves the leg to the thorough one
 GROUP_M, GROUP_BOW_M = 500.0, 0.003  # longest stretch, and its bow, that the second tier is given at once
 
 # What `sweep` leaves behind, by place.
@@ -165,6 +166,83 @@ def least_in_cell(sign, kd, turn, before, after, t, tb):  # type: ignore[no-unty
             if value < least:
                 return value, t + s * (tb - t)
     return least, where
+
+
+@device
+def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out):  # type: ignore[no-untyped-def]
+    """The first tier alone, fast: 1 where the demand is surely kept, -1 where the line itself breaks it, 0 unsure.
+
+    With ``full`` the whole leg is looked at; then, if 1, ``out`` is as `sweep` leaves it. Near unknown ground and at the
+    border it is never sure.
+    """
+    rows, cols = z.shape
+    parts, bow = parts_of(m, math.hypot(e1 - e0, n1 - n0), BOW_M)
+    r = reach + bow + m[ERROR_M]
+    share = 1.0 / parts
+    low, low_at, steepest = math.inf, 0.0, 0.0
+    sure = 1
+    cb, rb = to_grid(m, e0, n0)
+    for part in range(parts):
+        first = part * share
+        c0, r0 = cb, rb
+        if part == parts - 1:
+            cb, rb = to_grid(m, e1, n1)
+        else:
+            cb, rb = to_grid(m, e0 + (e1 - e0) * (first + share), n0 + (n1 - n0) * (first + share))
+        if not (
+            INSIDE < min(c0, cb)
+            and max(c0, cb) < cols - 1 - INSIDE
+            and INSIDE < min(r0, rb)
+            and max(r0, rb) < rows - 1 - INSIDE
+        ):
+            return 0
+        dc, dr = cb - c0, rb - r0
+        i, j = int(c0), int(r0)
+        side_c, side_r = (1 if dc > 0.0 else 0), (1 if dr > 0.0 else 0)
+        per_c, per_r = 1.0 / dc, 1.0 / dr
+        tx = (i + side_c - c0) * per_c if dc != 0.0 else math.inf
+        ty = (j + side_r - r0) * per_r if dr != 0.0 else math.inf
+        h = sign * (h0 + (h1 - h0) * first)
+        rise = sign * (h1 - h0) * share
+        u, v = c0 - i, r0 - j
+        za = z[j, i]
+        kb, kc = z[j, i + 1] - za, z[j + 1, i] - za
+        agl = h - sign * (za + kb * u + kc * v + (z[j + 1, i + 1] - za - kb - kc) * u * v)
+        t = 0.0
+        while True:
+            tb = min(min(tx, ty), 1.0)
+            za = z[j, i]
+            kb, kc = z[j, i + 1] - za, z[j + 1, i] - za
+            kd = z[j + 1, i + 1] - za - kb - kc
+            u, v = c0 + tb * dc - i, r0 + tb * dr - j
+            after = h + tb * rise - sign * (za + kb * u + kc * v + kd * u * v)
+            slope = slopes[j, i]
+            if not 0.0 <= slope < math.inf:
+                return 0
+            steepest = max(steepest, slope)
+            turn = dc * dr * (tb - t) * (tb - t)
+            # A quarter of the bulge is the most that the line can dip below the lower end.
+            if min(agl, after) + min(0.25 * sign * kd * turn, 0.0) < low:
+                least, where = least_in_cell(sign, kd, turn, agl, after, t, tb)
+                if least < low:
+                    low, low_at = least, first + where * share
+            if low - r * slope < need:
+                if not full:
+                    return -1 if need - low > TOUCH_M else 0
+                sure = 0
+            agl = after
+            if tb >= 1.0:
+                break
+            t = tb
+            if tx <= ty:
+                i += 2 * side_c - 1
+                tx = (i + side_c - c0) * per_c
+            else:
+                j += 2 * side_r - 1
+                ty = (j + side_r - r0) * per_r
+    out[LOW], out[LOW_AT], out[DEPTH], out[DEPTH_AT] = low, low_at, need - low, low_at
+    out[UNKNOWN], out[UNKNOWN_AT], out[STEEPEST], out[REACH] = math.inf, 0.0, steepest, r
+    return sure
 
 
 @device
