@@ -151,8 +151,8 @@ def _require_room(mission: Mission, vehicle: Vehicle) -> None:
     limit, count = manner(vehicle.autopilot).max_items, len(mission.wire_items())
     if count > limit:
         raise NoMission(
-            f"{vehicle.name}: the mission has {count} items and {vehicle.autopilot} takes {limit}: put the goal nearer, "
-            f"or plan it in stages",
+            f"{vehicle.name}: the mission has {count} items and {vehicle.autopilot} takes {limit}: put the goal "
+            f"nearer, or plan it in stages",
             reason="too_many_items",
         )
 

@@ -21,11 +21,11 @@ from gcsplan.export.kml import DRAWN_TOP_M, write_kml
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import ItemRow, Track, outline_deg
 from gcsplan.export.summary import ORDER, write_summary
+from gcsplan.mission_file.zone_draft import place_zones
+from gcsplan.mission_file.zone_geojson import read_zones
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
-from gcsplan.zone_draft import place_zones
-from gcsplan.zone_files import read_zones
 
 FRAME = Frame(36.6, -84.3)
 TRACK = Track(

@@ -42,8 +42,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "cli": EVERYTHING,
 }
 
-# Modules beside the rooms that belong to one: the user's file and what it names, and the way of the data.
-READERS = ("mission_", "zone_", "strict_yaml")
+# Modules beside the rooms that belong to one: the way of the data.
 STEPS = {"outputs", "delivery", "checking"}
 
 PROJECTION = {"world/frame.py", "world/datum.py", "world/terrain.py"}
@@ -63,8 +62,6 @@ def room_of(path: Path) -> str:
 
 def room(top: str) -> str:
     """The room of a module or folder that stands directly in the package."""
-    if top.startswith(READERS):
-        return "mission_file"
     return "pipeline" if top in STEPS else top
 
 

@@ -344,21 +344,21 @@ def _rooms(problem: Problem, track: Track) -> _Room:
 
 
 def _close_to_ends(problem: Problem, tube: Tube) -> Floats:
-    """Places near an end to be looked at one by one, where the tube's floor is beyond what can be climbed to.
+    """Places near an end to be looked at one by one, where the tube's floor is over it or beyond the climb limit.
 
     A tube bounds the floor over whole pieces. Start and goal lie on the floor more often than not, and a bound that
     is a metre too high a few metres away would shut them in.
     """
     limits, length = problem.limits, float(tube.s_m[-1])
     out = []
-    for at_start, z, slope, away, floor in (
-        (True, problem.start[2], limits.max_climb_slope, tube.s_m[1:], tube.floor_m[:, 1]),
-        (False, problem.goal[2], limits.max_descent_slope, length - tube.s_m[-2::-1], tube.floor_m[::-1, 0]),
+    up, down = limits.max_climb_slope, limits.max_descent_slope
+    for at_start, z, slope, away, floor, end_floor in (
+        (True, problem.start[2], up, tube.s_m[1:], tube.floor_m[:, 1], tube.floor_m[0, 0]),
+        (False, problem.goal[2], down, length - tube.s_m[-2::-1], tube.floor_m[::-1, 0], tube.floor_m[-1, 1]),
     ):
-        if np.isinf(slope):
-            continue
         count = int(np.searchsorted(away, CLOSE_M, "right"))
-        if (floor[:count] > z + slope * away[:count]).any():
+        shut = not np.isinf(slope) and (floor[:count] > z + slope * away[:count]).any()
+        if shut or end_floor > z:
             steps = np.arange(CLOSE_STEP_M, min(CLOSE_M, 0.5 * length), CLOSE_STEP_M)
             out.append(steps if at_start else length - steps)
     return np.concatenate(out) if out else np.zeros(0)

@@ -18,13 +18,23 @@ from gcsplan.world._sweep import (
     device,
     kernel,
     parts_of,
-    point_segment,
     slab,
     to_grid,
 )
 from gcsplan.world._sweep_terrain import EDGE, unknown_near
 from gcsplan.world._sweep_zones import (
-    CEILING_AGL, EAST, EAST_E, FIRST, FLOOR_AGL, LAST, NORTH, NORTH_N, RADIUS, SOUTH_N, WEST_E, signed_distance,
+    CEILING_AGL,
+    EAST,
+    EAST_E,
+    FIRST,
+    FLOOR_AGL,
+    LAST,
+    NORTH,
+    NORTH_N,
+    RADIUS,
+    SOUTH_N,
+    WEST_E,
+    signed_distance,
 )  # fmt: skip
 
 CHORD_M = 0.05

@@ -5,11 +5,19 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-
 from gcsplan.world._sweep import SOURCES, TOUCH_M, device, kernel
-from gcsplan.world._sweep_terrain import DEPTH, DEPTH_AT, LOW, LOW_AT, REACH, STEEPEST, UNKNOWN, UNKNOWN_AT, glance, sweep
+from gcsplan.world._sweep_terrain import (
+    DEPTH,
+    DEPTH_AT,
+    LOW,
+    LOW_AT,
+    REACH,
+    STEEPEST,
+    UNKNOWN,
+    UNKNOWN_AT,
+    glance,
+    sweep,
+)
 from gcsplan.world._sweep_zones import EAST_E, NORTH_N, SOUTH_N, WEST_E, meets
 
 MIN_AGL, TERRAIN, MAX_AGL, MAX_AMSL, COVERAGE, CLIMB, DESCENT = range(7)

@@ -172,7 +172,8 @@ def least_in_cell(sign, kd, turn, before, after, t, tb):  # type: ignore[no-unty
 def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out):  # type: ignore[no-untyped-def]
     """The first tier alone, fast: 1 where the demand is surely kept, -1 where the line itself breaks it, 0 unsure.
 
-    With ``full`` the whole leg is looked at; then, if 1, ``out`` is as `sweep` leaves it. Near unknown ground and at the
+    With ``full`` the whole leg is looked at; then, if 1, ``out`` is as `sweep` leaves it; without, the lowest there is a
+    lower bound. Near unknown ground and at the
     border it is never sure.
     """
     rows, cols = z.shape
@@ -190,9 +191,9 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
         else:
             cb, rb = to_grid(m, e0 + (e1 - e0) * (first + share), n0 + (n1 - n0) * (first + share))
         if not (
-            INSIDE < min(c0, cb)
+            min(c0, cb) > INSIDE
             and max(c0, cb) < cols - 1 - INSIDE
-            and INSIDE < min(r0, rb)
+            and min(r0, rb) > INSIDE
             and max(r0, rb) < rows - 1 - INSIDE
         ):
             return 0
@@ -217,19 +218,18 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
             u, v = c0 + tb * dc - i, r0 + tb * dr - j
             after = h + tb * rise - sign * (za + kb * u + kc * v + kd * u * v)
             slope = slopes[j, i]
-            if not 0.0 <= slope < math.inf:
-                return 0
-            steepest = max(steepest, slope)
             turn = dc * dr * (tb - t) * (tb - t)
-            # A quarter of the bulge is the most that the line can dip below the lower end.
-            if min(agl, after) + min(0.25 * sign * kd * turn, 0.0) < low:
-                least, where = least_in_cell(sign, kd, turn, agl, after, t, tb)
-                if least < low:
-                    low, low_at = least, first + where * share
-            if low - r * slope < need:
+            # A quarter of the bulge is the most that the line can dip below its lower end.
+            least = min(agl, after) + min(0.25 * sign * kd * turn, 0.0)
+            if not (slope >= 0.0 and least - r * slope >= need):
                 if not full:
-                    return -1 if need - low > TOUCH_M else 0
+                    return -1 if need - min(agl, after) > TOUCH_M else 0
                 sure = 0
+            steepest = max(steepest, slope)
+            if full and least < low:
+                least, where = least_in_cell(sign, kd, turn, agl, after, t, tb)
+                low_at = first + where * share if least < low else low_at
+            low = min(low, least)
             agl = after
             if tb >= 1.0:
                 break

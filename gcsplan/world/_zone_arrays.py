@@ -10,8 +10,27 @@ from numpy.typing import NDArray
 
 from gcsplan.world._sweep import Field
 from gcsplan.world._sweep_zones import (
-    BAND_HIGH, BAND_LOW, CEILING, CEILING_AGL, COL0, COL1, EAST, EAST_E, FIRST, FLOOR, FLOOR_AGL, LAST, NORTH, NORTH_N,
-    RADIUS, ROW0, ROW1, SOUTH_N, WEST_E, ZONE_NUMBERS, Zones,
+    BAND_HIGH,
+    BAND_LOW,
+    CEILING,
+    CEILING_AGL,
+    COL0,
+    COL1,
+    EAST,
+    EAST_E,
+    FIRST,
+    FLOOR,
+    FLOOR_AGL,
+    LAST,
+    NORTH,
+    NORTH_N,
+    RADIUS,
+    ROW0,
+    ROW1,
+    SOUTH_N,
+    WEST_E,
+    ZONE_NUMBERS,
+    Zones,
 )  # fmt: skip
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Level, Zone

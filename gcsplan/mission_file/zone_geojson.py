@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.zone_draft import Bounds, ZoneDraft, circle, polygon
+from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, circle, polygon
 
 MAX_BYTES = 20_000_000
 MAX_ZONES = 20_000
@@ -75,7 +75,7 @@ def read_zones(path: Path, *, where: str) -> ZoneFile:
         raise InputError(f"zones are read from .geojson, .json and .kml files, given {path.name}{hint}", where=where)
     data = _bytes(path, where)
     if kind == ".kml":
-        from gcsplan.zone_kml import read_kml
+        from gcsplan.mission_file.zone_kml import read_kml
 
         return read_kml(path, data)
     return read_geojson(path, data)

@@ -12,14 +12,14 @@ import shapely
 from numpy.typing import NDArray
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_schema import FrameKeys, LocalPoint, TerrainKeys, ZoneKeys
+from gcsplan.mission_file.schema import FrameKeys, LocalPoint, TerrainKeys, ZoneKeys
+from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, check_degrees, circle, polygon
+from gcsplan.mission_file.zone_geojson import read_zones
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.peaks import Peak
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Terrain, TerrainSpec
 from gcsplan.world.zones import Circle, Level, Zone
-from gcsplan.zone_draft import Bounds, ZoneDraft, check_degrees, circle, polygon
-from gcsplan.zone_files import read_zones
 
 Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]

@@ -15,8 +15,8 @@ import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.zone_draft import Bounds
-from gcsplan.zone_files import LARGEST_M, LEVEL_KEYS, ZoneFile
+from gcsplan.mission_file.zone_draft import Bounds
+from gcsplan.mission_file.zone_geojson import LARGEST_M, LEVEL_KEYS, ZoneFile
 
 MAX_DEPTH = 60
 _SHAPES = ("Polygon", "Point", "LineString", "LinearRing", "Model", "Track", "MultiTrack")

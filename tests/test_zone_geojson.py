@@ -14,12 +14,12 @@ import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gcsplan import zone_files
+from gcsplan.mission_file import zone_geojson
 from gcsplan.errors import InputError, Problem
+from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, circle, looks_swapped, place_zones, polygon, zones_sha256
+from gcsplan.mission_file.zone_geojson import ZoneFile, read_zones
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
-from gcsplan.zone_draft import Bounds, ZoneDraft, circle, looks_swapped, place_zones, polygon, zones_sha256
-from gcsplan.zone_files import ZoneFile, read_zones
 
 FRAME = Frame(36.6, -84.3)
 SQUARE = [[-84.31, 36.59], [-84.29, 36.59], [-84.29, 36.61], [-84.31, 36.61], [-84.31, 36.59]]
@@ -220,12 +220,12 @@ def test_missing_and_oversized_files_are_refused(tmp_path: Path, monkeypatch: py
         with pytest.raises(InputError) as caught:
             read_zones(path, where="m: no_fly[0].file")
         assert caught.value.where == "m: no_fly[0].file"
-    monkeypatch.setattr(zone_files, "MAX_BYTES", 50)
+    monkeypatch.setattr(zone_geojson, "MAX_BYTES", 50)
     assert "more than 50" in messages(tmp_path, collection(square()))
 
 
 def test_too_many_zones_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(zone_files, "MAX_ZONES", 2)
+    monkeypatch.setattr(zone_geojson, "MAX_ZONES", 2)
     assert "more than 2 zones" in messages(tmp_path, collection(*[square()] * 3))
 
 

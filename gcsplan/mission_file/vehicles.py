@@ -7,8 +7,8 @@ from dataclasses import fields
 from typing import Any
 
 from gcsplan.errors import Problem
-from gcsplan.mission_request import ArrivalRequest
-from gcsplan.mission_schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest
+from gcsplan.mission_file.request import ArrivalRequest
+from gcsplan.mission_file.schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 

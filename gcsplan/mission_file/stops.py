@@ -7,9 +7,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from gcsplan.errors import Problem
-from gcsplan.mission_request import VehicleRequest
-from gcsplan.mission_schema import VehicleKeys
-from gcsplan.mission_world import Place, zone_around
+from gcsplan.mission_file.request import VehicleRequest
+from gcsplan.mission_file.schema import VehicleKeys
+from gcsplan.mission_file.world import Place, zone_around
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.frame import Frame
 from gcsplan.world.surface import Surface

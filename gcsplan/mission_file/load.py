@@ -1,8 +1,7 @@
-"""The only reader of the user's request: a mission file becomes vehicles, zones and a surface in metres.
+"""In which order a mission file's parts are asked; every mistake is reported at once.
 
-Every mistake is reported at once, each with file, key path, what was given and what is wanted. What stands where:
-`gcsplan.mission_schema` (keys), `gcsplan.mission_vehicles` (vehicles and limits), `gcsplan.mission_world` (points,
-terrain, zones); this module says in which order they are asked.
+Each has its file, key path, what was given and what is wanted. What stands where: `schema` (keys), `vehicles` and
+`stops` (vehicles, limits, where they go), `world` (points, terrain, zones).
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_request import AltitudeFrame, ArrivalRequest, MissionFile, PlannerRequest, VehicleRequest
-from gcsplan.mission_schema import (
+from gcsplan.mission_file.request import AltitudeFrame, ArrivalRequest, MissionFile, PlannerRequest, VehicleRequest
+from gcsplan.mission_file.schema import (
     TOP_KEYS,
     ArrivalKeys,
     FrameKeys,
@@ -31,9 +30,10 @@ from gcsplan.mission_schema import (
     shown,
     unknown_keys,
 )  # fmt: skip
-from gcsplan.mission_stops import Stops, make_request
-from gcsplan.mission_vehicles import check_unique, make_arrival, make_vehicle
-from gcsplan.mission_world import (
+from gcsplan.mission_file.stops import Stops, make_request
+from gcsplan.mission_file.strict_yaml import MAX_BYTES, read_yaml
+from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle
+from gcsplan.mission_file.world import (
     covered,
     make_box,
     make_frame,
@@ -42,12 +42,11 @@ from gcsplan.mission_world import (
     make_zones,
     settle_zones,
 )  # fmt: skip
-from gcsplan.strict_yaml import MAX_BYTES, read_yaml
+from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, place_zones, zones_sha256
 from gcsplan.world.frame import Frame
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
 from gcsplan.world.zones import Zone
-from gcsplan.zone_draft import ZoneDraft, looks_swapped, place_zones, zones_sha256
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
 
