@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle as CirclePatch
 from matplotlib.patches import Patch
 from matplotlib.patches import Polygon as PolygonPatch
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from gcsplan.check.verdict import Verdict
@@ -82,7 +83,9 @@ def _map(ax: Axes, plan: Plan, extent: tuple[float, float, float, float]) -> Non
         ax.add_patch(_zone_patch(zone))
         x0, y0, x1, y1 = zone.bounds
         if x1 > west and x0 < east and y1 > south and y0 < north:
-            ax.annotate(_zone_words(zone), (0.5 * (x0 + x1), 0.5 * (y0 + y1)), ha="center", va="center", fontsize=7)
+            middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
+            halo = [withStroke(linewidth=2.0, foreground="white", alpha=0.7)]
+            ax.annotate(_zone_words(zone), middle, ha="center", va="center", fontsize=6.5, path_effects=halo, zorder=4)
     for vehicle, track, colour in zip(plan.vehicles, tracks, _colours(len(tracks)), strict=True):
         ax.plot(track[:, 0], track[:, 1], color=colour, lw=2, label=vehicle.name, marker=".", ms=5)
         ax.plot(*track[0, :2], "o", color=colour, ms=9, mec="white")
@@ -107,7 +110,7 @@ def _zone_patch(zone: Zone) -> CirclePatch | PolygonPatch:
 def _zone_words(zone: Zone) -> str:
     if zone.floor is None and zone.ceiling is None:
         return zone.name
-    return f"{zone.name}\n{zone.floor or 'ground'} – {zone.ceiling or 'unlimited'}"
+    return f"{zone.name}\n{zone.floor or 'ground'} – {zone.ceiling or 'unlimited'}".replace(" m AGL –", " –")
 
 
 def _profile(ax: Axes, world: World, verdict: Verdict, min_agl_m: float, colour: str) -> None:
@@ -122,4 +125,4 @@ def _profile(ax: Axes, world: World, verdict: Verdict, min_agl_m: float, colour:
     ax.plot(run / 1000, track[:, 2], color=colour, marker=".", lw=1.6, label="path")
     ax.set(xlabel="distance, km", ylabel="m AMSL", xlim=(0, max(run[-1] / 1000, 1e-3)))
     ax.grid(alpha=0.3)
-    ax.legend(loc="upper right", ncols=3, fontsize=8)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8, frameon=False)

@@ -21,20 +21,22 @@ from gcsplan.world._sweep_terrain import (
 from gcsplan.world._sweep_zones import EAST_E, NORTH_N, SOUTH_N, WEST_E, meets
 
 MIN_AGL, TERRAIN, MAX_AGL, MAX_AMSL, COVERAGE, CLIMB, DESCENT = range(7)
-ANGLE_RAD = 1e-9
 FEW_ZONES = 24  # up to so many boxes are looked through faster than the lattice
 
 
 class Demands(NamedTuple):
-    """Limits for the kernel; ``inf`` is no limit. ``clearance_m`` and track errors times ``scale`` are metres of the plane."""
+    """Limits for the kernel; ``inf`` is no limit. ``max_climb``, ``max_descent``: rise over run.
+
+    ``clearance_m`` and track errors times ``scale`` are metres of the plane.
+    """
 
     min_agl_m: float
     max_agl_m: float
     max_amsl_m: float
     clearance_m: float
     scale: float
-    max_climb_rad: float
-    max_descent_rad: float
+    max_climb: float
+    max_descent: float
 
 
 @device
@@ -123,8 +125,8 @@ def judge(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Judge every leg: ``ok`` (n,). With ``full`` also, by leg:
 
-    ``found``: lowest height above top, its fraction, highest above ground, climb in radians, zone clearance;
-    ``worst`` (7, 2): depth (NaN where there is none) and fraction by kind; ``nearest`` zone. Zones that are broken go to
+    ``found``: lowest height above top, its fraction, highest above ground, zone clearance;
+    ``worst`` (7, 2): depth (NaN where there is none; 1 for a climb too steep) and fraction by kind; ``nearest`` zone. Zones that are broken go to
     ``hit`` (leg, zone) and ``hit_at`` (signed distance, fraction) as far as there is room; their number is returned.
     """
     zone = zs.table
@@ -134,11 +136,12 @@ def judge(  # type: ignore[no-untyped-def]
     for i in range(len(start)):
         e0, n0, h0 = start[i, 0], start[i, 1], start[i, 2]
         e1, n1, h1 = end[i, 0], end[i, 1], end[i, 2]
-        climb = math.atan2(h1 - h0, math.hypot(e1 - e0, n1 - n0))
+        flat = math.sqrt((e1 - e0) ** 2 + (n1 - n0) ** 2)
         over_top = max(h0, h1) + altitude[i] - want.max_amsl_m
-        up = 0.0 if column[i] else climb - want.max_climb_rad
-        down = 0.0 if column[i] else -climb - want.max_descent_rad
-        fine = not (up > ANGLE_RAD or down > ANGLE_RAD or over_top > TOUCH_M)
+        # A slope without limit is inf, and inf times a leg that only climbs is NaN, which nothing exceeds.
+        up = not column[i] and h1 - h0 > flat * want.max_climb
+        down = not column[i] and h0 - h1 > flat * want.max_descent
+        fine = not (up or down or over_top > TOUCH_M)
         ok[i] = False
         if not (fine or full):
             continue
@@ -182,12 +185,12 @@ def judge(  # type: ignore[no-untyped-def]
                 best, which = max(dist, 0.0), k
         ok[i] = fine
         if full:
-            found[i, 0], found[i, 1], found[i, 2], found[i, 3], found[i, 4] = out[8], out[9], out[10], climb, best
+            found[i, 0], found[i, 1], found[i, 2], found[i, 3] = out[8], out[9], out[10], best
             nearest[i] = which
-            if up > ANGLE_RAD:
-                worst[i, CLIMB, 0] = up
-            if down > ANGLE_RAD:
-                worst[i, DESCENT, 0] = down
+            if up:
+                worst[i, CLIMB, 0] = 1.0
+            if down:
+                worst[i, DESCENT, 0] = 1.0
             if over_top > TOUCH_M:
                 worst[i, MAX_AMSL, 0], worst[i, MAX_AMSL, 1] = over_top, 1.0 if h1 >= h0 else 0.0
     return hits

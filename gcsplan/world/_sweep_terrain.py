@@ -177,7 +177,7 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
     border it is never sure.
     """
     rows, cols = z.shape
-    parts, bow = parts_of(m, math.hypot(e1 - e0, n1 - n0), BOW_M)
+    parts, bow = parts_of(m, math.sqrt((e1 - e0) ** 2 + (n1 - n0) ** 2), BOW_M)
     r = reach + bow + m[ERROR_M]
     share = 1.0 / parts
     low, low_at, steepest = math.inf, 0.0, 0.0
@@ -221,7 +221,7 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
             turn = dc * dr * (tb - t) * (tb - t)
             # A quarter of the bulge is the most that the line can dip below its lower end.
             least = min(agl, after) + min(0.25 * sign * kd * turn, 0.0)
-            if not (slope >= 0.0 and least - r * slope >= need):
+            if not (0.0 <= slope < math.inf and least - r * slope >= need):
                 if not full:
                     return -1 if need - min(agl, after) > TOUCH_M else 0
                 sure = 0

@@ -32,6 +32,9 @@ from gcsplan.world.zones import Zone
 __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 
 Floats = NDArray[np.float64]
+ANGLE_DEG = 1e-7
+"""Float noise of an angle: a climb that is steeper by less is legal."""
+
 Kind = Literal["min_agl", "max_agl", "max_amsl", "terrain_clearance", "zone", "climb", "descent", "coverage"]
 
 
@@ -148,7 +151,7 @@ class Airspace:
     def examine(self, legs: Legs, limits: Limits) -> LegReport:
         """Every violation along the whole of every leg. ``limits``' own errors are not used: the legs carry them."""
         n = len(legs)
-        ok, found = np.zeros(n, np.bool_), np.full((n, 5), np.nan)
+        ok, found = np.zeros(n, np.bool_), np.full((n, 4), np.nan)
         worst, nearest = np.full((n, 7, 2), np.nan), np.full(n, -1, np.intp)
         worst[:, :, 1] = 0.0
         room = n + 64
@@ -158,14 +161,16 @@ class Airspace:
             if hits <= room:
                 break
             room = hits
+        run, rise = np.hypot(*(legs.end - legs.start)[:, :2].T), legs.end[:, 2] - legs.start[:, 2]
+        climb_deg = np.degrees(np.arctan2(rise, run))
         return LegReport(
             found[:, 0],
             found[:, 1],
             found[:, 2],
-            np.degrees(found[:, 3]),
-            found[:, 4],
+            climb_deg,
+            found[:, 3],
             nearest,
-            self._violations(legs, limits, found, worst, hit[:hits], hit_at[:hits]),
+            self._violations(legs, limits, climb_deg, worst, hit[:hits], hit_at[:hits]),
         )
 
     def clear(self, legs: Legs, limits: Limits) -> NDArray[np.bool_]:
@@ -248,7 +253,7 @@ class Airspace:
         )  # fmt: skip
 
     def _violations(
-        self, legs: Legs, limits: Limits, found: Floats, worst: Floats, hit: NDArray[np.intp], hit_at: Floats
+        self, legs: Legs, limits: Limits, climb_deg: Floats, worst: Floats, hit: NDArray[np.intp], hit_at: Floats
     ) -> tuple[Violation, ...]:
         """Violations by leg, in the order of the kinds."""
         out: list[Violation] = []
@@ -258,10 +263,9 @@ class Airspace:
         for i, k, by, t in zip(where.tolist(), kinds.tolist(), depth.tolist(), fraction.tolist(), strict=True):
             unit = "m"
             if k in (CLIMB, DESCENT):
-                limit, by, unit = (
-                    (limits.max_climb_deg if k == CLIMB else limits.max_descent_deg), math.degrees(by), "deg",
-                )  # fmt: skip
-                value = limit + by
+                unit, value = "deg", abs(float(climb_deg[i]))
+                limit = limits.max_climb_deg if k == CLIMB else limits.max_descent_deg
+                by = max(value - limit, ANGLE_DEG)
             elif k == COVERAGE:
                 limit = float(reach[i])
                 value = max(limit - by, 0.0)
@@ -294,8 +298,13 @@ _KINDS: dict[int, Kind] = {
 }  # fmt: skip
 
 _NOTHING = (
-    np.zeros((0, 5)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),
+    np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),
 )  # fmt: skip
+
+
+def _steepest(degrees: float) -> float:
+    """Rise over run of the steepest legal leg, float noise forgiven."""
+    return math.inf if degrees >= 90.0 else math.tan(math.radians(degrees + ANGLE_DEG))
 
 
 def _demands(limits: Limits, scale: float) -> Demands:
@@ -305,6 +314,6 @@ def _demands(limits: Limits, scale: float) -> Demands:
         math.inf if limits.max_amsl_m is None else float(limits.max_amsl_m),
         float(limits.horizontal_clearance_m),
         float(scale),
-        math.radians(limits.max_climb_deg),
-        math.radians(limits.max_descent_deg),
+        _steepest(limits.max_climb_deg),
+        _steepest(limits.max_descent_deg),
     )
