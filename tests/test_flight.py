@@ -112,7 +112,7 @@ def test_an_arduplane_return_is_judged_over_the_whole_band_of_altitudes() -> Non
     )  # fmt: skip
     back, circle = flight.stretches[-2:]
     assert (back.start[2], back.end[2], back.band_m) == (400, 400, 20)
-    assert circle.reach_m == 60
+    assert 60 < circle.reach_m < 75  # it widens with altitude
     assert math.isinf(circle.hold_s)
 
 
@@ -153,7 +153,7 @@ def test_items_after_the_landing_are_named() -> None:
 
 def test_a_fixed_wings_loiter_is_a_circle_and_a_copters_is_a_point() -> None:
     plane = fly(at(m.VTOL_TAKEOFF, 0, 0, 65), at(m.LOITER_UNLIM, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE)
-    assert plane.stretches[-1].reach_m == 60
+    assert 60 < plane.stretches[-1].reach_m < 75
     assert fly(TAKEOFF, at(m.LOITER_UNLIM, 0.01, 0, 80)).stretches[-1].reach_m == 0
     turns = MissionItem(m.LOITER_TURNS, m.RELATIVE, (3, 0, -40, 0), m.degrees_e7(36.61), m.degrees_e7(-84.3), 80)
     circle = fly(TAKEOFF, turns).stretches[-1]

@@ -7,11 +7,13 @@ and altitude error and by the bow between the line straight in the plane and the
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcsplan.check.flight import Flight, follow
+from gcsplan.check.flight import follow
+from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.mission import Mission
@@ -56,10 +58,16 @@ def judge(
     if not flight.stretches:
         flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle")
         return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
-    plane = _legs(flight, vehicle.limits, world, terrain_error_m)
+    plane = _legs(flight.stretches, vehicle.limits, world, terrain_error_m)
     report = world.airspace.examine(plane.legs, vehicle.limits)
     figures = _figures(flight, plane, report, vehicle, world)
-    findings += _findings(flight, plane, report, world)
+    findings += _findings(flight.stretches, plane, report, world)
+    if flight.instead:  # what may be flown in place of a stretch must be legal; its figures are not the mission's
+        plane = _legs(flight.instead, vehicle.limits, world, terrain_error_m)
+        report = world.airspace.examine(plane.legs, vehicle.limits)
+        known = {(f.seq, f.kind, f.zone) for f in findings}
+        more = _findings(flight.instead, plane, report, world)
+        findings += [f for f in more if (f.seq, f.kind, f.zone) not in known]
     if any(s.terrain for s in flight.stretches):
         flight.notes.append(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged with {terrain_error_m:g} m of error"
@@ -68,14 +76,14 @@ def judge(
     return _with_battery(verdict, vehicle)
 
 
-def _legs(flight: Flight, limits: Limits, world: World, terrain_error_m: float) -> _Plane:
-    places = np.array([(s.start, s.end) for s in flight.stretches])
+def _legs(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> _Plane:
+    places = np.array([(s.start, s.end) for s in stretches])
     plane = np.empty_like(places)
     plane[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
     plane[..., 2] = places[..., 2]
     bow_m = world.frame.bow_m(places[:, 0, :2], places[:, 1, :2])
     starts, ends, owner, track, height = [], [], [], [], []
-    for i, s in enumerate(flight.stretches):
+    for i, s in enumerate(stretches):
         cuts, deviation = _follow_ground(plane[i], world) if s.terrain else (plane[i], np.zeros(1))
         starts.append(cuts[:-1])
         ends.append(cuts[1:])
@@ -83,7 +91,7 @@ def _legs(flight: Flight, limits: Limits, world: World, terrain_error_m: float) 
         track += [limits.track_error_m + bow_m[i] + s.reach_m] * (len(cuts) - 1)
         height += list(limits.altitude_error_m + s.band_m + (terrain_error_m if s.terrain else 0.0) + deviation)
     owners = np.array(owner, dtype=np.intp)
-    column = np.array([s.column for s in flight.stretches])[owners]
+    column = np.array([s.column for s in stretches])[owners]
     legs = Legs(np.concatenate(starts), np.concatenate(ends), column, np.array(track), np.array(height))
     return _Plane(legs, owners)
 
@@ -175,7 +183,7 @@ WORDS = {
 }
 
 
-def _findings(flight: Flight, plane: _Plane, report: LegReport, world: World) -> list[Finding]:
+def _findings(stretches: Sequence[Stretch], plane: _Plane, report: LegReport, world: World) -> list[Finding]:
     """The worst violation of each kind and zone on each stretch, in the order flown."""
     worst: dict[tuple[int, str, int], Violation] = {}
     for v in report.violations:
@@ -184,7 +192,7 @@ def _findings(flight: Flight, plane: _Plane, report: LegReport, world: World) ->
             worst[key] = v
     found = []
     for (owner, kind, zone), v in sorted(worst.items(), key=lambda kv: kv[0][0]):
-        s = flight.stretches[owner]
+        s = stretches[owner]
         lat, lon = (float(x) for x in world.frame.to_degrees(v.east_m, v.north_m))
         name = world.airspace.zones[zone].name if zone >= 0 else ""
         what = WORDS[kind] + (f" “{name}” or its clearance" if name else "")

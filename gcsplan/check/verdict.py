@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gcsplan.check.flight import Place, StretchKind
+from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.mavlink.mission import Mission
 
 

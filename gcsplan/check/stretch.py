@@ -1,0 +1,45 @@
+"""What a flight is made of: straight stretches, and what is not known of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+StretchKind = Literal["takeoff", "cruise", "land", "loiter", "rtl"]
+Place = tuple[float, float, float]
+"""Latitude, longitude in degrees, altitude AMSL in metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """One straight stretch, flown on behalf of wire item ``seq``.
+
+    ``column``: vertical take-off or landing. ``terrain``: altitude is interpolated above ground between the ends.
+    ``band_m`` widens the altitude error (altitude is known only within a band), ``reach_m`` the track error (a
+    loiter's circle). ``on_path``: counts for the path's length, from the top of the take-off to the approach.
+    """
+
+    seq: int
+    kind: StretchKind
+    start: Place
+    end: Place
+    speed_m_s: float
+    column: bool = False
+    terrain: bool = False
+    band_m: float = 0.0
+    reach_m: float = 0.0
+    hold_s: float = 0.0
+    on_path: bool = False
+
+
+@dataclass(slots=True)
+class Flight:
+    """All stretches in order, what could not be followed, and what is assumed.
+
+    ``instead``: stretches that another version flies in place of one of the ``stretches``; they must be legal too.
+    """
+
+    stretches: list[Stretch] = field(default_factory=list)
+    instead: list[Stretch] = field(default_factory=list)
+    not_judged: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
