@@ -214,7 +214,7 @@ def test_ssgwo_table_3_is_solved_within_one_percent(unlimited: bool, optimum_m: 
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_random_missions_on_the_sample_are_is_solved_in_words(seed: int) -> None:
+def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
     _is_solved(random_mission(seed))
 
 

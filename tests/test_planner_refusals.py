@@ -13,7 +13,7 @@ from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.planner_worlds import Floats, ground
 
 LOW = Limits(min_agl_m=10.0)
@@ -72,6 +72,12 @@ def test_start_within_a_zones_clearance_names_the_zone() -> None:
     )
     assert e.reason == "infeasible"
     assert "the start lies in no-fly zone 'village' or within 60.0 m" in e.message
+
+
+def test_start_inside_a_polygon_names_it() -> None:
+    square = Polygon(np.array([[100.0, 900.0], [300.0, 900.0], [300.0, 1100.0], [100.0, 1100.0]]))
+    e = refused(ground(0.0), (Zone("town", square),))
+    assert "the start lies in no-fly zone 'town'" in e.message
 
 
 def test_via_inside_a_zone_names_both() -> None:

@@ -44,7 +44,7 @@ def check_ends(problem: Problem) -> None:
     """Raise Refusal if start, a via or the goal breaks a limit by itself."""
     stops = terminals(problem)
     heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
-    names = ["start", *(f"via point {k + 1}" for k in range(len(problem.via))), "goal"]
+    names = ["the start", *(f"via point {k + 1}" for k in range(len(problem.via))), "the goal"]
     for name, place, amsl in zip(names, stops, heights, strict=True):
         _check_end(problem, name, place, amsl)
     if len(stops) == 2 and math.dist(*stops) < 1e-3:
@@ -60,21 +60,21 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
         return Refusal(f"no mission: {words}", reason="infeasible", place=place)
 
     if not math.isfinite(low):
-        raise refuse(f"the ground at the {name}, or within reach of it, is unknown to the terrain model")
+        raise refuse(f"the ground at {name}, or within reach of it, is unknown to the terrain model")
     if low > high + 1e-6:
         raise refuse(
-            f"at the {name} the lowest legal altitude, {low:.1f} m AMSL ({_floor_words(limits)}), is over the highest, "
+            f"at {name} the lowest legal altitude, {low:.1f} m AMSL ({_floor_words(limits)}), is over the highest, "
             f"{high:.1f} m ({_ceiling_words(limits, air, place)}): raise that limit by at least {low - high:.1f} m, "
-            f"or move the {name}"
+            f"or move {name}"
         )
     if amsl is not None and amsl < low - 1e-6:
         raise refuse(
-            f"the {name} at {amsl:.1f} m AMSL is under the lowest legal altitude there, {low:.1f} m "
+            f"{name} at {amsl:.1f} m AMSL is under the lowest legal altitude there, {low:.1f} m "
             f"({_floor_words(limits)})"
         )
     if amsl is not None and amsl > high + 1e-6:
         raise refuse(
-            f"the {name} at {amsl:.1f} m AMSL is over the highest legal altitude there, {high:.1f} m "
+            f"{name} at {amsl:.1f} m AMSL is over the highest legal altitude there, {high:.1f} m "
             f"({_ceiling_words(limits, air, place)})"
         )
     here = np.array([place])
@@ -85,8 +85,8 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
         at = amsl is not None and bottom + 1e-6 < amsl < top - 1e-6
         if at or (amsl is None and bottom < low and (top > high or math.isinf(top))):
             raise refuse(
-                f"the {name} lies in no-fly zone {zone.name!r} or within {_reach(problem):.1f} m of it "
-                f"(horizontal_clearance_m + track_error_m): move the {name}, or shrink the zone"
+                f"{name} lies in no-fly zone {zone.name!r} or within {_reach(problem):.1f} m of it "
+                f"(horizontal_clearance_m + track_error_m): move {name}, or shrink the zone"
             )
 
 
@@ -173,7 +173,8 @@ def _ceiling(problem: Problem, over_zones: bool = False) -> Reading:
     pass_m, place = _highest(router, way)
     if needed > pass_m + 5.0 and not over_zones and _crossed(problem, way):
         return None
-    enough = math.ceil(needed + limits.altitude_error_m)
+    # The lattice knows the floor by samples; along the way it is known better.
+    enough = math.ceil(max(needed, pass_m) + limits.altitude_error_m)
     return (
         f"no way below max_amsl_m {limits.max_amsl_m:g} ({limits.max_amsl_m - limits.altitude_error_m:g} m with the "
         f"altitude error): the lowest pass between start and goal that was found needs "

@@ -220,7 +220,9 @@ def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) ->
 
     polygon = shapely.Polygon(shape.vertices)
     shapely.prepare(polygon)
-    return np.asarray(shapely.dwithin(polygon, shapely.linestrings(np.stack([a, b], axis=1)), reach_m))
+    # A line without length is near nothing to shapely: a micrometre makes it one.
+    far = np.where((a == b).all(axis=1, keepdims=True), b + 1e-6, b)
+    return np.asarray(shapely.dwithin(polygon, shapely.linestrings(np.stack([a, far], axis=1)), reach_m))
 
 
 def zone_levels(air: Airspace, limits: Limits, zone: Zone, a: Floats, b: Floats) -> tuple[Floats, Floats]:

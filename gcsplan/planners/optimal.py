@@ -21,8 +21,8 @@ from gcsplan.planners.lattice import terminals
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.planners.pulling import Allowance, Pulled
 from gcsplan.planners.routes import LEVELS, Router
-from gcsplan.planners.track import Flown, Track, fly, make_track
-from gcsplan.world.airspace import Legs
+from gcsplan.planners.track import Flown, Track, distances, fly, make_track
+from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -35,6 +35,9 @@ COARSE, MEDIUM, FINE = 3e-4, 5e-5, 1e-5
 """Least gain worth a change, as a part of the straight way, in the three rounds of pulling."""
 WORTH = 1e-4
 """What fewer vertices may cost, as a part of the straight way."""
+
+CORRECTIONS, CORRECTED_M = 12, 0.01
+"""How often a profile is corrected by what the exact check finds near its ends, and by how much beyond it."""
 
 BOUND_NOTE = "the lower bound is the straight line from stop to stop: true, but not tight"
 
@@ -65,12 +68,9 @@ def plan(problem: Problem) -> Solution:
     # Every kernel has run by now, so that compiling them never eats the budget and changes the answer.
     allowance = Allowance(0, time.perf_counter() + problem.budget_s)
     pulled = _pull(problem, found, router, allowance, tell)
-    solution = None
-    for p in pulled:
-        points = _finish(problem, p.track, p.flown)
-        if points is not None:
-            solution = points
-            break
+    # A route as it was found is a last resort, should every pulled one fail the check.
+    ways = [*((p.track, p.flown) for p in pulled), *found]
+    solution = next((x for x in (_finish(problem, *way) for way in ways) if x is not None), None)
     if solution is None:
         raise Refusal(
             "a track was found, but its way points do not pass the exact check: please report this mission",
@@ -124,13 +124,16 @@ def _routes(problem: Problem, bound: float) -> tuple[list[tuple[Track, Flown]], 
         if straight[1].cost <= bound * (1.0 + 1e-9):
             return found, None
     router: Router | None = None
+    way = sum(math.dist(a, b) for a, b in _pairs(problem))
     for level in LEVELS:
         router = Router.at(problem, level)
         first = router.route()
         if first is not None:
             found.append(first)
-            found.extend(_variants(problem, router, first[1]))
-        if found:
+        # A way longer than the detours that this lattice holds may have a shorter rival outside it.
+        if any(track.s_m[-1] <= level.detour * way for track, _ in found):
+            if first is not None:
+                found.extend(_variants(problem, router, first[1]))
             break
     return found, router
 
@@ -217,10 +220,34 @@ def _pairs(problem: Problem) -> list[tuple[tuple[float, float], tuple[float, flo
 
 
 def _finish(problem: Problem, track: Track, flown: Flown) -> Floats | None:
-    """Way points that the exact check passes: thinned, or else every vertex, or None."""
-    points, pinned = way_points(problem, track, flown)
-    for candidate in (thin(problem, points, pinned, 1e-5 * flown.cost), points):
-        report = problem.airspace.examine(Legs.of_path(candidate, problem.limits), problem.limits)
-        if not report.violations:
-            return candidate
+    """Way points that the exact check passes: thinned, or else every vertex; None where none do.
+
+    Close to start and goal a track is held to its floor a little less strictly than elsewhere (`track`). What the
+    check finds there becomes a door of its own, and the profile is drawn anew.
+    """
+    known: list[tuple[float, float, float]] = []
+    for _ in range(CORRECTIONS):
+        points, pinned = way_points(problem, track, flown)
+        violations = _violations(problem, points)
+        if not violations:
+            few = thin(problem, points, pinned, 1e-5 * flown.cost)
+            return points if _violations(problem, few) else few
+        s = distances(points[:, :2])
+        for v in violations:
+            at = float(s[v.leg] + v.fraction * (s[v.leg + 1] - s[v.leg]))
+            room = v.by + CORRECTED_M
+            if v.kind in ("min_agl", "terrain_clearance"):
+                known.append((at, v.amsl_m + room, math.inf))
+            elif v.kind == "max_agl":
+                known.append((at, -math.inf, v.amsl_m - room))
+            else:
+                return None
+        again = fly(problem, track, known=known)
+        if not isinstance(again, Flown):
+            return None
+        flown = again
     return None
+
+
+def _violations(problem: Problem, points: Floats) -> tuple[Violation, ...]:
+    return problem.airspace.examine(Legs.of_path(points, problem.limits), problem.limits).violations

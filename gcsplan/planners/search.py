@@ -12,11 +12,13 @@ as long as climb limits do not bind.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from gcsplan.planners.heap import pop, push
 from gcsplan.planners.lattice import LINK_DOORS, STEPS, Lattice, Links
 
 Floats = NDArray[np.float64]
@@ -127,41 +129,22 @@ def search(
 
 
 @njit(cache=True)
-def _push(heap: Floats, ids: Ints, size: int, key: float, item: int) -> int:
-    k = size
-    while k > 0:
-        up = (k - 1) >> 1
-        if heap[up] < key or (heap[up] == key and ids[up] <= item):
-            break
-        heap[k], ids[k] = heap[up], ids[up]
-        k = up
-    heap[k], ids[k] = key, item
-    return size + 1
-
-
-@njit(cache=True)
-def _pop(heap: Floats, ids: Ints, size: int) -> int:
-    """Take the root away; the caller has read it."""
-    size -= 1
-    key, item = heap[size], ids[size]
-    k = 0
-    while True:
-        c = 2 * k + 1
-        if c >= size:
-            break
-        if c + 1 < size and (heap[c + 1] < heap[c] or (heap[c + 1] == heap[c] and ids[c + 1] < ids[c])):
-            c += 1
-        if heap[c] > key or (heap[c] == key and ids[c] >= item):
-            break
-        heap[k], ids[k] = heap[c], ids[c]
-        k = c
-    heap[k], ids[k] = key, item
-    return size
-
-
-@njit(cache=True)
 def _apart(x: float, low: float, high: float) -> float:
     return max(low - x, x - high, 0.0)
+
+
+@njit(cache=True)
+def _farther(x: float, y: float, low: float, high: float) -> float:
+    """How far the farther of two altitudes is out of an interval."""
+    return max(_apart(x, low, high), _apart(y, low, high))
+
+
+@njit(cache=True)
+def _grown(a: NDArray[Any], room: int) -> NDArray[Any]:
+    out = np.empty(room, a.dtype)
+    for k in range(len(a)):
+        out[k] = a[k]
+    return out
 
 
 @njit(cache=True)
@@ -211,21 +194,22 @@ def _search(
     spare: float,
     want: int,
     most_opened: int,
-) -> tuple[Ints, Ints, Floats, list[np.int64], bool, int]:
+) -> tuple[Ints, Ints, Floats, Ints, bool, int]:
     nodes = nx * ny
     room = 4096
     at = np.empty(room, np.int64)
     parent = np.empty(room, np.int64)
     following = np.empty(room, np.int64)  # next label of the same node
     alive = np.empty(room, np.bool_)
-    value = np.empty((room, 5))
+    value = np.empty(5 * room)  # five for each label: see `_door`
     heap = np.empty(room)
     ids = np.empty(room, np.int64)
     first = np.full(nodes + 2, -1, np.int64)
     held = np.zeros(nodes + 2, np.int16)
     count = size = opened = 0
     complete = True
-    goals = [np.int64(0) for _ in range(0)]
+    goals = np.empty(want, np.int64)
+    reached = 0
     v = np.empty(5)
     door_low = np.empty(LINK_DOORS)
     door_high = np.empty(LINK_DOORS)
@@ -233,19 +217,21 @@ def _search(
 
     for k in range(len(starts)):
         at[k], parent[k], following[k], alive[k] = nodes, -1, -1, True
-        value[k] = starts[k]
+        for q in range(5):
+            value[5 * k + q] = starts[k, q]
         count += 1
-        size = _push(heap, ids, size, starts[k, 0], k)
+        size = push(heap, ids, size, starts[k, 0], k)
 
     while size > 0:
         item = ids[0]
-        size = _pop(heap, ids, size)
+        size = pop(heap, ids, size)
         if not alive[item]:
             continue
         node = at[item]
         if node == nodes + 1:
-            goals.append(item)
-            if len(goals) >= want:
+            goals[reached] = item
+            reached += 1
+            if reached >= want:
                 break
             continue
         opened += 1
@@ -319,7 +305,8 @@ def _search(
                 gap_high = band_low[b] if b < b1 else np.inf
                 is_open = gap_high >= gap_low and gap_low < np.inf and gap_high > -np.inf
                 if is_open:
-                    v[:] = value[item]
+                    for q in range(5):
+                        v[q] = value[5 * item + q]
                     v[0] += length
                     for q in range(doors):
                         low, high = max(door_low[q], gap_low), min(door_high[q], gap_high, cap)
@@ -334,16 +321,17 @@ def _search(
                     other = first[to]
                     while other >= 0:
                         # `other` rules if it reaches as much and costs no more at any altitude, and the reverse.
-                        o = value[other]
-                        if o[1] <= v[1] + spare and o[2] >= v[2] - spare:
-                            extra = max(_apart(v[3], o[3], o[4]), _apart(v[4], o[3], o[4])) if weight > 0.0 else 0.0
-                            if o[0] + weight * extra <= v[0]:
-                                kept = False
-                                break
-                        ruled = v[1] <= o[1] and v[2] >= o[2]
+                        o = 5 * other
+                        if (
+                            value[o + 1] <= v[1] + spare
+                            and value[o + 2] >= v[2] - spare
+                            and value[o] + weight * _farther(v[3], v[4], value[o + 3], value[o + 4]) <= v[0]
+                        ):
+                            kept = False
+                            break
+                        ruled = v[1] <= value[o + 1] and v[2] >= value[o + 2]
                         if ruled:
-                            extra = max(_apart(o[3], v[3], v[4]), _apart(o[4], v[3], v[4])) if weight > 0.0 else 0.0
-                            ruled = v[0] + weight * extra <= o[0]
+                            ruled = v[0] + weight * _farther(value[o + 3], value[o + 4], v[3], v[4]) <= value[o]
                         if ruled:
                             alive[other] = False
                             held[to] -= 1
@@ -359,26 +347,23 @@ def _search(
                         kept = False
                     if kept:
                         if count >= room:
-                            grown = 2 * room
-                            at2, parent2 = np.empty(grown, np.int64), np.empty(grown, np.int64)
-                            following2, alive2 = np.empty(grown, np.int64), np.empty(grown, np.bool_)
-                            value2, heap2, ids2 = np.empty((grown, 5)), np.empty(grown), np.empty(grown, np.int64)
-                            at2[:room], parent2[:room], following2[:room], alive2[:room] = at, parent, following, alive
-                            value2[:room], heap2[:room], ids2[:room] = value, heap, ids
-                            at, parent, following, alive = at2, parent2, following2, alive2
-                            value, heap, ids, room = value2, heap2, ids2, grown
+                            room *= 2
+                            at, parent, following = _grown(at, room), _grown(parent, room), _grown(following, room)
+                            alive, ids, heap = _grown(alive, room), _grown(ids, room), _grown(heap, room)
+                            value = _grown(value, 5 * room)
                         at[count], parent[count], alive[count] = to, item, True
-                        value[count] = v
+                        for q in range(5):
+                            value[5 * count + q] = v[q]
                         following[count] = first[to]
                         first[to] = count
                         held[to] += 1
                         # What is left is no shorter than the straight way, nor than the climb (descent) takes.
                         ahead = max(rest, (goal_m[0] - v[2]) / up, (v[1] - goal_m[1]) / down)
                         vertical = max(v[3] - goal_m[1], goal_m[0] - v[4], 0.0)
-                        size = _push(heap, ids, size, v[0] + ahead + weight * vertical, count)
+                        size = push(heap, ids, size, v[0] + ahead + weight * vertical, count)
                         count += 1
                 if b >= b1:
                     break
                 gap_low = max(gap_low, band_high[b])
                 b += 1
-    return at[:count], parent[:count], value[:count], goals, complete, opened
+    return at[:count], parent[:count], value[: 5 * count].reshape(-1, 5), goals[:reached], complete, opened

@@ -18,14 +18,15 @@ from numpy.typing import NDArray
 from gcsplan.planners.lattice import ENDS_M
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.taut_string import Blocked, Profile, taut_string
-from gcsplan.world.airspace import Band, Tube
+from gcsplan.planners.tubes import cut, join
+from gcsplan.world.airspace import Tube
 
 Floats = NDArray[np.float64]
 
 KEEP_M = 1e-4
 """Kept from floors and ceilings where there is room, so that rounding never decides."""
 
-CLOSE_M, CLOSE_STEP_M, CLOSE_ROOM_M = 60.0, 4.0, 0.02
+CLOSE_M, CLOSE_STEP_M, CLOSE_ROOM_M = 60.0, 1.0, 0.03
 """Where a tube shuts an end in: so far from it the floor is read point by point, so often, with so much to spare."""
 
 BRANCHES = 64
@@ -121,81 +122,23 @@ def replace_part(problem: Problem, track: Track, s0_m: float, s1_m: float, betwe
     )
 
 
-def cut(tube: Tube, s0_m: float, s1_m: float) -> Tube | None:
-    """The part of a tube between two places, its ``s_m`` from 0; None where it has no length."""
-    if s1_m - s0_m < 1e-6:
-        return None
-    s, (floor, ceiling) = _cut_pieces(tube.s_m, (tube.floor_m, tube.ceiling_m), s0_m, s1_m)
-    bands = []
-    for b in tube.bands:
-        low, high = max(float(b.s_m[0]), s0_m), min(float(b.s_m[-1]), s1_m)
-        if high - low > 0.0:
-            bs, (bottom, top) = _cut_pieces(b.s_m, (b.bottom_m, b.top_m), low, high)
-            bs = bs - s0_m
-            bands.append(Band(b.zone, float(bs[0]), float(bs[-1]), bs, bottom, top))
-    return Tube(s - s0_m, floor, ceiling, tuple(bands))
-
-
-def _cut_pieces(s: Floats, values: tuple[Floats, Floats], s0: float, s1: float) -> tuple[Floats, tuple[Floats, Floats]]:
-    i = min(max(int(np.searchsorted(s, s0, "right")) - 1, 0), len(s) - 2)
-    j = min(max(int(np.searchsorted(s, s1, "left")), i + 1), len(s) - 1)
-    out = s[i : j + 1].copy()
-    u = (s0 - out[0]) / (out[1] - out[0])
-    v = (s1 - out[-2]) / (out[-1] - out[-2])
-    out[0], out[-1] = s0, s1
-    cuts = []
-    for value in values:
-        part = value[i:j].copy()
-        first, last = value[i].copy(), value[j - 1].copy()
-        if u > 0.0 and np.isfinite(first).all():
-            part[0, 0] = first[0] + u * (first[1] - first[0])
-        if v < 1.0 and np.isfinite(last).all():
-            part[-1, 1] = last[0] + v * (last[1] - last[0])
-        cuts.append(part)
-    return out, (cuts[0], cuts[1])
-
-
-def join(tubes: Sequence[Tube]) -> Tube:
-    """One tube after the other. Bands of one zone that meet become one, so that it is passed on one side."""
-    if len(tubes) == 1:
-        return tubes[0]
-    offsets = np.concatenate([[0.0], np.cumsum([t.s_m[-1] for t in tubes])])
-    s = np.concatenate([tubes[0].s_m] + [t.s_m[1:] + o for t, o in zip(tubes[1:], offsets[1:], strict=False)])
-    floor = np.concatenate([t.floor_m for t in tubes])
-    ceiling = np.concatenate([t.ceiling_m for t in tubes])
-    bands: list[Band] = []
-    for t, o in zip(tubes, offsets, strict=False):
-        for b in t.bands:
-            moved = Band(b.zone, b.s0_m + o, b.s1_m + o, b.s_m + o, b.bottom_m, b.top_m)
-            for k in range(len(bands) - 1, -1, -1):
-                if bands[k].zone == b.zone:
-                    if abs(bands[k].s1_m - moved.s0_m) < 1e-6:
-                        a = bands[k]
-                        moved = Band(
-                            b.zone,
-                            a.s0_m,
-                            moved.s1_m,
-                            np.concatenate([a.s_m, moved.s_m[1:]]),
-                            np.concatenate([a.bottom_m, moved.bottom_m]),
-                            np.concatenate([a.top_m, moved.top_m]),
-                        )
-                        del bands[k]
-                    break
-            bands.append(moved)
-    return Tube(s, floor, ceiling, tuple(bands))
-
-
-def fly(problem: Problem, track: Track, below: float = np.inf, branches: int = BRANCHES) -> Flown | Obstruction:
+def fly(
+    problem: Problem,
+    track: Track,
+    below: float = np.inf,
+    branches: int = BRANCHES,
+    known: Sequence[tuple[float, float, float]] = (),
+) -> Flown | Obstruction:
     """The cheapest legal profile over ``track``, each band passed above or below as is cheaper.
 
     Best first over the sides of those bands only that the string runs into; bands it clears cost nothing. Before
     the sides are tried one by one, all bands that are hit are passed on their nearer side at once; if that costs
     less than ``below``, it is taken where ``branches`` is 0. A profile of ``below`` or more is not wanted: the
-    search stops there and reports what it ran into.
+    search stops there and reports what it ran into. ``known`` are doors (s_m, low_m, high_m) to pass besides.
     """
     tube, limits = track.tube, problem.limits
     ends = (problem.start[2], problem.goal[2])
-    room = _rooms(problem, track)
+    room = _rooms(problem, track, known)
     horizontal = float(room.s_m[-1])
 
     def solve(over: Sides) -> Profile | Blocked:
@@ -308,13 +251,14 @@ def _narrow(low: Floats, high: Floats) -> None:
             low[i] = high[i] = 0.5 * (low[i] + high[i])
 
 
-def _rooms(problem: Problem, track: Track) -> _Room:
+def _rooms(problem: Problem, track: Track, known: Sequence[tuple[float, float, float]]) -> _Room:
     tube, z0, z1 = track.tube, problem.start[2], problem.goal[2]
     fixed = track.pinned & np.isfinite(track.pin_m)
     close = _close_to_ends(problem, tube)
     s = tube.s_m
-    if tube.bands or len(close) or fixed.any():
-        s = np.sort(np.concatenate([s, *(b.s_m for b in tube.bands), track.s_m[fixed], close]))
+    if tube.bands or known or len(close) or fixed.any():
+        here = np.array([k[0] for k in known])
+        s = np.sort(np.concatenate([s, *(b.s_m for b in tube.bands), track.s_m[fixed], close, here]))
         s = s[np.concatenate([[True], s[1:] - s[:-1] > 1e-9])]
     low = _edge(s, tube.s_m, tube.floor_m, True)
     high = _edge(s, tube.s_m, tube.ceiling_m, False)
@@ -322,9 +266,10 @@ def _rooms(problem: Problem, track: Track) -> _Room:
         near = np.flatnonzero((s <= CLOSE_M) | (s >= s[-1] - CLOSE_M))
         east, north = (np.interp(s[near], track.s_m, track.points[:, i]) for i in range(2))
         low[near] = np.minimum(low[near], problem.airspace.floor_amsl(east, north, problem.limits) + CLOSE_ROOM_M)
-    for at, z in zip(track.s_m[fixed], track.pin_m[fixed], strict=True):
+    pins = [(at, z, z) for at, z in zip(track.s_m[fixed], track.pin_m[fixed], strict=True)]
+    for at, under, over in (*pins, *known):
         k = int(np.argmin(np.abs(s - at)))
-        low[k], high[k] = max(low[k], z), min(high[k], z)
+        low[k], high[k] = max(low[k], under), min(high[k], over)
     _forgive(low, high, 0, z0)
     _forgive(low, high, -1, z1)
     spans, bottoms, tops = [], [], []
@@ -344,7 +289,7 @@ def _rooms(problem: Problem, track: Track) -> _Room:
 
 
 def _close_to_ends(problem: Problem, tube: Tube) -> Floats:
-    """Places near an end to be looked at one by one, where the tube's floor is over it or beyond the climb limit.
+    """Places near an end to be looked at one by one, where the tube's floor is beyond what can be climbed to.
 
     A tube bounds the floor over whole pieces. Start and goal lie on the floor more often than not, and a bound that
     is a metre too high a few metres away would shut them in.
@@ -352,13 +297,12 @@ def _close_to_ends(problem: Problem, tube: Tube) -> Floats:
     limits, length = problem.limits, float(tube.s_m[-1])
     out = []
     up, down = limits.max_climb_slope, limits.max_descent_slope
-    for at_start, z, slope, away, floor, end_floor in (
-        (True, problem.start[2], up, tube.s_m[1:], tube.floor_m[:, 1], tube.floor_m[0, 0]),
-        (False, problem.goal[2], down, length - tube.s_m[-2::-1], tube.floor_m[::-1, 0], tube.floor_m[-1, 1]),
+    for at_start, z, slope, away, floor in (
+        (True, problem.start[2], up, tube.s_m[1:], tube.floor_m[:, 1]),
+        (False, problem.goal[2], down, length - tube.s_m[-2::-1], tube.floor_m[::-1, 0]),
     ):
         count = int(np.searchsorted(away, CLOSE_M, "right"))
-        shut = not np.isinf(slope) and (floor[:count] > z + slope * away[:count]).any()
-        if shut or end_floor > z:
+        if not np.isinf(slope) and (floor[:count] > z + slope * away[:count]).any():
             steps = np.arange(CLOSE_STEP_M, min(CLOSE_M, 0.5 * length), CLOSE_STEP_M)
             out.append(steps if at_start else length - steps)
     return np.concatenate(out) if out else np.zeros(0)
