@@ -41,7 +41,12 @@ class Oracle:
         i, j = np.minimum(c.astype(int), cols - 2), np.minimum(r.astype(int), rows - 2)
         u, v = c - i, r - j
         total = np.zeros(np.shape(c))
-        for jj, ii, w in ((j, i, (1 - u) * (1 - v)), (j, i + 1, u * (1 - v)), (j + 1, i, (1 - u) * v), (j + 1, i + 1, u * v)):
+        for jj, ii, w in (
+            (j, i, (1 - u) * (1 - v)),
+            (j, i + 1, u * (1 - v)),
+            (j + 1, i, (1 - u) * v),
+            (j + 1, i + 1, u * v),
+        ):
             total = total + np.where(w > 1e-12, w * z[jj, ii], 0.0)
         return np.where(out, np.nan, total)
 
@@ -56,10 +61,14 @@ class Oracle:
         best = self.height(z, e, n)
         for k in range(1, rings + 1 if reach > 0 else 1):
             for a in np.arange(spokes) * (2 * np.pi / spokes) + 0.5 * k:
-                best = np.maximum(best, self.height(z, e + reach * k / rings * np.cos(a), n + reach * k / rings * np.sin(a)))
+                best = np.maximum(
+                    best, self.height(z, e + reach * k / rings * np.cos(a), n + reach * k / rings * np.sin(a))
+                )
         return best
 
-    def depths(self, start: Floats, end: Floats, column: bool, track: float, altitude: float, limits: Limits) -> dict[str, float]:
+    def depths(
+        self, start: Floats, end: Floats, column: bool, track: float, altitude: float, limits: Limits
+    ) -> dict[str, float]:
         """How deep each limit is broken (positive) or kept (negative), by kind; coverage 1 or 0."""
         _, p = self.line(start, end)
         e, n, h = p.T

@@ -1,4 +1,4 @@
-"""Kernels: bounds of a surface over and beside a ground track, and where a track is within reach of zones.
+"""Kernels: bounds of a surface over and beside a ground track, and around points.
 
 The height under a straight line is a quadratic in each cell; it is cut until a chord, lifted by what the quadratic
 rises above it (or lowered by what it dips below), lies within `CHORD_M`. What lies beside the line, within reach, is
@@ -22,20 +22,6 @@ from gcsplan.world._sweep import (
     to_grid,
 )
 from gcsplan.world._sweep_terrain import EDGE, unknown_near
-from gcsplan.world._sweep_zones import (
-    CEILING_AGL,
-    EAST,
-    EAST_E,
-    FIRST,
-    FLOOR_AGL,
-    LAST,
-    NORTH,
-    NORTH_N,
-    RADIUS,
-    SOUTH_N,
-    WEST_E,
-    signed_distance,
-)  # fmt: skip
 
 CHORD_M = 0.05
 MOST_CUTS = 64  # of the line in one cell
@@ -256,105 +242,3 @@ def around(m, z, halo, sign, points, reach_m, out, sources=SOURCES):  # type: ig
                         most = max(most, za + kb * u + kc * v + kd * u * v)
             best = min(best, most)
         out[p] = best
-
-
-@kernel
-def spans(zone, vertex, track, within_m, over_ground_m, rows, parts, sources=SOURCES):  # type: ignore[no-untyped-def]
-    """Where a ground track (N, 2) is within reach of zones: zone, leg, s0, s1 in ``rows``; their number.
-
-    The reach is ``within_m``, or ``over_ground_m`` for a zone with a level over ground.
-    """
-    count = 0
-    s_start = 0.0
-    for leg in range(len(track) - 1):
-        e0, n0, e1, n1 = track[leg, 0], track[leg, 1], track[leg + 1, 0], track[leg + 1, 1]
-        de, dn = e1 - e0, n1 - n0
-        length = math.hypot(de, dn)
-        if length == 0.0:
-            continue
-        west, east, south, north = min(e0, e1), max(e0, e1), min(n0, n1), max(n0, n1)
-        for k in range(len(zone)):
-            reach_m = over_ground_m if zone[k, FLOOR_AGL] != 0.0 or zone[k, CEILING_AGL] != 0.0 else within_m
-            if (
-                zone[k, WEST_E] - reach_m > east
-                or zone[k, EAST_E] + reach_m < west
-                or zone[k, SOUTH_N] - reach_m > north
-                or zone[k, NORTH_N] + reach_m < south
-            ):
-                continue
-            found = 0
-            radius = zone[k, RADIUS]
-            if radius >= 0.0:
-                middle = ((zone[k, EAST] - e0) * de + (zone[k, NORTH] - n0) * dn) / length
-                aside = ((zone[k, EAST] - e0) * dn - (zone[k, NORTH] - n0) * de) / length
-                half = (radius + reach_m) ** 2 - aside * aside
-                if half > 0.0:
-                    a, b = max(middle - math.sqrt(half), 0.0), min(middle + math.sqrt(half), length)
-                    if a < b:
-                        parts[0, 0], parts[0, 1] = a, b
-                        found = 1
-            else:
-                found = polygon_spans(zone, vertex, k, e0, n0, de / length, dn / length, length, reach_m, parts)
-            for q in range(found):
-                if count < len(rows):
-                    rows[count, 0], rows[count, 1] = k, leg
-                    rows[count, 2], rows[count, 3] = s_start + parts[q, 0], s_start + parts[q, 1]
-                count += 1
-        s_start += length
-    return count
-
-
-@device
-def polygon_spans(zone, vertex, k, e0, n0, ue, un, length, reach_m, parts):  # type: ignore[no-untyped-def]
-    """Merged parts [a, b] of a line, metres along it, within reach of a polygon; their number."""
-    found = 0
-    first, last = int(zone[k, FIRST]), int(zone[k, LAST])
-    x0, y0 = vertex[last - 1, 0] - e0, vertex[last - 1, 1] - n0
-    sa, oa = x0 * ue + y0 * un, y0 * ue - x0 * un
-    for v in range(first, last):
-        x1, y1 = vertex[v, 0] - e0, vertex[v, 1] - n0
-        sb, ob = x1 * ue + y1 * un, y1 * ue - x1 * un
-        low, high = math.inf, -math.inf
-        # Along and aside of the line: the edge grown by a disc is a strip and two discs.
-        for s, o in ((sa, oa), (sb, ob)):
-            half = reach_m * reach_m - o * o
-            if half >= 0.0:
-                low, high = min(low, s - math.sqrt(half)), max(high, s + math.sqrt(half))
-        edge = math.hypot(sb - sa, ob - oa)
-        if edge > 0.0 and ob != oa:
-            # The strip's two sides cut the line where they lie beside the edge.
-            for side in (-reach_m, reach_m):
-                px, py = sa - side * (ob - oa) / edge, oa + side * (sb - sa) / edge
-                w = -py / (ob - oa)
-                if 0.0 <= w <= 1.0:
-                    low, high = min(low, px + w * (sb - sa)), max(high, px + w * (sb - sa))
-        low, high = max(low, 0.0), min(high, length)
-        if low <= high:
-            parts[found, 0], parts[found, 1] = low, high
-            found += 1
-        sa, oa = sb, ob
-    for m in range(1, found):
-        a, b = parts[m, 0], parts[m, 1]
-        q = m - 1
-        while q >= 0 and parts[q, 0] > a:
-            parts[q + 1, 0], parts[q + 1, 1] = parts[q, 0], parts[q, 1]
-            q -= 1
-        parts[q + 1, 0], parts[q + 1, 1] = a, b
-    # A gap between two parts is inside or outside as a whole; what is inside belongs to the span.
-    kept = 0
-    done = 0.0
-    for m in range(found + 1):
-        a, b = (parts[m, 0], parts[m, 1]) if m < found else (length, length)
-        if a > done:
-            middle = 0.5 * (done + a)
-            if signed_distance(zone, vertex, k, e0 + middle * ue, n0 + middle * un) < 0.0:
-                a = done
-        if m == found and a >= length:
-            break
-        if kept and a <= parts[kept - 1, 1]:
-            parts[kept - 1, 1] = max(parts[kept - 1, 1], b)
-        else:
-            parts[kept, 0], parts[kept, 1] = a, b
-            kept += 1
-        done = max(done, b)
-    return kept

@@ -40,12 +40,14 @@ class Demands(NamedTuple):
 
 
 @device
-def judge_terrain(m, ground, top, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst, leg):  # type: ignore[no-untyped-def]
+def judge_terrain(  # type: ignore[no-untyped-def]
+    m, ground, top, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst, leg
+):
     """Ground, obstacles and ceilings of one leg; False at the first violation unless ``full``.
 
     ``near``, ``far``: halos of the top for the track error and for the clearance; ``over``: of the ground for the track
-    error. ``worst[kind]``: depth (for coverage, how far unknown ground reaches in) and fraction. Lowest height above
-    top and where, then highest above ground, are left in ``out[8:11]``; the rest of ``out`` is `sweep`'s.
+    error. ``worst[leg, kind]``: depth (for coverage, how far unknown ground reaches in) and fraction. Lowest height
+    above top and where, then highest above ground, are left in ``out[8:11]``; the rest of ``out`` is `sweep`'s.
     """
     fine = True
     track_m = track * want.scale
@@ -75,8 +77,8 @@ def judge_terrain(m, ground, top, near, far, over, column, e0, n0, h0, e1, n1, h
         if not good:
             extremes = halo.high if sign > 0.0 else halo.low
             good = sweep(
-                m, z, halo.slope, extremes, halo.cols, halo.rows, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full,
-                out,
+                m, z, halo.slope, extremes, halo.cols, halo.rows, sign,
+                e0, n0, h0, e1, n1, h1, need, reach, stack, full, out,
             )  # fmt: skip
         if not good and judged:
             if not full:
@@ -110,26 +112,34 @@ def candidates(zone, lat, bucket, near, west, south, east, north, seen, stamp, l
             first, last = (0, zones) if few else (bucket[j * cols + i], bucket[j * cols + i + 1])
             for q in range(first, last):
                 k = q if few else near[q]
-                if zone[k, WEST_E] < east and zone[k, EAST_E] > west and zone[k, SOUTH_N] < north and zone[k, NORTH_N] > south:
-                    if seen[k] != stamp:
-                        seen[k] = stamp
-                        list_of[count] = k
-                        count += 1
+                if (
+                    zone[k, WEST_E] < east
+                    and zone[k, EAST_E] > west
+                    and zone[k, SOUTH_N] < north
+                    and zone[k, NORTH_N] > south
+                    and seen[k] != stamp
+                ):
+                    seen[k] = stamp
+                    list_of[count] = k
+                    count += 1
     return count
 
 
 @kernel
 def judge(  # type: ignore[no-untyped-def]
-    m, ground, top, near, far, over, zs, start, end, column, track, altitude, want, full, ok, found, worst, nearest, hit, hit_at,
-    stack, out, seen, list_of, sources=SOURCES,
+    m, ground, top, near, far, over, zs, start, end, column, track, altitude, want, full,
+    ok, found, worst, nearest, hit, hit_at, stack, out, seen, list_of, sources=SOURCES,
 ):  # fmt: skip
-    """Judge every leg: ``ok`` (n,). With ``full`` also, by leg:
+    """Judge every leg; the number of zones broken.
 
-    ``found``: lowest height above top, its fraction, highest above ground, zone clearance;
-    ``worst`` (7, 2): depth (NaN where there is none; 1 for a climb too steep) and fraction by kind; ``nearest`` zone. Zones that are broken go to
-    ``hit`` (leg, zone) and ``hit_at`` (signed distance, fraction) as far as there is room; their number is returned.
+    ``m``, ``ground``, ``top``: map, surfaces; ``near``, ``far``, ``over``: halos, see `judge_terrain`; ``zs``: zones.
+    ``start``, ``end`` (n, 3), ``column``, ``track``, ``altitude`` (n,): as in `Legs`.
+
+    ``ok`` (n,): no violation. With ``full`` also ``found`` (n, 4): lowest height above top, its fraction, highest above
+    ground, zone clearance; ``worst`` (n, 7, 2) by kind: depth (NaN where there is none; 1 for a climb too steep) and
+    fraction; ``nearest`` (n,) zone; and, as far as there is room, ``hit`` (leg, zone) and ``hit_at`` (signed distance,
+    fraction). ``stack`` (256, 8), ``out`` (12,), ``seen`` (all -1) and ``list_of`` (0, 1, …) by zone: room to work in.
     """
-    zone = zs.table
     zone = zs.table
     zones = len(zone)
     hits = 0
@@ -147,8 +157,8 @@ def judge(  # type: ignore[no-untyped-def]
             continue
         fine = (
             judge_terrain(
-                m, ground, top, near, far, over, column[i], e0, n0, h0, e1, n1, h1, track[i], altitude[i], want, stack, full, out,
-                worst, i,
+                m, ground, top, near, far, over, column[i], e0, n0, h0, e1, n1, h1,
+                track[i], altitude[i], want, stack, full, out, worst, i,
             )
             and fine
         )  # fmt: skip
@@ -159,8 +169,9 @@ def judge(  # type: ignore[no-untyped-def]
         count = zones
         if not full:
             count = candidates(
-                zone, zs.lattice, zs.bucket, zs.near, west - reach, south - reach, east + reach, north + reach, seen, i, list_of
-            )
+                zone, zs.lattice, zs.bucket, zs.near, west - reach, south - reach, east + reach, north + reach,
+                seen, i, list_of,
+            )  # fmt: skip
         best, which = math.inf, -1
         for q in range(count):
             k = list_of[q]

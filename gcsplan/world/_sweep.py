@@ -2,7 +2,7 @@
 
 Kernels are compiled by numba and kept in its cache. numba notices a change of the file that a kernel stands in, but
 not of the files that it calls into; so each cached kernel takes `SOURCES`, a digest of all of them, as the default of
-its last parameter, which numba keeps as a part of the key.
+its last parameter, which numba keeps as a part of the key. Without that, a kernel could outlive a correction.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ from __future__ import annotations
 import hashlib
 import math
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.core.cpu import CPUTargetOptions
 from numpy.typing import NDArray
 
 from gcsplan.world.surface import DEGREE, TERMS, GridMap
@@ -29,17 +30,35 @@ RESOLUTION_M = 0.005
 BOW_M = 0.05
 """A leg is mapped to the grid in parts whose plane-straight and grid-straight lines lie within this."""
 
-SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("_*.py")))).hexdigest()
+SOURCES = hashlib.sha256(
+    b"".join(
+        path.read_bytes()
+        for path in (*sorted(Path(__file__).parent.glob("_*.py")), Path(__file__).parent / "surface.py")
+    )
+).hexdigest()
 
-device = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
+
+def _options(**wanted: object) -> dict[str, Any]:
+    """Those compiler options that this numba knows; without the others kernels are the same, but slower."""
+    return {name: value for name, value in wanted.items() if hasattr(CPUTargetOptions, name)}
+
+
+device = njit(
+    **_options(
+        nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True, _nrt=False
+    )
+)
 """A function that only kernels call. Nothing is allocated in it: counting references would cost more than the rest."""
 
-kernel = njit(nogil=True, error_model="numpy", cache=True, _nrt=False)
+kernel = njit(
+    cache=True, **_options(nogil=True, error_model="numpy", no_rewrites=True, no_cfunc_wrapper=True, _nrt=False)
+)
 """What Python calls. Dividing by zero gives inf or NaN, as in numpy; NaN is unknown, so there is no fast math."""
 
 # The map from the plane to the grid as one array, which is what kernels hand on: numbers by these places, then the
 # constant, the u and the v coefficients, used alone where the map is affine, then all of them, highest power first.
-AFFINE, CENTRE_E, CENTRE_N, PER_UNIT, HALF, BEND, ERROR_M, STEP_X, STEP_Y, LINEAR, HORNER = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 15
+AFFINE, CENTRE_E, CENTRE_N, PER_UNIT, HALF, BEND, ERROR_M, STEP_X, STEP_Y, LINEAR = range(10)
+HORNER = LINEAR + 6
 
 
 class Field(NamedTuple):
@@ -65,7 +84,8 @@ class Field(NamedTuple):
         low = [TERMS.index(t) for t in ((0, 0), (1, 0), (0, 1))]
         affine = not grid.coefficients[[k for k, (i, j) in enumerate(TERMS) if i + j > 1]].any()
         bend, step_x, step_y = _bounds(grid, affine)
-        head = [affine, *grid.centre, 1.0 / grid.scale_m, math.inf if affine else 1.0 + 1e-9, bend, grid.error_m, step_x, step_y]
+        half = math.inf if affine else 1.0 + 1e-9
+        head = [affine, *grid.centre, 1.0 / grid.scale_m, half, bend, grid.error_m, step_x, step_y]
         packed = np.concatenate([head, grid.coefficients[low].ravel(), grid.coefficients[order].ravel()])
         packed.setflags(write=False)
         return cls(packed, affine, bend, float(grid.error_m), step_x, step_y)
@@ -86,7 +106,7 @@ def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
 
     jacobian = np.stack([derivative(1, 0), derivative(0, 1)], axis=-1)
     inverse = np.linalg.inv(jacobian)
-    steps = np.array([_steps(m) for m in inverse])
+    steps = np.array([steps_of(*m.ravel().tolist()) for m in inverse])
     if affine:
         return 0.0, float(steps[:, 0].min()), float(steps[:, 1].min())
     # Of a symmetric form the largest value over two directions is attained at two that are equal.
@@ -99,16 +119,14 @@ def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
     return bend, float(steps[:, 0].min()) * keep, float(steps[:, 1].min()) * keep
 
 
-def _steps(inverse: Floats) -> tuple[float, float]:
-    return steps_of.py_func(inverse[0, 0], inverse[0, 1], inverse[1, 0], inverse[1, 1])  # type: ignore[no-any-return]
-
-
-@device
-def steps_of(a: float, b: float, c: float, d: float):  # type: ignore[no-untyped-def]
-    """Steps of a column and of a row, metres, from d(east, north)/d(col, row); skew is taken off both."""
+def steps_of(a: float, b: float, c: float, d: float) -> tuple[float, float]:
+    """Metres of a column and of a row from d(east, north)/d(col, row), [[a, b], [c, d]]; skew is taken off both."""
     xx, yy, xy = a * a + c * c, b * b + d * d, abs(a * b + c * d)
     k = math.sqrt(xx / yy)
     return math.sqrt(max(xx - xy * k, 0.0)), math.sqrt(max(yy - xy / k, 0.0))
+
+
+steps_in_kernel = device(steps_of)
 
 
 @device
@@ -174,7 +192,7 @@ def parts_of(m, length, bow_m):  # type: ignore[no-untyped-def]
 def local_steps(m, e0, n0, e1, n1, around_m):  # type: ignore[no-untyped-def]
     """Metres of a column and of a row, a lower bound within ``around_m`` of a segment."""
     a, b, c, d = plane_per_cell(m, 0.5 * (e0 + e1), 0.5 * (n0 + n1))
-    sx, sy = steps_of(a, b, c, d)
+    sx, sy = steps_in_kernel(a, b, c, d)
     keep = 1.0 - 1.1 * m[BEND] * (0.5 * math.hypot(e1 - e0, n1 - n0) + around_m) - 1e-9
     return sx * keep, sy * keep
 

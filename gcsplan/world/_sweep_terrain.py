@@ -32,6 +32,8 @@ from gcsplan.world._sweep import (
 MOST_PIECES = 1_000_000
 """Of one search; beyond it the demand counts as broken. Never met but by hostile input."""
 
+RESOLUTION = 0.1  # of itself: to this the depth of a break is surely resolved, beside RESOLUTION_M
+SPOKES = 16
 SMALLEST_M = 1e-3
 EDGE = 1e-9  # columns or rows by which a leg along the border may seem to lie beyond it
 INSIDE = 1e-6  # columns or rows from the border within which the fast look leaves the leg to the thorough one
@@ -43,8 +45,8 @@ LOW, LOW_AT, DEPTH, DEPTH_AT, UNKNOWN, UNKNOWN_AT, STEEPEST, REACH = range(8)
 
 @device
 def bar_above(depth):  # type: ignore[no-untyped-def]
-    """What a break must exceed to be news, when one of ``depth`` is known: by 5 mm or a hundredth."""
-    return depth + max(RESOLUTION_M, 0.01 * depth) if depth > TOUCH_M else TOUCH_M
+    """What a break must exceed to be news, when one of ``depth`` is known: by 5 mm or a tenth."""
+    return depth + max(RESOLUTION_M, RESOLUTION * depth) if depth > TOUCH_M else TOUCH_M
 
 
 @device
@@ -64,9 +66,7 @@ def unknown_near(m, z, halo_c, halo_r, e0, n0, e1, n1, reach, i, j):  # type: ig
                 total = z[jj, ii] + z[jj, ii + 1] + z[jj + 1, ii] + z[jj + 1, ii + 1]
                 if not math.isnan(total):
                     continue
-            dist, t = segment_box(
-                c0 * sx, r0 * sy, c1 * sx, r1 * sy, ii * sx, jj * sy, (ii + 1) * sx, (jj + 1) * sy
-            )
+            dist, t = segment_box(c0 * sx, r0 * sy, c1 * sx, r1 * sy, ii * sx, jj * sy, (ii + 1) * sx, (jj + 1) * sy)
             if dist < best:
                 best, at = dist, t
     return best, at
@@ -76,7 +76,7 @@ def unknown_near(m, z, halo_c, halo_r, e0, n0, e1, n1, reach, i, j):  # type: ig
 def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):  # type: ignore[no-untyped-def]
     """Worst break of the demand along a short segment: its depth and where on the segment (< 0: no news).
 
-    ``best`` is the depth already known. With ``full`` the worst is resolved to 5 mm or a hundredth, else the first
+    ``best`` is the depth already known. With ``full`` the worst is resolved to 5 mm or a tenth, else the first
     break ends the search. Unknown cells are passed over: they are judged elsewhere.
     """
     rows, cols = z.shape
@@ -138,7 +138,7 @@ def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):
                     u0, v0, u1, v1 = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
                     wide, tall = (u1 - u0) * sx, (v1 - v0) * sy
                     across = math.hypot(wide, tall)
-                    fine = max(RESOLUTION_M, 0.01 * found)
+                    fine = max(RESOLUTION_M, RESOLUTION * found)
                     if stack[size, 6] + rise * across <= fine or across <= SMALLEST_M or worked > MOST_PIECES:
                         found, at = bound, stack[size, 5]
                         if not full or worked > MOST_PIECES:
@@ -169,12 +169,32 @@ def least_in_cell(sign, kd, turn, before, after, t, tb):  # type: ignore[no-unty
 
 
 @device
+def beside_point(m, z, sign, e, n, h, need, reach):  # type: ignore[no-untyped-def]
+    """Deepest break at `SPOKES` places around a point, ``reach`` away from it; -inf where all of them are unknown."""
+    rows, cols = z.shape
+    c, r = to_grid(m, e, n)
+    sx, sy = local_steps(m, e, n, e, n, reach)
+    deepest_here = -math.inf
+    for k in range(SPOKES):
+        turn = 2.0 * math.pi * k / SPOKES
+        qc, qr = c + reach * math.cos(turn) / sx, r + reach * math.sin(turn) / sy
+        if 0.0 <= qc < cols - 1 and 0.0 <= qr < rows - 1:
+            i, j = int(qc), int(qr)
+            za = z[j, i]
+            kb, kc = z[j, i + 1] - za, z[j + 1, i] - za
+            u, v = qc - i, qr - j
+            depth = need - sign * (h - (za + kb * u + kc * v + (z[j + 1, i + 1] - za - kb - kc) * u * v))
+            if depth > deepest_here:
+                deepest_here = depth
+    return deepest_here
+
+
+@device
 def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out):  # type: ignore[no-untyped-def]
     """The first tier alone, fast: 1 where the demand is surely kept, -1 where the line itself breaks it, 0 unsure.
 
-    With ``full`` the whole leg is looked at; then, if 1, ``out`` is as `sweep` leaves it; without, the lowest there is a
-    lower bound. Near unknown ground and at the
-    border it is never sure.
+    With ``full`` the whole leg is looked at; then, if 1, ``out`` is as `sweep` leaves it; without, the lowest there is
+    a lower bound. Near unknown ground and at the border it is never sure.
     """
     rows, cols = z.shape
     parts, bow = parts_of(m, math.sqrt((e1 - e0) ** 2 + (n1 - n0) ** 2), BOW_M)
@@ -190,12 +210,9 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
             cb, rb = to_grid(m, e1, n1)
         else:
             cb, rb = to_grid(m, e0 + (e1 - e0) * (first + share), n0 + (n1 - n0) * (first + share))
-        if not (
-            min(c0, cb) > INSIDE
-            and max(c0, cb) < cols - 1 - INSIDE
-            and min(r0, rb) > INSIDE
-            and max(r0, rb) < rows - 1 - INSIDE
-        ):
+        # Also false for NaN, where the map gives nothing.
+        far_c, far_r = cols - 1 - INSIDE, rows - 1 - INSIDE
+        if not (INSIDE < c0 < far_c and INSIDE < cb < far_c and INSIDE < r0 < far_r and INSIDE < rb < far_r):
             return 0
         dc, dr = cb - c0, rb - r0
         i, j = int(c0), int(r0)
@@ -274,6 +291,10 @@ def sweep(m, z, slopes, extremes, halo_c, halo_r, sign, e0, n0, h0, e1, n1, h1, 
         if round_ == 1:
             if not pending:
                 break
+            if out[DEPTH] > TOUCH_M:
+                t = out[DEPTH_AT]
+                d = beside_point(m, z, sign, e0 + (e1 - e0) * t, n0 + (n1 - n0) * t, h0 + (h1 - h0) * t, need, r)
+                out[DEPTH] = max(out[DEPTH], d)
             cb, rb = to_grid(m, e0, n0)
         for part in range(parts):
             first = part * share

@@ -36,13 +36,13 @@ ACROSS_M = 0.02
 ZONE_BOW_M = 0.003
 
 
-# A zone is a row of numbers by these places. Circle: east, north, radius in metres of the plane; a negative radius marks
-# a polygon, whose vertices are those from FIRST up to LAST. Box: west, south, east, north. Floor and ceiling are above
-# mean sea level, or above ground where the mark is not 0; -inf and inf where there is none. Band: the same above mean
-# sea level, over all the ground that the zone stands on. Cells: first and last column, first and last row that the
-# shape may touch.
-EAST, NORTH, RADIUS, FIRST, LAST, WEST_E, SOUTH_N, EAST_E, NORTH_N = 0, 1, 2, 3, 4, 5, 6, 7, 8
-FLOOR, FLOOR_AGL, CEILING, CEILING_AGL, BAND_LOW, BAND_HIGH, COL0, COL1, ROW0, ROW1 = 9, 10, 11, 12, 13, 14, 15, 16, 17, 18
+# A zone is a row of numbers by these places. Circle: east, north, radius in metres of the plane; a negative radius
+# marks a polygon, whose vertices are those from FIRST up to LAST. Box: west, south, east, north. Floor and ceiling are
+# above mean sea level, or above ground where the mark is not 0; -inf and inf where there is none. Band: the same above
+# mean sea level, over all the ground that the zone stands on. Cells: first and last column, first and last row that
+# the shape may touch.
+EAST, NORTH, RADIUS, FIRST, LAST, WEST_E, SOUTH_N, EAST_E, NORTH_N = range(9)
+FLOOR, FLOOR_AGL, CEILING, CEILING_AGL, BAND_LOW, BAND_HIGH, COL0, COL1, ROW0, ROW1 = range(9, 19)
 ZONE_NUMBERS = 19
 
 
@@ -117,8 +117,8 @@ def approach(zone, vertex, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
 def enters(zone, vertex, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-def]
     """Whether a segment passes through the open inside of a polygon, by more than touching it.
 
-    Between neighbours among its crossings with the edges and the feet of the vertices on it, the segment stays on one
-    side of every edge, and is as far from the border in the middle as anywhere, but for a factor.
+    Between neighbours among its crossings with the edges' lines and the feet of the vertices on it, the distance from
+    each edge only grows or only shrinks, so in the middle the segment is about half as far from the border as it gets.
     """
     first, last = int(zone[k, FIRST]), int(zone[k, LAST])
     dx, dy = bx - ax, by - ay
@@ -151,27 +151,6 @@ def enters(zone, vertex, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-
             return True
         t = following
     return False
-
-
-@device
-def deepest_inside(zone, vertex, k, ax, ay, bx, by, stack):  # type: ignore[no-untyped-def]
-    """Greatest depth (>= 0) of a segment inside a polygon to a hundredth or 1 cm, and where on the segment."""
-    length = math.hypot(bx - ax, by - ay)
-    stack[0, 0], stack[0, 1] = 0.0, 1.0
-    size = 1
-    best, at = 0.0, 0.5
-    while size:
-        size -= 1
-        t0, t1 = stack[size, 0], stack[size, 1]
-        t = 0.5 * (t0 + t1)
-        depth = -signed_distance(zone, vertex, k, ax + t * (bx - ax), ay + t * (by - ay))
-        if depth > best:
-            best, at = depth, t
-        if depth + 0.5 * (t1 - t0) * length > best + max(0.01, 0.01 * best):
-            stack[size, 0], stack[size, 1] = t0, t
-            stack[size + 1, 0], stack[size + 1, 1] = t, t1
-            size += 2
-    return best, at
 
 
 @device
@@ -310,9 +289,6 @@ def meets(m, z, zone, vertex, scratch, k, e0, n0, h0, e1, n1, h1, altitude_m, re
     elif not dist < bound:
         return False, dist, where
     if zone[k, FLOOR_AGL] == 0.0 and zone[k, CEILING_AGL] == 0.0:
-        if full and polygon and dist <= 0.0:
-            depth, where = deepest_inside(zone, vertex, k, ax, ay, bx, by, stack)
-            dist, where = -depth, t0 + where * (t1 - t0)
         return True, dist, where
     # The levels follow the ground: look along the part that is near the zone's box.
     cutoff = max(bound, SMALLEST_M)

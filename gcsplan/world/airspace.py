@@ -22,12 +22,14 @@ from numpy.typing import ArrayLike, NDArray
 from gcsplan.world._envelope import around
 from gcsplan.world._halo import Halo
 from gcsplan.world._judge import CLIMB, COVERAGE, DESCENT, MAX_AGL, MAX_AMSL, MIN_AGL, TERRAIN, Demands, judge
-from gcsplan.world._sweep import BOW_M, Field
+from gcsplan.world._shapes import deepest_inside
+from gcsplan.world._sweep import BOW_M, TOUCH_M, Field
+from gcsplan.world._sweep_zones import CEILING, CEILING_AGL, FLOOR, FLOOR_AGL
 from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.tube import Band, Reaches, Tube, make_tube
-from gcsplan.world.zones import Zone
+from gcsplan.world.zones import Polygon, Zone
 
 __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 
@@ -183,10 +185,10 @@ class Airspace:
         """Lowest legal altitude over points of the plane, for terrain (min AGL, clearance; errors of ``limits``
         added); conservative; +inf where unknown. Zones are not in it."""
         reach = Reaches.of(limits, self._field, self.scale)
-        near, far = (self._around(1.0, east_m, north_m, r, reach) for r in (reach.near_m, reach.far_m))
-        floor = near + (limits.min_agl_m + limits.altitude_error_m)
+        floor = self._around(1.0, east_m, north_m, reach.near_m, reach) + limits.min_agl_m
         if limits.horizontal_clearance_m > 0.0:
-            floor = np.maximum(floor, far + limits.altitude_error_m)
+            floor = np.maximum(floor, self._around(1.0, east_m, north_m, reach.far_m, reach))
+        floor += limits.altitude_error_m
         return np.where(np.isnan(floor), np.inf, floor)
 
     def ceiling_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:
@@ -205,9 +207,7 @@ class Airspace:
             raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
         return make_tube(points, limits, self.surface, self._field, self._zones, self._halo, self.scale)
 
-    def _around(
-        self, sign: float, east_m: ArrayLike, north_m: ArrayLike, reach_m: float, reach: Reaches
-    ) -> Floats:
+    def _around(self, sign: float, east_m: ArrayLike, north_m: ArrayLike, reach_m: float, reach: Reaches) -> Floats:
         """Highest ``sign`` times height within reach of each point, margin included."""
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
         out = np.empty(e.size)
@@ -256,44 +256,62 @@ class Airspace:
         self, legs: Legs, limits: Limits, climb_deg: Floats, worst: Floats, hit: NDArray[np.intp], hit_at: Floats
     ) -> tuple[Violation, ...]:
         """Violations by leg, in the order of the kinds."""
-        out: list[Violation] = []
-        where, kinds = np.nonzero(worst[:, :, 0] > 0.0)
-        depth, fraction = worst[where, kinds, 0], worst[where, kinds, 1]
+        leg, kind = np.nonzero(worst[:, :, 0] > 0.0)
+        by, at = worst[leg, kind, 0], worst[leg, kind, 1]
         reach = (legs.track_error_m + limits.horizontal_clearance_m) * self.scale
-        for i, k, by, t in zip(where.tolist(), kinds.tolist(), depth.tolist(), fraction.tolist(), strict=True):
-            unit = "m"
-            if k in (CLIMB, DESCENT):
-                unit, value = "deg", abs(float(climb_deg[i]))
-                limit = limits.max_climb_deg if k == CLIMB else limits.max_descent_deg
-                by = max(value - limit, ANGLE_DEG)
-            elif k == COVERAGE:
-                limit = float(reach[i])
-                value = max(limit - by, 0.0)
-            elif k == TERRAIN:
-                limit, value = 0.0, -by
-            elif k == MIN_AGL:
-                limit, value = limits.min_agl_m, limits.min_agl_m - by
-            else:
-                limit = float((limits.max_agl_m if k == MAX_AGL else limits.max_amsl_m) or 0.0)
-                value = limit + by
-            out.append(self._at(legs, i, _KINDS[k], t, value, limit, by, unit))
-        for (i, zone), (value, t) in zip(hit.tolist(), hit_at.tolist(), strict=True):
-            limit = float(reach[i])
-            out.append(self._at(legs, i, "zone", t, value, limit, max(limit - value, 1e-6), "m", zone))
-        out.sort(key=lambda v: v.leg)
-        return tuple(out)
+        known_within = np.where(legs.column, legs.track_error_m * self.scale, reach)
+        steep = np.isin(kind, (CLIMB, DESCENT))
+        asked = np.zeros(len(_KINDS))
+        asked[[MIN_AGL, CLIMB, DESCENT]] = limits.min_agl_m, limits.max_climb_deg, limits.max_descent_deg
+        asked[[MAX_AGL, MAX_AMSL]] = limits.max_agl_m or 0.0, limits.max_amsl_m or 0.0
+        limit = np.where(kind == COVERAGE, known_within[leg], asked[kind])
+        by = np.where(steep, np.maximum(np.abs(climb_deg[leg]) - limit, ANGLE_DEG), by)
+        value = limit + np.where(np.isin(kind, (MIN_AGL, TERRAIN, COVERAGE)), -by, by)
+        value = np.where(kind == COVERAGE, np.maximum(value, 0.0), value)
+        hit_value, hit_t = self._depths(legs, hit, hit_at)
+        hit_reach = reach[hit[:, 0]]
+        leg = np.concatenate([leg, hit[:, 0]])
+        at = np.concatenate([at, hit_t])
+        order = np.argsort(leg, kind="stable")
+        place = legs.start[leg] + at[:, None] * (legs.end[leg] - legs.start[leg])
+        columns = (
+            leg,
+            np.concatenate([kind, np.full(len(hit), ZONE)]),
+            at,
+            *place.T,
+            np.concatenate([value, hit_value]),
+            np.concatenate([limit, hit_reach]),
+            np.concatenate([by, np.maximum(hit_reach - hit_value, TOUCH_M)]),
+            np.concatenate([np.full(len(kind), -1), hit[:, 1]]),
+        )
+        rows = zip(*(c[order].tolist() for c in columns), strict=True)
+        return tuple(
+            Violation(i, _KINDS[k], t, e, n, h, v, lim, off, "deg" if k in (CLIMB, DESCENT) else "m", zone)
+            for i, k, t, e, n, h, v, lim, off, zone in rows
+        )
 
-    @staticmethod
-    def _at(
-        legs: Legs, leg: int, kind: Kind, t: float, value: float, limit: float, by: float, unit: str, zone: int = -1
-    ) -> Violation:
-        a, b = legs.start[leg].tolist(), legs.end[leg].tolist()
-        e, n, h = (p + (q - p) * t for p, q in zip(a, b, strict=True))
-        return Violation(leg, kind, t, e, n, h, value, limit, by, unit, zone)
+    def _depths(self, legs: Legs, hit: NDArray[np.intp], hit_at: Floats) -> tuple[Floats, Floats]:
+        """Signed distances of broken zones and where on the leg: the kernel gives 0 anywhere inside a polygon."""
+        value, at = hit_at[:, 0].copy(), hit_at[:, 1].copy()
+        for row in np.nonzero(value == 0.0)[0].tolist():
+            leg, k = hit[row].tolist()
+            numbers, shape = self._zones.table[k], self.zones[k].shape
+            if not isinstance(shape, Polygon) or numbers[FLOOR_AGL] or numbers[CEILING_AGL]:
+                continue
+            a, b, error = legs.start[leg], legs.end[leg], legs.altitude_error_m[leg]
+            part = np.array([0.0, 1.0])
+            if a[2] != b[2]:
+                levels = np.array([numbers[FLOOR] - error, numbers[CEILING] + error])
+                part = np.sort((levels - a[2]) / (b[2] - a[2])).clip(0.0, 1.0)
+            depth, t = deepest_inside(shape.vertices, *(a[:2] + part[:, None] * (b - a)[:2]))
+            if depth > 0.0:
+                value[row], at[row] = -depth, part[0] + t * (part[1] - part[0])
+        return value, at
 
 
+ZONE = 7  # after the kernel's kinds
 _KINDS: dict[int, Kind] = {
-    MIN_AGL: "min_agl", TERRAIN: "terrain_clearance", MAX_AGL: "max_agl", MAX_AMSL: "max_amsl",
+    ZONE: "zone", MIN_AGL: "min_agl", TERRAIN: "terrain_clearance", MAX_AGL: "max_agl", MAX_AMSL: "max_amsl",
     COVERAGE: "coverage", CLIMB: "climb", DESCENT: "descent",
 }  # fmt: skip
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.world._envelope import pieces, spans
+from gcsplan.world._envelope import pieces
 from gcsplan.world._halo import Halo
+from gcsplan.world._shapes import spans
 from gcsplan.world._sweep import BOW_M, Field
 from gcsplan.world._sweep_zones import BAND_HIGH, BAND_LOW, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
 from gcsplan.world.limits import Limits
@@ -94,7 +95,17 @@ def make_tube(
     under = halo(False, reach.near_m + reach.spare_m + bow)
     beside = halo(True, reach.near_m + reach.spare_m + bow)
     beyond = halo(True, reach.far_m + reach.spare_m + bow)
-    rows = _pieces(field, surface.ground_m, surface.top_m, under, beside, beyond, track, (reach.near_m, reach.near_m, reach.far_m), reach.spare_m)
+    rows = _pieces(
+        field,
+        surface.ground_m,
+        surface.top_m,
+        under,
+        beside,
+        beyond,
+        track,
+        (reach.near_m, reach.near_m, reach.far_m),
+        reach.spare_m,
+    )
     error, near, far = limits.altitude_error_m, reach.margin_m(reach.near_m), reach.margin_m(reach.far_m)
     floor = rows[:, 3:5] + (limits.min_agl_m + error + near)
     if limits.horizontal_clearance_m > 0.0:
@@ -131,32 +142,17 @@ def _bands(
     halo: Callable[[bool, float], Halo], reach: Reaches,
 ) -> tuple[Band, ...]:  # fmt: skip
     """One band for each span of the track within reach of a zone, by zone and way."""
-    far, error = reach.far_m, limits.altitude_error_m
-    rows = np.empty((64 + len(zones.table), 4))
-    wide = far + reach.spare_m, far + reach.spare_m + ZONE_ROOM_M
-    parts = np.empty((len(zones.scratch) // 2 + 1, 2))
-    count = spans(zones.table, zones.vertex, track, *wide, rows, parts)
-    if count > len(rows):
-        rows = np.empty((count, 4))
-        spans(zones.table, zones.vertex, track, *wide, rows, parts)
-    rows = rows[:count]
-    rows = rows[np.lexsort((rows[:, 2], rows[:, 0]))]
+    error = limits.altitude_error_m
+    wide = reach.far_m + reach.spare_m + ZONE_ROOM_M
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
     out: list[Band] = []
-    at = 0
-    while at < len(rows):
-        zone, s0, s1 = int(rows[at, 0]), rows[at, 2], rows[at, 3]
-        at += 1
-        # A span that goes on into the next leg is one span.
-        while at < len(rows) and rows[at, 0] == zone and rows[at, 2] <= s1 + 1e-6:
-            s1 = max(s1, rows[at, 3])
-            at += 1
+    for zone, s0, s1 in spans(track, zones, reach.far_m + reach.spare_m, wide):
         numbers = zones.table[zone]
         bottom, top, agl = numbers[FLOOR], numbers[CEILING], numbers[[FLOOR_AGL, CEILING_AGL]]
         if agl.any():
-            around = halo(False, wide[1] + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
+            around = halo(False, wide + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
             part = _between(track, length, s0, s1)
-            ground = _pieces(field, surface.ground_m, surface.ground_m, around, around, around, part, (wide[1],) * 3, 0.0)
+            ground = _pieces(field, surface.ground_m, surface.ground_m, around, around, around, part, (wide,) * 3, 0.0)
             s = np.concatenate([[s0], s0 + ground[:, 0]])
             low, high = ground[:, 1:3], ground[:, 3:5]
         else:
@@ -172,7 +168,7 @@ def _bands(
             high = np.where(np.isnan(ground[:, 3:5]), np.inf, high)
         else:
             high = np.full_like(high, top)
-        out.append(Band(zone, float(s0), float(s1), s, low - error, high + error))
+        out.append(Band(zone, s0, s1, s, low - error, high + error))
     return tuple(out)
 
 
