@@ -7,15 +7,20 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import InputError, UsageError
+from gcsplan.errors import CheckFailed, InputError, UsageError
 from gcsplan.mavlink.files import read_mission_file
 from gcsplan.mavlink.mission import Home, Mission
+from gcsplan.mavlink.preflight import distance_m
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.pipeline import world_of
 from gcsplan.vehicle import Vehicle
+
+SAME_PLACE_M = 1.0
+"""A home row within this of the vehicle's start is the start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +72,12 @@ def check_files(source: MissionFile, arguments: Sequence[str]) -> list[Checked]:
         if mission.home.lat_e7 == 0 and mission.home.lon_e7 == 0:
             notes.append("the file's home row is blank: the vehicle's start in the mission file was taken for home")
             mission = replace(mission, home=start)
+        elif distance_m(mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7, *request.start_deg) > SAME_PLACE_M:
+            # No autopilot flies from a file's home row: heights count from where it arms, and that is the start.
+            notes.append(
+                "the file's home row lies elsewhere: the vehicle's start in the mission file was taken for home"
+            )
+            mission = replace(mission, home=start)
         if mission.autopilot is not vehicle.autopilot:
             raise InputError(f"is for {mission.autopilot}, and {vehicle.name} is {vehicle.autopilot}", where=str(file))
         verdict = judge(
@@ -74,3 +85,17 @@ def check_files(source: MissionFile, arguments: Sequence[str]) -> list[Checked]:
         )
         checked.append(Checked(file, vehicle, request, mission, verdict, tuple(notes)))
     return checked
+
+
+def failure(checked: Sequence[Checked], *, allow_unjudged: bool) -> dict[str, Any] | None:
+    """The ``error`` of ``check --json``: which limits are broken or what could not be judged; None if all may fly."""
+    bad = [c for c in checked if c.verdict.safe is False or (c.verdict.safe is None and not allow_unjudged)]
+    if not bad:
+        return None
+    broken = any(c.verdict.safe is False for c in bad)
+    return {
+        "code": CheckFailed.exit_code,
+        "reason": "violation" if broken else "not_judged",
+        "message": "\n".join(f"{c.vehicle.name}: {line}" for c in bad for line in c.verdict.describe().splitlines()),
+        "where": ", ".join(str(c.file) for c in bad),
+    }

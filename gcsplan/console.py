@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def plan_table(plan: Plan) -> None:
     """A column for each vehicle of a plan, and the limit beside what was reached; for large fleets a row for each."""
     many = len(plan.vehicles) > 4
     rows = [_plan_row(v) for v in plan.vehicles]
-    title = f"[bold]{plan.source.name}[/]  planner {plan.planner}, objective {plan.objective}"
+    title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
     if many:
         table = _table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
         for row in rows:
@@ -77,7 +78,7 @@ def _plan_row(v: VehiclePlan) -> dict[str, str]:
         "energy, kJ": number(verdict.energy_j / 1000),
         "battery, %": number(verdict.battery_used_percent),
         "lowest AGL, m": f"{number(lowest.min_agl_m, 1)} of {limits.min_agl_m:g}" if lowest else "–",
-        "nearest zone, m": f"{number(nearest.zone_clearance_m, 1)} {nearest.nearest_zone}" if nearest else "–",
+        "nearest zone, m": f"{number(nearest.zone_clearance_m, 1)} {escape(nearest.nearest_zone)}" if nearest else "–",
         "steepest, °": f"{number(verdict.max_climb_deg, 1)}{climb}",
         "time to goal, s": number(verdict.arrive_s),
         "verdict": verdict_word(verdict.safe),
@@ -89,13 +90,13 @@ def verdict_table(name: str, verdict: Verdict) -> None:
     columns = [("item", True), ("", False), ("leg m", True), ("to AMSL m", True), ("AGL m", True),
                ("lowest AGL m", True), ("climb °", True), ("nearest zone m", True), ("energy kJ", True),
                ("time s", True)]  # fmt: skip
-    table = _table(f"[bold]{name}[/]  {verdict_word(verdict.safe)}", columns)
+    table = _table(f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe)}", columns)
     bad = {f.seq for f in verdict.findings}
     for leg in verdict.legs:
         table.add_row(
             str(leg.seq), leg.kind, number(leg.length_m), number(leg.end[2], 1), number(leg.agl_end_m, 1),
             "–" if leg.column else number(leg.min_agl_m, 1), number(leg.climb_deg, 1),
-            f"{number(leg.zone_clearance_m)} {leg.nearest_zone}" if leg.nearest_zone else "–",
+            f"{number(leg.zone_clearance_m)} {escape(leg.nearest_zone)}" if leg.nearest_zone else "–",
             number(leg.energy_j / 1000, 1), number(leg.time_s), style="red" if leg.seq in bad else None,
         )  # fmt: skip
     console.print(table)
@@ -106,14 +107,16 @@ def verdict_table(name: str, verdict: Verdict) -> None:
 
 def delivery_table(deliveries: Sequence[Delivery], title: str = "upload") -> None:
     """One row for each vehicle that something was sent to, or compared with."""
-    columns = [("vehicle", False), ("link", False), ("items", True), ("outcome", False), ("read back", False),
-               ("s", True), ("retries", True)]  # fmt: skip
+    sent = title == "upload"
+    columns = [("vehicle", False), ("link", False), ("items", True), *([("outcome", False)] if sent else []),
+               ("read back", False), ("s", True), ("retries", True)]  # fmt: skip
     table = _table(f"[bold]{title}[/]", columns)
     for d in deliveries:
         told = {"accepted": "[green]accepted[/]"}.get(d.outcome, f"[bold red]{d.outcome}[/]")
         verified = "[green]verified[/]" if d.verified else "[bold red]not verified[/]"
-        link = f"{d.url} [bold yellow]simulated[/]" if d.simulated else d.url
-        table.add_row(d.vehicle, link, str(d.items), told, verified, number(d.seconds, 2), str(d.retries))
+        link = escape(d.url) + (" [bold yellow]simulated[/]" if d.simulated else "")
+        outcome = [told] if sent else []  # a comparison sends nothing
+        table.add_row(escape(d.vehicle), link, str(d.items), *outcome, verified, number(d.seconds, 2), str(d.retries))
     console.print(table)
     for d in deliveries:
         say_notes([f"{d.vehicle}: {w}" for w in d.warnings])

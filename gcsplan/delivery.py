@@ -7,6 +7,7 @@ starts a loopback vehicle for each UAV where its mission starts; the results say
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
@@ -18,6 +19,7 @@ from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.checking import Checked, split_name
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
+from gcsplan.export.outdir import write_whole
 from gcsplan.mavlink import session
 from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.files import read_mission_file, write_plan, write_waypoints
@@ -78,6 +80,7 @@ class Delivery:
     message: str = ""
     warnings: tuple[str, ...] = ()
     code: int = 0
+    reason: str = ""
     details: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
@@ -101,16 +104,26 @@ def targets(where: Sequence[str], vehicles: Sequence[Vehicle]) -> dict[str, str]
             if name not in by_name:
                 known = ", ".join(by_name)
                 raise UsageError(f"--upload {word}: the mission file has no vehicle {name!r}; it has {known}")
-            single[name] = url if url == SIM else parse_url(url).url
+            single[name] = url if url == SIM else _url(url, word)
         elif word == LINK:
             missing = [v.name for v in vehicles if not v.link]
             if missing:
                 raise UsageError(f"--upload link: {', '.join(missing)} has no `link` in the mission file")
-            chosen |= {v.name: parse_url(v.link or "").url for v in vehicles}
+            chosen |= {v.name: _url(v.link or "", f"link of {v.name}") for v in vehicles}
         else:
-            url = SIM if word == SIM else parse_url(word).url
+            url = SIM if word == SIM else _url(word, word)
             chosen |= dict.fromkeys(by_name, url)
     return chosen | single
+
+
+def _url(text: str, word: str) -> str:
+    """``text`` as a URL in its one form; ``word`` is what the user wrote. Raises UsageError."""
+    try:
+        return parse_url(text).url
+    except InputError as error:
+        near = [w for w in (SIM, LINK) if w == word.strip().lower()]
+        hint = f"; did you mean {near[0]}?" if near else f". Besides URLs there are {SIM}, {LINK} and NAME=URL"
+        raise UsageError(f"{error.message}{hint}", where=f"upload to {word!r}") from None
 
 
 def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[Job]:
@@ -125,13 +138,20 @@ def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[Job]:
     ]  # fmt: skip
 
 
-def jobs_of_files(source: MissionFile, checked: Sequence[Checked], url: str) -> list[Job]:
-    """The uploads of checked files, all to one URL (`SIM` too)."""
+def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) -> list[Job]:
+    """The uploads of checked files; ``word`` as of ``--upload``. Raises UsageError for two files of one vehicle."""
     world = world_of(source)
-    to = SIM if url == SIM else parse_url(url).url
+    seen: dict[str, Path] = {}
+    for c in checked:
+        if seen.setdefault(c.vehicle.name, c.file) is not c.file:
+            raise UsageError(f"{seen[c.vehicle.name]} and {c.file} are both for {c.vehicle.name}: give one of them")
+    to = targets([word], [r.vehicle for r in source.vehicles])
+    missing = [c.vehicle.name for c in checked if c.vehicle.name not in to]
+    if missing:
+        raise UsageError(f"--to {word} says nothing of {', '.join(missing)}")
     return [
         Job(
-            c.vehicle.name, to, c.mission, c.verdict, c.vehicle, world, c.request.rtl_rel_home_m,
+            c.vehicle.name, to[c.vehicle.name], c.mission, c.verdict, c.vehicle, world, c.request.rtl_rel_home_m,
             source.terrain_error_m,
         )
         for c in checked
@@ -142,6 +162,7 @@ def unchecked_job(argument: str, url: str, sysid: int) -> Job:
     """A file for ``--unchecked``; the vehicle itself says which autopilot it is where the file does not."""
     name, file = split_name(argument)
     endpoint = parse_url(url)
+    require_file(file)
     autopilot = None
     if file.suffix.lower() != ".plan":
         with _open(url) as link:
@@ -238,13 +259,13 @@ def _delivery(job: Job, ended: UploadResult | GcsplanError) -> Delivery:
         outcome = "refused" if isinstance(ended, VehicleRefused) else "unknown"
         return Delivery(
             job.name, job.url, outcome, False, len(job.mission.wire_items()), 0.0, simulated=job.url == SIM,
-            message=str(ended), code=ended.exit_code,
+            message=str(ended), code=ended.exit_code, reason=ended.reason,
         )  # fmt: skip
     error = ended.error()
     return Delivery(
         job.name, job.url if job.url == SIM else ended.url, ended.outcome, ended.verified, ended.items, ended.seconds,
         ended.retries, ended.simulated, str(error) if error else "", ended.warnings,
-        error.exit_code if error else 0, ended.as_dict(),
+        error.exit_code if error else 0, error.reason if error else "", ended.as_dict(),
     )  # fmt: skip
 
 
@@ -255,8 +276,29 @@ def exit_code(deliveries: Sequence[Delivery]) -> int:
     return next((c for c in order if c in codes), max(codes, default=0))
 
 
+def failure(deliveries: Sequence[Delivery]) -> dict[str, Any] | None:
+    """The ``error`` of ``--json``: of those that failed the worst kind; None if all are verified."""
+    code = exit_code(deliveries)
+    if code == 0:
+        return None
+    worst = [d for d in deliveries if d.code == code]
+    return {
+        "code": code,
+        "reason": worst[0].reason,
+        "message": "\n".join(f"{d.vehicle}: {d.message}" for d in worst),
+        "where": ", ".join(dict.fromkeys(d.url for d in worst)),
+    }
+
+
+def require_file(file: Path) -> None:
+    """Raise InputError where there is no such file, before a vehicle is looked for."""
+    if not os.path.exists(file):
+        raise InputError("there is no such file", where=str(file))
+
+
 def verify_file(file: Path, url: str, sysid: int) -> Delivery:
     """Compare a file with what is on board; nothing is written to the vehicle."""
+    require_file(file)
     with _open(url) as link:
         autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
         read = read_mission_file(file, autopilot=autopilot)
@@ -270,25 +312,22 @@ def download_to(url: str, sysid: int, file: Path) -> int:
     """Write the mission on board to a `.waypoints` or `.plan` file; returns the number of its wire items."""
     if file.suffix.lower() not in (".waypoints", ".plan"):
         raise UsageError(f"-o {file}: a name that ends in .waypoints or .plan is wanted")
+    if file.is_dir() or not file.parent.is_dir():
+        raise UsageError(f"-o {file}: a file in a directory that is there is wanted")
     with _open(url) as link:
         autopilot = _autopilot_of(link, sysid)
         mission = session.download_mission(
             link, sysid, autopilot, name=file.stem, options=session.Options(listen_s=0.0)
         )
     text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
-    part = file.with_name(f".{file.name}.part")
-    try:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        part.replace(file)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise InputError(f"cannot be written: {error.strerror}", where=str(file)) from error
+    write_whole(file, text)
     return len(mission.wire_items())
 
 
-def clear(url: str, sysid: int, kind: str) -> None:
+def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False) -> None:
     """Clear one list on board and read back that it is empty."""
     if kind not in KINDS:
         raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
     with _open(url) as link:
-        session.clear_mission(link, sysid, KINDS[kind], options=session.Options(listen_s=LISTEN_S)).raise_for_outcome()
+        options = session.Options(listen_s=LISTEN_S, allow_armed=allow_armed)
+        session.clear_mission(link, sysid, KINDS[kind], options=options).raise_for_outcome()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -35,6 +36,15 @@ def outputs_of(plan: Plan) -> dict[str, str]:
     files["profile.csv"] = write_profile([row for v in plan.vehicles for row in item_rows(v.name, v.verdict)])
     files["summary.json"] = write_summary(summary_of(plan))
     return files
+
+
+def picture_of(plan: Plan) -> bytes:
+    """Map and profiles as PNG."""
+    from gcsplan.report import picture
+
+    buffer = io.BytesIO()
+    picture.save(plan, buffer)
+    return buffer.getvalue()
 
 
 def upload_text(plan: Plan, deliveries: Sequence[Delivery]) -> str:

@@ -142,7 +142,8 @@ def _plan_vehicle(
         failed = verdict
         if not any(f.seq > mission.first_seq for f in verdict.findings if f.kind != "battery"):
             break  # no margin mends a battery or a take-off column
-        margins = _larger(margins, verdict, terrain=source.altitude_frame == "terrain")
+        all_along = source.altitude_frame == "terrain" or vehicle.autopilot is Autopilot.ARDUPLANE
+        margins = _larger(margins, verdict, all_along=all_along)
     assert failed is not None
     raise _unsafe(failed, vehicle)
 
@@ -157,9 +158,14 @@ def _require_room(mission: Mission, vehicle: Vehicle) -> None:
         )
 
 
-def _larger(margins: Margins, verdict: Verdict, *, terrain: bool) -> Margins:
-    """Margins for another attempt. Over sloping ground a terrain-frame leg is low all along, not at one hilltop."""
-    low_m = max((f.by for f in verdict.findings if f.kind == "min_agl"), default=0.0) if terrain else 0.0
+def _larger(margins: Margins, verdict: Verdict, *, all_along: bool) -> Margins:
+    """Margins for another attempt.
+
+    ``all_along``: what is off is off on many legs, not at one hilltop: a terrain-frame leg over sloping ground, and
+    ArduPlane's, which changes height by less than GLIDE_SLOPE_MIN at once.
+    """
+    heights = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
+    low_m = max((f.by for f in verdict.findings if f.kind in heights), default=0.0) if all_along else 0.0
     return Margins(
         3.0 * margins.altitude_m + 1.05 * low_m, 3.0 * margins.track_m, 3.0 * margins.bow_m, 3.0 * margins.slope
     )

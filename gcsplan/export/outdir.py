@@ -29,13 +29,35 @@ _NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 _OURS = re.compile(r".+\.(waypoints|plan)|mission\.(kml|geojson)|profile\.csv|(summary|upload)\.json|report\.html")
 
 
-def write_outputs(directory: str | os.PathLike[str], files: Mapping[str, str | bytes]) -> None:
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write one file of the user's choice, whole or not at all; what is there is replaced. Raises InputError."""
+    target = Path(path)
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    try:
+        handle, name = tempfile.mkstemp(prefix=f"{MANIFEST}-", dir=target.parent)
+        part = Path(name)
+        try:
+            with open(handle, "wb") as stream:
+                stream.write(data)
+            mask = os.umask(0)
+            os.umask(mask)
+            part.chmod(0o666 & ~mask)  # as any other new file; mkstemp's own are for the owner alone
+            part.replace(target)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be written: {getattr(error, 'strerror', None) or error}", where=str(path)) from error
+
+
+def write_outputs(directory: str | os.PathLike[str], files: Mapping[str, str | bytes]) -> list[str]:
     """Make ``files`` (name to content, text in UTF-8) gcsplan's outputs in ``directory``; earlier ones go.
 
-    The directory is made where it is missing. Raises InputError where it cannot be written; then everything is as it
+    Returns the names of files of others that stood in the way and were moved to ``previous/``. The directory is made
+    where it is missing. Raises InputError where it cannot be written; then everything is as it
     was. Raises ValueError for a name that is no plain file name.
     """
-    _write(Path(directory), files, keep=False)
+    return _write(Path(directory), files, keep=False)
 
 
 def add_output(directory: str | os.PathLike[str], name: str, content: str | bytes) -> None:
@@ -78,9 +100,10 @@ def retire_outputs(directory: str | os.PathLike[str]) -> list[str]:
         return names
 
 
-def _write(root: Path, files: Mapping[str, str | bytes], *, keep: bool) -> None:
+def _write(root: Path, files: Mapping[str, str | bytes], *, keep: bool) -> list[str]:
     _check_names(files)
     contents = {name: c.encode("utf-8") if isinstance(c, str) else bytes(c) for name, c in files.items()}
+    in_the_way = []
     with _reported(root), _made(root):
         ours = _manifest(root)
         with _Moves(root) as moves:
@@ -97,11 +120,13 @@ def _write(root: Path, files: Mapping[str, str | bytes], *, keep: bool) -> None:
                     else:
                         moves.make_directory(root / PREVIOUS)
                         moves.move(target, _free(root / PREVIOUS, name))
+                        in_the_way.append(name)
                 if name in staged:
                     moves.move(staged[name], target)
             if os.path.lexists(root / MANIFEST):
                 moves.discard(root / MANIFEST)
             moves.move(manifest, root / MANIFEST)
+    return in_the_way
 
 
 def _check_names(files: Mapping[str, str | bytes]) -> None:

@@ -42,7 +42,7 @@ from gcsplan.mission_file.world import (
     make_zones,
     settle_zones,
 )  # fmt: skip
-from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, place_zones, zones_sha256
+from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zones_sha256
 from gcsplan.world.frame import Frame
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
@@ -171,7 +171,7 @@ class _Reading:
         if not isinstance(value, str) or not value.strip() or len(value) > 300:
             words = f"must be text, 300 characters at most, given {shown(value)}"
             self.problems.append(Problem(f"{self.where}name", words))
-        return str(value)
+        return one_line(str(value))
 
     def _choice(self, key: str, choices: tuple[str, ...], default: str) -> Any:
         value = self.raw.get(key)
@@ -273,9 +273,9 @@ class _Reading:
         # Names from other people's files may repeat; reports need them apart.
         seen: Counter[str] = Counter()
         for k, draft in enumerate(drafts):
-            seen[draft.name] += 1
-            if seen[draft.name] > 1:
-                drafts[k] = replace(draft, name=f"{draft.name} #{seen[draft.name]}")
+            name = one_line(draft.name)
+            seen[name] += 1
+            drafts[k] = replace(draft, name=f"{name} #{seen[name]}" if seen[name] > 1 else name)
         return drafts
 
     def _far(self, far: list[ZoneDraft], frame: Frame) -> None:

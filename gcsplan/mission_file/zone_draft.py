@@ -189,6 +189,11 @@ def looks_swapped(draft: ZoneDraft, frame: Frame) -> bool:
     return bool(_shapes(turned, frame))
 
 
+def one_line(text: str) -> str:
+    """``text`` fit for tables, files and terminals: one line, no control characters, no halves of surrogates."""
+    return "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in text).strip()
+
+
 def zones_sha256(drafts: Sequence[ZoneDraft]) -> str:
     """Hash of what the zones say, wherever they were written and however they were laid out."""
     plain = [

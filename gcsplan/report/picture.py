@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -43,9 +43,9 @@ def draw(plan: Plan) -> Figure:
     return figure
 
 
-def save(plan: Plan, file: FilePath) -> None:
+def save(plan: Plan, file: FilePath | IO[bytes]) -> None:
     """Write `draw`'s picture as PNG."""
-    draw(plan).savefig(file, dpi=110, metadata={"Software": None})
+    draw(plan).savefig(file, format="png", dpi=110, metadata={"Software": None})
 
 
 def _colours(n: int) -> list[str]:
