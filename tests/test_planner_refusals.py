@@ -137,6 +137,12 @@ def test_start_over_unknown_ground() -> None:
     assert "unknown" in e.message
 
 
+def test_via_straight_over_the_start_is_refused_and_not_forgotten() -> None:
+    e = refused(ground(0.0), via=(Via(200.0, 1000.0, 60.0),))
+    assert "the start and via point 1 are one place, 40.0 m apart in height" in e.message
+
+
 def test_same_place_is_no_mission() -> None:
     e = refused(ground(0.0), goal=(200.0, 1000.0, 20.0))
     assert "same place" in e.message
+    assert "same place" in refused(ground(0.0), goal=(200.0, 1000.0, 20.0), via=(Via(200.0, 1000.0),)).message

@@ -47,7 +47,16 @@ def check_ends(problem: Problem) -> None:
     names = ["the start", *(f"via point {k + 1}" for k in range(len(problem.via))), "the goal"]
     for name, place, amsl in zip(names, stops, heights, strict=True):
         _check_end(problem, name, place, amsl)
-    if len(stops) == 2 and math.dist(*stops) < 1e-3:
+    for k, (a, b) in enumerate(pairwise(stops)):
+        z0, z1 = heights[k], heights[k + 1]
+        if math.dist(a, b) < 1e-3 and z0 is not None and z1 is not None and abs(z1 - z0) > 1e-3:
+            raise Refusal(
+                f"no mission: {names[k]} and {names[k + 1]} are one place, {abs(z1 - z0):.1f} m apart in height, and a "
+                f"climb on the spot is not planned: move one of them",
+                reason="infeasible",
+                place=a,
+            )
+    if all(math.dist(stops[0], x) < 1e-3 for x in stops):
         raise Refusal("start and goal are the same place: there is nothing to fly", reason="infeasible", place=stops[0])
 
 

@@ -60,15 +60,13 @@ def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float,
 
 @dataclass(eq=False, slots=True)
 class Router:
-    """A lattice with its terminals, and how many searches were spent on it."""
+    """A lattice with its terminals, and what the exact test last found on it."""
 
     problem: Problem
     lattice: Lattice
     stops: list[tuple[float, float]]
     links: list[Links]
     climb_factor: float = 1.0
-    searches: int = 0
-    complete: bool = True
     last: Obstruction | None = None
     last_place: Floats | None = field(default=None)
 
@@ -110,8 +108,6 @@ class Router:
                 weight=weight,
                 want=4 if free else 1,
             )
-            self.searches += 1
-            self.complete &= found.complete
             labels = found.labels
             if not labels:
                 break
