@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-import io
-import json
 import os
 import sys
-import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from gcsplan.ending import Interrupted, emit, explained, fail, put, speak_plainly, talking
 from gcsplan.errors import CheckFailed, GcsplanError, InputError, NoMission, UsageError
+from gcsplan.options import (
+    LINKS,
+    ArmedOption,
+    AutopilotOption,
+    FilesArgument,
+    JsonOption,
+    ListenOption,
+    MisbehaveOption,
+    MissionArgument,
+    PlaceOption,
+    SimSysidOption,
+    SysidOption,
+    ToOption,
+    TypeOption,
+    UncheckedSysidOption,
+    UnjudgedOption,
+)
 
 if TYPE_CHECKING:
     from gcsplan.delivery import Delivery
@@ -32,71 +45,8 @@ app = typer.Typer(
 bench_app = typer.Typer(help="Measurements: legs checked a second; upload beside MAVSDK's.", no_args_is_help=True)
 app.add_typer(bench_app, name="bench")
 
-LINKS = "udpout:HOST:PORT sends, udpin:HOST:PORT listens, tcp:HOST:PORT, /dev/ttyUSB0,57600."
-MISBEHAVIOURS = (
-    "drop, duplicate, reorder, delay (probabilities), delay_s, corrupt (an item), corrupt_field, silent_after "
-    "(messages), reboot_at (an item), reboot_s, reboot_loses, edit (an item), stray_sysid, stale_type, answer_sysid, "
-    "refuse (an item), refuse_code, no_space, armed, seed"
-)
 
-MissionArgument = Annotated[Path, typer.Argument(metavar="MISSION.yaml", help="The mission file.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
-UnjudgedOption = Annotated[
-    bool, typer.Option("--allow-unjudged", help="Accept a mission of which something could not be judged.")
-]
-SysidOption = Annotated[
-    int, typer.Option("--sysid", metavar="N", min=1, max=255, help="System id of the vehicle, 1 to 255.")
-]
-ToOption = Annotated[str, typer.Option("--to", metavar="URL", help=f"Where the vehicle is: {LINKS}")]
-FilesArgument = Annotated[
-    list[str], typer.Argument(metavar="FILE...", help="FILE or NAME=FILE (the vehicle's name); .waypoints or .plan.")
-]
-TypeOption = Annotated[str, typer.Option("--type", metavar="KIND", help="mission, fence or rally.")]
-ArmedOption = Annotated[bool, typer.Option("--allow-armed", help="Send to an armed vehicle.")]
-PlaceOption = Annotated[bool, typer.Option("--ignore-position", help="Send wherever the vehicle stands.")]
-
-
-class Interrupted(GcsplanError):
-    """Ctrl-C while vehicles were being talked to: says what is to be done about them."""
-
-    exit_code: ClassVar[int] = 130
-    default_reason: ClassVar[str] = "interrupted"
-
-
-def emit(document: dict[str, Any], error: dict[str, Any] | None = None) -> None:
-    """The one JSON document of ``--json``, with what went wrong."""
-    from gcsplan.export.summary import write_summary
-
-    put(write_summary(document | ({"error": error} if error else {}), clocks=True))
-
-
-def put(text: str) -> None:
-    """Write to standard output, now: what does not arrive there is an error. Raises InputError (or BrokenPipeError)."""
-    try:
-        sys.stdout.write(text)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        raise
-    except (OSError, AttributeError) as error:  # a full disk; a standard output that was closed is None
-        with suppress(OSError, AttributeError, ValueError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        words = getattr(error, "strerror", None) or "it is closed"
-        raise InputError(f"cannot be written: {words}", where="standard output") from error
-
-
-@contextmanager
-def talking(names: list[str]) -> Iterator[None]:
-    """Around a conversation with vehicles: Ctrl-C in it leaves something to be told."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        raise Interrupted(
-            f"interrupted while talking to {', '.join(names)}: a transfer under way was broken off, and the vehicle "
-            f"told so; what it holds now is unknown: send it again, or compare with gcsplan verify"
-        ) from None
-
-
-@app.command()
+@app.command(short_help="Plan a mission file; upload and verify if asked.")
 def plan(
     mission: MissionArgument,
     out: Annotated[
@@ -183,7 +133,7 @@ def plan(
     raise typer.Exit(delivery.exit_code(deliveries))
 
 
-@app.command()
+@app.command(short_help="Does a file fly safely in a mission's world?")
 def check(
     mission: MissionArgument,
     files: FilesArgument,
@@ -209,7 +159,7 @@ def check(
     raise typer.Exit(CheckFailed.exit_code if checking.failure(checked, allow_unjudged=allow_unjudged) else 0)
 
 
-@app.command()
+@app.command(short_help="Check files, upload them, read them back, compare.")
 def upload(
     files: FilesArgument,
     to: Annotated[
@@ -224,12 +174,7 @@ def upload(
         Path | None, typer.Option(metavar="MISSION.yaml", help="Mission file whose world the files are checked in.")
     ] = None,
     unchecked: Annotated[bool, typer.Option("--unchecked", help="Send without any check of safety.")] = False,
-    sysid: Annotated[
-        int | None,
-        typer.Option(
-            "--sysid", metavar="N", min=1, max=255, help="With --unchecked: system id of the vehicle [default: 1]"
-        ),
-    ] = None,
+    sysid: UncheckedSysidOption = None,
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
@@ -276,7 +221,7 @@ def upload(
     raise typer.Exit(delivery.exit_code(deliveries))
 
 
-@app.command()
+@app.command(short_help="Is exactly this file on board?")
 def verify(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The .waypoints or .plan that should be on board.")],
     to: ToOption,
@@ -315,7 +260,7 @@ def download(
         say(f"{items} item{'' if items == 1 else 's'} written to {out}")
 
 
-@app.command()
+@app.command(short_help="Remove the mission, fence or rally points.")
 def clear(
     to: ToOption,
     sysid: SysidOption = 1,
@@ -336,27 +281,15 @@ def clear(
         say(f"the {what} of vehicle {sysid} is empty now")
 
 
-@app.command()
+@app.command(short_help="Loopback vehicles that take missions.")
 def sim(
     mission: Annotated[
         Path | None, typer.Argument(metavar="MISSION.yaml", help="One vehicle for each of the mission's.")
     ] = None,
-    listen: Annotated[
-        str,
-        typer.Option(metavar="URL", help="udpin:HOST:PORT or tcpin:HOST:PORT listens, udpout:HOST:PORT speaks first."),
-    ] = "udpin:127.0.0.1:14560",
-    autopilot: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Without a mission file: arducopter, arduplane or px4 [default: arducopter]"),
-    ] = None,
-    sysid: Annotated[
-        int | None,
-        typer.Option("--sysid", metavar="N", min=1, max=255, help="Without a mission file: system id [default: 1]"),
-    ] = None,
-    misbehave: Annotated[
-        str,
-        typer.Option(metavar="HOW", help=f"Trouble, for example drop=0.1,corrupt=7,seed=3. Known: {MISBEHAVIOURS}."),
-    ] = "",
+    listen: ListenOption = "udpin:127.0.0.1:14560",
+    autopilot: AutopilotOption = None,
+    sysid: SimSysidOption = None,
+    misbehave: MisbehaveOption = "",
 ) -> None:
     """A loopback vehicle (or one for each of the mission's vehicles) that takes missions like a real one.
 
@@ -410,7 +343,7 @@ def planners(as_json: JsonOption = False) -> None:
         planners_table(rows)
 
 
-@bench_app.command("check")
+@bench_app.command("check", short_help="Legs checked a second.")
 def bench_check(
     legs: Annotated[int, typer.Option(metavar="N", help="Random one-kilometre legs.")] = 200_000,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the legs.")] = 1,
@@ -426,10 +359,10 @@ def bench_check(
         put(bench.report(result) + "\n")
 
 
-@bench_app.command("upload")
+@bench_app.command("upload", short_help="Upload beside MAVSDK's.")
 def bench_upload(
     items: Annotated[int, typer.Option(metavar="N", help="Items of the mission.")] = 600,
-    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each, in turn.")] = 5,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each, in turn.")] = 15,
     as_json: JsonOption = False,
 ) -> None:
     """Upload to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
@@ -460,7 +393,7 @@ def main() -> NoReturn:
     debug = "--debug" in sys.argv
     arguments = [a for a in sys.argv[1:] if a != "--debug"]
     as_json = "--json" in arguments
-    _speak_plainly()
+    speak_plainly()
     try:
         # Outside standalone mode click hands typer.Exit's code back instead of exiting.
         code = app(args=arguments, prog_name="gcsplan", standalone_mode=False)
@@ -479,48 +412,7 @@ def main() -> NoReturn:
         words = "not enough memory for this: give a smaller area, coarser terrain, fewer zones or items"
         fail(InputError(words, reason="memory"), as_json, debug)
     except Exception as error:  # the one place where a bug of ours becomes an exit code
-        fail(_explained(error), as_json, debug)
-
-
-def _speak_plainly() -> None:
-    """JSON is UTF-8 everywhere, and no terminal or pipe is so poor that a ° or a – would end the program."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(encoding="utf-8" if "--json" in sys.argv else None, errors="backslashreplace")
-
-
-def _explained(error: Exception) -> GcsplanError:
-    """What an exception that is none of ours amounts to."""
-    told = getattr(error, "format_message", None)  # click's usage errors, whichever click typer brings along
-    if told is not None:
-        context = getattr(error, "ctx", None)
-        if type(error).__name__ == "NoArgsIsHelpError":
-            return UsageError(f"a command is wanted\n\n{told()}")
-        return UsageError(f"{told()} (see {context.command_path if context else 'gcsplan'} --help)")
-    cause: BaseException | None = error
-    while cause is not None:
-        if isinstance(cause, KeyboardInterrupt):  # compiled code turns Ctrl-C into an error of its own
-            return Interrupted("interrupted")
-        cause = cause.__cause__ or cause.__context__
-    return GcsplanError(f"internal error, a bug in gcsplan: {type(error).__name__}: {error} (--debug shows where)")
-
-
-def fail(error: GcsplanError, as_json: bool, debug: bool) -> NoReturn:
-    """One message on standard error, one JSON document if asked, and the exit code."""
-    code = error.exit_code
-    if debug:
-        traceback.print_exc()
-    with suppress(OSError):  # there is nobody left to tell
-        # Names of files and values come from anywhere: none of them may speak to the terminal.
-        words = "".join(c if c.isprintable() or c in "\n\u2009" else "\ufffd" for c in str(error))
-        print(f"gcsplan: {words}", file=sys.stderr)
-    if as_json:
-        document = {"code": code, "reason": error.reason, "message": error.message, "where": error.where}
-        if isinstance(error, InputError):
-            document["problems"] = [{"where": p.where, "message": p.message} for p in error.problems]
-        with suppress(InputError, BrokenPipeError):
-            put(json.dumps({"error": document}) + "\n")
-    sys.exit(code)
+        fail(explained(error), as_json, debug)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from gcsplan.planners.problem import Progress
 
 PLAIN_WIDTH = 130  # of a log file or a pipe, where nobody says how wide it is
+WIDEST = 100_000
 
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 if not console.is_terminal:
@@ -40,6 +41,18 @@ def _table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
     return table
 
 
+def _width(table: Table) -> int:
+    """Columns of the terminal that ``table`` takes if nothing is cut."""
+    return console.measure(table, options=console.options.update(width=WIDEST)).maximum
+
+
+def _print(table: Table) -> None:
+    """Whole, even where the terminal is too narrow and breaks its lines: a verdict that is cut off is none."""
+    width = _width(table)
+    wide = console if width <= console.width else Console(stderr=True, highlight=False, soft_wrap=True, width=width)
+    wide.print(table)
+
+
 def verdict_word(safe: bool | None) -> str:
     """Safe, UNSAFE or not judged, coloured."""
     return {True: "[green]safe[/]", False: "[bold red]UNSAFE[/]", None: "[yellow]not judged[/]"}[safe]
@@ -47,22 +60,33 @@ def verdict_word(safe: bool | None) -> str:
 
 def plan_table(plan: Plan) -> None:
     """A column for each vehicle of a plan, and the limit beside what was reached; for large fleets a row for each."""
-    many = len(plan.vehicles) > 4
     rows = [_plan_row(v) for v in plan.vehicles]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
-    if many:
-        table = _table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
-        for row in rows:
-            table.add_row(*row.values())
+    table = _table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
+    for row in rows:
+        table.add_row(*row.values())
+    if len(rows) > 4 and _width(table) <= console.width:
+        _print(table)
     else:
-        table = _table(title, [("", False), *((row["vehicle"], True) for row in rows)])
-        for name in list(rows[0])[1:]:
-            table.add_row(name, *(row[name] for row in rows))
-    console.print(table)
-    notes = [f"{v.name}: {n}" for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)]
-    say_notes([*plan.notes, *notes])
+        each = next((n for n in (4, 3, 2) if all(_width(t) <= console.width for t in _columns(title, rows, n))), 1)
+        for table in _columns(title, rows, each):
+            _print(table)
+    say_notes(plan.notes)
+    say_notes_of([(v.name, n) for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)])
     if plan.source.inputs.get("bare_dem"):
         console.print("[yellow]bare DEM: trees, masts and wires are not in it[/]")
+
+
+def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[Table]:
+    """Tables with a column for each of ``rows``, at most ``each`` of them beside each other."""
+    tables = []
+    for first in range(0, len(rows), each):
+        some = rows[first : first + each]
+        table = _table("" if first else title, [("", False), *((row["vehicle"], True) for row in some)])
+        for name in list(rows[0])[1:]:
+            table.add_row(name, *(row[name] for row in some))
+        tables.append(table)
+    return tables
 
 
 def _plan_row(v: VehiclePlan) -> dict[str, str]:
@@ -90,16 +114,23 @@ def verdict_table(name: str, verdict: Verdict) -> None:
     columns = [("item", True), ("", False), ("leg m", True), ("to AMSL m", True), ("AGL m", True),
                ("lowest AGL m", True), ("climb °", True), ("nearest zone m", True), ("energy kJ", True),
                ("time s", True)]  # fmt: skip
-    table = _table(f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe)}", columns)
     bad = {f.seq for f in verdict.findings}
-    for leg in verdict.legs:
-        table.add_row(
+    rows = [
+        (
             str(leg.seq), leg.kind, number(leg.length_m), number(leg.end[2], 1), number(leg.agl_end_m, 1),
             "–" if leg.column else number(leg.min_agl_m, 1), number(leg.climb_deg, 1),
             f"{number(leg.zone_clearance_m)} {escape(leg.nearest_zone)}" if leg.nearest_zone else "–",
-            number(leg.energy_j / 1000, 1), number(leg.time_s), style="red" if leg.seq in bad else None,
-        )  # fmt: skip
-    console.print(table)
+            number(leg.energy_j / 1000, 1), number(leg.time_s),
+        )
+        for leg in verdict.legs
+    ]  # fmt: skip
+    for shown in (10, 9, 8):  # on a narrow terminal time and energy are left out: the limits are what counts
+        table = _table(f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe)}", columns[:shown])
+        for leg, row in zip(verdict.legs, rows, strict=True):
+            table.add_row(*row[:shown], style="red" if leg.seq in bad else None)
+        if _width(table) <= console.width:
+            break
+    _print(table)
     say_notes(verdict.notes)
     if verdict.findings or verdict.not_judged:
         console.print(verdict.describe(), style="red" if verdict.findings else "yellow", markup=False)
@@ -117,9 +148,9 @@ def delivery_table(deliveries: Sequence[Delivery], title: str = "upload") -> Non
         link = escape(d.url) + (" [bold yellow]simulated[/]" if d.simulated else "")
         outcome = [told] if sent else []  # a comparison sends nothing
         table.add_row(escape(d.vehicle), link, str(d.items), *outcome, verified, number(d.seconds, 2), str(d.retries))
-    console.print(table)
+    _print(table)
+    say_notes_of([(d.vehicle, w) for d in deliveries for w in d.warnings])
     for d in deliveries:
-        say_notes([f"{d.vehicle}: {w}" for w in d.warnings])
         if d.message:
             console.print(f"{d.vehicle}: {d.message}", style="red", markup=False)
 
@@ -128,6 +159,14 @@ def say_notes(notes: Sequence[str]) -> None:
     """Notes, each once, in the order given."""
     for note in dict.fromkeys(notes):
         console.print(f"note: {note}", style="dim", markup=False)
+
+
+def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
+    """Notes on vehicles, (name, note) each: what holds for several is said once, with all their names."""
+    names: dict[str, list[str]] = {}
+    for name, note in dict.fromkeys(notes):
+        names.setdefault(note, []).append(name)
+    say_notes([f"{', '.join(of)}: {note}" for note, of in names.items()])
 
 
 @contextmanager

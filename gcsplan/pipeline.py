@@ -256,7 +256,7 @@ def make_problem(
     if vehicle.autopilot is Autopilot.ARDUPLANE:
         notes.append(
             "arduplane with turn_radius_m 0 is flown as a VTOL (QuadPlane): vertical take-off and landing; corners "
-            "are cut, so track_error_m must hold the turn radius"
+            "are cut and the landing place is overshot while braking: track_error_m must hold both"
         )
     return problem, tuple(notes)
 

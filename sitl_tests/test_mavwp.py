@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,15 @@ from gcsplan.mavlink.files import read_mission_file, write_waypoints
 from gcsplan.mavlink.mission import float32
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission
+
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+
+
+@pytest.fixture(autouse=True)
+def closed_files() -> Iterator[None]:
+    """mavwp leaves its files open: they are closed before another test could be blamed for it."""
+    yield
+    gc.collect()
 
 
 @pytest.mark.parametrize("autopilot", list(Autopilot))

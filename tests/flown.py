@@ -27,7 +27,7 @@ GEOD = Geod(ellps="WGS84")
 A_M, E2 = 6378137.0, 0.0066943799901413165
 TERRAIN_ERROR_M = 30.0
 GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane: smaller changes of height are flown at once, not along the leg
-HEIGHT_M, WIDTH_M, ANGLE_DEG = 2e-3, 1e-2, 0.3
+HEIGHT_M, WIDTH_M, ANGLE_DEG = 2e-3, 1e-2, 0.35
 """What is forgiven: between the projected plane and geodesics; the angle is that of the ground inside one cell."""
 
 

@@ -30,6 +30,8 @@ class Oracle:
     zones: Sequence[Zone] = ()
     scale: float = 1.0
     step_m: float = 0.5
+    rings: int = 2
+    spokes: int = 12
 
     def height(self, z: Floats, e: Floats, n: Floats) -> Floats:
         """Bilinear height at points of the plane, NaN outside and wherever a corner with weight is unknown."""
@@ -56,14 +58,13 @@ class Oracle:
         t = np.linspace(0.0, 1.0, count)
         return t, start + t[:, None] * (end - start)
 
-    def highest(self, z: Floats, e: Floats, n: Floats, reach: float, rings: int = 2, spokes: int = 12) -> Floats:
+    def highest(self, z: Floats, e: Floats, n: Floats, reach: float) -> Floats:
         """Highest sampled height within ``reach`` of each point; NaN as soon as one sample is unknown."""
         best = self.height(z, e, n)
-        for k in range(1, rings + 1 if reach > 0 else 1):
-            for a in np.arange(spokes) * (2 * np.pi / spokes) + 0.5 * k:
-                best = np.maximum(
-                    best, self.height(z, e + reach * k / rings * np.cos(a), n + reach * k / rings * np.sin(a))
-                )
+        for k in range(1, self.rings + 1 if reach > 0 else 1):
+            for a in np.arange(self.spokes) * (2 * np.pi / self.spokes) + 0.5 * k:
+                d = reach * k / self.rings
+                best = np.maximum(best, self.height(z, e + d * np.cos(a), n + d * np.sin(a)))
         return best
 
     def depths(
@@ -149,8 +150,9 @@ class Oracle:
                 d = reach * k_ring / rings * (1 - 1e-9)
                 qe, qn = e + d * np.cos(a), n + d * np.sin(a)
                 low, high = self.levels(zone, qe, qn)
-                inside = self.shape_distance(zone, qe, qn) <= (0.0 if k_ring else min(grow_m, 0.0))
-                if (inside & (low < high) & (h + altitude > low) & (h - altitude < high)).any():
+                met = (low < high) & (h + altitude > low) & (h - altitude < high)
+                deep = 0.0 if k_ring else min(grow_m, 0.0)
+                if met.any() and (self.shape_distance(zone, qe[met], qn[met]) <= deep).any():
                     return True
         return False
 
@@ -164,32 +166,32 @@ def deepest(
     oracle: Oracle, z: Floats, sign: float, start: Floats, end: Floats, need: float, reach: float, hint: float,
     rng: np.random.Generator,
 ) -> float:  # fmt: skip
-    """Largest sampled ``need − sign·(altitude − height)`` within ``reach`` of a leg, by zooming in on the best samples.
+    """Largest sampled ``need − sign·(altitude − height)`` within ``reach`` of a leg; a lower bound of the truth.
 
-    From a coarse look along the whole leg and from the fraction ``hint``; a lower bound of the truth, close to it.
+    A coarse look along the whole leg and around the fraction ``hint``, then zooming in on the best places of it.
     """
     length = max(float(np.linalg.norm((end - start)[:2])), 1e-9)
-    best = -math.inf
-    for first in (None, hint):
-        t = np.linspace(0, 1, 60) if first is None else np.clip(first + rng.normal(0, 2.0 / length, 60), 0, 1)
-        t = np.repeat(t, 25)
-        r, a = reach * np.sqrt(rng.uniform(0, 1, len(t))), rng.uniform(0, 2 * np.pi, len(t))
-        r[::3] = reach
-        wide_t, wide_r, wide_a = 1.0 / 60, reach / 3, 0.5
-        at: tuple[float, float, float] | None = None
+
+    def look(t: Floats, r: Floats, a: Floats) -> Floats:
+        p = start + t[:, None] * (end - start)
+        depth = need - sign * (p[:, 2] - oracle.height(z, p[:, 0] + r * np.cos(a), p[:, 1] + r * np.sin(a)))
+        return np.where(np.isnan(depth), -np.inf, depth)
+
+    count = 6000
+    t = np.where(np.arange(count) % 2, rng.uniform(0, 1, count), hint + rng.normal(0, 0.5 * reach / length, count))
+    t = np.clip(t, 0, 1)
+    r, a = reach * np.sqrt(rng.uniform(0, 1, count)), rng.uniform(0, 2 * np.pi, count)
+    r[::3] = reach
+    depth = look(t, r, a)
+    best = float(depth.max())
+    for k in np.argsort(depth)[::-1][:60:12]:
+        at, wide = np.array([t[k], r[k], a[k]]), np.array([0.02, reach / 8, 0.2])
         for _ in range(9):
-            if at is not None:
-                t = np.clip(at[0] + rng.normal(0, wide_t, 150), 0, 1)
-                r = np.clip(at[1] + rng.normal(0, wide_r, 150), 0, reach)
-                a = at[2] + rng.normal(0, wide_a, 150)
-                t[:20], r[20:60] = at[0], reach
-                wide_t, wide_r, wide_a = wide_t / 3, wide_r / 3, wide_a / 3
-            p = start + t[:, None] * (end - start)
-            depth = need - sign * (p[:, 2] - oracle.height(z, p[:, 0] + r * np.cos(a), p[:, 1] + r * np.sin(a)))
-            if np.isnan(depth).all():
-                break
-            k = int(np.nanargmax(depth))
-            if depth[k] > best or at is None:
-                at = (t[k], r[k], a[k])
-                best = max(best, depth[k])
+            near = at + rng.normal(0, 1, (120, 3)) * wide
+            near[:20, 0], near[20:50, 1] = at[0], reach
+            near[:, 0], near[:, 1] = near[:, 0].clip(0, 1), near[:, 1].clip(0, reach)
+            found = look(*near.T)
+            if found.max() >= best or found.max() >= depth[k]:
+                at, depth[k] = near[found.argmax()], found.max()
+            best, wide = max(best, float(found.max())), wide / 2.5
     return best

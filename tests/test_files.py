@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import math
 import os
@@ -265,6 +266,7 @@ def test_every_writers_manner_gives_the_same_mission(text: str) -> None:
     assert mission.items == (MissionItem(WAYPOINT, RELATIVE, (0, 0, 0, 0), 366_100_000, -843_700_000, 60.125),)
 
 
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 def test_pymavlink_reads_what_we_write_and_we_read_what_it_saves(tmp_path: Path) -> None:
     os.environ["MAVLINK20"] = "1"
     from pymavlink import mavwp
@@ -281,6 +283,7 @@ def test_pymavlink_reads_what_we_write_and_we_read_what_it_saves(tmp_path: Path)
         assert [round(w.x * 1e7), round(w.y * 1e7)] == ([item.x, item.y] if placed else [0, 0])
         assert [float32(v) for v in (w.param1, w.param2, w.param3, w.param4, w.z)] == [*item.params, item.z]
     loader.save(str(file))
+    gc.collect()  # it leaves its files open
     read = read_mission_file(file, autopilot=COPTER)
     assert any("six decimals" in note for note in read.notes)
     assert read.mission.items[1] == mission.items[1]

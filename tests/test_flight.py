@@ -175,3 +175,157 @@ def test_a_hold_counts_on_copter_and_not_on_plane() -> None:
     assert fly(TAKEOFF, hold).stretches[-1].hold_s == 12
     plane = fly(at(m.VTOL_TAKEOFF, 0, 0, 65), hold, autopilot=Autopilot.ARDUPLANE)
     assert plane.stretches[-1].hold_s == 0
+
+
+SLOPE = 20_000.0  # metres of ground for a degree of latitude
+
+
+def fly_over_a_slope(
+    *items: MissionItem, autopilot: Autopilot = Autopilot.ARDUCOPTER, rtl_rel_home_m: float | None = None
+) -> Flight:
+    mission = Mission(autopilot, HOME, items)
+    craft = vehicle(autopilot)
+    return follow(
+        mission, craft, lambda lat, lon: GROUND_M + SLOPE * (lat - 36.6), rtl_rel_home_m=rtl_rel_home_m
+    )  # fmt: skip
+
+
+VTOL_TAKEOFF = at(m.VTOL_TAKEOFF, 0, 0, 65)
+
+
+@pytest.mark.parametrize(("z", "at_once"), [(79.9, True), (51, True), (80.1, False), (49, False)])
+def test_arduplane_changes_height_by_less_than_its_glide_slope_minimum_at_once(z: float, at_once: bool) -> None:
+    flight = fly(VTOL_TAKEOFF, at(m.WAYPOINT, 0.01, 0, z), autopilot=Autopilot.ARDUPLANE)
+    assert bool(flight.instead) == at_once
+    for band in flight.instead:
+        assert band.start[2] == band.end[2] == pytest.approx(GROUND_M + 0.5 * (65 + z))
+        assert band.band_m == pytest.approx(abs(z - 65) / 2)
+
+
+def test_arduplane_climbs_at_once_from_below_twenty_metres() -> None:
+    low = at(m.WAYPOINT, 0.01, 0, 15)
+    flight = fly(VTOL_TAKEOFF, low, at(m.WAYPOINT, 0.02, 0, 200), autopilot=Autopilot.ARDUPLANE)
+    assert [s.seq for s in flight.instead] == [3]
+    assert flight.instead[0].band_m == pytest.approx(92.5)
+
+
+def test_copter_and_px4_change_height_along_the_leg() -> None:
+    assert fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 70)).instead == []
+    assert fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 70), autopilot=Autopilot.PX4).instead == []
+
+
+def test_arduplanes_glide_slope_minimum_counts_above_ground_in_terrain_frame() -> None:
+    level = at(m.WAYPOINT, 0.01, 0, 65, m.TERRAIN)  # 200 m higher above sea, the same above ground
+    flight = fly_over_a_slope(VTOL_TAKEOFF, level, autopilot=Autopilot.ARDUPLANE)
+    (band,) = flight.instead
+    assert band.terrain
+    assert band.band_m == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("frame", [m.GLOBAL, m.TERRAIN])
+def test_arduplanes_vtol_take_off_in_another_frame_is_not_judged(frame: int) -> None:
+    flight = fly(at(m.VTOL_TAKEOFF, 0, 0, 400, frame), at(m.LOITER_UNLIM, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE)
+    assert any("VTOL take-off" in what for what in flight.not_judged)
+    assert flight.stretches[0].end[2] == GROUND_M + 400  # by its altitude
+
+
+@pytest.mark.parametrize("autopilot", [Autopilot.PX4, Autopilot.ARDUCOPTER])
+def test_a_vtol_take_off_of_anything_but_arduplane_is_not_judged(autopilot: Autopilot) -> None:
+    assert any("command 84" in what for what in fly(VTOL_TAKEOFF, autopilot=autopilot).not_judged)
+
+
+def test_a_take_off_to_less_than_the_least_climb_ends_there() -> None:
+    assert fly(at(m.TAKEOFF, 0, 0, -20)).stretches[0].end[2] == GROUND_M + 1.0
+    assert fly(at(m.TAKEOFF, 0, 0, 0), autopilot=Autopilot.PX4).stretches[0].end[2] == GROUND_M + 2.5
+
+
+def test_copter_keeps_its_height_in_the_frame_of_the_item() -> None:
+    flight = fly_over_a_slope(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 0, m.TERRAIN))
+    assert flight.stretches[-1].end[2] == pytest.approx(GROUND_M + 200 + 65)
+    flight = fly_over_a_slope(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 0, m.GLOBAL))
+    assert flight.stretches[-1].end[2] == pytest.approx(GROUND_M + 65)
+
+
+def test_arduplane_keeps_its_altitude_only_where_there_is_no_place_either() -> None:
+    flight = fly(VTOL_TAKEOFF, at(m.WAYPOINT, 0.01, 0, 0), autopilot=Autopilot.ARDUPLANE)
+    assert flight.stretches[-1].end[2] == GROUND_M
+    flight = fly(VTOL_TAKEOFF, MissionItem(m.LOITER_TIME, m.RELATIVE, (10, 0, 0, 0)), autopilot=Autopilot.ARDUPLANE)
+    assert flight.stretches[-1].end[2] == GROUND_M + 65
+
+
+def test_px4_knows_no_here() -> None:
+    flight = fly(TAKEOFF, MissionItem(m.WAYPOINT, m.RELATIVE, z=90.0), autopilot=Autopilot.PX4)
+    assert any("command 16" in what for what in flight.not_judged)
+
+
+def test_a_landing_elsewhere_in_terrain_frame_keeps_its_height_above_ground() -> None:
+    flight = fly_over_a_slope(TAKEOFF, at(m.LAND, 0.01, 0, 0, m.TERRAIN))
+    over, down = flight.stretches[-2:]
+    assert over.terrain
+    assert over.end[2] == pytest.approx(GROUND_M + 200 + 65)
+    assert down.end[2] == pytest.approx(GROUND_M + 200)
+
+
+def test_a_landing_elsewhere_is_judged_both_level_and_along_the_ground() -> None:
+    flight = fly_over_a_slope(TAKEOFF, at(m.LAND, -0.01, 0, 0))
+    over, down = flight.instead  # ArduCopter before 4.6, with terrain data
+    assert over.terrain
+    assert over.end[2] == pytest.approx(GROUND_M - 200 + 65)
+    assert down.column
+    assert flight.stretches[-2].end[2] == GROUND_M + 65
+    assert fly_over_a_slope(TAKEOFF, at(m.LAND, -0.01, 0, 0), autopilot=Autopilot.PX4).instead == []
+
+
+def test_rtl_from_near_home_climbs_less_than_its_altitude() -> None:
+    near = at(m.WAYPOINT, 0.0002, 0, 40)  # 22 m off
+    copter = fly(TAKEOFF, near, MissionItem(m.RTL, 2), rtl_rel_home_m=120)
+    (band,) = copter.instead
+    assert band.start[2] - band.band_m == pytest.approx(GROUND_M + 3 * 22.24, abs=0.1)  # RTL_CONE_SLOPE 3
+    assert band.start[2] + band.band_m == pytest.approx(GROUND_M + 120)
+    px4 = fly(TAKEOFF, near, MissionItem(m.RTL, 2), rtl_rel_home_m=120, autopilot=Autopilot.PX4)
+    assert px4.instead[0].start[2] - px4.instead[0].band_m == pytest.approx(GROUND_M + 40)
+    assert fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 40), MissionItem(m.RTL, 2), rtl_rel_home_m=120).instead == []
+
+
+def test_copter_reaches_a_circles_altitude_at_its_edge() -> None:
+    turns = MissionItem(m.LOITER_TURNS, m.RELATIVE, (1, 0, 200, 0), m.degrees_e7(36.61), m.degrees_e7(-84.3), 165)
+    edge = fly(TAKEOFF, turns).stretches[1]
+    assert edge.end[2] == GROUND_M + 165
+    assert (36.61 - edge.end[0]) * 111_195 == pytest.approx(200, rel=1e-3)
+
+
+def test_a_circles_radius_holds_for_the_next_one_without() -> None:
+    def circle(radius: float) -> MissionItem:
+        place = m.degrees_e7(36.61), m.degrees_e7(-84.3)
+        return MissionItem(m.LOITER_TURNS, m.RELATIVE, (1, 0, radius, 0), *place, 65)
+
+    assert fly(TAKEOFF, circle(0)).stretches[-1].reach_m == 10
+    assert fly(TAKEOFF, circle(80), circle(0)).stretches[-1].reach_m == 80
+
+
+def test_px4_takes_no_turns() -> None:
+    flight = fly(TAKEOFF, at(m.LOITER_TURNS, 0.01, 0, 80), autopilot=Autopilot.PX4)
+    assert any("command 18" in what for what in flight.not_judged)
+
+
+def test_a_ground_speed_is_no_target_on_arduplane() -> None:
+    ground, air = (MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (kind, 9, -1, 0)) for kind in (1, 0))
+    to = at(m.WAYPOINT, 0.01, 0, 80)
+    flight = fly(VTOL_TAKEOFF, ground, to, air, to, autopilot=Autopilot.ARDUPLANE)
+    assert [s.speed_m_s for s in flight.stretches] == [15, 15, 9]
+
+
+def test_arduplane_does_not_wait_in_the_air() -> None:
+    wait = MissionItem(m.DELAY, m.NO_POSITION, (60, 0, 0, 0))
+    assert fly(VTOL_TAKEOFF, wait, autopilot=Autopilot.ARDUPLANE).stretches[-1].hold_s == 0
+    assert fly(TAKEOFF, wait).stretches[-1].hold_s == 60
+
+
+@pytest.mark.parametrize(("command", "first"), [(180, 0), (208, 2), (212, 1), (218, 4), (222, 5), (223, 0)])
+def test_commands_that_may_change_the_flight_are_named(command: int, first: float) -> None:
+    flight = fly(TAKEOFF, MissionItem(command, 2, (first, 0, 0, 0)))
+    assert any(f"command {command}" in what for what in flight.not_judged)
+
+
+def test_an_armed_parachute_moves_nothing() -> None:
+    assert fly(TAKEOFF, MissionItem(208, 2, (1, 0, 0, 0))).not_judged == []

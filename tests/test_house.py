@@ -44,6 +44,8 @@ MAY_IMPORT: dict[str, set[str]] = {
 
 # Modules beside the rooms that belong to one: the way of the data.
 STEPS = {"outputs", "delivery", "checking"}
+# Likewise of the command line: its options, and how it ends.
+COMMAND_LINE = {"ending", "options"}
 
 PROJECTION = {"world/frame.py", "world/datum.py", "world/terrain.py"}
 SOCKETS = {"mavlink/link.py", "mavlink/transport.py", "sim/server.py", "sim/sockets.py"}
@@ -62,7 +64,7 @@ def room_of(path: Path) -> str:
 
 def room(top: str) -> str:
     """The room of a module or folder that stands directly in the package."""
-    return "pipeline" if top in STEPS else top
+    return "pipeline" if top in STEPS else "cli" if top in COMMAND_LINE else top
 
 
 def knows_metres_alone(path: Path) -> bool:

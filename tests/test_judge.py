@@ -169,3 +169,49 @@ def test_a_jump_makes_the_verdict_not_judged() -> None:
 def test_every_autopilot_is_judged(autopilot: Autopilot) -> None:
     verdict = verdict_of(world(), HIGH_ENOUGH, vehicle(autopilot))
     assert verdict.safe is True, verdict.describe()
+
+
+def test_what_arduplane_may_fly_at_once_is_judged_too() -> None:
+    # 74 to 66 m: legal along the leg, but flown at once it is too low over the mound at its beginning.
+    mound = world(lambda e, n: 300 + 6 * np.exp(-((e - 500) ** 2 + n**2) / 4e4))
+    points = [[0.0, 0, 374], [3000, 0, 366]]
+    verdict = verdict_of(mound, points, vehicle(Autopilot.ARDUPLANE), end="loiter")
+    assert "min_agl" in {f.kind for f in verdict.findings}
+    assert verdict_of(mound, points, vehicle(), end="loiter").safe is True
+
+
+@pytest.mark.parametrize(
+    ("lat_e7", "lon_e7", "z"),
+    [
+        (-366_000_000, 957_000_000, 80), (0, 57_000_000, 80), (900_000_000, 0, 80), (366_000_000, -700_000_000, 80),
+        (2_000_000_000, 1, 80), (366_000_000, -843_000_000, 1e30), (366_000_000, -843_000_000, math.inf),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_a_way_point_beyond_all_reason_is_a_finding_and_not_a_crash(
+    autopilot: Autopilot, lat_e7: int, lon_e7: int, z: float
+) -> None:
+    mission, craft = mission_over(world(), HIGH_ENOUGH, vehicle(autopilot))
+    items = list(mission.items)
+    items[2] = replace(items[2], x=lat_e7, y=lon_e7, z=z)
+    verdict = judge(replace(mission, items=tuple(items)), craft, world())
+    assert verdict.safe is not True
+    if math.isfinite(z):
+        assert "coverage" in {f.kind for f in verdict.findings}
+
+
+def test_terrain_following_is_as_steep_as_its_steepest_metre_and_not_as_the_chord_of_a_cell() -> None:
+    # Over a twisted cell the ground under a diagonal is a parabola: level from edge to edge, steep at both.
+    twisted = world(lambda e, n: 300 + np.where((np.abs(e) < 60) & (np.abs(n) < 60) & (e != n), 30.0, 0.0))
+    points = [[-300.0, -280, 450], [300.0, 320, 450]]
+    surface = twisted.airspace.surface
+    t = np.linspace(0, 1, 20_001)
+    ground = surface.ground_at(-300 + 600 * t, -280 + 600 * t)
+    steepest = math.degrees(np.arctan(np.abs(np.diff(ground)).max() / (math.hypot(600, 600) / 20_000)))
+
+    def verdict(max_climb_deg: float) -> Verdict:
+        craft = vehicle(max_climb_deg=max_climb_deg, max_descent_deg=max_climb_deg)
+        return verdict_of(twisted, points, craft, altitude_frame="terrain")
+
+    assert {f.kind for f in verdict(steepest - 0.2).findings} >= {"climb"}
+    assert verdict(steepest + 0.2).safe is True

@@ -9,8 +9,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.mission_file import strict_yaml
 from gcsplan.errors import InputError
+from gcsplan.mission_file import strict_yaml
 from gcsplan.mission_file.strict_yaml import read_yaml
 
 

@@ -14,8 +14,8 @@ import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gcsplan.mission_file import zone_geojson
 from gcsplan.errors import InputError, Problem
+from gcsplan.mission_file import zone_geojson
 from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, circle, looks_swapped, place_zones, polygon, zones_sha256
 from gcsplan.mission_file.zone_geojson import ZoneFile, read_zones
 from gcsplan.world.frame import Frame

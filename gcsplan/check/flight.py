@@ -312,7 +312,7 @@ class _Pilot:
     def _wait(self, seq: int, item: MissionItem) -> None:
         if self.autopilot is Autopilot.ARDUPLANE and self.airborne:
             return
-        if item.params[0] > 0:
+        if 0 < item.params[0] < math.inf:
             self._add(seq, "loiter", self.at, self.at, hold_s=item.params[0], column=not self.airborne)
         else:
             self.flight.not_judged.append(f"item {seq}: a wait until a time of day costs what is not known beforehand")

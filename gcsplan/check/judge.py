@@ -19,11 +19,21 @@ from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.mission import Mission
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Floats, LegReport, Legs, Violation
+from gcsplan.world.frame import EARTH_RADIUS_M, FARTHEST_M
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 
 TERRAIN_ERROR_M = 30.0
 """ArduPilot shifts all terrain by up to this when it arms; terrain-frame legs are judged with it."""
+
+CHORD_SLOPE = 0.002
+"""How much steeper than its chords a terrain-frame leg may be, rise over run: a tenth of a degree."""
+
+MOST_PARTS = 200
+"""Into which a piece of a terrain-frame leg is cut for that, at most."""
+
+HIGHEST_M = 20_000.0
+"""No aircraft that is planned for here gets there; keeps absurd numbers out of the exact check."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +68,9 @@ def judge(
     if not flight.stretches:
         flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle")
         return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
+    far = [_too_far(s) for s in (*flight.stretches, *flight.instead) if _is_too_far(s, world)]
+    if far:  # the plane does not reach there, and neither does any terrain model that could be loaded
+        return Verdict(mission, (), tuple(findings + far), tuple(flight.not_judged), tuple(flight.notes))
     plane = _legs(flight.stretches, vehicle.limits, world, terrain_error_m)
     report = world.airspace.examine(plane.legs, vehicle.limits)
     figures = _figures(flight, plane, report, vehicle, world)
@@ -74,6 +87,27 @@ def judge(
         )
     verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
     return _with_battery(verdict, vehicle)
+
+
+def _is_too_far(stretch: Stretch, world: World) -> bool:
+    """Beyond `FARTHEST_M` from the frame's origin, off the globe, or `HIGHEST_M` up or down."""
+    lat0, lon0 = math.radians(world.frame.lat_deg), math.radians(world.frame.lon_deg)
+    for lat_deg, lon_deg, amsl_m in (stretch.start, stretch.end):
+        lat, lon = math.radians(lat_deg), math.radians(lon_deg)
+        h = math.sin(0.5 * (lat - lat0)) ** 2 + math.cos(lat) * math.cos(lat0) * math.sin(0.5 * (lon - lon0)) ** 2
+        away_m = 2.0 * EARTH_RADIUS_M * math.asin(math.sqrt(min(max(h, 0.0), 1.0)))
+        if abs(lat_deg) > 90.0 or not (away_m <= FARTHEST_M and abs(amsl_m) <= HIGHEST_M):
+            return True
+    return not (stretch.reach_m <= FARTHEST_M and stretch.band_m <= HIGHEST_M)
+
+
+def _too_far(s: Stretch) -> Finding:
+    lat, lon, amsl = s.end
+    message = (
+        f"item {s.seq} ({s.kind}): goes to {lat:.6f}, {lon:.6f}, {amsl:.1f} m AMSL: too far from the mission's terrain "
+        f"to be judged"
+    )
+    return Finding(s.seq, "coverage", message, lat, lon, amsl, math.nan, math.nan, math.nan, "m")
 
 
 def _legs(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> _Plane:
@@ -97,7 +131,7 @@ def _legs(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_er
 
 
 def _follow_ground(ends: Floats, world: World) -> tuple[Floats, Floats]:
-    """A terrain-frame leg as straight pieces, one for each DEM cell, and how far each piece is off, metres.
+    """A terrain-frame leg as straight pieces, some for each DEM cell, and how far each piece is off, metres.
 
     Height is interpolated above ground between the ends, and ground is a quadratic in each cell: the chord of a
     quadratic is off by at most its middle's distance.
@@ -111,17 +145,25 @@ def _follow_ground(ends: Floats, world: World) -> tuple[Floats, Floats]:
         if high > low:
             cuts.append((lines - a[axis]) / (b[axis] - a[axis]))
     t = np.unique(np.clip(np.concatenate(cuts), 0.0, 1.0))
-    middle = 0.5 * (t[1:] + t[:-1])
+    run_m = float(np.hypot(*(ends[1, :2] - ends[0, :2])))
 
     def point(f: Floats) -> tuple[Floats, Floats]:
         en = ends[0, :2] + f[:, None] * (ends[1, :2] - ends[0, :2])
         return en, surface.ground_at(en[:, 0], en[:, 1])
 
+    def sag(t: Floats) -> Floats:
+        _, ground = point(t)
+        _, middle = point(0.5 * (t[1:] + t[:-1]))
+        return np.asarray(np.abs(middle - 0.5 * (ground[1:] + ground[:-1])))
+
+    # A quadratic is steeper at its end than its chord by 4 · sag / length, and the angle of climb is judged by chords.
+    steeper = 4.0 * np.nan_to_num(sag(t)) / np.maximum(np.diff(t) * run_m, 1e-9)
+    parts = np.clip(np.ceil(steeper / CHORD_SLOPE), 1, MOST_PARTS).astype(int)
+    t = np.concatenate([*(a + (b - a) * np.arange(n) / n for a, b, n in zip(t[:-1], t[1:], parts, strict=True)), [1.0]])
     _, ground_ends = point(np.array([0.0, 1.0]))
     agl = ends[:, 2] - ground_ends
     en, ground = point(t)
-    _, ground_middle = point(middle)
-    off = np.abs(ground_middle - 0.5 * (ground[1:] + ground[:-1]))
+    off = sag(t)
     z = ground + agl[0] + t * (agl[1] - agl[0])
     if np.isnan(z).any():  # unknown ground: examined as a straight leg, which reports the void
         return ends, np.zeros(1)

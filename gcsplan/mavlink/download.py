@@ -23,10 +23,10 @@ answers DENIED while it is being written to. Both are reasons to start anew, wit
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import Enum, auto
+from enum import auto
 from typing import Any, ClassVar
 
-from gcsplan.mavlink.machine import Machine, Progress, Timers, checked_type
+from gcsplan.mavlink.machine import Label, Machine, Progress, Timers, checked_type
 from gcsplan.mavlink.messages import (
     Ack,
     Address,
@@ -57,7 +57,7 @@ _BUSY = frozenset({ERROR, INVALID, INVALID_SEQUENCE, DENIED, CANCELLED})
 _RESTARTS = 16  # with pauses of 1.5 s much longer than the 8 s for which ArduPilot denies after a broken upload
 
 
-class State(Enum):
+class State(Label):
     """Where a download is."""
 
     IDLE = auto()
@@ -67,7 +67,7 @@ class State(Enum):
     ENDED = auto()
 
 
-class Event(Enum):
+class Event(Label):
     """What can happen to it."""
 
     START = auto()

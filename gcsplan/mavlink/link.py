@@ -18,13 +18,13 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink import wire
 from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing, SigningKey
-from gcsplan.mavlink.messages import Address, Packet
-from gcsplan.mavlink.transport import Peer, Transport, open_transport, wait_readable
+from gcsplan.mavlink.messages import Address, Item, Packet, Request
+from gcsplan.mavlink.prompt import Prepared, PromptAnswers
+from gcsplan.mavlink.transport import Clock, Peer, Transport, Udp, open_transport, wait_readable
 from gcsplan.mavlink.url import Endpoint, parse_url
 
 T = TypeVar("T")
 Steps = Generator[float, None, T]
-Clock = Callable[[], float]
 
 GCS = Address(255, 190)
 """System and component id that ground stations use (MAV_COMP_ID_MISSIONPLANNER)."""
@@ -32,7 +32,7 @@ GCS = Address(255, 190)
 _MOST_PEERS = 64
 _MOST_WAITING = 4096
 _FORGET_S = 10.0
-_IDLE_S = 0.2
+_IDLE_S = 0.1  # a machine hears of prompt answers, and progress is shown, at least so often
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +45,21 @@ class Heard:
 
 
 class Channel:
-    """What one system says on a link: an inbox, bounded, and a way to answer."""
+    """What one system says on a link: an inbox, bounded, and a way to answer.
+
+    Not in the inbox are requests that were answered on the spot: their seqs are in ``prepared.asked``.
+    """
 
     def __init__(self, link: Link, sysid: int) -> None:
         self.link = link
         self.sysid = sysid
         self.inbox: deque[Heard] = deque(maxlen=_MOST_WAITING)
+        self.prepared: Prepared | None = None
+
+    @property
+    def waits(self) -> bool:
+        """Whether there is something to take, or to take note of."""
+        return bool(self.inbox or (self.prepared and self.prepared.asked))
 
     def take(self) -> Iterable[Heard]:
         """Everything that has come since the last time."""
@@ -98,6 +107,7 @@ class Link:
         self._bad = self._unsigned = 0
         self.heard_systems: dict[int, float] = {}
         self.transport: Transport = open_transport(self.endpoint)
+        self.prompt = PromptAnswers(self._writer, possible=isinstance(self.transport, Udp))
 
     def __enter__(self) -> Link:
         return self
@@ -163,9 +173,27 @@ class Link:
         """Read what is there into the inboxes, and send our heartbeat if it is due."""
         now = self.clock()
         for peer, data in self.transport.read():
-            for message in self._parser(peer, now).feed(data, datagram=self.transport.datagrams):
-                self._route(peer, message, now)
+            self._take_in(peer, data, now)
         self._beat(now)
+
+    def answer(self, until: float) -> bool:
+        """Instead of `poll`: give prompt answers until ``until``, or a short silence, or something else comes.
+
+        Whether anything came. A link that has no answers ready says no at once.
+        """
+        if not self.prompt or not isinstance(self.transport, Udp):
+            return False
+        rest = self.transport.exchange(self.prompt, until, self.clock)
+        now, answered = self.clock(), self.prompt.answered()
+        self._heard_at.update((peer, now) for peer in answered & self._heard_at.keys())
+        for peer, data in rest:
+            self._take_in(peer, data, now)
+        self._beat(now)
+        return bool(rest or answered)
+
+    def _take_in(self, peer: Peer, data: bytes, now: float) -> None:
+        for message in self._parser(peer, now).feed(data, datagram=self.transport.datagrams):
+            self._route(peer, message, now)
 
     @property
     def next_heartbeat(self) -> float:
@@ -216,6 +244,17 @@ class Link:
 class Driven(Protocol):
     """A sans-IO machine as `drive` needs it."""
 
+    vehicle: Address
+
+    @property
+    def answers(self) -> Sequence[Item]:
+        """What a request gets, by seq, at any time between `start` and `cancel`."""
+        ...
+
+    def answered(self, seqs: Iterable[int], now: float) -> None:
+        """Take note of requests that got their answer already."""
+        ...
+
     @property
     def deadline(self) -> float | None:
         """When `on_timer` is due; None once it has ended."""
@@ -246,21 +285,30 @@ def drive(
     progress: Callable[[], None] | None = None,
 ) -> Steps[None]:
     """The task that runs ``machine`` to its end; it is cancelled if the task is closed before (Ctrl-C)."""
-    clock = channel.link.clock
+    clock, prompt = channel.link.clock, channel.link.prompt
+    channel.prepared = prepared = prompt.prepare(machine.answers, machine.vehicle)
     channel.send_packets(machine.start(clock()))
     try:
         while (deadline := machine.deadline) is not None:
             yield deadline
+            if prepared.asked:
+                machine.answered(prepared.asked, clock())
+                prepared.asked.clear()
             for heard in channel.take():
+                packet = wire.decode(heard.message)
+                if packet is not None:  # the answer first: the vehicle waits for it
+                    answers = machine.receive(packet, clock())
+                    channel.send_packets(answers)
+                    if answers and isinstance(packet.message, Request):
+                        prompt.learn(prepared, heard.peer, heard.message)
                 if watch:
                     watch(heard)
-                packet = wire.decode(heard.message)
-                if packet is not None:
-                    channel.send_packets(machine.receive(packet, clock()))
             channel.send_packets(machine.on_timer(clock()))
             if progress:
                 progress()
     finally:
+        prompt.drop(prepared)
+        channel.prepared = None
         if machine.deadline is not None:
             channel.send_packets(machine.cancel(clock()))
 
@@ -300,13 +348,15 @@ def pump(jobs: Sequence[Job[T]]) -> None:
         while True:
             now = clock()
             for job in jobs:
-                if not job.ended and (job.channel.inbox or now >= job.wake_at):
+                if not job.ended and (job.channel.waits or now >= job.wake_at):
                     job.advance()
             waiting = [job.wake_at for job in jobs if not job.ended]
             if not waiting:
                 return
-            due = min(*waiting, *(link.next_heartbeat for link in links))
-            wait_readable([link.transport for link in links], min(due - clock(), _IDLE_S))
+            due = min(*waiting, *(link.next_heartbeat for link in links), clock() + _IDLE_S)
+            if len(links) == 1 and links[0].answer(due):
+                continue
+            wait_readable([link.transport for link in links], due - clock())
             for link in links:
                 link.poll()
     finally:

@@ -10,13 +10,13 @@ bring about ourselves and that is not in the table (a second ``start``) is a bug
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar
 
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.mavlink.messages import Address, MissionMessage, Packet
+from gcsplan.mavlink.messages import Address, Item, MissionMessage, Packet
 from gcsplan.mavlink.outcome import Outcome
 
 
@@ -58,6 +58,12 @@ class Progress:
     total: int
 
 
+class Label(Enum):
+    """A state or an event: one of its kind, so that identity will do for a hash, and it is a quick one."""
+
+    __hash__ = object.__hash__
+
+
 class ImpossibleTransition(GcsplanError, RuntimeError):
     """A machine was used in a way that its table does not know: a bug in the caller."""
 
@@ -68,7 +74,7 @@ class Machine:
     ROLE: ClassVar[str]
     TABLE: ClassVar[Mapping[tuple[Any, Any], Any]]
 
-    def __init__(self, *, us: Address, vehicle: Address, mission_type: int, timers: Timers, state: Enum) -> None:
+    def __init__(self, *, us: Address, vehicle: Address, mission_type: int, timers: Timers, state: Label) -> None:
         self.us = us
         self.vehicle = vehicle
         self.mission_type = mission_type
@@ -106,7 +112,15 @@ class Machine:
             and packet.message.mission_type == self.mission_type
         )
 
-    def _step(self, event: Enum) -> None:
+    @property
+    def answers(self) -> Sequence[Item]:
+        """What a request gets, by seq, at any time between `start` and `cancel`; most machines answer none."""
+        return ()
+
+    def answered(self, seqs: Iterable[int], now: float) -> None:
+        """Take note of requests that got their answer already."""
+
+    def _step(self, event: Label) -> None:
         try:
             self._state = self.TABLE[self._state, event]
         except KeyError:
@@ -114,7 +128,7 @@ class Machine:
                 f"{self.ROLE}: {event.name} is impossible in state {self._state.name}", where=f"vehicle {self.vehicle}"
             ) from None
 
-    def _end(self, event: Enum, outcome: Outcome) -> None:
+    def _end(self, event: Label, outcome: Outcome) -> None:
         self._step(event)
         self.outcome, self._deadline = outcome, None
 

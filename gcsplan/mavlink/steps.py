@@ -13,8 +13,9 @@ from gcsplan.mavlink.watch import STANDBY, UNINIT, VehicleState, Watch
 
 _REQUEST_MESSAGE = 512
 _AUTOPILOT_VERSION, _GLOBAL_POSITION_INT, _HOME_POSITION = 148, 33, 242
+_DOES_NOT_EXIST = 1  # MAV_PARAM_ERROR
 _ASK_AGAIN_S = 0.5
-_ASKED_TIMES = 4
+_ASKED_TIMES, _GENERIC_ASKED_TIMES = 4, 2  # one that calls itself generic is taken without a position as well
 _PARAMETER_S = 2.0
 _NO_PARAMETERS_S = 1.0
 
@@ -38,10 +39,11 @@ def discover_steps(
     while True:
         now = clock()
         state = watch.state(now) or state
+        times = _GENERIC_ASKED_TIMES if is_generic(state.mav_autopilot) else _ASKED_TIMES
         complete = state.capabilities is not None and state.located
         if _is_booting(state) and now < found + standby_s:
             yield now + _ASK_AGAIN_S
-        elif not complete and now >= ask_at and asked < _ASKED_TIMES:
+        elif not complete and now >= ask_at and asked < times:
             _ask(channel, state)
             asked, ask_at = asked + 1, now + _ASK_AGAIN_S
         elif not complete and now < ask_at:
@@ -56,13 +58,15 @@ def discover_steps(
 def parameter_steps(
     channel: Channel, state: VehicleState, groups: tuple[tuple[str, ...], ...], watch: Watch
 ) -> Steps[dict[str, float]]:
-    """The values of those parameters that the vehicle has; at most two seconds, one if it answers none."""
+    """The values of those parameters that the vehicle has; at most two seconds, one if it gives none."""
     clock = channel.link.clock
     values: dict[str, float] = {}
+    unknown: set[str] = set()  # the vehicle said that it has none of that name
     started, ask_at = clock(), clock()
 
     def missing() -> list[str]:
-        return [name for group in groups if not any(n in values for n in group) for name in group]
+        left = [name for group in groups if not any(n in values for n in group) for name in group]
+        return [name for name in left if name not in unknown]
 
     while missing():
         now = clock()
@@ -75,10 +79,13 @@ def parameter_steps(
         yield ask_at
         for heard in channel.take():
             watch.note(heard, clock())
-            if heard.message.get_type() == "PARAM_VALUE" and heard.source == state.address:
+            kind = heard.message.get_type() if heard.source == state.address else ""
+            if kind == "PARAM_VALUE":
                 name = parameter_name(heard.message)
                 if any(name in group for group in groups):
                     values[name] = decode_value(heard.message, state.mav_autopilot)
+            elif kind == "PARAM_ERROR" and heard.message.error == _DOES_NOT_EXIST:
+                unknown.add(parameter_name(heard.message))
     return values
 
 

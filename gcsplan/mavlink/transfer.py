@@ -10,7 +10,7 @@ that can help. Only a list that was read back whole and equal is ever called ver
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
@@ -19,7 +19,7 @@ from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.compare import Difference, compare, faults
 from gcsplan.mavlink.download import Download
 from gcsplan.mavlink.machine import ImpossibleTransition, Machine, Progress, Timers
-from gcsplan.mavlink.messages import Address, Packet
+from gcsplan.mavlink.messages import Address, Item, Packet
 from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, MissionItem
 from gcsplan.mavlink.outcome import ERROR, Accepted, Outcome, Refused, Unknown
 from gcsplan.mavlink.upload import Clear, Upload
@@ -145,6 +145,15 @@ class VerifiedUpload:
         if self._phase is _Phase.READ and self._download:
             out += self._download.receive(packet, now)
         return out + self._advance(now)
+
+    @property
+    def answers(self) -> Sequence[Item]:
+        """What a request gets, by seq, in every phase."""
+        return self._upload.answers
+
+    def answered(self, seqs: Iterable[int], now: float) -> None:
+        """Take note of requests that got their answer already."""
+        self._upload.answered(seqs, now)
 
     def on_timer(self, now: float) -> list[Packet]:
         """What is due at ``now``."""

@@ -22,12 +22,12 @@ goes on. An ERROR after the last item says nothing about what is on board.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from enum import Enum, auto
+from collections.abc import Iterable, Mapping, Sequence
+from enum import auto
 from typing import Any, ClassVar
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.machine import Machine, Progress, Timers, checked_type
+from gcsplan.mavlink.machine import Label, Machine, Progress, Timers, checked_type
 from gcsplan.mavlink.messages import Ack, Address, ClearAll, Count, Item, MissionMessage, Packet, Request
 from gcsplan.mavlink.mission import ALL, MISSION, MissionItem
 from gcsplan.mavlink.outcome import (
@@ -46,7 +46,7 @@ from gcsplan.mavlink.outcome import (
 _MOST_ITEMS = 65535
 
 
-class State(Enum):
+class State(Label):
     """Where an upload or a clearing is."""
 
     IDLE = auto()
@@ -57,7 +57,7 @@ class State(Enum):
     ENDED = auto()
 
 
-class Event(Enum):
+class Event(Label):
     """What can happen to it."""
 
     START = auto()
@@ -145,6 +145,16 @@ class Upload(Machine):
         self._step(E.START)
         return self._announce(now)
 
+    @property
+    def answers(self) -> Sequence[Item]:
+        """What a request gets, by seq, at any time between `start` and `cancel`."""
+        return [self._item(seq) for seq in range(len(self.items))]
+
+    def answered(self, seqs: Iterable[int], now: float) -> None:
+        """Take note of requests that got their answer already."""
+        for seq in seqs:
+            self._asked_for(seq, now)
+
     def cancel(self, now: float) -> list[Packet]:
         """Give up and say so (ArduPilot does not listen); the outcome is unknown from the first request on."""
         self._end(E.CANCEL, Unknown("cancelled by us"))
@@ -165,14 +175,19 @@ class Upload(Machine):
     def _answer(self, seq: int, now: float) -> list[Packet]:
         if self._state is S.IDLE or self._cancelled:
             return []
+        self._asked_for(seq, now)
+        return [self._to_vehicle(self._item(seq))]
+
+    def _asked_for(self, seq: int, now: float) -> None:
         self._note(seq, now)
         self._step(E.ALL_ASKED if len(self._asked) == len(self.items) else E.ASKED)
         if self._state is not S.ENDED:
             self._doubt = None
             wait = 2 * self.timers.response_s if self._state is S.ALL_SENT else self.timers.silence_s
             self._deadline = min(now + wait, self._gives_up_at)
-        current = int(seq == 0 and self.mission_type == MISSION)
-        return [self._to_vehicle(Item(seq, self.items[seq], self.mission_type, current))]
+
+    def _item(self, seq: int) -> Item:
+        return Item(seq, self.items[seq], self.mission_type, int(seq == 0 and self.mission_type == MISSION))
 
     def _note(self, seq: int, now: float) -> None:
         if seq == 0 and self._highest > 0 and self._rounds < self.timers.retries:

@@ -6,6 +6,7 @@ from pathlib import Path as FilePath
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LightSource
@@ -45,7 +46,8 @@ def draw(plan: Plan) -> Figure:
 
 def save(plan: Plan, file: FilePath | IO[bytes]) -> None:
     """Write `draw`'s picture as PNG."""
-    draw(plan).savefig(file, format="png", dpi=110, metadata={"Software": None})
+    with rc_context({"text.parse_math": False}):  # a dollar sign in a name is one
+        draw(plan).savefig(file, format="png", dpi=110, metadata={"Software": None})
 
 
 def _colours(n: int) -> list[str]:

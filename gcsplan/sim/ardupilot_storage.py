@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from gcsplan.mavlink.mission import (
     FENCE,
     GLOBAL,
+    LOITER_TURNS,
     MISSION,
     RALLY,
     RELATIVE,
@@ -90,18 +91,6 @@ def _positive(value: float) -> float:
     return 1.0 if value > 0 else 0.0
 
 
-def _turns(value: float) -> float:
-    """Loiter turns: a byte; parts of one turn as 256ths."""
-    return _u8(value * 256.0) / 256.0 if 0 < value < 1 else _u8(min(255.0, value))
-
-
-def _turn_radius(value: float) -> float:
-    """Loiter radius of 18: a byte of metres, beyond 255 m of tens of metres; the sign is the direction."""
-    size = abs(value)
-    kept = _u8(size) if size <= 255 else 10.0 * _u8(min(255.0, float32(size * float32(0.1))))
-    return math.copysign(kept, -1.0 if value < 0 else 1.0)
-
-
 _NOTHING = (_zero, _zero, _zero, _zero)
 _FIRST_U16 = (_u16, _zero, _zero, _zero)
 
@@ -109,7 +98,7 @@ _FIRST_U16 = (_u16, _zero, _zero, _zero)
 _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
     16: _FIRST_U16,  # waypoint: hold
     17: (_zero, _zero, _signed_u16, _zero),  # loiter unlimited: radius
-    18: (_turns, _zero, _turn_radius, _positive),
+    18: _NOTHING,  # loiter turns: `_loiter_turns`
     19: (_u16, _zero, _sign, _positive),  # loiter time
     21: (_u16, _zero, _zero, _land_sign),  # land: the yaw reads back as 1
     22: _FIRST_U16,  # take-off
@@ -192,8 +181,24 @@ def keep_mission_item(item: MissionItem, *, plane: bool) -> MissionItem:
 
 
 def _kept_params(keeps: tuple[Keep, Keep, Keep, Keep], item: MissionItem) -> tuple[float, float, float, float]:
+    if item.command == LOITER_TURNS:
+        return _loiter_turns(item.params)
     first, second, third, fourth = (keep(value) for keep, value in zip(keeps, item.params, strict=True))
     return first, second, third, fourth
+
+
+def _loiter_turns(params: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    """One 16-bit word for both: turns below, radius above.
+
+    Parts of one turn are 256ths; a radius beyond 255 m is in tens of metres, its sign is the direction. Nothing keeps
+    negative turns out of the upper byte: the whole word is set, and the radius reads back as 255.
+    """
+    turns, _, radius_m, exit_from = params
+    part, far = 0 < turns < 1, abs(radius_m) > 255
+    word = int(_u16(min(255.0, turns * 256.0 if part else turns)))
+    word |= int(_u8(min(255.0, float32(abs(radius_m) * float32(0.1))) if far else abs(radius_m))) << 8
+    size_m = (word >> 8) * (10.0 if far else 1.0)
+    return (word & 0xFF) / (256.0 if part else 1.0), 0.0, math.copysign(size_m, _sign(radius_m)), _positive(exit_from)
 
 
 def _need_place(item: MissionItem) -> None:

@@ -69,13 +69,13 @@ def put_unknown(rows, count, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, spare_m, rows, sources=SOURCES):  # type: ignore[no-untyped-def]
+def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, rows, sources=SOURCES):  # type: ignore[no-untyped-def]
     """Cut a ground track (N, 2) into pieces and bound the surface over each; their number.
 
     Into ``rows``, as far as there is room: s at the end of the piece in metres along the track; lower bound of the
     ground within ``low_m`` at both ends; upper bound of the top within ``near_m``; the same within ``far_m``. Linear
     between; NaN where the ground within reach is unknown. ``under``, ``beside``, ``beyond``: halos of the ground and
-    of the top for the three reaches (each made for a little more than its reach). ``spare_m`` widens them all.
+    of the top for the three reaches, each made for its reach and the bow.
     """
     count = 0
     s_start = 0.0
@@ -86,7 +86,7 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, s
         if length == 0.0:
             continue
         parts, bow = parts_of(m, length, BOW_M)
-        widen = bow + 2.0 * m[ERROR_M] + spare_m
+        widen = bow + 2.0 * m[ERROR_M]
         cb, rb = to_grid(m, e0, n0)
         for part in range(parts):
             fa, fb = part / parts, (part + 1) / parts

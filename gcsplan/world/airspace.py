@@ -185,16 +185,16 @@ class Airspace:
         """Lowest legal altitude over points of the plane, for terrain (min AGL, clearance; errors of ``limits``
         added); conservative; +inf where unknown. Zones are not in it."""
         reach = Reaches.of(limits, self._field, self.scale)
-        floor = self._around(1.0, east_m, north_m, reach.near_m, reach) + limits.min_agl_m
+        floor = self._around(1.0, east_m, north_m, reach.near_m) + (limits.min_agl_m + reach.near_margin_m)
         if limits.horizontal_clearance_m > 0.0:
-            floor = np.maximum(floor, self._around(1.0, east_m, north_m, reach.far_m, reach))
+            floor = np.maximum(floor, self._around(1.0, east_m, north_m, reach.far_m) + reach.far_margin_m)
         floor += limits.altitude_error_m
         return np.where(np.isnan(floor), np.inf, floor)
 
     def ceiling_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:
         """Highest legal altitude over points (max AGL, max AMSL; errors taken off); conservative; -inf unknown."""
         reach = Reaches.of(limits, self._field, self.scale)
-        ground = -self._around(-1.0, east_m, north_m, reach.near_m, reach)
+        ground = -self._around(-1.0, east_m, north_m, reach.near_m) - reach.near_margin_m
         ceiling = ground + ((math.inf if limits.max_agl_m is None else limits.max_agl_m) - limits.altitude_error_m)
         if limits.max_amsl_m is not None:
             ceiling = np.minimum(ceiling, limits.max_amsl_m - limits.altitude_error_m)
@@ -207,15 +207,14 @@ class Airspace:
             raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
         return make_tube(points, limits, self.surface, self._field, self._zones, self._halo, self.scale)
 
-    def _around(self, sign: float, east_m: ArrayLike, north_m: ArrayLike, reach_m: float, reach: Reaches) -> Floats:
-        """Highest ``sign`` times height within reach of each point, margin included."""
+    def _around(self, sign: float, east_m: ArrayLike, north_m: ArrayLike, reach_m: float) -> Floats:
+        """Highest ``sign`` times height within reach of each point; NaN where unknown."""
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
         out = np.empty(e.size)
-        wide = reach_m + reach.spare_m
         heights = self.surface.top_m if sign > 0.0 else self.surface.ground_m
         points = np.stack([e.ravel(), n.ravel()], axis=-1)
-        around(self._field.packed, heights, self._halo(sign > 0.0, wide), sign, points, wide, out)
-        return out.reshape(e.shape) + reach.margin_m(reach_m)
+        around(self._field.packed, heights, self._halo(sign > 0.0, reach_m), sign, points, reach_m, out)
+        return out.reshape(e.shape)
 
     def _halo(self, of_top: bool, reach_m: float) -> Halo:
         """The halo of top or ground for a reach, made once for each size in cells."""

@@ -52,32 +52,41 @@ class Band:
 ROOM_M = 0.02
 """Reach beyond what is demanded, which takes up what the check loses between the plane and the grid."""
 
+FINE_ROOM_M = 0.002
+"""The same where the map is exact: the smallest pieces that the check cuts beside a cliff are half as large."""
+
+ZONE_ROOM_M = 0.05
+"""The same beside a zone whose levels follow the ground."""
+
 MARGIN_M = 0.01
 """Height beyond what is demanded: twice what the check's branch and bound resolves."""
 
 
-ZONE_ROOM_M = 0.05
-"""The same, beside a zone whose levels follow the ground."""
-
-
 @dataclass(frozen=True, slots=True)
 class Reaches:
-    """How far from a track the ground counts, metres of the plane: for its errors, and for its clearance."""
+    """How far from a place the ground counts, metres of the plane, for errors (near) and clearance (far); margins in.
+
+    Where the map is exact and nothing beside the place counts, nothing is spared: the check is exact there too.
+    ``near_margin_m``, ``far_margin_m``: heights to keep from what lies within. ``zone_m``: the reach of zones, bare.
+    """
 
     near_m: float
     far_m: float
-    spare_m: float
+    near_margin_m: float
+    far_margin_m: float
+    zone_m: float
 
     @classmethod
     def of(cls, limits: Limits, field: Field, scale: float) -> Reaches:
-        """Reaches of ``limits``; nothing is spared where the map is exact and nothing beside the line counts."""
+        """Reaches that ``limits`` demand."""
         near = limits.track_error_m * scale
-        far = near + limits.horizontal_clearance_m * scale if limits.horizontal_clearance_m > 0.0 else near
-        return cls(near, far, 0.0 if field.affine else ROOM_M + 2.0 * field.error_m)
-
-    def margin_m(self, reach_m: float) -> float:
-        """Height to keep from a bound within ``reach_m``."""
-        return MARGIN_M if reach_m + self.spare_m > 0.0 else 0.0
+        far = near + limits.horizontal_clearance_m * scale
+        if field.affine:
+            rooms = [FINE_ROOM_M if r > 0.0 else 0.0 for r in (near, far)]
+        else:
+            rooms = [ROOM_M + 2.0 * field.error_m] * 2
+        margins = [MARGIN_M if room > 0.0 else 0.0 for room in rooms]
+        return cls(near + rooms[0], far + rooms[1], margins[0], margins[1], far)
 
 
 def make_tube(
@@ -92,28 +101,19 @@ def make_tube(
     """The tube over ``track`` (N, 2); ``halo(of_top, reach_m)`` gives the surface's bounds. See `Tube`."""
     reach = Reaches.of(limits, field, scale)
     bow = 0.0 if field.affine else BOW_M + 2.0 * field.error_m
-    under = halo(False, reach.near_m + reach.spare_m + bow)
-    beside = halo(True, reach.near_m + reach.spare_m + bow)
-    beyond = halo(True, reach.far_m + reach.spare_m + bow)
+    under, beside = halo(False, reach.near_m + bow), halo(True, reach.near_m + bow)
+    beyond = halo(True, reach.far_m + bow)
     rows = _pieces(
-        field,
-        surface.ground_m,
-        surface.top_m,
-        under,
-        beside,
-        beyond,
-        track,
-        (reach.near_m, reach.near_m, reach.far_m),
-        reach.spare_m,
+        field, surface.ground_m, surface.top_m, under, beside, beyond, track, (reach.near_m, reach.near_m, reach.far_m)
     )
-    error, near, far = limits.altitude_error_m, reach.margin_m(reach.near_m), reach.margin_m(reach.far_m)
-    floor = rows[:, 3:5] + (limits.min_agl_m + error + near)
+    error, margin = limits.altitude_error_m, reach.near_margin_m
+    floor = rows[:, 3:5] + (limits.min_agl_m + error + margin)
     if limits.horizontal_clearance_m > 0.0:
-        floor = np.maximum(floor, rows[:, 5:7] + (error + far))
+        floor = np.maximum(floor, rows[:, 5:7] + (error + reach.far_margin_m))
     unknown = np.isnan(floor)
     ceiling = np.full_like(floor, np.inf)
     if limits.max_agl_m is not None:
-        ceiling = np.where(unknown, -np.inf, rows[:, 1:3] + (limits.max_agl_m - error - near))
+        ceiling = np.where(unknown, -np.inf, rows[:, 1:3] + (limits.max_agl_m - error - margin))
     if limits.max_amsl_m is not None:
         ceiling = np.minimum(ceiling, limits.max_amsl_m - error)
     return Tube(
@@ -126,12 +126,12 @@ def make_tube(
 
 def _pieces(
     field: Field, ground: Floats, top: Floats, under: Halo, beside: Halo, beyond: Halo, track: Floats,
-    reaches: tuple[float, float, float], spare_m: float,
+    reaches: tuple[float, float, float],
 ) -> Floats:  # fmt: skip
     room = 2048
     while True:
         rows = np.empty((room, 7))
-        count = pieces(field.packed, ground, top, under, beside, beyond, track, *reaches, spare_m, rows)
+        count = pieces(field.packed, ground, top, under, beside, beyond, track, *reaches, rows)
         if count <= room:
             return rows[:count]
         room = count
@@ -143,16 +143,16 @@ def _bands(
 ) -> tuple[Band, ...]:  # fmt: skip
     """One band for each span of the track within reach of a zone, by zone and way."""
     error = limits.altitude_error_m
-    wide = reach.far_m + reach.spare_m + ZONE_ROOM_M
+    wide = reach.far_m + ZONE_ROOM_M
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
     out: list[Band] = []
-    for zone, s0, s1 in spans(track, zones, reach.far_m + reach.spare_m, wide):
+    for zone, s0, s1 in spans(track, zones, reach.zone_m, wide):
         numbers = zones.table[zone]
         bottom, top, agl = numbers[FLOOR], numbers[CEILING], numbers[[FLOOR_AGL, CEILING_AGL]]
         if agl.any():
             around = halo(False, wide + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
             part = _between(track, length, s0, s1)
-            ground = _pieces(field, surface.ground_m, surface.ground_m, around, around, around, part, (wide,) * 3, 0.0)
+            ground = _pieces(field, surface.ground_m, surface.ground_m, around, around, around, part, (wide,) * 3)
             s = np.concatenate([[s0], s0 + ground[:, 0]])
             low, high = ground[:, 1:3], ground[:, 3:5]
         else:

@@ -1,0 +1,95 @@
+"""How a command ends: one document on standard output, one message on standard error, an exit code of the contract."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any, ClassVar, NoReturn
+
+from gcsplan.errors import GcsplanError, InputError, UsageError
+
+
+class Interrupted(GcsplanError):
+    """Ctrl-C while vehicles were being talked to: says what is to be done about them."""
+
+    exit_code: ClassVar[int] = 130
+    default_reason: ClassVar[str] = "interrupted"
+
+
+def emit(document: dict[str, Any], error: dict[str, Any] | None = None) -> None:
+    """The one JSON document of ``--json``, with what went wrong."""
+    from gcsplan.export.summary import write_summary
+
+    put(write_summary(document | ({"error": error} if error else {}), clocks=True))
+
+
+def put(text: str) -> None:
+    """Write to standard output, now: what does not arrive there is an error. Raises InputError (or BrokenPipeError)."""
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except (OSError, AttributeError) as error:  # a full disk; a standard output that was closed is None
+        with suppress(OSError, AttributeError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        words = getattr(error, "strerror", None) or "it is closed"
+        raise InputError(f"cannot be written: {words}", where="standard output") from error
+
+
+@contextmanager
+def talking(names: Sequence[str]) -> Iterator[None]:
+    """Around a conversation with vehicles: Ctrl-C in it leaves something to be told."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Interrupted(
+            f"interrupted while talking to {', '.join(names)}: a transfer under way was broken off, and the vehicle "
+            f"told so; what it holds now is unknown: send it again, or compare with gcsplan verify"
+        ) from None
+
+
+def speak_plainly() -> None:
+    """JSON is UTF-8 everywhere, and no terminal or pipe is so poor that a ° or a – would end the program."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(encoding="utf-8" if "--json" in sys.argv else None, errors="backslashreplace")
+
+
+def explained(error: Exception) -> GcsplanError:
+    """What an exception that is none of ours amounts to."""
+    told = getattr(error, "format_message", None)  # click's usage errors, whichever click typer brings along
+    if told is not None:
+        context = getattr(error, "ctx", None)
+        if type(error).__name__ == "NoArgsIsHelpError":
+            return UsageError(f"a command is wanted\n\n{told()}")
+        return UsageError(f"{told()} (see {context.command_path if context else 'gcsplan'} --help)")
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, KeyboardInterrupt):  # compiled code turns Ctrl-C into an error of its own
+            return Interrupted("interrupted")
+        cause = cause.__cause__ or cause.__context__
+    return GcsplanError(f"internal error, a bug in gcsplan: {type(error).__name__}: {error} (--debug shows where)")
+
+
+def fail(error: GcsplanError, as_json: bool, debug: bool) -> NoReturn:
+    """One message on standard error, one JSON document if asked, and the exit code."""
+    code = error.exit_code
+    if debug:
+        traceback.print_exc()
+    with suppress(OSError):  # there is nobody left to tell
+        # Names of files and values come from anywhere: none of them may speak to the terminal.
+        words = "".join(c if c.isprintable() or c in "\n\u2009" else "\ufffd" for c in str(error))
+        print(f"gcsplan: {words}", file=sys.stderr)
+    if as_json:
+        document = {"code": code, "reason": error.reason, "message": error.message, "where": error.where}
+        if isinstance(error, InputError):
+            document["problems"] = [{"where": p.where, "message": p.message} for p in error.problems]
+        with suppress(InputError, BrokenPipeError):
+            put(json.dumps({"error": document}) + "\n")
+    sys.exit(code)

@@ -1,0 +1,50 @@
+"""Options and arguments that several commands have, each with the words of its help."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+LINKS = "udpout:HOST:PORT sends, udpin:HOST:PORT listens, tcp:HOST:PORT, /dev/ttyUSB0,57600."
+MISBEHAVIOURS = (
+    "drop, duplicate, reorder, delay (probabilities), delay_s, corrupt (an item), corrupt_field, silent_after "
+    "(messages), reboot_at (an item), reboot_s, reboot_loses, edit (an item), stray_sysid, stale_type, answer_sysid, "
+    "refuse (an item), refuse_code, no_space, armed, seed"
+)
+
+MissionArgument = Annotated[Path, typer.Argument(metavar="MISSION.yaml", help="The mission file.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
+UnjudgedOption = Annotated[
+    bool, typer.Option("--allow-unjudged", help="Accept a mission of which something could not be judged.")
+]
+SysidOption = Annotated[
+    int, typer.Option("--sysid", metavar="N", min=1, max=255, help="System id of the vehicle, 1 to 255.")
+]
+ToOption = Annotated[str, typer.Option("--to", metavar="URL", help=f"Where the vehicle is: {LINKS}")]
+FilesArgument = Annotated[
+    list[str], typer.Argument(metavar="FILE...", help="FILE or NAME=FILE (the vehicle's name); .waypoints or .plan.")
+]
+TypeOption = Annotated[str, typer.Option("--type", metavar="KIND", help="mission, fence or rally.")]
+ArmedOption = Annotated[bool, typer.Option("--allow-armed", help="Send to an armed vehicle.")]
+PlaceOption = Annotated[bool, typer.Option("--ignore-position", help="Send wherever the vehicle stands.")]
+
+UncheckedSysidOption = Annotated[
+    int | None,
+    typer.Option("--sysid", metavar="N", min=1, max=255, help="With --unchecked: its system id [default: 1]"),
+]
+ListenOption = Annotated[
+    str, typer.Option(metavar="URL", help="udpin:HOST:PORT or tcpin:HOST:PORT listens, udpout:HOST:PORT speaks first.")
+]
+AutopilotOption = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="Without a mission file: arducopter, arduplane or px4 [default: arducopter]"),
+]
+SimSysidOption = Annotated[
+    int | None,
+    typer.Option("--sysid", metavar="N", min=1, max=255, help="Without a mission file: system id [default: 1]"),
+]
+MisbehaveOption = Annotated[
+    str, typer.Option(metavar="HOW", help=f"Trouble, for example drop=0.1,corrupt=7,seed=3. Known: {MISBEHAVIOURS}.")
+]
