@@ -1,9 +1,9 @@
 """gcsplan: plans, proves, uploads and verifies MAVLink missions over real terrain.
 
-    from gcsplan import load_mission, plan
+from gcsplan import load_mission, plan
 
-    for vehicle in plan(load_mission("missions/jacksboro.yaml")).vehicles:
-        print(vehicle.name, vehicle.verdict.length_m, vehicle.verdict.safe)
+for vehicle in plan(load_mission("missions/jacksboro.yaml")).vehicles:
+    print(vehicle.name, vehicle.verdict.length_m, vehicle.verdict.safe)
 """
 
 from __future__ import annotations

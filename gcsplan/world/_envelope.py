@@ -52,6 +52,22 @@ def steepest_in(m, z, slopes, i, j, c0, r0, c1, r1):  # type: ignore[no-untyped-
 
 
 @device
+def lift_beside(m, z, halo, ea, na, eb, nb, c0, r0, c1, r1, i, j, reach):  # type: ignore[no-untyped-def]
+    """How much higher than a short segment in cell (i, j) the surface may lie within ``reach``; NaN where unknown.
+
+    The segment's ends in the plane, then in the grid.
+    """
+    if halo.slope[j, i] < 0.0:
+        d, _ = unknown_near(m, z, halo.cols, halo.rows, ea, na, eb, nb, reach, i, j)
+        if d < reach:
+            return math.nan
+    x, y = reach / m[STEP_X], reach / m[STEP_Y]
+    return reach * steepest_in(
+        m, z, halo.slope, i, j, min(c0, c1) - x, min(r0, r1) - y, max(c0, c1) + x, max(r0, r1) + y
+    )
+
+
+@device
 def put(rows, count, s, low0, low1, near0, near1, far0, far1):  # type: ignore[no-untyped-def]
     """Add a piece that ends at ``s`` if there is room; the new number of pieces."""
     if count < len(rows):
@@ -148,38 +164,31 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, r
                     up0, up1 = t0 - min(t_bulge, 0.0), t1 - min(t_bulge, 0.0)
                     near0, near1, far0, far1 = up0, up1, up0, up1
                     g0, t0 = g1, t1
+                    fa_, fb_ = fa + (fb - fa) * pa, fa + (fb - fa) * pb
+                    ea, na, eb, nb = (
+                        e0 + (e1 - e0) * fa_,
+                        n0 + (n1 - n0) * fa_,
+                        e0 + (e1 - e0) * fb_,
+                        n0 + (n1 - n0) * fb_,
+                    )
                     for which in range(3):
-                        reach = low_m if which == 0 else (near_m if which == 1 else far_m)
-                        reach += widen
+                        reach = widen + (low_m if which == 0 else (near_m if which == 1 else far_m))
                         if reach <= 0.0:
                             continue
                         z = ground if which == 0 else top
                         halo = under if which == 0 else (beside if which == 1 else beyond)
-                        lost = False
-                        if halo.slope[jj, ii] < 0.0:
-                            fa_, fb_ = fa + (fb - fa) * pa, fa + (fb - fa) * pb
-                            d, _ = unknown_near(
-                                m, z, halo.cols, halo.rows, e0 + (e1 - e0) * fa_, n0 + (n1 - n0) * fa_,
-                                e0 + (e1 - e0) * fb_, n0 + (n1 - n0) * fb_, reach, ii, jj,
-                            )  # fmt: skip
-                            lost = d < reach
-                        x, y = reach / m[STEP_X], reach / m[STEP_Y]
-                        lift = reach * steepest_in(
-                            m, z, halo.slope, ii, jj, min(va, wa) - x, min(vb, wb) - y, max(va, wa) + x, max(vb, wb) + y
-                        )
-                        if lost:
-                            lift = math.nan
+                        lift = lift_beside(m, z, halo, ea, na, eb, nb, va, vb, wa, wb, ii, jj, reach)
                         if which == 0:
                             bound = halo.low[jj, ii]
                             whole = min(low0, low1) - lift < bound
                             low0, low1 = (bound, bound) if whole else (low0 - lift, low1 - lift)
+                            continue
+                        bound = halo.high[jj, ii]
+                        whole = max(up0, up1) + lift > bound
+                        if which == 1:
+                            near0, near1 = (bound, bound) if whole else (up0 + lift, up1 + lift)
                         else:
-                            bound = halo.high[jj, ii]
-                            whole = max(up0, up1) + lift > bound
-                            if which == 1:
-                                near0, near1 = (bound, bound) if whole else (up0 + lift, up1 + lift)
-                            else:
-                                far0, far1 = (bound, bound) if whole else (up0 + lift, up1 + lift)
+                            far0, far1 = (bound, bound) if whole else (up0 + lift, up1 + lift)
                     count = put(rows, count, s0 + pb * run, low0, low1, near0, near1, far0, far1)
                 t = tb
             if end < 1.0:
