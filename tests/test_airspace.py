@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -395,6 +396,18 @@ def test_clear_says_what_examine_says_of_ten_thousand_legs_over_mountains() -> N
         assert v.by == pytest.approx(abs(v.value - v.limit), abs=2e-6)
         at = legs.start[v.leg] + v.fraction * (legs.end[v.leg] - legs.start[v.leg])
         assert (v.east_m, v.north_m, v.amsl_m) == pytest.approx(tuple(at))
+
+
+def test_several_threads_may_share_an_airspace() -> None:
+    rng = np.random.default_rng(5)
+    airspace = flat([Zone("u", NOTCH), Zone("z", Circle(1000, 0, 300), None, Level(50.0, "agl"))])
+    a = rng.uniform(0.0, 2000.0, (3000, 2))
+    points = [np.column_stack([p, np.full(3000, 51.0)]) for p in (a, a + rng.normal(0.0, 200.0, a.shape))]
+    legs = Legs(points[0], points[1], np.zeros(3000, np.bool_), np.zeros(3000), np.zeros(3000))
+    alone = judged(airspace, legs, Limits(10.0))
+    with ThreadPoolExecutor(4) as pool:
+        for report in pool.map(lambda _: airspace.examine(legs, Limits(10.0)), range(8)):
+            assert report.violations == alone.violations
 
 
 def test_a_leg_of_fifty_kilometres_is_cut_until_it_is_straight_in_the_grid() -> None:

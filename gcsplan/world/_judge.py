@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from gcsplan.world._sweep import SOURCES, TOUCH_M, device, kernel
+from gcsplan.world._sweep import SOURCES, TOUCH_M, inlined, kernel
 from gcsplan.world._sweep_terrain import (
     DEPTH,
     DEPTH_AT,
@@ -39,7 +39,7 @@ class Demands(NamedTuple):
     max_descent: float
 
 
-@device
+@inlined
 def judge_terrain(  # type: ignore[no-untyped-def]
     m, ground, top, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst, leg
 ):
@@ -96,7 +96,7 @@ def judge_terrain(  # type: ignore[no-untyped-def]
     return fine
 
 
-@device
+@inlined
 def candidates(zone, lat, bucket, near, west, south, east, north, seen, stamp, list_of):  # type: ignore[no-untyped-def]
     """Number of zones whose boxes overlap a box, put into ``list_of`` once each."""
     count = 0
@@ -128,7 +128,7 @@ def candidates(zone, lat, bucket, near, west, south, east, north, seen, stamp, l
 @kernel
 def judge(  # type: ignore[no-untyped-def]
     m, ground, top, near, far, over, zs, start, end, column, track, altitude, want, full,
-    ok, found, worst, nearest, hit, hit_at, stack, out, seen, list_of, sources=SOURCES,
+    ok, found, worst, nearest, hit, hit_at, stack, out, events, seen, list_of, sources=SOURCES,
 ):  # fmt: skip
     """Judge every leg; the number of zones broken.
 
@@ -138,7 +138,8 @@ def judge(  # type: ignore[no-untyped-def]
     ``ok`` (n,): no violation. With ``full`` also ``found`` (n, 4): lowest height above top, its fraction, highest above
     ground, zone clearance; ``worst`` (n, 7, 2) by kind: depth (NaN where there is none; 1 for a climb too steep) and
     fraction; ``nearest`` (n,) zone; and, as far as there is room, ``hit`` (leg, zone) and ``hit_at`` (signed distance,
-    fraction). ``stack`` (256, 8), ``out`` (12,), ``seen`` (all -1) and ``list_of`` (0, 1, …) by zone: room to work in.
+    fraction). ``stack`` (256, 8), ``out`` (12,), ``events`` (two for each corner), ``seen`` (all -1) and
+    ``list_of`` (0, 1, …) by zone: room to work in.
     """
     zone = zs.table
     zones = len(zone)
@@ -182,7 +183,7 @@ def judge(  # type: ignore[no-untyped-def]
                 if gap > 0.0 and gap >= best and gap >= reach:
                     continue
             broken, dist, at = meets(
-                m, ground, zone, zs.vertex, zs.scratch, k, e0, n0, h0, e1, n1, h1, altitude[i], reach, stack, full
+                m, ground, zone, zs.vertex, k, e0, n0, h0, e1, n1, h1, altitude[i], reach, stack, events, full
             )
             if broken:
                 fine = False

@@ -121,7 +121,7 @@ def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, 
         t = np.linspace(low, high, 33)
         p = start + t[:, None] * (end - start)
         away = p[:, None] - corners
-        w = ((away * edge).sum(-1) / (edge * edge).sum(-1)).clip(0.0, 1.0)
+        w = ((away * edge).sum(-1) / np.maximum((edge * edge).sum(-1), 1e-30)).clip(0.0, 1.0)
         distance = np.linalg.norm(away - w[..., None] * edge, axis=-1).min(axis=1)
         e, n = p[:, :1], p[:, 1:]
         spans_n = (corners[:, 1] > n) != (after[:, 1] > n)

@@ -43,12 +43,15 @@ def _options(**wanted: object) -> dict[str, Any]:
     return {name: value for name, value in wanted.items() if hasattr(CPUTargetOptions, name)}
 
 
-device = njit(
-    **_options(
-        nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True, _nrt=False
-    )
+_INSIDE = _options(
+    nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True, _nrt=False
 )
+
+device = njit(**_INSIDE)
 """A function that only kernels call. Nothing is allocated in it: counting references would cost more than the rest."""
+
+inlined = njit(inline="always", **_INSIDE)
+"""The same, with one caller, into which it is copied: that compiles faster than a function of its own."""
 
 kernel = njit(
     cache=True, **_options(nogil=True, error_model="numpy", no_rewrites=True, no_cfunc_wrapper=True, _nrt=False)

@@ -20,6 +20,7 @@ from gcsplan.world._sweep import (
     TOUCH_M,
     Floats,
     device,
+    inlined,
     local_steps,
     parts_of,
     plane_per_cell,
@@ -50,7 +51,7 @@ class Zones(NamedTuple):
     """The zones as arrays: ``table`` (n, `ZONE_NUMBERS`); ``vertex`` (v, 2) of all polygons, one after the other.
 
     ``lattice``: a coarse one, as west, south, 1 / side, columns, rows; ``bucket``, ``near``: the zones of each of its
-    squares, ``near[bucket[k]:bucket[k + 1]]``. ``scratch``: room for the kernels, two numbers for each corner.
+    squares, ``near[bucket[k]:bucket[k + 1]]``. ``most_corners`` of any polygon.
     """
 
     table: Floats
@@ -58,7 +59,7 @@ class Zones(NamedTuple):
     lattice: Floats
     bucket: NDArray[np.int64]
     near: NDArray[np.int64]
-    scratch: Floats
+    most_corners: int
 
 
 @device
@@ -267,8 +268,8 @@ def nearest_conflict(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, 
     return best, at
 
 
-@device
-def meets(m, z, zone, vertex, scratch, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stack, full):  # type: ignore[no-untyped-def]
+@inlined
+def meets(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stack, events, full):  # type: ignore[no-untyped-def]
     """Whether a leg breaks a zone; its signed distance from the shape at the worst point, and where on the leg.
 
     Without a break the distance is the least at which the leg meets the zone's heights (for a zone over ground a lower
@@ -284,7 +285,7 @@ def meets(m, z, zone, vertex, scratch, k, e0, n0, h0, e1, n1, h1, altitude_m, re
     polygon = zone[k, RADIUS] < 0.0
     bound = reach - TOUCH_M
     if polygon and bound <= 0.0 and dist <= 0.0:
-        if not enters(zone, vertex, k, ax, ay, bx, by, scratch):
+        if not enters(zone, vertex, k, ax, ay, bx, by, events):
             return False, 0.0, where
     elif not dist < bound:
         return False, dist, where

@@ -68,9 +68,7 @@ def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale
             row[BAND_LOW] += low if row[FLOOR_AGL] else 0.0
             row[BAND_HIGH] += high if row[CEILING_AGL] else 0.0
     most = max((len(v) for v in vertices), default=0)
-    return Zones(
-        table, np.concatenate(vertices) if vertices else np.zeros((0, 2)), *_lattice(table[:, BOX]), np.zeros(2 * most)
-    )
+    return Zones(table, np.concatenate(vertices) if vertices else np.zeros((0, 2)), *_lattice(table[:, BOX]), most)
 
 
 def _cells(box: Floats, surface: Surface, field: Field) -> tuple[int, int, int, int]:

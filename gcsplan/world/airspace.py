@@ -247,7 +247,8 @@ class Airspace:
                 f.packed, self.surface.ground_m, self.surface.top_m, near, far, self._halo(False, near_m), self._zones,
                 legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
                 _demands(limits, self.scale), full, ok, found, worst, nearest, hit, hit_at,
-                np.empty((256, 8)), np.zeros(12), np.full(len(self.zones), -1), np.arange(len(self.zones)),
+                np.empty((256, 8)), np.zeros(12), np.empty(2 * self._zones.most_corners),
+                np.full(len(self.zones), -1), np.arange(len(self.zones)),
             )
         )  # fmt: skip
 
