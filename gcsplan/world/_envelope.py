@@ -21,7 +21,8 @@ from gcsplan.world._sweep import (
     slab,
     to_grid,
 )
-from gcsplan.world._sweep_terrain import EDGE, unknown_near
+from gcsplan.world._sweep_beside import unknown_near
+from gcsplan.world._sweep_terrain import EDGE
 
 CHORD_M = 0.05
 MOST_CUTS = 64  # of the line in one cell

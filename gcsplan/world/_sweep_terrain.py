@@ -14,141 +14,15 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.world._sweep import (
-    BEND,
-    BOW_M,
-    ERROR_M,
-    RESOLUTION_M,
-    TOUCH_M,
-    device,
-    local_steps,
-    parts_of,
-    segment_box,
-    slab,
-    to_grid,
-    within,
-)
+from gcsplan.world._sweep import BEND, BOW_M, ERROR_M, TOUCH_M, device, parts_of, slab, to_grid
+from gcsplan.world._sweep_beside import bar_above, beside_point, deepest, unknown_near
 
-MOST_PIECES = 1_000_000
-"""Of one search; beyond it the demand counts as broken. Never met but by hostile input."""
-
-RESOLUTION = 0.1  # of itself: to this the depth of a break is surely resolved, beside RESOLUTION_M
-SPOKES = 16
-SMALLEST_M = 1e-3
 EDGE = 1e-9  # columns or rows by which a leg along the border may seem to lie beyond it
 INSIDE = 1e-6  # columns or rows from the border within which the fast look leaves the leg to the thorough one
 GROUP_M, GROUP_BOW_M = 500.0, 0.003  # longest stretch, and its bow, that the second tier is given at once
 
 # What `sweep` leaves behind, by place.
 LOW, LOW_AT, DEPTH, DEPTH_AT, UNKNOWN, UNKNOWN_AT, STEEPEST, REACH = range(8)
-
-
-@device
-def bar_above(depth):  # type: ignore[no-untyped-def]
-    """What a break must exceed to be news, when one of ``depth`` is known: by 5 mm or a tenth."""
-    return depth + max(RESOLUTION_M, RESOLUTION * depth) if depth > TOUCH_M else TOUCH_M
-
-
-@device
-def unknown_near(m, z, halo_c, halo_r, e0, n0, e1, n1, reach, i, j):  # type: ignore[no-untyped-def]
-    """Distance from a short segment in cell (i, j) to the nearest unknown patch, and where on the segment.
-
-    Only patches up to ``halo_c`` columns and ``halo_r`` rows away are looked at; ``inf`` if there is none.
-    """
-    rows, cols = z.shape
-    c0, r0 = to_grid(m, e0, n0)
-    c1, r1 = to_grid(m, e1, n1)
-    sx, sy = local_steps(m, e0, n0, e1, n1, reach)
-    best, at = math.inf, 0.0
-    for jj in range(j - halo_r, j + halo_r + 1):
-        for ii in range(i - halo_c, i + halo_c + 1):
-            if 0 <= ii < cols - 1 and 0 <= jj < rows - 1:
-                total = z[jj, ii] + z[jj, ii + 1] + z[jj + 1, ii] + z[jj + 1, ii + 1]
-                if not math.isnan(total):
-                    continue
-            dist, t = segment_box(c0 * sx, r0 * sy, c1 * sx, r1 * sy, ii * sx, jj * sy, (ii + 1) * sx, (jj + 1) * sy)
-            if dist < best:
-                best, at = dist, t
-    return best, at
-
-
-@device
-def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):  # type: ignore[no-untyped-def]
-    """Worst break of the demand along a short segment: its depth and where on the segment (< 0: no news).
-
-    ``best`` is the depth already known. With ``full`` the worst is resolved to 5 mm or a tenth, else the first
-    break ends the search. Unknown cells are passed over: they are judged elsewhere.
-    """
-    rows, cols = z.shape
-    length = math.hypot(e1 - e0, n1 - n0)
-    r = reach + m[BEND] * length * length / 8.0 + m[ERROR_M]
-    c0, r0 = to_grid(m, e0, n0)
-    c1, r1 = to_grid(m, e1, n1)
-    sx, sy = local_steps(m, e0, n0, e1, n1, r)
-    x0, y0 = c0 * sx, r0 * sy
-    dx, dy = c1 * sx - x0, r1 * sy - y0
-    w0, dw = sign * h0, sign * (h1 - h0)
-    flat = math.hypot(dx, dy)
-    rise = abs(dw) / flat if flat > 0.0 else 0.0
-    lowest = min(w0, w0 + dw)
-    i0 = max(int(math.floor(min(c0, c1) - r / sx)), 0)
-    i1 = min(int(math.floor(max(c0, c1) + r / sx)), cols - 2)
-    j0 = max(int(math.floor(min(r0, r1) - r / sy)), 0)
-    j1 = min(int(math.floor(max(r0, r1) + r / sy)), rows - 2)
-    found, at = best, -1.0
-    worked = 0
-    for j in range(j0, j1 + 1):
-        for i in range(i0, i1 + 1):
-            za, zb, zc, zd = sign * z[j, i], sign * z[j, i + 1], sign * z[j + 1, i], sign * z[j + 1, i + 1]
-            high = max(max(za, zb), max(zc, zd))
-            bar = bar_above(found)
-            if not (high + need - lowest > bar) or math.isnan(za + zb + zc + zd):
-                continue
-            kb, kc, kd = zb - za, zc - za, za - zb - zc + zd
-            # The whole cell goes through the same mill as its pieces, as the one child of nothing.
-            u0, v0, um, vm, u1, v1, ul, vl = 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
-            children, size = 1, 0
-            while children:
-                before = size
-                for _ in range(children):
-                    p, q = za + kb * u0 + kc * v0 + kd * u0 * v0, za + kb * um + kc * v0 + kd * um * v0
-                    s, t = za + kb * u0 + kc * vm + kd * u0 * vm, za + kb * um + kc * vm + kd * um * vm
-                    high = max(max(p, q), max(s, t))
-                    if high + need - lowest > bar:
-                        ta, tb = within(x0, y0, dx, dy, (i + u0) * sx, (j + v0) * sy, (i + um) * sx, (j + vm) * sy, r)
-                        if ta <= tb:
-                            tl = ta if dw > 0.0 else tb
-                            stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3] = u0, v0, um, vm
-                            stack[size, 4], stack[size, 5] = high + need - (w0 + tl * dw), tl
-                            stack[size, 6] = high - min(min(p, q), min(s, t))
-                            size += 1
-                    u0, v0, um, vm = ul, vl, u1, v1
-                # The deeper half is looked into first.
-                if size == before + 2 and stack[before, 4] > stack[before + 1, 4]:
-                    for k in range(7):
-                        stack[before, k], stack[before + 1, k] = stack[before + 1, k], stack[before, k]
-                children = 0
-                while size and not children:
-                    size -= 1
-                    bound = stack[size, 4]
-                    bar = bar_above(found)
-                    if not bound > bar:
-                        continue
-                    worked += 1
-                    u0, v0, u1, v1 = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
-                    wide, tall = (u1 - u0) * sx, (v1 - v0) * sy
-                    across = math.hypot(wide, tall)
-                    fine = max(RESOLUTION_M, RESOLUTION * found)
-                    if stack[size, 6] + rise * across <= fine or across <= SMALLEST_M or worked > MOST_PIECES:
-                        found, at = bound, stack[size, 5]
-                        if not full or worked > MOST_PIECES:
-                            return found, at
-                        continue
-                    um = 0.5 * (u0 + u1) if wide >= tall else u1
-                    vm = v1 if wide >= tall else 0.5 * (v0 + v1)
-                    ul, vl = (um, v0) if wide >= tall else (u0, vm)
-                    children = 2
-    return found, at
 
 
 @device
@@ -166,27 +40,6 @@ def least_in_cell(sign, kd, turn, before, after, t, tb):  # type: ignore[no-unty
             if value < least:
                 return value, t + s * (tb - t)
     return least, where
-
-
-@device
-def beside_point(m, z, sign, e, n, h, need, reach):  # type: ignore[no-untyped-def]
-    """Deepest break at `SPOKES` places around a point, ``reach`` away from it; -inf where all of them are unknown."""
-    rows, cols = z.shape
-    c, r = to_grid(m, e, n)
-    sx, sy = local_steps(m, e, n, e, n, reach)
-    deepest_here = -math.inf
-    for k in range(SPOKES):
-        turn = 2.0 * math.pi * k / SPOKES
-        qc, qr = c + reach * math.cos(turn) / sx, r + reach * math.sin(turn) / sy
-        if 0.0 <= qc < cols - 1 and 0.0 <= qr < rows - 1:
-            i, j = int(qc), int(qr)
-            za = z[j, i]
-            kb, kc = z[j, i + 1] - za, z[j + 1, i] - za
-            u, v = qc - i, qr - j
-            depth = need - sign * (h - (za + kb * u + kc * v + (z[j + 1, i + 1] - za - kb - kc) * u * v))
-            if depth > deepest_here:
-                deepest_here = depth
-    return deepest_here
 
 
 @device

@@ -29,7 +29,7 @@ from gcsplan.world._sweep import (
     slab,
     to_grid,
 )
-from gcsplan.world._sweep_terrain import MOST_PIECES, SMALLEST_M
+from gcsplan.world._sweep_beside import MOST_PIECES, SMALLEST_M
 
 ACROSS_M = 0.02
 """Size to which pieces are cut beside a zone whose levels follow the ground."""
