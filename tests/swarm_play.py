@@ -1,0 +1,85 @@
+"""Playing an update rule batch by batch, with every random number that it drew laid open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gcsplan.swarm.box import Floats, Run
+from gcsplan.swarm.table import get
+
+DRAWS = ("random", "uniform", "integers", "normal", "permutation")
+
+
+class Recorded:
+    """A generator that keeps what it gave, in order."""
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng(seed)
+        self.drawn: list[Any] = []
+
+    def __getattr__(self, name: str) -> Any:
+        method = getattr(self._rng, name)
+        if name not in DRAWS:
+            return method
+
+        def draw(*args: Any, **kwargs: Any) -> Any:
+            value = method(*args, **kwargs)
+            self.drawn.append(np.copy(value))
+            return value
+
+        return draw
+
+
+class Play:
+    """One run of a rule of the table. ``batches`` and ``costs`` are what it yielded and was sent so far."""
+
+    def __init__(
+        self, name: str, cost: Callable[[Floats], Floats], first: Floats, *, T: int, seed: int = 0, **changes: Any
+    ) -> None:
+        self.rng = Recorded(seed)
+        self.cost = cost
+        n, dim = first.shape
+        population = changes.pop("population", n)
+        run = Run(self.rng, dim, population, T, start=first)  # type: ignore[arg-type]
+        self._steps = get(name).rule()(run, **get(name).with_defaults(changes))
+        self._next = next(self._steps)
+        self.batches: list[Floats] = []
+        self.costs: list[Floats] = []
+        self.rng.drawn.clear()  # the first population was given
+        self._answer()
+
+    def step(self) -> Floats:
+        """Let the rule yield once more; its population, a copy."""
+        self._answer_to_rule()
+        return self.batches[-1]
+
+    def draws(self) -> list[Any]:
+        """What was drawn since the last call."""
+        out = list(self.rng.drawn)
+        self.rng.drawn.clear()
+        return out
+
+    def _answer(self) -> None:
+        self.batches.append(self._next.copy())
+        self.costs.append(np.asarray(self.cost(self._next), dtype=float))
+
+    def _answer_to_rule(self) -> None:
+        self._next = self._steps.send(self.costs[-1].copy())
+        self._answer()
+
+
+def clip(value: float) -> float:
+    return min(1.0, max(0.0, value))
+
+
+def bowl(x: Floats) -> Floats:
+    """An uneven bowl, its least value off the middle."""
+    weights = 1.0 + np.arange(x.shape[1])
+    return np.asarray((weights * (x - 0.37) ** 2).sum(axis=1))
+
+
+def crowd(n: int, dim: int, seed: int = 11) -> Floats:
+    return np.random.default_rng(seed).random((n, dim))
