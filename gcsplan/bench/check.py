@@ -40,13 +40,7 @@ def run(legs: int = 200_000, seed: int = 1, repeats: int = 5) -> dict[str, Any]:
     """
     if legs < 1 or repeats < 1:
         raise ValueError(f"legs and repeats must be 1 or more, given {legs} and {repeats}")
-    frame = Frame(MIDDLE_DEG[0], MIDDLE_DEG[1])
-    box = (-HALF_M[0] - LEG_M, -HALF_M[1] - LEG_M, HALF_M[0] + LEG_M, HALF_M[1] + LEG_M)
-    spec = TerrainSpec(dem=("sample:jacksboro",), vertical_datum="EGM96")
-    surface = load_terrain(spec, frame, box, where="the benchmark's terrain")
-    rng = np.random.default_rng(seed)
-    airspace = Airspace(surface, _zones(rng), scale=frame.scale_at(float(np.hypot(*HALF_M)) + LEG_M))
-    some = _legs(rng, surface, legs)
+    airspace, some = scene(legs, seed)
     began = time.perf_counter()
     airspace.clear(_part(some, np.arange(min(legs, 2))), LIMITS)
     first_call_s = time.perf_counter() - began
@@ -57,7 +51,7 @@ def run(legs: int = 200_000, seed: int = 1, repeats: int = 5) -> dict[str, Any]:
         "leg_m": LEG_M,
         "seed": seed,
         "repeats": repeats,
-        "dem_cells": [int(n) for n in surface.ground_m.shape],
+        "dem_cells": [int(n) for n in airspace.surface.ground_m.shape],
         "zones": len(airspace.zones),
         "legal_share": float(legal.mean()),
         "clear_legs_per_s": legs / _median_s(lambda: airspace.clear(some, LIMITS), repeats),
@@ -65,6 +59,17 @@ def run(legs: int = 200_000, seed: int = 1, repeats: int = 5) -> dict[str, Any]:
         "examine_legal_legs_per_s": len(kept) / _median_s(lambda: airspace.examine(kept, LIMITS), repeats),
         "first_call_s": first_call_s,
     }
+
+
+def scene(legs: int, seed: int) -> tuple[Airspace, Legs]:
+    """The sample DEM with a dozen zones, and random one-kilometre legs over it, by a seed."""
+    frame = Frame(MIDDLE_DEG[0], MIDDLE_DEG[1])
+    box = (-HALF_M[0] - LEG_M, -HALF_M[1] - LEG_M, HALF_M[0] + LEG_M, HALF_M[1] + LEG_M)
+    spec = TerrainSpec(dem=("sample:jacksboro",), vertical_datum="EGM96")
+    surface = load_terrain(spec, frame, box, where="the benchmark's terrain")
+    rng = np.random.default_rng(seed)
+    airspace = Airspace(surface, _zones(rng), scale=frame.scale_at(float(np.hypot(*HALF_M)) + LEG_M))
+    return airspace, _legs(rng, surface, legs)
 
 
 def report(result: dict[str, Any]) -> str:

@@ -61,8 +61,11 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """The cells of a surface: ``floor_m`` (rows, cols) lowest altitude legal everywhere in each, NaN where unknown;
-    ``east_m``, ``north_m`` their middles; ``reach_m`` from the middle to the farthest corner."""
+    """The cells of a surface.
+
+    ``floor_m`` (rows, cols): lowest altitude legal everywhere in each, NaN or inf where unknown; ``east_m``,
+    ``north_m``: their middles; ``reach_m``: from the middle to the farthest corner.
+    """
 
     floor_m: Floats
     east_m: Floats
@@ -98,7 +101,8 @@ class Cells:
 
     def lowest_join(self, surface: Surface, a: tuple[float, float], b: tuple[float, float]) -> float:
         """Lowest altitude, to half a metre above, below which ``a`` and ``b`` are joined; inf where there is none."""
-        low, high = float(np.nanmin(self.floor_m)), float(np.nanmax(self.floor_m))
+        known = self.floor_m[np.isfinite(self.floor_m)]  # close to the map's border nothing is legal: inf
+        low, high = float(known.min()), float(known.max())
         if not self.joined(surface, a, b, self.floor_m <= high):
             return math.inf
         while high - low > 0.5:
@@ -134,7 +138,7 @@ def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int,
         cells = Cells.of(airspace, limits)
         top = draw_ceiling(rng, pair, cells, limits) if ceiling else None
         if top is not None or not ceiling:
-            below = cells.floor_m <= (math.inf if top is None else top - limits.altitude_error_m)
+            below = cells.floor_m <= (1e9 if top is None else top - limits.altitude_error_m)
             for _ in range(MOST_ZONE_SETS):
                 found = draw_zones(rng, pair, zones)
                 free = below & cells.outside(found, limits.horizontal_clearance_m + limits.track_error_m)

@@ -165,7 +165,10 @@ def _large(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProble
             join = Cells.of(airspace, limits).lowest_join(surface, pair.start, pair.goal)
             held = replace(held, max_amsl_m=math.floor(join + ABOVE_JOIN_M[0] + limits.altitude_error_m) + 0.5)
         name = f"large {seed}/{number:02d}, 10 zones"
-        yield NamedProblem(name, _problem(pair, airspace, held), "large", f"{rows} × {cols} nodes", pair.redraws)
+        problem = _problem(pair, airspace, held)
+        # A new airspace: what was worked out for the old one takes hundreds of megabytes.
+        problem = replace(problem, airspace=Airspace(surface, airspace.zones, scale=scale))
+        yield NamedProblem(name, problem, "large", f"{rows} × {cols} nodes", pair.redraws)
 
 
 def _many(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:

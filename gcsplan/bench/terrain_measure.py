@@ -1,0 +1,157 @@
+"""What is kept of one planner's attempt at one problem, and how an attempt's memory is measured."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import gc
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.problem import Problem
+from gcsplan.world.airspace import Legs
+
+Floats = NDArray[np.float64]
+Status = Literal["solved", "infeasible", "not found", "unsafe", "failed"]
+OURS = "gcsplan"
+OURS_LONG = "gcsplan 60 s"
+SAGITTA_M = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One method's attempt at one problem; times are medians of ``runs``.
+
+    ``status``: solved means that the exact check passes the whole path from start to goal, infeasible that its absence
+    is proved; unsafe that a path was given which the check rejects. ``cost`` and ``bound`` in metres or joules;
+    ``raw_cost`` before a rival's path was simplified. ``sweep_s``: the exact check of 100,000 one-kilometre legs, in
+    between. ``memory_mb``: peak above what was in use before. ``points``: the path, of rivals only.
+    """
+
+    key: str
+    name: str
+    kind: str
+    group: str
+    method: str
+    status: Status
+    detail: str = ""
+    cost: float | None = None
+    raw_cost: float | None = None
+    bound: float | None = None
+    first_path_s: float | None = None
+    planning_s: float | None = None
+    sweep_s: float | None = None
+    memory_mb: float | None = None
+    checks: int | None = None
+    runs: int = 1
+    stopped_by: str = ""
+    version: str = ""
+    points: list[list[float]] = field(default_factory=list)
+
+    @property
+    def gap_percent(self) -> float | None:
+        """Above its own bound, percent; None without either."""
+        return None if not self.cost or not self.bound else 100.0 * (self.cost / self.bound - 1.0)
+
+
+def passes(problem: Problem, points: object) -> bool:
+    """True where a path leads from start to goal and the exact check finds nothing on any leg, arcs included.
+
+    With a turn radius every corner is flown as the arc tangent to both legs, and arcs must not overlap.
+    """
+    p = np.asarray(points, dtype=np.float64)
+    if p.ndim != 2 or p.shape[1] != 3 or len(p) < 2 or not np.isfinite(p).all():
+        return False
+    off = max(float(np.abs(p[0] - problem.start).max()), float(np.abs(p[-1] - problem.goal).max()))
+    if off > 1e-6:
+        return False
+    limits = problem.limits
+    if problem.turn_radius_m > 0.0:
+        arcs = flown(p, problem.turn_radius_m)
+        if arcs is None:
+            return False
+        p, limits = arcs, replace(limits, track_error_m=limits.track_error_m + SAGITTA_M)
+    return not problem.airspace.examine(Legs.of_path(p, limits), problem.limits).violations
+
+
+def flown(points: Floats, radius_m: float) -> Floats | None:
+    """(M, 3) the track that a fixed wing flies by way points (N, 3): legs, and arcs as chords within `SAGITTA_M`.
+
+    The altitude of a way point is reached in the middle of its arc and is linear along the track between. None where
+    the arcs of neighbours overlap, so that it cannot be flown. Written for this judgement alone: it shares nothing
+    with the planners.
+    """
+    legs = np.diff(points[:, :2], axis=0)
+    lengths = np.hypot(*legs.T)
+    if not (lengths > 0.0).all():
+        return None
+    headings = np.arctan2(legs[:, 1], legs[:, 0])
+    turns = (np.diff(headings) + math.pi) % (2.0 * math.pi) - math.pi
+    with np.errstate(over="ignore"):
+        reach = np.concatenate([[0.0], radius_m * np.tan(np.abs(turns) / 2.0), [0.0]])
+    if (reach[:-1] + reach[1:] > lengths + 1e-3).any():
+        return None
+    step = 2.0 * math.acos(max(0.0, 1.0 - SAGITTA_M / radius_m))
+    track, middle = [points[0, :2]], [0]
+    for i, turn in enumerate(turns.tolist()):
+        halves = max(1, math.ceil(abs(turn) / (2.0 * step)))
+        angle = headings[i] + np.linspace(0.0, turn, 2 * halves + 1)
+        side = math.copysign(1.0, turn)
+        begin = points[i + 1, :2] - reach[i + 1] * legs[i] / lengths[i]
+        turned = np.stack([np.sin(angle) - np.sin(headings[i]), np.cos(headings[i]) - np.cos(angle)], axis=-1)
+        middle.append(len(track) + halves)
+        track += list(begin + side * radius_m * turned)
+    middle.append(len(track))
+    track.append(points[-1, :2])
+    flat = np.array(track)
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])
+    return np.column_stack([flat, np.interp(s, s[middle], points[:, 2])])
+
+
+class Memory:
+    """Peak resident memory of this process within a ``with`` block of `peak`, above what was in use before it.
+
+    Of the resident set, since arrays of compiled code and of other people's C++ count too, which tracing Python's
+    allocations would miss. None where the system does not tell (it needs Linux's ``/proc``).
+    """
+
+    def __init__(self) -> None:
+        self.peak_mb: float | None = None
+
+    @contextlib.contextmanager
+    def peak(self) -> Iterator[None]:
+        """Measure what runs inside."""
+        gc.collect()
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).malloc_trim(0)  # memory freed but kept by the C library would hide what comes
+        before = None
+        with contextlib.suppress(OSError):
+            Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+            before = _status_kb("VmRSS")
+        yield
+        most = None if before is None else _status_kb("VmHWM")
+        self.peak_mb = None if before is None or most is None else max(0.0, (most - before) / 1024.0)
+
+
+def _status_kb(key: str) -> float | None:
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines():
+            if line.startswith(f"{key}:"):
+                return float(line.split()[1])
+    return None
+
+
+def percentile(values: list[float], percent: float) -> float | None:
+    """Linear between neighbours; None of none."""
+    return float(np.percentile(values, percent)) if values else None
+
+
+def beyond(cost: float | None, bound: float | None) -> float | None:
+    """Percent of ``cost`` above ``bound``; None without either."""
+    return None if cost is None or not bound or not math.isfinite(bound) else 100.0 * (cost / bound - 1.0)
