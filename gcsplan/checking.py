@@ -14,7 +14,6 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, InputError, UsageError
 from gcsplan.mavlink.files import read_mission_file
 from gcsplan.mavlink.mission import Home, Mission
-from gcsplan.mavlink.preflight import distance_m
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.pipeline import world_of
 from gcsplan.vehicle import Vehicle
@@ -60,6 +59,8 @@ def match(source: MissionFile, argument: str) -> tuple[VehicleRequest, Path]:
 
 def check_files(source: MissionFile, arguments: Sequence[str]) -> list[Checked]:
     """Judge each FILE or NAME=FILE in the world of ``source``; InputError and UsageError for what is not readable."""
+    from gcsplan.mavlink.preflight import distance_m  # with the dialect behind it, which planning can do without
+
     world = world_of(source)
     checked = []
     for argument in arguments:

@@ -80,7 +80,6 @@ def plan(
     from gcsplan.console import delivery_table, plan_table, planning_status, say, transfer_progress
     from gcsplan.export.outdir import add_output, retire_outputs, write_outputs, write_whole
     from gcsplan.planners import table
-    from gcsplan.sim.loopback import loopback_fleet
 
     directory = Path(mission.stem) if out is None else out
     if planner is not None:
@@ -117,6 +116,8 @@ def plan(
         say(f"written to {directory}{os.sep}: {', '.join(files)}")
     deliveries: list[Delivery] = []
     if targets:
+        from gcsplan.sim.loopback import loopback_fleet
+
         jobs = delivery.jobs_of(planned, targets)
         options = delivery.Options(allow_armed=allow_armed, ignore_position=ignore_position)
         names = [job.name for job in jobs]

@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from gcsplan.native import notice
+
 if TYPE_CHECKING:
     from gcsplan.check.verdict import Verdict
     from gcsplan.delivery import Delivery
@@ -186,11 +188,15 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, int, int]
 
 @contextmanager
 def planning_status() -> Iterator[Callable[[str, Progress], None]]:
-    """A status line while planning, on a terminal only: call the result with (vehicle, progress)."""
+    """A status line while planning, on a terminal only: call the result with (vehicle, progress).
+
+    That kernels are being compiled, which happens once, is said in a log too: the first run takes longer.
+    """
     if not console.is_terminal:
-        yield lambda who, told: None
+        with notice.told(say):
+            yield lambda who, told: None
         return
-    with console.status("planning…") as status:
+    with console.status("planning…") as status, notice.told(lambda words: status.update(f"{words}…")):
 
         def update(who: str, told: Progress) -> None:
             cost = f", best {number(told.cost)}" if told.cost is not None else ""

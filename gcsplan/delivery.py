@@ -2,6 +2,8 @@
 
 One link for each URL; several vehicles on one URL are told apart by system id. For ``sim`` the caller hands in what
 starts a loopback vehicle for each UAV where its mission starts; the results say *simulated*.
+
+Links and transfers are imported by what opens one: most plans are sent nowhere, and the dialect is slow to import.
 """
 
 from __future__ import annotations
@@ -13,25 +15,26 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.checking import Checked, split_name
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
-from gcsplan.mavlink import session
 from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.files import read_mission_file, write_plan, write_waypoints
-from gcsplan.mavlink.frames import signing_key
-from gcsplan.mavlink.link import Link
 from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, Mission
-from gcsplan.mavlink.results import UploadResult
 from gcsplan.mavlink.url import parse_url
 from gcsplan.mission_file import MissionFile
 from gcsplan.pipeline import Plan, world_of
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
+
+if TYPE_CHECKING:
+    from gcsplan.mavlink import session
+    from gcsplan.mavlink.link import Link
+    from gcsplan.mavlink.results import UploadResult
 
 SIM, LINK = "sim", "link"
 LISTEN_S = 1.5
@@ -173,10 +176,15 @@ def unchecked_job(argument: str, url: str, sysid: int) -> Job:
 
 def _open(url: str) -> Link:
     """The link at ``url``, signed where the environment holds a key."""
+    from gcsplan.mavlink.frames import signing_key
+    from gcsplan.mavlink.link import Link
+
     return Link(url, key=signing_key())
 
 
 def _autopilot_of(link: Link, sysid: int) -> Autopilot:
+    from gcsplan.mavlink import session
+
     state = session.discover(link, sysid, listen_s=LISTEN_S)
     for autopilot in Autopilot:
         table = manner(autopilot)
@@ -192,6 +200,9 @@ def deliver(
     jobs: Sequence[Job], options: Options, progress: ProgressCall | None = None, *, simulator: Simulator | None = None
 ) -> list[Delivery]:
     """Upload every job, all at once, read back, compare, and check what was read back; in the order given."""
+    from gcsplan.mavlink import session
+    from gcsplan.mavlink.link import Link
+
     with ExitStack() as stack:
         links: dict[str, Link] = {}
         simulated = [job for job in jobs if job.url == SIM]
@@ -217,6 +228,8 @@ def deliver(
 
 
 def _order(job: Job, link: Link, options: Options, progress: ProgressCall | None) -> session.Order:
+    from gcsplan.mavlink import session
+
     ground_m = None
     if job.world is not None:
         home = job.mission.home
@@ -298,6 +311,8 @@ def require_file(file: Path) -> None:
 
 def verify_file(file: Path, url: str, sysid: int) -> Delivery:
     """Compare a file with what is on board; nothing is written to the vehicle."""
+    from gcsplan.mavlink import session
+
     require_file(file)
     with _open(url) as link:
         autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
@@ -314,6 +329,8 @@ def download_to(url: str, sysid: int, file: Path) -> int:
         raise UsageError(f"-o {file}: a name that ends in .waypoints or .plan is wanted")
     if file.is_dir() or not file.parent.is_dir():
         raise UsageError(f"-o {file}: a file in a directory that is there is wanted")
+    from gcsplan.mavlink import session
+
     with _open(url) as link:
         autopilot = _autopilot_of(link, sysid)
         mission = session.download_mission(
@@ -326,6 +343,8 @@ def download_to(url: str, sysid: int, file: Path) -> int:
 
 def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False) -> None:
     """Clear one list on board and read back that it is empty."""
+    from gcsplan.mavlink import session
+
     if kind not in KINDS:
         raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
     with _open(url) as link:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from gcsplan.world import _judge, _sweep
 from gcsplan.world.airspace import Airspace, LegReport, Legs, Violation
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
@@ -458,10 +457,3 @@ def test_legs_that_make_no_sense_are_refused(change: dict[str, Floats], message:
     }  # fmt: skip
     with pytest.raises(ValueError, match=message):
         Legs(**(good | change))  # type: ignore[arg-type]
-
-
-def test_compiled_kernels_are_kept_by_the_text_of_every_kernel() -> None:
-    """numba's cache knows one file only: without the digest of all in its key a correction might not arrive."""
-    airspace = flat()
-    airspace.clear(leg([100, 100, 60], [900, 700, 60]), Limits(60.0))
-    assert _sweep.SOURCES in str(_judge.judge.signatures[0][-1])

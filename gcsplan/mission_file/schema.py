@@ -26,6 +26,7 @@ Angle = Annotated[float, Field(gt=0.0, le=90.0)]
 Speed = Annotated[float, Field(gt=0.0, le=300.0)]
 Text = Annotated[str, Field(min_length=1, max_length=300)]
 Encoding = Literal["box", "sections", "polar", "bspline", "offsets"]
+SwarmCost = Literal["krill", "ssgwo", "msfoa", "abo", "ib-abc"]
 
 
 class _Section(BaseModel):
@@ -191,6 +192,7 @@ class PlannerKeys(_Section):
     gap_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
     budget_s: Annotated[float, Field(gt=0.0, le=86400.0)] = 10.0
     encoding: Encoding | None = None
+    cost: SwarmCost | None = None
     points: Annotated[int, Field(ge=1, le=1000)] | None = None
     population: Annotated[int, Field(ge=2, le=100_000)] | None = None
     iterations: Annotated[int, Field(ge=1, le=10_000_000)] | None = None

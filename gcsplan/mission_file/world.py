@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from gcsplan.errors import InputError, Problem
@@ -232,6 +231,8 @@ def zone_around(zones: Sequence[Zone], east_m: float, north_m: float, amsl_m: fl
         if isinstance(shape, Circle):
             inside = math.hypot(east_m - shape.east_m, north_m - shape.north_m) < shape.radius_m
         else:
+            import shapely  # many missions have no polygons
+
             inside = bool(shapely.Polygon(shape.vertices).contains(shapely.Point(east_m, north_m)))
         if (
             inside
@@ -283,6 +284,8 @@ def _ground_under(zone: Zone, surface: Surface) -> tuple[float, float] | None:
             if isinstance(shape, Circle):
                 inside = np.hypot(plane[..., 0] - shape.east_m, plane[..., 1] - shape.north_m) < shape.radius_m
             else:
+                import shapely
+
                 inside = shapely.contains_xy(shapely.Polygon(shape.vertices), plane[..., 0], plane[..., 1])
             block = block[inside]
         # Beyond that the whole rectangle is taken: its extremes enclose the true ones, so nothing is refused wrongly.

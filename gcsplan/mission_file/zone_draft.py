@@ -8,14 +8,17 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from gcsplan.errors import Problem
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+
+if TYPE_CHECKING:
+    import shapely
 
 Floats = NDArray[np.float64]
 
@@ -140,6 +143,8 @@ def polygon(
     if len(set(ring)) < 3:
         problems.append(Problem(at, f"a polygon needs at least 3 different points, given {len(set(ring))}"))
         return None
+    import shapely  # many missions have no polygons
+
     shape = shapely.Polygon(np.asarray(ring) if local else _unwrapped(ring, ring[0][1]))
     if not shape.is_valid or not shape.area > 0.0:
         problems.append(Problem(at, _why_invalid(shape, local)))
@@ -235,6 +240,8 @@ def _near_rings(draft: ZoneDraft, frame: Frame) -> list[Floats]:
             continue
         parts: list[Floats] = [turned]
         if low[0] < window[0] or high[0] > window[2] or low[1] < south or high[1] > north:
+            import shapely
+
             cut = shapely.intersection(shapely.Polygon(turned), shapely.box(*window))
             parts = [
                 np.asarray(p.exterior.coords)[:-1]
@@ -265,6 +272,8 @@ def _unwrapped(points: Sequence[tuple[float, float]], near_lon_deg: float) -> Fl
 
 
 def _why_invalid(shape: shapely.Polygon, local: bool) -> str:
+    import shapely
+
     reason = shapely.is_valid_reason(shape)
     match = re.search(r"\[(\S+) (\S+)\]", reason)
     if match is None:

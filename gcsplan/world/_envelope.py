@@ -9,18 +9,8 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.world._sweep import (
-    BOW_M,
-    ERROR_M,
-    SOURCES,
-    STEP_X,
-    STEP_Y,
-    device,
-    kernel,
-    parts_of,
-    slab,
-    to_grid,
-)
+from gcsplan.world._shared import BOW_M, ERROR_M, STEP_X, STEP_Y
+from gcsplan.world._sweep import device, parts_of, slab, to_grid
 from gcsplan.world._sweep_beside import unknown_near
 from gcsplan.world._sweep_terrain import EDGE
 
@@ -85,8 +75,8 @@ def put_unknown(rows, count, s):  # type: ignore[no-untyped-def]
     return put(rows, count, s, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
-@kernel
-def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, rows, sources=SOURCES):  # type: ignore[no-untyped-def]
+@device
+def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, rows):  # type: ignore[no-untyped-def]
     """Cut a ground track (N, 2) into pieces and bound the surface over each; their number.
 
     Into ``rows``, as far as there is room: s at the end of the piece in metres along the track; lower bound of the
@@ -198,8 +188,8 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, r
     return count
 
 
-@kernel
-def around(m, z, halo, sign, points, reach_m, out, sources=SOURCES):  # type: ignore[no-untyped-def]
+@device
+def around(m, z, halo, sign, points, reach_m, out):  # type: ignore[no-untyped-def]
     """Upper bound of ``sign·height`` within ``reach_m`` of each point (N, 2) of the plane; NaN where unknown.
 
     The tightest of three: the gradient at the point where the disc lies in one cell; the highest corner of the cells'

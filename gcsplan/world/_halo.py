@@ -3,57 +3,44 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.world._sweep import Field
+from gcsplan.world._field import Field
+from gcsplan.world._shared import Halo
 
 CELLS_AT_ONCE = 200_000  # stay in the processor's cache
 FEW_STEPS = 4  # up to so many cells of reach, shifting is faster than scipy's filter
 
 
-class Halo(NamedTuple):
-    """Bounds over the known cells within ``cols`` and ``rows`` of each cell, (rows - 1, cols - 1) float32.
-
-    ``slope`` (rise over run) is ``inf`` in a cell that is itself unknown, and negative (its size is the slope) where
-    an unknown cell, or the border, lies within. ``high`` and ``low`` are AMSL metres; all three are rounded outward.
-    """
-
-    slope: NDArray[np.float32]
-    high: NDArray[np.float32]
-    low: NDArray[np.float32]
-    cols: int
-    rows: int
-
-    @classmethod
-    def around(cls, field: Field, heights: NDArray[np.float64], reach_m: float) -> Halo:
-        """Bounds for every point within ``reach_m`` of a point of the cell."""
-        cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
-        shape = heights.shape[0] - 1, heights.shape[1] - 1
-        slope, high, low = (np.empty(shape, np.float32) for _ in range(3))
-        unknown, near = np.empty(shape, np.bool_), np.empty(shape, np.bool_)
-        at_once = max(CELLS_AT_ONCE // shape[1], 1)
-        for at in range(0, shape[0], at_once):
-            part = slice(at, min(at + at_once, shape[0]))
-            steep, most, least = _cells(field, heights[at : part.stop + 1])
-            lost = np.isnan(steep)
-            unknown[part] = lost
-            if lost.any():
-                steep[lost], most[lost], least[lost] = 0.0, -np.inf, np.inf
-            near[part] = _spread(lost, cols, 1, True)
-            slope[part] = _spread(steep, cols, 1, 0.0)
-            high[part] = _spread(most, cols, 1, -np.inf)
-            low[part] = -_spread(-least, cols, 1, -np.inf)
-        slope = _spread(slope, rows, 0, 0.0)
-        high = _spread(high, rows, 0, -np.inf)
-        low = -_spread(-low, rows, 0, -np.inf)
-        if cols or rows:
-            near = _spread(near, rows, 0, True)
-            slope[near] = -slope[near] - np.float32(1e-9)
-        slope[unknown] = np.inf
-        return cls(slope, high, low, cols, rows)
+def halo_around(field: Field, heights: NDArray[np.float64], reach_m: float) -> Halo:
+    """Bounds for every point within ``reach_m`` of a point of the cell."""
+    cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
+    shape = heights.shape[0] - 1, heights.shape[1] - 1
+    slope, high, low = (np.empty(shape, np.float32) for _ in range(3))
+    unknown, near = np.empty(shape, np.bool_), np.empty(shape, np.bool_)
+    at_once = max(CELLS_AT_ONCE // shape[1], 1)
+    for at in range(0, shape[0], at_once):
+        part = slice(at, min(at + at_once, shape[0]))
+        steep, most, least = _cells(field, heights[at : part.stop + 1])
+        lost = np.isnan(steep)
+        unknown[part] = lost
+        if lost.any():
+            steep[lost], most[lost], least[lost] = 0.0, -np.inf, np.inf
+        near[part] = _spread(lost, cols, 1, True)
+        slope[part] = _spread(steep, cols, 1, 0.0)
+        high[part] = _spread(most, cols, 1, -np.inf)
+        low[part] = -_spread(-least, cols, 1, -np.inf)
+    slope = _spread(slope, rows, 0, 0.0)
+    high = _spread(high, rows, 0, -np.inf)
+    low = -_spread(-low, rows, 0, -np.inf)
+    if cols or rows:
+        near = _spread(near, rows, 0, True)
+        slope[near] = -slope[near] - np.float32(1e-9)
+    slope[unknown] = np.inf
+    return Halo(slope, high, low, cols, rows)
 
 
 def _cells(

@@ -3,9 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-from gcsplan.world._sweep import SOURCES, TOUCH_M, inlined, kernel
+from gcsplan.world._shared import (
+    CLIMB,
+    COVERAGE,
+    DESCENT,
+    EAST_E,
+    MAX_AGL,
+    MAX_AMSL,
+    MIN_AGL,
+    NORTH_N,
+    SOUTH_N,
+    TERRAIN,
+    TOUCH_M,
+    WEST_E,
+)
+from gcsplan.world._sweep import device, inlined
 from gcsplan.world._sweep_terrain import (
     DEPTH,
     DEPTH_AT,
@@ -18,25 +31,9 @@ from gcsplan.world._sweep_terrain import (
     glance,
     sweep,
 )
-from gcsplan.world._sweep_zones import EAST_E, NORTH_N, SOUTH_N, WEST_E, meets
+from gcsplan.world._sweep_zones import meets
 
-MIN_AGL, TERRAIN, MAX_AGL, MAX_AMSL, COVERAGE, CLIMB, DESCENT = range(7)
 FEW_ZONES = 24  # up to so many boxes are looked through faster than the lattice
-
-
-class Demands(NamedTuple):
-    """Limits for the kernel; ``inf`` is no limit. ``max_climb``, ``max_descent``: rise over run.
-
-    ``clearance_m`` and track errors times ``scale`` are metres of the plane.
-    """
-
-    min_agl_m: float
-    max_agl_m: float
-    max_amsl_m: float
-    clearance_m: float
-    scale: float
-    max_climb: float
-    max_descent: float
 
 
 @inlined
@@ -125,10 +122,10 @@ def candidates(zone, lat, bucket, near, west, south, east, north, seen, stamp, l
     return count
 
 
-@kernel
+@device
 def judge(  # type: ignore[no-untyped-def]
     m, ground, top, near, far, over, zs, start, end, column, track, altitude, want, full,
-    ok, found, worst, nearest, hit, hit_at, stack, out, events, seen, list_of, sources=SOURCES,
+    ok, found, worst, nearest, hit, hit_at, stack, out, events, seen, list_of,
 ):  # fmt: skip
     """Judge every leg; the number of zones broken.
 

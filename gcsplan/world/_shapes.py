@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.world._sweep_zones import (
+from gcsplan.world._shared import (
     CEILING_AGL,
     EAST,
     EAST_E,
@@ -18,7 +18,7 @@ from gcsplan.world._sweep_zones import (
     SOUTH_N,
     WEST_E,
     Zones,
-)  # fmt: skip
+)
 
 Floats = NDArray[np.float64]
 

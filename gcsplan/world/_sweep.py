@@ -1,133 +1,34 @@
-"""What every kernel of the exact check shares: the surface as arrays, the map to its grid, and plane geometry.
+"""What every kernel of the exact check shares: the map to the grid, and plane geometry.
 
-Kernels are compiled by numba and kept in its cache. numba notices a change of the file that a kernel stands in, but
-not of the files that it calls into; so each cached kernel takes `SOURCES`, a digest of all of them, as the default of
-its last parameter, which numba keeps as a part of the key. Without that, a kernel could outlive a correction.
+Kernels are numba's, and only imported where they must be compiled: see `gcsplan.native`. Dividing by zero gives inf
+or NaN in them, as in numpy; NaN is unknown, so there is no fast math.
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
-from pathlib import Path
-from typing import Any, NamedTuple
 
-import numpy as np
 from numba import njit
-from numba.core.cpu import CPUTargetOptions
-from numpy.typing import NDArray
 
-from gcsplan.world.surface import DEGREE, TERMS, GridMap
-
-Floats = NDArray[np.float64]
-
-TOUCH_M = 1e-6
-"""Float noise: a limit that is broken by less is touched, and touching is legal."""
-
-RESOLUTION_M = 0.005
-"""Height to which the branch and bound resolves what lies within reach; what it cannot tell apart, it refuses."""
-
-BOW_M = 0.05
-"""A leg is mapped to the grid in parts whose plane-straight and grid-straight lines lie within this."""
-
-SOURCES = hashlib.sha256(
-    b"".join(
-        path.read_bytes()
-        for path in (*sorted(Path(__file__).parent.glob("_*.py")), Path(__file__).parent / "surface.py")
-    )
-).hexdigest()
-
-
-def _options(**wanted: object) -> dict[str, Any]:
-    """Those compiler options that this numba knows; without the others kernels are the same, but slower."""
-    return {name: value for name, value in wanted.items() if hasattr(CPUTargetOptions, name)}
-
-
-_INSIDE = _options(
-    nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True, _nrt=False
+from gcsplan.native.source import INSIDE
+from gcsplan.world._shared import (
+    AFFINE,
+    BEND,
+    CENTRE_E,
+    CENTRE_N,
+    HALF,
+    HORNER,
+    LINEAR,
+    PER_UNIT,
+    steps_of,
 )
+from gcsplan.world.surface import DEGREE
 
-device = njit(**_INSIDE)
+device = njit(**INSIDE)
 """A function that only kernels call. Nothing is allocated in it: counting references would cost more than the rest."""
 
-inlined = njit(inline="always", **_INSIDE)
+inlined = njit(inline="always", **INSIDE)
 """The same, with one caller, into which it is copied: that compiles faster than a function of its own."""
-
-kernel = njit(
-    cache=True, **_options(nogil=True, error_model="numpy", no_rewrites=True, no_cfunc_wrapper=True, _nrt=False)
-)
-"""What Python calls. Dividing by zero gives inf or NaN, as in numpy; NaN is unknown, so there is no fast math."""
-
-# The map from the plane to the grid as one array, which is what kernels hand on: numbers by these places, then the
-# constant, the u and the v coefficients, used alone where the map is affine, then all of them, highest power first.
-AFFINE, CENTRE_E, CENTRE_N, PER_UNIT, HALF, BEND, ERROR_M, STEP_X, STEP_Y, LINEAR = range(10)
-HORNER = LINEAR + 6
-
-
-class Field(NamedTuple):
-    """What the check knows of a surface's map to its grid.
-
-    ``bend`` bounds the map's second derivative, cells taken as metres, 1/m: a line of length L bows by bend·L²/8 at
-    most, and the metric changes by bend·d over a distance d. ``step_x``, ``step_y``: metres of one column and one
-    row, a lower bound over the whole map: (step_x·Δcol)² + (step_y·Δrow)² <= distance². ``packed``: all of it for the
-    kernels. Beyond the square that the map was fitted to it is not to be trusted, and nothing is known.
-    """
-
-    packed: Floats
-    affine: bool
-    bend: float
-    error_m: float
-    step_x: float
-    step_y: float
-
-    @classmethod
-    def of(cls, grid: GridMap) -> Field:
-        """Bounds of ``grid``, and its numbers in the kernels' order."""
-        order = [TERMS.index((i, j)) for i in range(DEGREE, -1, -1) for j in range(DEGREE - i, -1, -1)]
-        low = [TERMS.index(t) for t in ((0, 0), (1, 0), (0, 1))]
-        affine = not grid.coefficients[[k for k, (i, j) in enumerate(TERMS) if i + j > 1]].any()
-        bend, step_x, step_y = _bounds(grid, affine)
-        half = math.inf if affine else 1.0 + 1e-9
-        head = [affine, *grid.centre, 1.0 / grid.scale_m, half, bend, grid.error_m, step_x, step_y]
-        packed = np.concatenate([head, grid.coefficients[low].ravel(), grid.coefficients[order].ravel()])
-        packed.setflags(write=False)
-        return cls(packed, affine, bend, float(grid.error_m), step_x, step_y)
-
-
-def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
-    """``bend``, ``step_x``, ``step_y`` of `Field`, from a lattice over the fitted square."""
-    f = np.linspace(-1.0, 1.0, 2 if affine else 33)
-    u, v = (a.ravel() for a in np.meshgrid(f, f))
-
-    def derivative(du: int, dv: int) -> Floats:
-        total = np.zeros((len(u), 2))
-        for k, (i, j) in enumerate(TERMS):
-            if i >= du and j >= dv:
-                factor = math.perm(i, du) * math.perm(j, dv) / grid.scale_m ** (du + dv)
-                total += factor * (u ** (i - du) * v ** (j - dv))[:, None] * grid.coefficients[k]
-        return total
-
-    jacobian = np.stack([derivative(1, 0), derivative(0, 1)], axis=-1)
-    inverse = np.linalg.inv(jacobian)
-    steps = np.array([steps_of(*m.ravel().tolist()) for m in inverse])
-    if affine:
-        return 0.0, float(steps[:, 0].min()), float(steps[:, 1].min())
-    # Of a symmetric form the largest value over two directions is attained at two that are equal.
-    uu, uv, vv = (np.einsum("nij,nj->ni", inverse, derivative(*d)) for d in ((2, 0), (1, 1), (0, 2)))
-    turn = np.linspace(0.0, np.pi, 24, endpoint=False)
-    c, s = np.cos(turn)[:, None, None], np.sin(turn)[:, None, None]
-    bend = 1.1 * float(np.linalg.norm(c * c * uu + 2.0 * c * s * uv + s * s * vv, axis=-1).max())
-    spacing = grid.scale_m * (f[1] - f[0])
-    keep = 1.0 - bend * spacing
-    return bend, float(steps[:, 0].min()) * keep, float(steps[:, 1].min()) * keep
-
-
-def steps_of(a: float, b: float, c: float, d: float) -> tuple[float, float]:
-    """Metres of a column and of a row from d(east, north)/d(col, row), [[a, b], [c, d]]; skew is taken off both."""
-    xx, yy, xy = a * a + c * c, b * b + d * d, abs(a * b + c * d)
-    k = math.sqrt(xx / yy)
-    return math.sqrt(max(xx - xy * k, 0.0)), math.sqrt(max(yy - xy / k, 0.0))
-
 
 steps_in_kernel = device(steps_of)
 

@@ -4,17 +4,8 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.world._sweep import (
-    BEND,
-    ERROR_M,
-    RESOLUTION_M,
-    TOUCH_M,
-    device,
-    local_steps,
-    segment_box,
-    to_grid,
-    within,
-)
+from gcsplan.world._shared import BEND, ERROR_M, RESOLUTION_M, TOUCH_M
+from gcsplan.world._sweep import device, local_steps, segment_box, to_grid, within
 
 MOST_PIECES = 1_000_000
 """Of one search; beyond it the demand counts as broken. Never met but by hostile input."""

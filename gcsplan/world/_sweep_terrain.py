@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.world._sweep import BEND, BOW_M, ERROR_M, TOUCH_M, device, parts_of, slab, to_grid
+from gcsplan.world._shared import BEND, BOW_M, ERROR_M, TOUCH_M
+from gcsplan.world._sweep import device, parts_of, slab, to_grid
 from gcsplan.world._sweep_beside import bar_above, beside_point, deepest, unknown_near
 
 EDGE = 1e-9  # columns or rows by which a leg along the border may seem to lie beyond it

@@ -8,17 +8,33 @@ the nearest point of the shape whose own heights, on its own ground, the leg mee
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gcsplan.world._sweep import (
+from gcsplan.world._shared import (
+    BAND_HIGH,
+    BAND_LOW,
     BEND,
+    CEILING,
+    CEILING_AGL,
+    COL0,
+    COL1,
+    EAST,
+    EAST_E,
     ERROR_M,
+    FIRST,
+    FLOOR,
+    FLOOR_AGL,
+    LAST,
+    NORTH,
+    NORTH_N,
+    RADIUS,
     RESOLUTION_M,
+    ROW0,
+    ROW1,
+    SOUTH_N,
     TOUCH_M,
-    Floats,
+    WEST_E,
+)
+from gcsplan.world._sweep import (
     device,
     inlined,
     local_steps,
@@ -35,31 +51,6 @@ ACROSS_M = 0.02
 """Size to which pieces are cut beside a zone whose levels follow the ground."""
 
 ZONE_BOW_M = 0.003
-
-
-# A zone is a row of numbers by these places. Circle: east, north, radius in metres of the plane; a negative radius
-# marks a polygon, whose vertices are those from FIRST up to LAST. Box: west, south, east, north. Floor and ceiling are
-# above mean sea level, or above ground where the mark is not 0; -inf and inf where there is none. Band: the same above
-# mean sea level, over all the ground that the zone stands on. Cells: first and last column, first and last row that
-# the shape may touch.
-EAST, NORTH, RADIUS, FIRST, LAST, WEST_E, SOUTH_N, EAST_E, NORTH_N = range(9)
-FLOOR, FLOOR_AGL, CEILING, CEILING_AGL, BAND_LOW, BAND_HIGH, COL0, COL1, ROW0, ROW1 = range(9, 19)
-ZONE_NUMBERS = 19
-
-
-class Zones(NamedTuple):
-    """The zones as arrays: ``table`` (n, `ZONE_NUMBERS`); ``vertex`` (v, 2) of all polygons, one after the other.
-
-    ``lattice``: a coarse one, as west, south, 1 / side, columns, rows; ``bucket``, ``near``: the zones of each of its
-    squares, ``near[bucket[k]:bucket[k + 1]]``. ``most_corners`` of any polygon.
-    """
-
-    table: Floats
-    vertex: Floats
-    lattice: Floats
-    bucket: NDArray[np.int64]
-    near: NDArray[np.int64]
-    most_corners: int
 
 
 @device

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.world._sweep import Field
-from gcsplan.world._sweep_zones import (
+from gcsplan.world._field import Field
+from gcsplan.world._shared import (
     BAND_HIGH,
     BAND_LOW,
     CEILING,
@@ -31,7 +31,7 @@ from gcsplan.world._sweep_zones import (
     WEST_E,
     ZONE_NUMBERS,
     Zones,
-)  # fmt: skip
+)
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Level, Zone
 

@@ -19,12 +19,28 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gcsplan.world._envelope import around
-from gcsplan.world._halo import Halo
-from gcsplan.world._judge import CLIMB, COVERAGE, DESCENT, MAX_AGL, MAX_AMSL, MIN_AGL, TERRAIN, Demands, judge
+from gcsplan.native.form import Held
+from gcsplan.world._compiled import FOUND, HALO, ONE_SURFACE, SURFACE, ZONES, around, judge, room
+from gcsplan.world._field import Field
+from gcsplan.world._halo import halo_around
 from gcsplan.world._shapes import deepest_inside
-from gcsplan.world._sweep import BOW_M, TOUCH_M, Field
-from gcsplan.world._sweep_zones import CEILING, CEILING_AGL, FLOOR, FLOOR_AGL
+from gcsplan.world._shared import (
+    BOW_M,
+    CEILING,
+    CEILING_AGL,
+    CLIMB,
+    COVERAGE,
+    DESCENT,
+    FLOOR,
+    FLOOR_AGL,
+    MAX_AGL,
+    MAX_AMSL,
+    MIN_AGL,
+    TERRAIN,
+    TOUCH_M,
+    Demands,
+    Halo,
+)
 from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
@@ -148,7 +164,12 @@ class Airspace:
         self.scale = scale
         self._field = Field.of(surface.grid)
         self._zones = zones_as_arrays(self.zones, surface, self._field, scale)
-        self._halos: dict[tuple[bool, int, int], Halo] = {}
+        self._halos: dict[tuple[bool, int, int], tuple[Halo, Held]] = {}
+        ground, top = (np.ascontiguousarray(a, dtype=np.float64) for a in (surface.ground_m, surface.top_m))
+        self._surfaces = Held(SURFACE, self._field.packed, ground, top)
+        self._grounds = Held(SURFACE, self._field.packed, ground, ground)
+        self._tops, self._bare = (Held(ONE_SURFACE, self._field.packed, z) for z in (top, ground))
+        self._held_zones = Held(ZONES, *self._zones)
 
     def examine(self, legs: Legs, limits: Limits) -> LegReport:
         """Every violation along the whole of every leg. ``limits``' own errors are not used: the legs carry them."""
@@ -159,7 +180,7 @@ class Airspace:
         room = n + 64
         while True:
             hit, hit_at = np.zeros((room, 2), np.intp), np.zeros((room, 2))
-            hits = self._judge(legs, limits, True, ok, found, worst, nearest, hit, hit_at)
+            hits = self._judge(legs, limits, True, ok, Held(FOUND, found, worst, nearest, hit, hit_at))
             if hits <= room:
                 break
             room = hits
@@ -178,7 +199,7 @@ class Airspace:
     def clear(self, legs: Legs, limits: Limits) -> NDArray[np.bool_]:
         """(N,) True where `examine` would find no violation; faster."""
         ok = np.zeros(len(legs), np.bool_)
-        self._judge(legs, limits, False, ok, *_NOTHING)
+        self._judge(legs, limits, False, ok, _HELD_NOTHING)
         return ok
 
     def floor_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:
@@ -205,24 +226,40 @@ class Airspace:
         points = np.array(track, dtype=np.float64, order="C")
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
             raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
-        return make_tube(points, limits, self.surface, self._field, self._zones, self._halo, self.scale)
+        return make_tube(
+            points, limits, self._field, self._zones, self._held, self._surfaces, self._grounds, self.scale
+        )
+
+    def straight_cells(self, bow_m: float) -> int:
+        """So many cells of the terrain model lie in the plane as if its lines were straight, within ``bow_m``."""
+        f = self._field
+        if f.affine:
+            return int(max(self.surface.ground_m.shape))
+        return max(int(math.sqrt(4.0 * bow_m / f.bend) / max(f.step_x, f.step_y)), 1)
 
     def _around(self, sign: float, east_m: ArrayLike, north_m: ArrayLike, reach_m: float) -> Floats:
         """Highest ``sign`` times height within reach of each point; NaN where unknown."""
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
         out = np.empty(e.size)
-        heights = self.surface.top_m if sign > 0.0 else self.surface.ground_m
         points = np.stack([e.ravel(), n.ravel()], axis=-1)
-        around(self._field.packed, heights, self._halo(sign > 0.0, reach_m), sign, points, reach_m, out)
+        around(self._tops if sign > 0.0 else self._bare, self._held(sign > 0.0, reach_m), sign, points, reach_m, out)
         return out.reshape(e.shape)
 
     def _halo(self, of_top: bool, reach_m: float) -> Halo:
         """The halo of top or ground for a reach, made once for each size in cells."""
+        return self._halo_and_held(of_top, reach_m)[0]
+
+    def _held(self, of_top: bool, reach_m: float) -> Held:
+        """The same, as kernels take it."""
+        return self._halo_and_held(of_top, reach_m)[1]
+
+    def _halo_and_held(self, of_top: bool, reach_m: float) -> tuple[Halo, Held]:
         f = self._field
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))
         if key not in self._halos:
-            self._halos[key] = Halo.around(f, self.surface.top_m if of_top else self.surface.ground_m, reach_m)
+            halo = halo_around(f, self.surface.top_m if of_top else self.surface.ground_m, reach_m)
+            self._halos[key] = halo, Held(HALO, *halo)
         return self._halos[key]
 
     def _judge(
@@ -231,24 +268,19 @@ class Airspace:
         limits: Limits,
         full: bool,
         ok: NDArray[np.bool_],
-        found: Floats,
-        worst: Floats,
-        nearest: NDArray[np.intp],
-        hit: NDArray[np.intp],
-        hit_at: Floats,
+        found: Held,
     ) -> int:
         f = self._field
         spare = 0.0 if f.affine else BOW_M + f.error_m
         near_m = float(legs.track_error_m.max(initial=0.0)) * self.scale + spare
-        near = self._halo(True, near_m)
-        far = self._halo(True, near_m + limits.horizontal_clearance_m * self.scale)
+        near = self._held(True, near_m)
+        far = self._held(True, near_m + limits.horizontal_clearance_m * self.scale)
         return int(
             judge(
-                f.packed, self.surface.ground_m, self.surface.top_m, near, far, self._halo(False, near_m), self._zones,
+                self._surfaces, near, far, self._held(False, near_m), self._held_zones,
                 legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
-                _demands(limits, self.scale), full, ok, found, worst, nearest, hit, hit_at,
-                np.empty((256, 8)), np.zeros(12), np.empty(2 * self._zones.most_corners),
-                np.full(len(self.zones), -1), np.arange(len(self.zones)),
+                *_demands(limits, self.scale), full, ok, found,
+                room(self._zones.most_corners, len(self.zones)),
             )
         )  # fmt: skip
 
@@ -318,6 +350,7 @@ _KINDS: dict[int, Kind] = {
 _NOTHING = (
     np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),
 )  # fmt: skip
+_HELD_NOTHING = Held(FOUND, *_NOTHING)
 
 
 def _steepest(degrees: float) -> float:

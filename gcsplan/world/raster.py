@@ -8,6 +8,7 @@ either case.
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import math
 import warnings
 from collections.abc import Callable, Iterator
@@ -110,9 +111,11 @@ def sample_jacksboro() -> Raster:
 
     Its xmin … ymax are the edges of the cells and row 0 is the north (the file's "ymin" is the northern edge).
     """
-    from matplotlib.cbook import get_sample_data
-
-    path = Path(str(get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)))
+    # Where the file lies is all that is wanted: importing matplotlib would take longer than the rest.
+    found = importlib.util.find_spec("matplotlib")
+    if found is None or found.origin is None:
+        raise InputError(f"{SAMPLE} comes with matplotlib, which is not installed: pip install matplotlib")
+    path = Path(found.origin).parent / "mpl-data" / "sample_data" / "jacksboro_fault_dem.npz"
     with np.load(path) as file:
         heights = np.asarray(file["elevation"], float)
         west, north, dx, dy = (float(file[k]) for k in ("xmin", "ymin", "dx", "dy"))

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.world._envelope import pieces
-from gcsplan.world._halo import Halo
+from gcsplan.native.form import Held
+from gcsplan.world._compiled import pieces
+from gcsplan.world._field import Field
 from gcsplan.world._shapes import spans
-from gcsplan.world._sweep import BOW_M, Field
-from gcsplan.world._sweep_zones import BAND_HIGH, BAND_LOW, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
+from gcsplan.world._shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
 from gcsplan.world.limits import Limits
-from gcsplan.world.surface import Surface
 
 Floats = NDArray[np.float64]
 
@@ -92,20 +91,22 @@ class Reaches:
 def make_tube(
     track: Floats,
     limits: Limits,
-    surface: Surface,
     field: Field,
     zones: Zones,
-    halo: Callable[[bool, float], Halo],
+    halo: Callable[[bool, float], Held],
+    surfaces: Held,
+    grounds: Held,
     scale: float,
 ) -> Tube:
-    """The tube over ``track`` (N, 2); ``halo(of_top, reach_m)`` gives the surface's bounds. See `Tube`."""
+    """The tube over ``track`` (N, 2); ``halo(of_top, reach_m)`` gives the surface's bounds. See `Tube`.
+
+    ``surfaces``, ``grounds``: the map with ground and top, and with the ground alone.
+    """
     reach = Reaches.of(limits, field, scale)
     bow = 0.0 if field.affine else BOW_M + 2.0 * field.error_m
     under, beside = halo(False, reach.near_m + bow), halo(True, reach.near_m + bow)
     beyond = halo(True, reach.far_m + bow)
-    rows = _pieces(
-        field, surface.ground_m, surface.top_m, under, beside, beyond, track, (reach.near_m, reach.near_m, reach.far_m)
-    )
+    rows = _pieces(surfaces, under, beside, beyond, track, (reach.near_m, reach.near_m, reach.far_m))
     error, margin = limits.altitude_error_m, reach.near_margin_m
     floor = rows[:, 3:5] + (limits.min_agl_m + error + margin)
     if limits.horizontal_clearance_m > 0.0:
@@ -120,26 +121,25 @@ def make_tube(
         np.concatenate([[0.0], rows[:, 0]]),
         np.where(unknown, np.inf, floor),
         ceiling,
-        _bands(track, limits, surface, field, zones, halo, reach),
+        _bands(track, limits, field, zones, halo, reach, grounds),
     )
 
 
 def _pieces(
-    field: Field, ground: Floats, top: Floats, under: Halo, beside: Halo, beyond: Halo, track: Floats,
-    reaches: tuple[float, float, float],
-) -> Floats:  # fmt: skip
+    surfaces: Held, under: Held, beside: Held, beyond: Held, track: Floats, reaches: tuple[float, float, float]
+) -> Floats:
     room = 2048
     while True:
         rows = np.empty((room, 7))
-        count = pieces(field.packed, ground, top, under, beside, beyond, track, *reaches, rows)
+        count = pieces(surfaces, under, beside, beyond, track, *reaches, rows)
         if count <= room:
             return rows[:count]
         room = count
 
 
 def _bands(
-    track: Floats, limits: Limits, surface: Surface, field: Field, zones: Zones,
-    halo: Callable[[bool, float], Halo], reach: Reaches,
+    track: Floats, limits: Limits, field: Field, zones: Zones,
+    halo: Callable[[bool, float], Held], reach: Reaches, grounds: Held,
 ) -> tuple[Band, ...]:  # fmt: skip
     """One band for each span of the track within reach of a zone, by zone and way."""
     error = limits.altitude_error_m
@@ -152,7 +152,7 @@ def _bands(
         if agl.any():
             around = halo(False, wide + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
             part = _between(track, length, s0, s1)
-            ground = _pieces(field, surface.ground_m, surface.ground_m, around, around, around, part, (wide,) * 3)
+            ground = _pieces(grounds, around, around, around, part, (wide,) * 3)
             s = np.concatenate([[s0], s0 + ground[:, 0]])
             low, high = ground[:, 1:3], ground[:, 3:5]
         else:

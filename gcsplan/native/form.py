@@ -1,0 +1,89 @@
+"""The forms of kernels' arguments: what Python hands in, and the slots of eight bytes that machine code takes."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+_NUMBERS: dict[str, np.dtype[Any]] = {
+    "f8": np.dtype(np.float64),
+    "f4": np.dtype(np.float32),
+    "i8": np.dtype(np.int64),
+    "i4": np.dtype(np.int32),
+    "i1": np.dtype(np.int8),
+    "b1": np.dtype(np.bool_),
+}
+_SHAPES = {"": 0, "[]": 1, "[,]": 2, "[,,]": 3}
+_ARRAYS_ONLY = {"f4", "i4", "i1"}
+_address_of = ctypes.addressof
+_over = ctypes.c_char.from_buffer
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """One argument: a number (``dimensions`` 0) or a C-contiguous array. ``letters``: f8, f4, i8, i4, i1 or b1."""
+
+    letters: str
+    dimensions: int
+
+    @property
+    def slots(self) -> str:
+        """As `struct` packs them: a number in one slot, an array as its address and its lengths."""
+        if self.dimensions:
+            return "Q" + self.dimensions * "q"
+        return "d" if self.letters == "f8" else "q"
+
+
+@functools.cache
+def read_forms(text: str) -> tuple[Form, ...]:
+    """Forms from words such as ``f8`` (a number), ``f8[]``, ``f8[,]``, ``f8[,,]`` (arrays)."""
+    forms = []
+    for word in text.split():
+        letters, shape = word[:2], word[2:]
+        if letters not in _NUMBERS or shape not in _SHAPES or word in _ARRAYS_ONLY:
+            raise ValueError(
+                f"a form is f8, i8 or b1, or an array of these, f4, i4 or i1, such as f8[,], given {word!r}"
+            )
+        forms.append(Form(letters, _SHAPES[shape]))
+    return tuple(forms)
+
+
+def slots_of(form: Form, argument: Any) -> tuple[Any, ...]:
+    """The contents of the slots of one argument. Raises TypeError where it has not the form that is wanted.
+
+    Of an array it is the address: whoever holds the slots must hold the array.
+    """
+    if not form.dimensions:
+        return (argument,)
+    if argument.dtype != _NUMBERS[form.letters] or argument.ndim != form.dimensions or not argument.flags.c_contiguous:
+        raise TypeError(
+            f"a kernel wants a contiguous array of {form.letters} in {form.dimensions} dimensions, given "
+            f"{argument.dtype.str[1:]} in {argument.ndim}{'' if argument.flags.c_contiguous else ', not contiguous'}"
+        )
+    if not argument.size:
+        return (0, *argument.shape)
+    # The quick way to an address works for what may be written only.
+    address = _address_of(_over(argument)) if argument.flags.writeable else argument.ctypes.data
+    return (address, *argument.shape)
+
+
+class Held:
+    """Arguments whose slots are made ready once, for many calls; they stand in for those arguments."""
+
+    __slots__ = ("arguments", "forms", "slots", "text")
+
+    def __init__(self, forms: str, *arguments: Any) -> None:
+        self.text = forms
+        self.forms = read_forms(forms)
+        self.arguments = arguments
+        self.slots = [
+            slot for form, argument in zip(self.forms, arguments, strict=True) for slot in slots_of(form, argument)
+        ]
+
+    def __reduce__(self) -> tuple[type[Held], tuple[Any, ...]]:
+        """A copy, here or in another process, has arrays of its own, and their addresses."""
+        return Held, (self.text, *self.arguments)

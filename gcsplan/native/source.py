@@ -1,0 +1,169 @@
+"""From numba functions to LLVM's bitcode: the slow half, done by a developer or where the shipped form is stale."""
+
+# mypy: disable-error-code="no-untyped-call,no-untyped-def,untyped-decorator"
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import FunctionType
+from typing import Any, cast
+
+import llvmlite.binding as llvm  # type: ignore[import-untyped]
+import numpy as np
+from numba import njit, types
+from numba.core import cgutils
+from numba.core.cpu import CPUTargetOptions
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array, populate_array
+
+from gcsplan.native.form import Form
+
+_DTYPES = {"f8": np.float64, "f4": np.float32, "i8": np.int64, "i4": np.int32, "i1": np.int8, "b1": np.bool_}
+
+
+def options(**wanted: object) -> dict[str, Any]:
+    """Those compiler options that this numba knows; without the others kernels are the same, but slower."""
+    return {name: value for name, value in wanted.items() if hasattr(CPUTargetOptions, name)}
+
+
+INSIDE = options(
+    nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True, _nrt=False
+)
+"""Options of kernels and of what they call: dividing by zero gives inf or NaN, and nothing is allocated."""
+
+
+def _slot(builder, block, position):
+    return builder.load(builder.gep(block, [position]))
+
+
+@intrinsic
+def integer_at(typingctx, block, position):
+    """The int64 in a slot."""
+
+    def lower(context, builder, signature, arguments):
+        return _slot(builder, *arguments)
+
+    return types.int64(block, position), lower
+
+
+@intrinsic
+def number_at(typingctx, block, position):
+    """The float64 in a slot."""
+
+    def lower(context, builder, signature, arguments):
+        return builder.bitcast(_slot(builder, *arguments), context.get_value_type(types.float64))
+
+    return types.float64(block, position), lower
+
+
+@intrinsic
+def array_at(typingctx, block, position, like, shape):
+    """A C-contiguous array of that shape (a tuple of int64) whose address is in a slot; ``like``: a dtype."""
+    array = types.Array(like.dtype, len(shape), "C")
+
+    def lower(context, builder, signature, arguments):
+        block, position, _, lengths = arguments
+        out = make_array(array)(context, builder)
+        itemsize = context.get_abi_sizeof(context.get_data_type(array.dtype))
+        step = context.get_constant(types.intp, itemsize)
+        sizes = cgutils.unpack_tuple(builder, lengths)
+        strides: list[Any] = []
+        for size in reversed(sizes):
+            strides.insert(0, step)
+            step = builder.mul(step, size)
+        populate_array(
+            out,
+            data=builder.inttoptr(_slot(builder, block, position), out.data.type),
+            shape=sizes,
+            strides=strides,
+            itemsize=context.get_constant(types.intp, itemsize),
+            meminfo=None,
+        )
+        return out._getvalue()
+
+    return array(block, position, like, shape), lower
+
+
+@intrinsic
+def result_of(typingctx, value):
+    """What a kernel gives back, as an int64; 0 where it gives back nothing."""
+    if not isinstance(value, types.Integer | types.Boolean | types.NoneType):
+        raise TypingError(f"a kernel gives back an int or nothing, not {value}")
+
+    def lower(context, builder, signature, arguments):
+        if isinstance(value, types.NoneType):
+            return context.get_constant(types.int64, 0)
+        return context.cast(builder, arguments[0], signature.args[0], types.int64)
+
+    return types.int64(value), lower
+
+
+def bitcode(kernels: Mapping[str, tuple[Any, tuple[Form, ...]]]) -> bytes:
+    """One module with a function of each name, that takes addresses and lengths for arrays."""
+    whole = None
+    for name, (function, forms) in kernels.items():
+        text = _compiled(name, function, forms)
+        module = llvm.parse_assembly(text)
+        if whole is None:
+            whole = module
+        else:
+            whole.link_in(module)
+    assert whole is not None
+    for function in whole.functions:
+        if not function.is_declaration and function.name not in kernels:
+            function.linkage = "internal"
+    whole.verify()
+    return bytes(whole.as_bitcode())
+
+
+def bitcode_of_plain(
+    kernels: Mapping[str, tuple[Callable[..., Any], tuple[Form, ...]]], others: Mapping[int, Callable[..., Any]]
+) -> bytes:
+    """The same of plain functions. ``others``: by the identity of whatever modules know under a name, the plain
+    function that stands behind it and that kernels call; kernels included.
+    """
+    scopes: dict[int, dict[str, Any]] = {}
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        """Its numba self, in a copy of its module where all of these functions are theirs."""
+        plain = cast(FunctionType, function)
+        scope = scopes.setdefault(id(plain.__globals__), dict(plain.__globals__))
+        twin = FunctionType(plain.__code__, scope, plain.__name__, plain.__defaults__, plain.__closure__)
+        return njit(**INSIDE)(twin)
+
+    twins = {id(function): compiled(function) for function in {id(f): f for f in others.values()}.values()}
+    for scope in scopes.values():
+        for name, value in scope.items():
+            if id(value) in others:
+                scope[name] = twins[id(others[id(value)])]
+    return bitcode({name: (twins[id(function)], forms) for name, (function, forms) in kernels.items()})
+
+
+def _compiled(name: str, function: Any, forms: tuple[Form, ...]) -> str:
+    """LLVM's intermediate form of a kernel and all that it calls, as text; the kernel has the name ``name``."""
+    arguments = []
+    at = 0
+    for form in forms:
+        if form.dimensions:
+            lengths = "".join(f"integer_at(block, {at + 1 + d}), " for d in range(form.dimensions))
+            arguments.append(f"array_at(block, {at}, {form.letters}, ({lengths}))")
+        elif form.letters == "f8":
+            arguments.append(f"number_at(block, {at})")
+        else:
+            arguments.append(f"integer_at(block, {at})" + (" != 0" if form.letters == "b1" else ""))
+        at += len(form.slots)
+    scope: dict[str, Any] = {
+        "array_at": array_at,
+        "number_at": number_at,
+        "integer_at": integer_at,
+        "kernel": function,
+        "result_of": result_of,
+        **_DTYPES,
+    }
+    exec(f"def entry(block):\n    return result_of(kernel({', '.join(arguments)}))\n", scope)
+    entry = njit(**INSIDE)(scope["entry"])
+    entry.compile(types.int64(types.CPointer(types.int64)))
+    [compiled] = entry.overloads.values()
+    module = llvm.parse_assembly(compiled.library.get_llvm_str())
+    module.get_function(compiled.fndesc.llvm_func_name).name = name
+    return str(module)

@@ -1,0 +1,79 @@
+"""Kernels written as plain functions and marked as such: numba is imported only where they must be compiled.
+
+    UNIT = Unit("planners", Path(__file__).parent, "gcsplan.planners", ("_mesh", "_string"))
+
+    @UNIT.device
+    def inner(x, y): ...
+
+    @UNIT.kernel("f8[,] i8 f8[]")
+    def outer(a, k, out): ...      # fills arrays; gives back an int or nothing (0)
+
+`outer` is then called with arrays of exactly these forms (see `gcsplan.native.form`), and runs as machine code.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from gcsplan.native.form import read_forms
+from gcsplan.native.kernels import Kernels
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class Unit(Kernels):
+    """Kernels of some modules of a package that are compiled together.
+
+    ``modules``: all of them that hold a marked function or a constant that one uses, names within ``package``;
+    ``more``: further files that they depend on, beside them.
+    """
+
+    def __init__(
+        self, name: str, folder: Path, package: str, modules: tuple[str, ...], more: tuple[str, ...] = ()
+    ) -> None:
+        super().__init__(name, folder, (*(f"{m}.py" for m in modules), *more), package, {})
+        self._modules = tuple(f"{package}.{m}" for m in modules)
+        self._plain: dict[int, Callable[..., Any]] = {}
+        self._kernels: dict[str, Callable[..., Any]] = {}
+
+    def device(self, function: Function) -> Function:
+        """Mark a function that kernels call. From Python it can be called too, as the plain function that it is."""
+        self._plain[id(function)] = function
+        return function
+
+    def kernel(self, forms: str) -> Callable[[Callable[..., Any]], Callable[..., int]]:
+        """Mark a function that Python calls as machine code; the plain one is its ``__wrapped__``."""
+        read_forms(forms)
+
+        def mark(function: Callable[..., Any]) -> Callable[..., int]:
+            name = function.__name__
+            if name in self._kernels:
+                raise ValueError(f"two kernels of {self.name} are called {name}")
+
+            @functools.wraps(function)
+            def call(*arguments: Any) -> int:
+                return self[name](*arguments)
+
+            self.forms[name] = forms
+            self._kernels[name] = function
+            self._plain[id(function)] = self._plain[id(call)] = function
+            return call
+
+        return mark
+
+    def digest(self) -> str | None:
+        """See `Kernels.digest`."""
+        for module in self._modules:  # so that every kernel is known
+            importlib.import_module(module)
+        return super().digest()
+
+    def bitcode_from_source(self) -> bytes:
+        """See `Kernels.bitcode_from_source`."""
+        self.digest()
+        source = importlib.import_module("gcsplan.native.source")
+        kernels = {name: (function, read_forms(self.forms[name])) for name, function in self._kernels.items()}
+        return bytes(source.bitcode_of_plain(kernels, self._plain))

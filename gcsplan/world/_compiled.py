@@ -1,0 +1,87 @@
+"""The compiled kernels of the exact check, as Python calls them."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gcsplan.native.form import Held
+from gcsplan.native.kernels import Kernels
+
+_HALO = "f4[,] f4[,] f4[,] i8 i8"
+_ZONES = "f8[,] f8[,] f8[] i8[] i8[] i8"
+_ROOM = "f8[,] f8[] f8[] i8[] i8[]"
+
+KERNELS = Kernels(
+    "world",
+    Path(__file__).parent,
+    (
+        "_shared.py",
+        "_sweep.py",
+        "_sweep_terrain.py",
+        "_sweep_beside.py",
+        "_sweep_zones.py",
+        "_judge.py",
+        "_envelope.py",
+        "_entries.py",
+        "surface.py",
+    ),
+    "gcsplan.world._entries",
+    {
+        "judge": (
+            f"f8[] f8[,] f8[,] {_HALO} {_HALO} {_HALO} {_ZONES} f8[,] f8[,] b1[] f8[] f8[] "
+            f"f8 f8 f8 f8 f8 f8 f8 b1 b1[] f8[,] f8[,,] i8[] i8[,] f8[,] {_ROOM}"
+        ),
+        "pieces": f"f8[] f8[,] f8[,] {_HALO} {_HALO} {_HALO} f8[,] f8 f8 f8 f8[,]",
+        "around": f"f8[] f8[,] {_HALO} f8 f8[,] f8 f8[]",
+    },
+)
+
+
+SURFACE, ONE_SURFACE, HALO, ZONES = "f8[] f8[,] f8[,]", "f8[] f8[,]", _HALO, _ZONES
+"""Forms of arguments that stay the same over many calls: the map with both surfaces or one, a halo, the zones."""
+
+FOUND = "f8[,] f8[,,] i8[] i8[,] f8[,]"
+"""Forms of where `judge` puts what it finds."""
+
+
+class Room(threading.local):
+    """Room for `judge` to work in, one for each thread, made ready again before each call."""
+
+    def __init__(self) -> None:
+        self._size = (-1, -1)
+
+    def __call__(self, most_corners: int, zones: int) -> Held:
+        """For polygons of so many corners, and so many zones."""
+        if self._size != (most_corners, zones):
+            self._out, self._seen = np.zeros(12), np.empty(zones, np.int64)
+            self._list = np.arange(zones)
+            self._ready = Held(
+                _ROOM, np.empty((256, 8)), self._out, np.empty(2 * most_corners), self._seen, np.arange(zones)
+            )
+            self._size = most_corners, zones
+        self._out.fill(0.0)
+        self._seen.fill(-1)
+        self._ready.arguments[-1][:] = self._list
+        return self._ready
+
+
+room = Room()
+
+
+def judge(*arguments: Any) -> int:
+    """See `gcsplan.world._entries.judge`."""
+    return KERNELS["judge"](*arguments)
+
+
+def pieces(*arguments: Any) -> int:
+    """See `gcsplan.world._entries.pieces`."""
+    return KERNELS["pieces"](*arguments)
+
+
+def around(*arguments: Any) -> int:
+    """See `gcsplan.world._entries.around`."""
+    return KERNELS["around"](*arguments)
