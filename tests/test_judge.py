@@ -50,6 +50,13 @@ def test_a_mission_above_every_limit_is_safe_and_its_figures_add_up() -> None:
     assert verdict.arrive_s == pytest.approx(flight_s - 66 / 1.5, rel=1e-5)
 
 
+def test_a_vehicle_that_flies_arcs_is_not_called_safe_on_the_strength_of_its_straight_legs() -> None:
+    verdict = verdict_of(world(), HIGH_ENOUGH, replace(vehicle(), turn_radius_m=80.0))
+    assert verdict.safe is None
+    assert verdict.findings == ()
+    assert any("the arcs of 80 m" in words for words in verdict.not_judged)
+
+
 def test_the_altitude_error_is_taken_off() -> None:
     verdict = verdict_of(world(), [[0.0, 0, 366], [3000, 0, 364.9], [6000, 1000, 366]])
     assert {f.kind for f in verdict.findings} == {"min_agl"}

@@ -48,7 +48,6 @@ def small_lattice(seed: int) -> Lattice:
         band_high=low + rng.uniform(0.5, 10.0, 20),
         band_zone=np.zeros(20, np.int64),
         reach_m=0.0,
-        walls=np.zeros((0, 3)),
     )
 
 

@@ -56,6 +56,11 @@ def judge(
     table = manner(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
     flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    if vehicle.turn_radius_m > 0.0:  # the straight legs are judged below; a pass would claim what nobody looked at
+        flight.not_judged.append(
+            f"the arcs of {vehicle.turn_radius_m:g} m that {vehicle.name} flies at its corners are not judged: "
+            f"autopilots begin a turn, and change altitude in it, by parameters that the mission does not hold"
+        )
     findings: list[Finding] = []
     count = len(mission.wire_items())
     if table.max_items is not None and count > table.max_items:

@@ -47,17 +47,20 @@ def check_ends(problem: Problem) -> None:
     names = ["the start", *(f"via point {k + 1}" for k in range(len(problem.via))), "the goal"]
     for name, place, amsl in zip(names, stops, heights, strict=True):
         _check_end(problem, name, place, amsl)
+    one_place = all(math.dist(stops[0], x) < 1e-3 for x in stops)
+    if one_place and not problem.via and abs(problem.start[2] - problem.goal[2]) > 1e-3:
+        return  # a climb on the spot, in laps
+    if one_place:
+        raise Refusal("start and goal are the same place: there is nothing to fly", reason="infeasible", place=stops[0])
     for k, (a, b) in enumerate(pairwise(stops)):
         z0, z1 = heights[k], heights[k + 1]
         if math.dist(a, b) < 1e-3 and z0 is not None and z1 is not None and abs(z1 - z0) > 1e-3:
             raise Refusal(
                 f"no mission: {names[k]} and {names[k + 1]} are one place, {abs(z1 - z0):.1f} m apart in height, and a "
-                f"climb on the spot is not planned: move one of them",
+                f"climb on the spot is planned only from a start to a goal above or below it: move one of them",
                 reason="infeasible",
                 place=a,
             )
-    if all(math.dist(stops[0], x) < 1e-3 for x in stops):
-        raise Refusal("start and goal are the same place: there is nothing to fly", reason="infeasible", place=stops[0])
 
 
 def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: float | None) -> None:
@@ -117,9 +120,13 @@ def _ceiling_words(limits: Limits, air: Airspace, place: tuple[float, float]) ->
     return words + (f", altitude error {limits.altitude_error_m:g} m" if limits.altitude_error_m else "")
 
 
-def explain(problem: Problem, router: Router | None) -> Refusal:
-    """The refusal for a problem whose ends are legal and for which no route was found."""
-    proved = _proved_shut(problem)
+def explain(problem: Problem, router: Router | None = None, *, proved: bool | None = None) -> Refusal:
+    """The refusal for a problem whose ends are legal and for which no route was found.
+
+    ``proved``: that there is none is known already; None: see whether the raster's cells prove it.
+    """
+    if proved is None:
+        proved = _proved_shut(problem)
     reason: NoMissionReason = "infeasible" if proved else "not_found"
     place = None if router is None or router.last_place is None else (router.last_place[0], router.last_place[1])
     grid = "" if proved or router is None else f" (searched on a grid of {router.lattice.step_m:.0f} m)"
@@ -134,7 +141,8 @@ def explain(problem: Problem, router: Router | None) -> Refusal:
         found = reading(problem)
         if found is not None:
             words, place = found
-            return Refusal(f"no mission: {words}{grid}", reason=reason, place=place)
+            sure = "; that there is none is proved" if proved else ""
+            return Refusal(f"no mission: {words}{grid}{sure}", reason=reason, place=place)
     return Refusal(
         f"no mission: no way from start to goal was found{grid}, nor with any one limit lifted: limits, zones and the "
         f"edge of the known terrain bind together",
@@ -226,7 +234,7 @@ def _climb(problem: Problem) -> Reading:
     which = "max_climb_deg" if limits.max_climb_deg <= limits.max_descent_deg else "max_descent_deg"
     return (
         f"{which} {steepest:g} is too tight: no way is that gentle between floor and ceiling; about "
-        f"{needed:.1f} degrees would do. A climb in circles over start or goal is not planned",
+        f"{needed:.1f} degrees would do",
         None,
     )
 

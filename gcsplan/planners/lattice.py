@@ -2,8 +2,8 @@
 
 Floors and ceilings are those of `Airspace` on a lattice of half the spacing, so that every edge knows its ends
 and its middle; zones are tested against the whole line of an edge. A guide, never a judge: what comes out of a
-search is tested exactly along its line, and `Lattice.raise_floor` and `Lattice.widen_zone` tell the next search
-what the exact test knew better.
+search is tested exactly along its line, and `Lattice.raise_floor` tells the next search what the exact test knew
+better.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gcsplan.planners.problem import Problem
@@ -27,9 +26,6 @@ Ints = NDArray[np.int64]
 STEPS = np.array([(1, 0), (0, 1), (1, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1)], dtype=np.int64)
 """Half of the 16 directions; edge ``node * 8 + k`` goes from ``node`` by ``STEPS[k]``."""
 
-SEEMS_M = 2.0
-"""Between samples a floor may be lower than a bilinear reading by about this."""
-
 ENDS_M = 25.0
 """Bounds over a line are conservative, in rough ground by this much at worst; so whether start and goal themselves are
 legal is not read from them."""
@@ -42,7 +38,6 @@ LINK_DOORS = 9
 class Lattice:
     """Node (i, j) lies at (west_m + i·step_m, south_m + j·step_m) and has the number ``j·nx + i``.
 
-    ``walls`` (K, 3): east, north, radius within which no height is legal (round zones without floor and ceiling).
     ``floor_m``, ``ceiling_m`` (2·ny − 1, 2·nx − 1): AMSL on the half lattice. Bands (altitudes that a zone forbids
     on an edge, from ``band_low`` to ``band_high``) of edge e stand at ``band_at[e] : band_at[e + 1]``, low first.
     """
@@ -59,31 +54,11 @@ class Lattice:
     band_high: Floats
     band_zone: Ints
     reach_m: float
-    walls: Floats
-
-    def seems_open(self, a: Floats, b: Floats) -> bool:
-        """False where the straight line from ``a`` to ``b`` meets a wall, or samples that leave no room to fly.
-
-        Saves exact tests; what seems open may still be shut, and a line that is called shut only costs quality.
-        """
-        if _meets_wall(self.walls, a[0], a[1], b[0], b[1]):
-            return False
-        half = 0.5 * self.step_m
-        x, y = (a[0] - self.west_m) / half, (a[1] - self.south_m) / half
-        return bool(
-            _seems_open(self.floor_m, self.ceiling_m, x, y, (b[0] - self.west_m) / half, (b[1] - self.south_m) / half)
-        )
 
     def node_places(self, nodes: Ints) -> Floats:
         """(K, 2) places of nodes."""
         j, i = np.divmod(nodes, self.nx)
         return np.stack([self.west_m + i * self.step_m, self.south_m + j * self.step_m], axis=-1)
-
-    def widen_zone(self, zone: int, by_m: float) -> None:
-        """Widen what a zone forbids by ``by_m`` up and down; ``inf`` closes it."""
-        of = self.band_zone == zone
-        self.band_low[of] -= by_m
-        self.band_high[of] += by_m
 
     def raise_floor(self, place: Floats, by_m: float) -> None:
         """Raise the floor by ``by_m`` around a place, where the exact test found less room than the samples did."""
@@ -91,36 +66,13 @@ class Lattice:
         i, j = round((place[0] - self.west_m) / half), round((place[1] - self.south_m) / half)
         self.floor_m[max(j - 1, 0) : max(j + 2, 0), max(i - 1, 0) : max(i + 2, 0)] += by_m
 
-
-@njit(cache=True)
-def _meets_wall(walls: Floats, x0: float, y0: float, x1: float, y1: float) -> bool:
-    dx, dy = x1 - x0, y1 - y0
-    square = max(dx * dx + dy * dy, 1e-300)
-    for k in range(len(walls)):
-        px, py = walls[k, 0] - x0, walls[k, 1] - y0
-        t = min(max((px * dx + py * dy) / square, 0.0), 1.0)
-        if (px - t * dx) ** 2 + (py - t * dy) ** 2 < walls[k, 2] ** 2 * (1.0 - 1e-9):
-            return True
-    return False
-
-
-@njit(cache=True)
-def _seems_open(floor: Floats, ceiling: Floats, x0: float, y0: float, x1: float, y1: float) -> bool:
-    n = int(max(abs(x1 - x0), abs(y1 - y0))) + 1
-    rows, cols = floor.shape
-    for k in range(n + 1):
-        x, y = x0 + (x1 - x0) * k / n, y0 + (y1 - y0) * k / n
-        i, j = int(x), int(y)
-        if i < 0 or j < 0 or i >= cols - 1 or j >= rows - 1:
-            continue  # not on the lattice: nothing is known
-        u, v = x - i, y - j
-        low = (1 - v) * ((1 - u) * floor[j, i] + u * floor[j, i + 1])
-        low += v * ((1 - u) * floor[j + 1, i] + u * floor[j + 1, i + 1])
-        high = (1 - v) * ((1 - u) * ceiling[j, i] + u * ceiling[j, i + 1])
-        high += v * ((1 - u) * ceiling[j + 1, i] + u * ceiling[j + 1, i + 1])
-        if low > high + SEEMS_M:
-            return False
-    return True
+    def shut(self, place: Floats, radius_m: float) -> None:
+        """Leave no room within ``radius_m`` of a place."""
+        half = 0.5 * self.step_m
+        x, y = (place[0] - self.west_m) / half, (place[1] - self.south_m) / half
+        rows, cols = self.floor_m.shape
+        j, i = np.ogrid[:rows, :cols]
+        self.floor_m[(i - x) ** 2 + (j - y) ** 2 <= (radius_m / half) ** 2] = np.inf
 
 
 def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_m: float, detour: float) -> Lattice:
@@ -147,14 +99,7 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
     edges, lows, highs, zones = _edge_bands(air, limits, reach, west, south, step_m, nx, ny)
     at = np.zeros(nx * ny * 8 + 1, np.int64)
     np.cumsum(np.bincount(edges, minlength=nx * ny * 8), out=at[1:])
-    walls = [
-        (z.shape.east_m, z.shape.north_m, z.shape.radius_m * air.scale + reach)
-        for z in air.zones
-        if isinstance(z.shape, Circle) and z.floor is None and z.ceiling is None
-    ]
-    return Lattice(
-        west, south, step_m, nx, ny, floor, ceiling, at, lows, highs, zones, reach, np.array(walls).reshape(-1, 3)
-    )
+    return Lattice(west, south, step_m, nx, ny, floor, ceiling, at, lows, highs, zones, reach)
 
 
 def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_m: float) -> NDArray[np.bool_]:

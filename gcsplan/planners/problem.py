@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
 
 from gcsplan.world.airspace import Airspace
@@ -37,7 +38,9 @@ class Problem:
     """From ``start`` to ``goal`` (east_m, north_m, amsl_m), past ``via`` in order.
 
     ``limits`` already hold the margins for wire rounding, so a path that `Airspace.examine` passes under them
-    passes the final check too. Metres only: a planner never sees a degree.
+    passes the final check too. Metres only: a planner never sees a degree. ``options`` are what only some planners
+    know: the swarms' ``encoding``, ``cost``, ``points``, ``population``, ``iterations``, ``evaluations`` and
+    ``parameters``.
     """
 
     airspace: Airspace
@@ -53,6 +56,7 @@ class Problem:
     gap_percent: float = 0.1
     budget_s: float = 10.0
     progress: Callable[[Progress], None] | None = None
+    options: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
     def cost(self, path: Path) -> float:
         """Metres or joules of ``path``, by the objective."""
@@ -67,6 +71,9 @@ class Solution:
 
     ``lower_bound`` holds for every feasible path of the stated model, in the objective's unit; None where the
     planner has none. ``stopped_by``: gap, exhausted, evaluations, time. ``notes`` are said to the user.
+    ``flown``: the track that ``path``'s points are flown by on, where there is a turn radius; None where corners are
+    flown as they are. Of planners that search by samples: ``raw_violations``, how many limits the exact check found broken in the result
+    of the search itself, and whether it was ``repaired``; None of all others.
     """
 
     path: Path
@@ -75,3 +82,6 @@ class Solution:
     planning_s: float = 0.0
     first_path_s: float = 0.0
     notes: tuple[str, ...] = ()
+    flown: Path | None = None
+    raw_violations: int | None = None
+    repaired: bool | None = None

@@ -1,4 +1,4 @@
-"""From a lattice to tracks that hold: search, test exactly, tell the lattice what it got wrong, search again."""
+"""Ways over a lattice, from stop to stop, and the tracks that they make."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from gcsplan.planners.lattice import Lattice, Links, make_lattice, make_links, terminals
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.search import Found, Label, search
-from gcsplan.planners.track import Flown, Obstruction, Track, fly, make_track
+from gcsplan.planners.track import Obstruction, Track, make_track
 
 Floats = NDArray[np.float64]
 
-RETRIES = 12
-"""Searches for one route; each follows an exact test that failed and changed the lattice."""
+SHUT_IN = 200
+"""An end from which no more labels than this are to be had is shut in."""
+FORWARD, BACKWARD, MOST = 40_000, 60_000, 400_000
+"""Labels taken up by a search from the start; then, for a goal that is hard to come to, by one from the goal; then by
+one from the start again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +72,9 @@ class Router:
     climb_factor: float = 1.0
     last: Obstruction | None = None
     last_place: Floats | None = field(default=None)
+    opened: int = 0
+    """Labels that searches on this lattice have taken up."""
+    opened_last: int = 0
 
     @classmethod
     def at(cls, problem: Problem, level: Level) -> Router:
@@ -82,10 +88,41 @@ class Router:
 
     def way(self, cap_m: float = math.inf, weight: float = 0.0) -> Floats | None:
         """(N, 2) places of the best way over the lattice under ``cap_m``, through every stop; None if there is none."""
-        found = self.labels(cap_m, weight)
+        direct = not self.problem.via
+        found = self.labels(cap_m, weight, FORWARD if direct else MOST)
+        if not found and direct and self.opened_last > FORWARD:
+            back = self._leg(-1, 0, cap_m, weight, BACKWARD)
+            if back:
+                return np.ascontiguousarray(back[0].places[::-1])
+            if self.opened_last > BACKWARD:
+                found = self.labels(cap_m, weight, MOST)
         return found[0].places if found else None
 
-    def labels(self, cap_m: float, weight: float) -> tuple[Label, ...]:
+    def _leg(self, here: int, there: int, cap_m: float, weight: float, most_opened: int) -> tuple[Label, ...]:
+        """How the one end is reached from the other: from the start (0), or backwards from the goal (-1)."""
+        p = self.problem
+        up, down = p.limits.max_climb_slope * self.climb_factor, p.limits.max_descent_slope * self.climb_factor
+        heights = {0: p.start[2], -1: p.goal[2]}
+        z = heights[here]
+        found = search(
+            self.lattice,
+            [Label(0.0, z, z, z, z, np.array([self.stops[here]]))],
+            self.stops[here],
+            self.stops[there],
+            self.links[here],
+            self.links[there],
+            (heights[there], heights[there]),
+            cap_m=cap_m,
+            climb_slope=up if here == 0 else down,
+            descent_slope=down if here == 0 else up,
+            weight=weight,
+            most_opened=most_opened,
+        )
+        self.opened += found.opened
+        self.opened_last = found.opened
+        return found.labels
+
+    def labels(self, cap_m: float, weight: float, most_opened: int = MOST) -> tuple[Label, ...]:
         """How the goal is reached, cheapest first."""
         p = self.problem
         z = p.start[2]
@@ -107,24 +144,35 @@ class Router:
                 descent_slope=p.limits.max_descent_slope * self.climb_factor,
                 weight=weight,
                 want=4 if free else 1,
+                most_opened=most_opened,
             )
             labels = found.labels
+            self.opened += found.opened
+            self.opened_last = found.opened
             if not labels:
                 break
         return labels
 
-    def route(self, cap_m: float = math.inf, weight: float = 0.0) -> tuple[Track, Flown] | None:
-        """A track that passes the exact test under ``cap_m`` as the lattice sees it; None where none was found."""
-        for attempt in range(RETRIES):
-            way = self.way(cap_m, weight)
-            if way is None:
-                return None
-            track = self.track_of(way)
-            flown = fly(self.problem, track)
-            if isinstance(flown, Flown):
-                return track, flown
-            self._learn(track, flown, attempt)
-        return None
+    def cut_off(self) -> tuple[bool, bool]:
+        """Whether start, and goal, are shut in on this lattice: nothing leads away from them (to them) for long."""
+        p = self.problem
+        up, down = p.limits.max_climb_slope * self.climb_factor, p.limits.max_descent_slope * self.climb_factor
+        out = []
+        for here, there, amsl, climb, descent in ((0, -1, p.start[2], up, down), (-1, 0, p.goal[2], down, up)):
+            found = search(
+                self.lattice,
+                [Label(0.0, amsl, amsl, amsl, amsl, np.array([self.stops[here]]))],
+                self.stops[here],
+                self.stops[there],
+                self.links[here],
+                self.links[there],
+                (-math.inf, math.inf),
+                climb_slope=climb,
+                descent_slope=descent,
+                most_opened=SHUT_IN,
+            )
+            out.append(not found.labels and found.opened <= SHUT_IN)
+        return out[0], out[1]
 
     def track_of(self, way: Floats) -> Track:
         """The track over ``way``, its stops pinned, its points on straight lines dropped."""
@@ -141,18 +189,3 @@ class Router:
         keep = pinned.copy()
         keep[1:-1] |= bent
         return make_track(self.problem, way[keep], pinned[keep], pin_m[keep])
-
-    def _learn(self, track: Track, why: Obstruction, attempt: int) -> None:
-        place = track.place(0.5 * (why.s0_m + why.s1_m))
-        self.last, self.last_place = why, place
-        by = why.by if math.isfinite(why.by) else math.inf
-        if why.kind == "pinched":
-            self.lattice.raise_floor(place, by + 0.5)
-        elif why.kind == "zone":
-            zone = self.problem.airspace.zones[why.zone]
-            if attempt < 3 and (zone.floor is not None or zone.ceiling is not None):
-                self.lattice.widen_zone(why.zone, by + 0.5)
-            else:
-                self.lattice.raise_floor(place, math.inf)
-        else:
-            self.climb_factor *= 0.97

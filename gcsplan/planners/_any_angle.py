@@ -1,0 +1,297 @@
+"""Shortest paths in the plane, exact on a mesh of convex pieces: Polyanya (Cui, Harabor, Grastien, IJCAI 2017).
+
+A search node is an interval on a portal together with the last corner of the path, its *root*: the whole interval is
+seen from there. Pushed through the piece behind, it becomes an interval for each portal that it sees; where an end
+of the interval is a corner of a wall, the path may turn there, and what lies beyond in the piece is reached from it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.compiled import device, digest, kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+SOURCES = digest("compiled.py", "_any_angle.py")
+Names = NDArray[np.int64]
+
+ROOT_X, ROOT_Y, COST, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, AHEAD = range(8)
+PIECE, CAME, PARENT, TURNS = range(4)
+LEFT, RIGHT, ROOT = range(3)
+
+SAME_M = 1e-6
+"""Places nearer than this are one."""
+MOST_TURNS = 8
+"""No more pieces than this meet at one place; who passes more of them turns in a circle around it."""
+
+
+@device
+def _push(heap: Floats, ids: Ints, size: int, key: float, item: int) -> int:
+    k = size
+    while k > 0:
+        up = (k - 1) >> 1
+        if heap[up] <= key:
+            break
+        heap[k], ids[k] = heap[up], ids[up]
+        k = up
+    heap[k], ids[k] = key, item
+    return size + 1
+
+
+@device
+def _pop(heap: Floats, ids: Ints, size: int) -> int:
+    size -= 1
+    key, item = heap[size], ids[size]
+    k = 0
+    while True:
+        down = 2 * k + 1
+        if down >= size:
+            break
+        if down + 1 < size and heap[down + 1] < heap[down]:
+            down += 1
+        if key <= heap[down]:
+            break
+        heap[k], ids[k] = heap[down], ids[down]
+        k = down
+    heap[k], ids[k] = key, item
+    return size
+
+
+@device
+def _ahead(rx: float, ry: float, lx: float, ly: float, qx: float, qy: float, gx: float, gy: float) -> float:
+    """The shortest way from a root through an interval to the goal, nothing else in the way."""
+    ex, ey = qx - lx, qy - ly
+    side_r = ex * (ry - ly) - ey * (rx - lx)
+    side_g = ex * (gy - ly) - ey * (gx - lx)
+    if side_r * side_g > 0.0:  # on the same side: the goal's mirror image
+        square = ex * ex + ey * ey
+        if square > 0.0:
+            gx, gy = gx + 2.0 * side_g * ey / square, gy - 2.0 * side_g * ex / square
+    dx, dy = gx - rx, gy - ry
+    if dx * (ly - ry) - dy * (lx - rx) < 0.0:  # the left end lies right of the straight way
+        return math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2) + math.sqrt((gx - lx) ** 2 + (gy - ly) ** 2)
+    if dx * (qy - ry) - dy * (qx - rx) > 0.0:
+        return math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2) + math.sqrt((gx - qx) ** 2 + (gy - qy) ** 2)
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@device
+def _off(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """How far a point is from a segment."""
+    ex, ey = bx - ax, by - ay
+    square = ex * ex + ey * ey
+    t = 0.0
+    if square > 0.0:
+        t = min(max(((px - ax) * ex + (py - ay) * ey) / square, 0.0), 1.0)
+    return math.sqrt((ax + t * ex - px) ** 2 + (ay + t * ey - py) ** 2)
+
+
+@kernel
+def search(
+    start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats,
+    sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float, slack: float, most: int,
+    remaining: Floats, entered: Floats,
+    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats, sources: str = SOURCES,
+) -> int:  # fmt: skip
+    """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
+
+    ``order`` (start[p] : start[p + 1]) lists the portals of piece p. ``sources_at`` (K, 3) x, y, cost so far, each in
+    piece ``sources_piece`` (K,); a goal in any of ``goal_piece``. ``best`` (names,) zeros; ``node`` (room, 8), ``link``
+    (room, 4), ``name`` (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining``
+    (pieces,): no way on from a piece's entrance is shorter. ``slack`` >= 0: go on after the goal is reached, as far as
+    that much (as a part of the length) beyond it; ``entered`` (pieces,), inf, receives the least cost at each
+    piece's entrance; both may be empty. Returns the number of corners, ends
+    included, with ``out[0, 2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than ``limit``;
+    -1: no room left; -2: more than ``most`` nodes were opened.
+    """
+    room = len(heap)
+    gx, gy = goal[0], goal[1]
+    count = size = opened = 0
+    reached = -1
+    flood, guided = len(entered) > 0, len(remaining) > 0
+    # What a node pushes is listed here as from, to and root; sources push all portals of their piece.
+    current = -1
+    source = 0
+    while True:
+        if source < len(sources_piece):
+            rx, ry, cost = sources_at[source, 0], sources_at[source, 1], sources_at[source, 2]
+            piece, came, all_round = sources_piece[source], -1, True
+            lx = ly = qx = qy = 0.0
+            left = right = np.int64(-1)
+            root = np.int64(-2 - source)
+            parent, turns = np.int64(-1), np.int32(0)
+            source += 1
+        else:
+            if size == 0 or heap[0] >= limit:
+                break
+            current = ids[0]
+            size = _pop(heap, ids, size)
+            piece, came = link[current, PIECE], link[current, CAME]
+            if piece < 0:
+                if reached < 0:
+                    reached = current
+                    limit = min(limit, (node[current, COST] + node[current, AHEAD]) * (1.0 + slack))
+                if slack < 0.0:
+                    break
+                continue
+            rx, ry, cost = node[current, ROOT_X], node[current, ROOT_Y], node[current, COST]
+            root = name[current, ROOT]
+            if root >= 0 and cost + 1.0 > best[root] + SAME_M:
+                continue
+            lx, ly, qx, qy = (
+                node[current, LEFT_X],
+                node[current, LEFT_Y],
+                node[current, RIGHT_X],
+                node[current, RIGHT_Y],
+            )
+            left, right = name[current, LEFT], name[current, RIGHT]
+            parent, turns = np.int64(current), link[current, TURNS]
+            all_round = False
+            opened += 1
+            if opened > most:
+                return -2
+        width_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
+        width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
+        if width_l < SAME_M or width_r < SAME_M:
+            all_round = True  # the root is a corner of this convex piece
+            if turns >= MOST_TURNS:
+                continue
+            turns += 1
+        else:
+            turns = 0
+        is_goal = False
+        for k in range(len(goal_piece)):
+            if goal_piece[k] == piece:
+                is_goal = True
+        for at in range(start[piece] - (1 if is_goal else 0), start[piece + 1]):
+            to_goal = at < start[piece]
+            behind = -1
+            if to_goal:
+                ax, ay, bx, by = gx, gy, gx, gy
+                va = vb = np.int64(-1)
+            else:
+                p = order[at]
+                # From its right end a to its left end b, as seen from inside.
+                if joins[p, 0] == piece:
+                    behind = joins[p, 1]
+                    ax, ay, bx, by = ends[p, 0], ends[p, 1], ends[p, 2], ends[p, 3]
+                    va, vb = names[p, 0], names[p, 1]
+                else:
+                    behind = joins[p, 0]
+                    ax, ay, bx, by = ends[p, 2], ends[p, 3], ends[p, 0], ends[p, 1]
+                    va, vb = names[p, 1], names[p, 0]
+                if behind == came:
+                    continue
+            t0, t1, off = 0.0, 1.0, 0.0
+            at_a = at_b = 0.0
+            along = -1  # the end at which a portal begins that the root sees edge-on
+            if not to_goal:
+                ex, ey = bx - ax, by - ay
+                long = math.sqrt(ex * ex + ey * ey)
+                if abs(ex * (ry - ay) - ey * (rx - ax)) <= SAME_M * long:
+                    at_a = math.sqrt((rx - ax) ** 2 + (ry - ay) ** 2)
+                    at_b = math.sqrt((rx - bx) ** 2 + (ry - by) ** 2)
+                    if min(at_a, at_b) > SAME_M and max(at_a, at_b) >= long:
+                        # Nothing behind it is seen from here; whoever goes on behind it turns at its end, or at a
+                        # portal's that is nearer to the root.
+                        along = 0 if at_a < at_b else 1
+            if along >= 0:
+                t0, t1 = 1.0, 0.0
+            elif not all_round:
+                # Signed distances off the two rays; beyond a ray is beyond what the root sees.
+                ra = ((qx - rx) * (ay - ry) - (qy - ry) * (ax - rx)) / width_r
+                rb = ((qx - rx) * (by - ry) - (qy - ry) * (bx - rx)) / width_r
+                la = ((lx - rx) * (ay - ry) - (ly - ry) * (ax - rx)) / width_l
+                lb = ((lx - rx) * (by - ry) - (ly - ry) * (bx - rx)) / width_l
+                if rb < -SAME_M:
+                    t0 = 2.0
+                elif ra < -SAME_M:
+                    t0 = min(max(ra / (ra - rb), 0.0), 1.0)
+                if la > SAME_M:
+                    t1 = -1.0
+                elif lb > SAME_M:
+                    t1 = min(max(la / (la - lb), 0.0), 1.0)
+            for part in range(3):
+                # 0: what is seen; 1: right of it, round the right end; 2: left of it, round the left end.
+                x0, y0, x1, y1, n0, n1 = ax, ay, bx, by, va, vb
+                nx, ny, ncost, nroot = rx, ry, cost, root
+                if along >= 0:
+                    if part > 0:
+                        continue
+                    nx, ny, nroot = (ax, ay, va) if along == 0 else (bx, by, vb)
+                    if nroot < 0:
+                        continue
+                    ncost = cost + min(at_a, at_b)
+                elif part == 0:
+                    if t0 > t1:
+                        continue
+                    if t0 > 0.0:
+                        x0, y0, n0 = ax + t0 * (bx - ax), ay + t0 * (by - ay), np.int64(-1)
+                    if t1 < 1.0:
+                        x1, y1, n1 = ax + t1 * (bx - ax), ay + t1 * (by - ay), np.int64(-1)
+                elif part == 1:
+                    if all_round or t0 == 0.0 or right < 0:
+                        continue
+                    nx, ny, ncost, nroot = qx, qy, cost + width_r, right
+                    if t0 < 1.0:
+                        x1, y1, n1 = ax + t0 * (bx - ax), ay + t0 * (by - ay), np.int64(-1)
+                else:
+                    if all_round or t1 == 1.0 or left < 0:
+                        continue
+                    nx, ny, ncost, nroot = lx, ly, cost + width_l, left
+                    if t1 > 0.0:
+                        x0, y0, n0 = ax + t1 * (bx - ax), ay + t1 * (by - ay), np.int64(-1)
+                if nroot >= 0:
+                    if best[nroot] > 0.0 and ncost + 1.0 > best[nroot] + SAME_M:
+                        continue
+                    if best[nroot] == 0.0 or ncost + 1.0 < best[nroot]:
+                        best[nroot] = ncost + 1.0
+                if to_goal:
+                    ahead = math.sqrt((gx - nx) ** 2 + (gy - ny) ** 2)
+                else:
+                    ahead = _ahead(nx, ny, x1, y1, x0, y0, gx, gy)
+                    if guided or flood:
+                        off = _off(nx, ny, x0, y0, x1, y1)
+                        if guided:
+                            ahead = max(ahead, off + remaining[behind])
+                if ncost + ahead >= limit:
+                    continue
+                if flood and not to_goal:
+                    entered[behind] = min(entered[behind], ncost + off)
+                if count >= room:
+                    return -1
+                node[count, ROOT_X], node[count, ROOT_Y], node[count, COST] = nx, ny, ncost
+                node[count, LEFT_X], node[count, LEFT_Y] = x1, y1
+                node[count, RIGHT_X], node[count, RIGHT_Y] = x0, y0
+                node[count, AHEAD] = ahead
+                link[count, PIECE], link[count, CAME] = -1 if to_goal else behind, piece
+                link[count, PARENT], link[count, TURNS] = parent, turns
+                name[count, LEFT], name[count, RIGHT], name[count, ROOT] = n1, n0, nroot
+                size = _push(heap, ids, size, ncost + ahead, count)
+                count += 1
+    if reached < 0:
+        return 0
+    # Corners from the goal back.
+    current = reached
+    length = node[current, COST] + node[current, AHEAD]
+    out[0, 0], out[0, 1] = gx, gy
+    n = 1
+    at = current
+    number = 0
+    last = np.int64(-1 - 2**40)
+    while at >= 0:
+        if name[at, ROOT] != last:
+            last = name[at, ROOT]
+            if n >= len(out):
+                return -1
+            out[n, 0], out[n, 1] = node[at, ROOT_X], node[at, ROOT_Y]
+            n += 1
+            number = -2 - last
+        at = link[at, PARENT]
+    out[0, 2], out[1, 2] = number, length
+    return n

@@ -1,0 +1,163 @@
+"""The excess of a lattice's nodes over what may be flown, cell by cell where it is wanted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.compiled import device, digest, kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+SOURCES = digest("compiled.py", "_fill.py")
+
+
+@kernel
+def fill(
+    top: Floats, ground: Floats, steep: Floats, x: Floats, y: Floats, wanted: NDArray[np.bool_], fineness: int,
+    more: float, beside: float, cap: float, cones: Floats, low: bool, excess: Floats, floor: Floats, under: Floats,
+    fine_x: Floats, fine_y: Floats, diagonal: NDArray[np.int8], sources: str = SOURCES,
+) -> None:  # fmt: skip
+    """Cut each ``wanted`` (rows - 1, cols - 1) cell into ``fineness`` parts a side and give their nodes values.
+
+    ``floor`` is ``top`` + ``more`` + ``beside`` times ``steep`` (empty: 0); ``excess`` (inf before) what it is over
+    ``cap`` and over ``cones`` (K, 4: x, y, height, slope), which are too low rather than too high between nodes;
+    ``under`` the ground. ``diagonal``: the way to cut a cell so that triangles never lie above (``low``), or never
+    below, the bilinear patch.
+    """
+    rows, cols = wanted.shape
+    fine_cols = cols * fineness
+    for j in range(rows):
+        for i in range(cols):
+            if not wanted[j, i]:
+                continue
+            twist = top[j, i] + top[j + 1, i + 1] - top[j, i + 1] - top[j + 1, i]
+            way = np.int8(1 if (twist > 0.0) == low else 0)
+            dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
+            square = (dx * dx + dy * dy) / (fineness * fineness)
+            side = math.sqrt(square)
+            for q in range(fineness + 1):
+                v = q / fineness
+                for p in range(fineness + 1):
+                    u = p / fineness
+                    a, b, c, d = (1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v
+                    jj, ii = j * fineness + q, i * fineness + p
+                    if q < fineness and p < fineness:
+                        diagonal[jj * fine_cols + ii] = way
+                    height = _mix(top, j, i, a, b, c, d)
+                    if math.isnan(height):
+                        continue
+                    height += more
+                    if len(steep):
+                        height += beside * _mix(steep, j, i, a, b, c, d)
+                    px, py = _mix(x, j, i, a, b, c, d), _mix(y, j, i, a, b, c, d)
+                    e = height - cap
+                    for k in range(len(cones)):
+                        off = math.sqrt((px - cones[k, 0]) ** 2 + (py - cones[k, 1]) ** 2)
+                        bow = square / (8.0 * max(off, 0.5 * side))
+                        e = max(e, height - cones[k, 2] - cones[k, 3] * (off - bow))
+                    excess[jj, ii], floor[jj, ii] = e, height
+                    under[jj, ii] = _mix(ground, j, i, a, b, c, d)
+                    fine_x[jj, ii], fine_y[jj, ii] = px, py
+
+
+@device
+def _mix(z: Floats, j: int, i: int, a: float, b: float, c: float, d: float) -> float:
+    """Bilinear; a weight of 0 does not carry an unknown neighbour's NaN over."""
+    out = 0.0
+    if a != 0.0:
+        out += a * z[j, i]
+    if b != 0.0:
+        out += b * z[j, i + 1]
+    if c != 0.0:
+        out += c * z[j + 1, i + 1]
+    if d != 0.0:
+        out += d * z[j + 1, i]
+    return out
+
+
+@kernel
+def raise_cone(
+    excess: Floats, floor: Floats, of: Ints, x: Floats, y: Floats, at_x: float, at_y: float, col: float, row: float,
+    height: float, slope: float, cap: float, seen: NDArray[np.int8], sources: str = SOURCES,
+) -> None:  # fmt: skip
+    """Hold nodes near an end to what can be climbed to from there, where a bound may.
+
+    A node that the end sees over cells which are free as a whole is reached from it in a straight line, so no path
+    short enough to matter is higher there than ``height`` plus ``slope`` times the distance. ``seen`` (rows, cols)
+    is room for one window: zeros. A node counts only if all around it are seen too.
+    """
+    ny, nx = excess.shape
+    if not height < cap:
+        return
+    away = (cap - height) / slope
+    i0, j0 = int(col), int(row)
+    i0, j0 = min(max(i0, 0), nx - 2), min(max(j0, 0), ny - 2)
+    step_x = math.sqrt((x[j0, i0 + 1] - x[j0, i0]) ** 2 + (y[j0, i0 + 1] - y[j0, i0]) ** 2)
+    step_y = math.sqrt((x[j0 + 1, i0] - x[j0, i0]) ** 2 + (y[j0 + 1, i0] - y[j0, i0]) ** 2)
+    if not (step_x > 0.0 and step_y > 0.0):
+        return
+    wide, tall = int(1.05 * away / step_x) + 2, int(1.05 * away / step_y) + 2
+    left, right = max(i0 - wide, 0), min(i0 + wide + 1, nx - 1)
+    low, high = max(j0 - tall, 0), min(j0 + tall + 1, ny - 1)
+    for j in range(low, high + 1):
+        for i in range(left, right + 1):
+            if excess[j, i] <= 0.0 and _sees(excess, of, col, row, i, j):
+                seen[j, i] = 1
+    spare = 0.25 * slope * math.sqrt(step_x * step_x + step_y * step_y)
+    for j in range(max(low, 1), min(high, ny - 2) + 1):
+        for i in range(max(left, 1), min(right, nx - 2) + 1):
+            if seen[j, i] == 0:
+                continue
+            alone = False
+            for q in range(-1, 2):
+                for p in range(-1, 2):
+                    if seen[j + q, i + p] == 0:
+                        alone = True
+            if alone:
+                continue
+            cone = height + slope * math.sqrt((x[j, i] - at_x) ** 2 + (y[j, i] - at_y) ** 2)
+            # Where cap and cone meet, a linear function over the cell would be too high.
+            if cone < cap + 4.0 * spare:
+                excess[j, i] = max(excess[j, i], floor[j, i] - cone) - spare
+
+
+@device
+def _sees(excess: Floats, of: Ints, col: float, row: float, i: int, j: int) -> bool:
+    """Whether the straight line from a place (in cells) to a node meets only cells that are free as a whole."""
+    nx = excess.shape[1]
+    du, dv = i - col, j - row
+    u, v = col, row
+    ci, cj = int(math.floor(u)), int(math.floor(v))
+    # The node's own cell on this side of the line.
+    end_i = i - 1 if du > 0.0 else i
+    end_j = j - 1 if dv > 0.0 else j
+    for _ in range(abs(end_i - ci) + abs(end_j - cj) + 3):
+        if not (0 <= ci < nx - 1 and 0 <= cj < excess.shape[0] - 1):
+            return False
+        if of[cj * (nx - 1) + ci] > 0:
+            return False
+        if (
+            excess[cj, ci] > 0.0 or excess[cj, ci + 1] > 0.0
+            or excess[cj + 1, ci] > 0.0 or excess[cj + 1, ci + 1] > 0.0
+        ):  # fmt: skip
+            # The end's own cell may be free in part: it lies on the floor more often than not.
+            if not (ci == int(math.floor(col)) and cj == int(math.floor(row))):
+                return False
+        if ci == end_i and cj == end_j:
+            return True
+        # To the next cell: the nearer of the two edges ahead.
+        tu = (ci + (1 if du > 0.0 else 0) - col) / du if du != 0.0 else math.inf
+        tv = (cj + (1 if dv > 0.0 else 0) - row) / dv if dv != 0.0 else math.inf
+        if tu < tv:
+            if tu >= 1.0:
+                return True
+            ci += 1 if du > 0.0 else -1
+        else:
+            if tv >= 1.0:
+                return True
+            cj += 1 if dv > 0.0 else -1
+    return False

@@ -1,0 +1,259 @@
+"""Kernel of `search`: A* over a lattice whose labels carry the altitudes that can be reached.
+
+Nothing is allocated here. A label is a row of numbers: cost, lowest and highest altitude, the same of those altitudes
+that can be had at the lowest cost, and a row of names: its node, the label it came from, the next label of its node,
+and 1 while it counts.
+"""
+
+from __future__ import annotations
+
+import math
+
+from gcsplan.planners.compiled import device, digest, kernel
+
+COST, LOW, HIGH, CHEAP_LOW, CHEAP_HIGH = range(5)
+AT, PARENT, NEXT, ALIVE = range(4)
+COUNT, SIZE, OPENED, REACHED, COMPLETE = range(5)
+"""Places in the state, which is kept between calls."""
+STEP, GOAL_X, GOAL_Y, GOAL_LOW, GOAL_HIGH, CAP, UP, DOWN, WEIGHT, SPARE = range(10)
+"""Places in what the search is told."""
+
+SOURCES = digest("_reach.py", "compiled.py")
+DONE, SHORT = 0, 1
+AT_ONCE = 1024
+"""Most labels that one label leads to; so much room there must be."""
+
+
+@device
+def push(keys, ids, size, key, item):  # type: ignore[no-untyped-def]
+    """Put ``item`` into a heap in two arrays; equal keys leave in the order of their numbers."""
+    k = size
+    while k > 0:
+        up = (k - 1) >> 1
+        if keys[up] < key or (keys[up] == key and ids[up] <= item):
+            break
+        keys[k], ids[k] = keys[up], ids[up]
+        k = up
+    keys[k], ids[k] = key, item
+
+
+@device
+def pop(keys, ids, size):  # type: ignore[no-untyped-def]
+    """Take the root, which the caller has read, out of a heap that is left with ``size`` items."""
+    key, item = keys[size], ids[size]
+    k = 0
+    while 2 * k + 1 < size:
+        c = 2 * k + 1
+        if c + 1 < size and (keys[c + 1] < keys[c] or (keys[c + 1] == keys[c] and ids[c + 1] < ids[c])):
+            c += 1
+        if keys[c] > key or (keys[c] == key and ids[c] >= item):
+            break
+        keys[k], ids[k] = keys[c], ids[c]
+        k = c
+    keys[k], ids[k] = key, item
+
+
+@device
+def through(v, run, low, high, told):  # type: ignore[no-untyped-def]
+    """Carry a label's numbers over ``run`` metres through a door, in place; False where the door is out of reach."""
+    lo, hi = v[LOW], v[HIGH]
+    if run > 0.0:
+        lo -= told[DOWN] * run
+        hi += told[UP] * run
+    lo = low if low > lo else lo
+    hi = high if high < hi else hi
+    if not lo <= hi:
+        return False
+    v[LOW], v[HIGH] = lo, hi
+    a, b = v[CHEAP_LOW], v[CHEAP_HIGH]
+    if told[WEIGHT] == 0.0:
+        a, b = lo, hi
+    elif a > hi:
+        v[COST] += told[WEIGHT] * (a - hi)  # all cheap altitudes are shut: the nearest open one costs the way to it
+        a = b = hi
+    elif b < lo:
+        v[COST] += told[WEIGHT] * (lo - b)
+        a = b = lo
+    else:
+        a = lo if lo > a else a
+        b = hi if hi < b else b
+    v[CHEAP_LOW], v[CHEAP_HIGH] = a, b
+    return True
+
+
+@device
+def farther(a, b, low, high):  # type: ignore[no-untyped-def]
+    """How far the farther of two altitudes is out of an interval."""
+    x, y = low - a, b - high
+    x = y if y > x else x
+    return x if x > 0.0 else 0.0
+
+
+@device
+def doors_of(x, y, dx, dy, k, floor, ceiling, step, door):  # type: ignore[no-untyped-def]
+    """Doors (run, low, high) of the edge from node (x, y) by (dx, dy), kind ``k``; their number."""
+    hx, hy = 2 * x, 2 * y
+    flat = math.sqrt(float(dx * dx + dy * dy)) * step
+    count = 3 if k < 4 else 5
+    for q in range(count):
+        door[q, 0] = flat / (count - 1) if q > 0 else 0.0
+        if count == 3 or q % 2 == 0:
+            part = q if count == 3 else q // 2
+            j, i = hy + part * dy, hx + part * dx
+            door[q, 1], door[q, 2] = floor[j, i], ceiling[j, i]
+        else:
+            # A quarter of the way lies between two half-lattice points, side by side across the short step.
+            px, py = hx + (q // 2) * dx, hy + (q // 2) * dy
+            if dx == 2 or dx == -2:
+                ax, ay, bx, by = px + dx // 2, py, px + dx // 2, py + dy
+            else:
+                ax, ay, bx, by = px, py + dy // 2, px + dx, py + dy // 2
+            door[q, 1] = 0.5 * (floor[ay, ax] + floor[by, bx])
+            door[q, 2] = 0.5 * (ceiling[ay, ax] + ceiling[by, bx])
+    return count
+
+
+@device
+def admit(to, v, value, name, first, held, most, told):  # type: ignore[no-untyped-def]
+    """1 if a label with numbers ``v`` may stay at a node, 0 if another rules it, -1 if there is no room.
+
+    Another rules it that reaches as much and costs no more at any altitude; those that it rules itself are dropped.
+    """
+    weight, before, other = told[WEIGHT], -1, first[to]
+    while other >= 0:
+        o = value[other]
+        following = name[other, NEXT]
+        if (
+            o[LOW] <= v[LOW] + told[SPARE]
+            and o[HIGH] >= v[HIGH] - told[SPARE]
+            and o[COST] + weight * farther(v[CHEAP_LOW], v[CHEAP_HIGH], o[CHEAP_LOW], o[CHEAP_HIGH]) <= v[COST]
+        ):
+            return 0
+        if (
+            v[LOW] <= o[LOW]
+            and v[HIGH] >= o[HIGH]
+            and (v[COST] + weight * farther(o[CHEAP_LOW], o[CHEAP_HIGH], v[CHEAP_LOW], v[CHEAP_HIGH]) <= o[COST])
+        ):
+            name[other, ALIVE] = 0
+            held[to] -= 1
+            if before < 0:
+                first[to] = following
+            else:
+                name[before, NEXT] = following
+        else:
+            before = other
+        other = following
+    return 1 if held[to] < most else -1
+
+
+@kernel
+def reach(  # type: ignore[no-untyped-def]
+    floor, ceiling, steps, band_at, band_low, band_high, link_at, link_to, link_length, link_low, link_high,
+    told, want, most_opened, most_held, state, name, value, keys, ids, first, held, goals, v, door,
+    sources=SOURCES,
+):  # fmt: skip
+    """Search until ``want`` labels have reached the goal; `DONE`, or `SHORT` where there must be more room to go on.
+
+    ``floor``, ``ceiling`` (2·ny - 1, 2·nx - 1) on the half lattice; ``steps`` (8, 2); ``band_*``, see `Lattice`;
+    ``link_*``: of the terminals, by source (nodes, start, goal). ``told``, ``state``: by the names above. ``name``
+    (room, 4) and ``value`` (room, 5): the labels; ``keys``, ``ids`` (room,): the heap; ``first``, ``held``
+    (nodes + 2,): each node's labels; ``goals`` (want,). ``v`` (5,) and ``door`` (16, 3): room to work in.
+    """
+    nx, ny = (floor.shape[1] + 1) // 2, (floor.shape[0] + 1) // 2
+    nodes = nx * ny
+    count, size = state[COUNT], state[SIZE]
+    status = DONE
+    while size > 0:
+        if count + AT_ONCE > len(keys):
+            status = SHORT
+            break
+        item = ids[0]
+        size -= 1
+        pop(keys, ids, size)
+        if name[item, ALIVE] == 0:
+            continue
+        node = name[item, AT]
+        if node == nodes + 1:
+            goals[state[REACHED]] = item
+            state[REACHED] += 1
+            if state[REACHED] >= want:
+                break
+            continue
+        state[OPENED] += 1
+        if state[OPENED] > most_opened:
+            state[COMPLETE] = 0
+            break
+        x, y = node % nx, node // nx
+        moves = 16 if node < nodes else 0
+        for m in range(moves + link_at[node + 1] - link_at[node]):
+            b0, b1, to, length, doors = 0, 0, 0, 0.0, 0
+            if m < moves:
+                k = m >> 1
+                sign = 1 - 2 * (m & 1)
+                dx, dy = sign * steps[k, 0], sign * steps[k, 1]
+                i, j = x + dx, y + dy
+                if i < 0 or i >= nx or j < 0 or j >= ny:
+                    continue
+                to = j * nx + i
+                edge = (node if sign > 0 else to) * 8 + k
+                b0, b1 = band_at[edge], band_at[edge + 1]
+                doors = doors_of(x, y, dx, dy, k, floor, ceiling, told[STEP], door)
+                length = math.sqrt(float(dx * dx + dy * dy)) * told[STEP]
+            else:
+                link = link_at[node] + m - moves
+                to, length = link_to[link], link_length[link]
+                doors = link_low.shape[1]
+                for q in range(doors):
+                    door[q, 0] = length / (doors - 1) if q > 0 else 0.0
+                    door[q, 1], door[q, 2] = link_low[link, q], link_high[link, q]
+            if to == nodes:
+                continue
+            rest = 0.0
+            if to < nodes:
+                rest = told[STEP] * math.sqrt((told[GOAL_X] - to % nx) ** 2 + (told[GOAL_Y] - to // nx) ** 2)
+            else:
+                door[doors, 0], door[doors, 1], door[doors, 2] = 0.0, told[GOAL_LOW], told[GOAL_HIGH]
+                doors += 1
+            # Each gap between the edge's bands is a way of its own.
+            under = -math.inf
+            for b in range(b0, b1 + 1):
+                over = band_low[b] if b < b1 else math.inf
+                is_open = over >= under and under < math.inf and over > -math.inf
+                top = over if over < told[CAP] else told[CAP]
+                for q in range(5):
+                    v[q] = value[item, q]
+                v[COST] += length
+                for q in range(doors):
+                    if is_open:
+                        low = under if under > door[q, 1] else door[q, 1]
+                        high = top if top < door[q, 2] else door[q, 2]
+                        is_open = through(v, door[q, 0], low, high, told)
+                if b < b1 and band_high[b] > under:
+                    under = band_high[b]
+                if not is_open:
+                    continue
+                stays = admit(to, v, value, name, first, held, most_held, told) if count < len(keys) else -1
+                if stays < 0:
+                    state[COMPLETE] = 0
+                if stays <= 0:
+                    continue
+                name[count, AT], name[count, PARENT], name[count, NEXT], name[count, ALIVE] = to, item, first[to], 1
+                for q in range(5):
+                    value[count, q] = v[q]
+                first[to] = count
+                held[to] += 1
+                # What is left is no shorter than the straight way, nor than the climb (descent) takes.
+                ahead, vertical = rest, 0.0
+                if told[GOAL_LOW] > v[HIGH] and (told[GOAL_LOW] - v[HIGH]) / told[UP] > ahead:
+                    ahead = (told[GOAL_LOW] - v[HIGH]) / told[UP]
+                if v[LOW] > told[GOAL_HIGH] and (v[LOW] - told[GOAL_HIGH]) / told[DOWN] > ahead:
+                    ahead = (v[LOW] - told[GOAL_HIGH]) / told[DOWN]
+                if v[CHEAP_LOW] > told[GOAL_HIGH]:
+                    vertical = v[CHEAP_LOW] - told[GOAL_HIGH]
+                elif v[CHEAP_HIGH] < told[GOAL_LOW]:
+                    vertical = told[GOAL_LOW] - v[CHEAP_HIGH]
+                push(keys, ids, size, v[COST] + ahead + told[WEIGHT] * vertical, count)
+                size += 1
+                count += 1
+    state[COUNT], state[SIZE] = count, size
+    return status

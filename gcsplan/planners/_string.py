@@ -1,0 +1,326 @@
+"""Kernels that pull a ground track tight over samples of the room above it.
+
+A track is a few vertices; its room is sampled along its legs from two rasters (floor and ceiling); the best profile
+through the samples is a taut string (see `taut_string`), and its cost is the track's. Where there is none within
+the limits the cost counts what is missing, metre by metre, so that the same moves that shorten a track also mend
+one that does not hold yet. A guide: what comes out is judged exactly elsewhere.
+
+All in one file, because numba's cache notices a change of the file that a kernel stands in and of no other.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.compiled import device, digest, kernel
+
+Floats = NDArray[np.float64]
+
+MOST_POINTS = 400
+MOST_DOORS = 6000
+
+# Numbers that a kernel is told: by these places in `spec`.
+WEST, SOUTH, PER_STEP, SPACING, MARGIN, UP, DOWN, VERTICAL, HORIZONTAL, ENERGY, PENALTY, REACH = range(12)
+
+SOURCES = digest("_string.py", "compiled.py")
+
+
+@device
+def funnel(s, low, high, n, chain, at, z):  # type: ignore[no-untyped-def]
+    """Pull a string through doors 0 … n - 1, the first and last of no height; the number of its vertices.
+
+    Their door numbers go to ``at``, their altitudes to ``z``. ``chain`` (4, n + 1) is room to work in: the chain to the
+    last door's high edge (it hangs under ceilings) and the one to its low edge, door numbers then altitudes.
+    """
+    top = bottom = low[0]
+    for i in range(1, n):
+        top, bottom = max(top, low[i]), min(bottom, high[i])
+    at[0], z[0], count = 0.0, low[0], 1
+    # Row 0, 1: the high chain; 2, 3: the low chain; head is the apex in both.
+    head0 = tail0 = head1 = tail1 = 0
+    chain[0, 0] = chain[2, 0] = 0.0
+    chain[1, 0] = chain[3, 0] = low[0]
+    for i in range(1, n):
+        for side in range(2):
+            own, other = 2 * side, 2 - 2 * side
+            sign = 1.0 - 2.0 * side
+            edge = sign * (min(high[i], top) if side == 0 else max(low[i], bottom))
+            head, tail = (head0, tail0) if side == 0 else (head1, tail1)
+            ohead, otail = (head1, tail1) if side == 0 else (head0, tail0)
+            t = tail
+            while t > head:
+                sa, sb = s[int(chain[own, t - 1])], s[int(chain[own, t])]
+                za, zb = sign * chain[own + 1, t - 1], sign * chain[own + 1, t]
+                if (zb - za) * (s[i] - sb) < (edge - zb) * (sb - sa):
+                    break
+                t -= 1
+            if t == head:
+                # The straight line may cross the other chain: then the apex walks along that chain.
+                while ohead < otail:
+                    sa, sb = s[int(chain[other, ohead])], s[int(chain[other, ohead + 1])]
+                    za, zb = sign * chain[other + 1, ohead], sign * chain[other + 1, ohead + 1]
+                    if (zb - za) * (s[i] - sa) <= (edge - za) * (sb - sa):
+                        break
+                    ohead += 1
+                    at[count], z[count] = chain[other, ohead], chain[other + 1, ohead]
+                    count += 1
+                t = head = 0
+                chain[own, 0], chain[own + 1, 0] = chain[other, ohead], chain[other + 1, ohead]
+            tail = t + 1
+            chain[own, tail], chain[own + 1, tail] = i, sign * edge
+            if side == 0:
+                head0, tail0, head1 = head, tail, ohead
+            else:
+                head1, tail1, head0 = head, tail, ohead
+    for k in range(head0 + 1, tail0 + 1):
+        if chain[0, k] != at[count - 1]:
+            at[count], z[count] = chain[0, k], chain[1, k]
+            count += 1
+    return count
+
+
+@device
+def walled(ax, ay, bx, by, circles, edges, reach):  # type: ignore[no-untyped-def]
+    """True where a leg meets a circle, or comes within ``reach`` of a polygon's edge."""
+    dx, dy = bx - ax, by - ay
+    square = max(dx * dx + dy * dy, 1e-12)
+    for k in range(len(circles)):
+        px, py = circles[k, 0] - ax, circles[k, 1] - ay
+        t = min(max((px * dx + py * dy) / square, 0.0), 1.0)
+        if (px - t * dx) ** 2 + (py - t * dy) ** 2 < circles[k, 2] ** 2:
+            return True
+    for k in range(len(edges)):
+        px, py, qx, qy = edges[k, 0] - ax, edges[k, 1] - ay, edges[k, 2] - ax, edges[k, 3] - ay
+        if min(px, qx) - reach > max(dx, 0.0) or max(px, qx) + reach < min(dx, 0.0):
+            continue
+        c, d = dx * py - dy * px, dx * qy - dy * qx
+        ex, ey = qx - px, qy - py
+        e, f = ey * px - ex * py, ex * (dy - py) - ey * (dx - px)
+        if c * d < 0.0 and e * f < 0.0:
+            return True
+        near = math.inf
+        for w in range(4):
+            # A corner against the other segment.
+            if w < 2:
+                cx, cy = (px, py) if w == 0 else (qx, qy)
+                gx, gy, sq = dx, dy, square
+            else:
+                cx, cy = (-px, -py) if w == 2 else (dx - px, dy - py)
+                gx, gy, sq = ex, ey, max(ex * ex + ey * ey, 1e-12)
+            t = min(max((cx * gx + cy * gy) / sq, 0.0), 1.0)
+            near = min(near, (cx - t * gx) ** 2 + (cy - t * gy) ** 2)
+        if near < reach * reach:
+            return True
+    return False
+
+
+@device
+def evaluate(p, n, za, zb, floor, ceiling, circles, edges, spec, doors, chain, at, z, out_z):  # type: ignore[no-untyped-def]
+    """Cost of a track p[:n] flown from altitude ``za`` to ``zb``, and what is missing for it to be legal, in metres.
+
+    A row of ``p`` is east, north, pinned, and the altitude at which to pass, NaN where free. ``out_z``: the altitudes
+    of the vertices.
+    """
+    s, low, high, vertex = doors[0], doors[1], doors[2], doors[3]
+    rows, cols = floor.shape
+    s[0], low[0], high[0], vertex[0] = 0.0, za, za, 0.0
+    count, way, missing = 1, 0.0, 0.0
+    for k in range(n - 1):
+        ax, ay, bx, by = p[k, 0], p[k, 1], p[k + 1, 0], p[k + 1, 1]
+        length = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+        if length < 1e-3:
+            length = 1e-3
+        if walled(ax, ay, bx, by, circles, edges, spec[REACH]):
+            missing += 1e6 + length
+        m = int(length / spec[SPACING]) + 1
+        if count + m > len(s):
+            return math.inf, math.inf
+        x0, y0 = (ax - spec[WEST]) * spec[PER_STEP], (ay - spec[SOUTH]) * spec[PER_STEP]
+        dx, dy = (bx - ax) * spec[PER_STEP] / m, (by - ay) * spec[PER_STEP] / m
+        for q in range(1, m + 1):
+            x, y = x0 + q * dx, y0 + q * dy
+            x, y = min(max(x, 0.0), cols - 1.001), min(max(y, 0.0), rows - 1.001)
+            i, j = int(x), int(y)
+            u, v = x - i, y - j
+            lo = (1.0 - v) * ((1.0 - u) * floor[j, i] + u * floor[j, i + 1])
+            lo += v * ((1.0 - u) * floor[j + 1, i] + u * floor[j + 1, i + 1]) + spec[MARGIN]
+            hi = (1.0 - v) * ((1.0 - u) * ceiling[j, i] + u * ceiling[j, i + 1])
+            hi += v * ((1.0 - u) * ceiling[j + 1, i] + u * ceiling[j + 1, i + 1]) - spec[MARGIN]
+            if q == m and p[k + 1, 3] == p[k + 1, 3]:
+                lo, hi = max(lo, p[k + 1, 3]), min(hi, p[k + 1, 3])
+            if lo > hi:
+                missing += lo - hi
+                lo = hi = 0.5 * (lo + hi)
+            s[count], low[count], high[count] = way + q * (length / m), lo, hi
+            vertex[count] = k + 1 if q == m else 0.0
+            count += 1
+        way += length
+    low[count - 1] = high[count - 1] = zb
+    corners = funnel(s, low, high, count, chain, at, z)
+    cost, d = spec[HORIZONTAL] * way if spec[ENERGY] > 0.0 else 0.0, 0
+    out_z[0] = za
+    for k in range(corners - 1):
+        a, b = int(at[k]), int(at[k + 1])
+        run, rise = s[b] - s[a], z[k + 1] - z[k]
+        missing += max(rise - spec[UP] * run, -rise - spec[DOWN] * run, 0.0)
+        cost += spec[VERTICAL] * abs(rise) if spec[ENERGY] > 0.0 else math.sqrt(run * run + rise * rise)
+        for d in range(a + 1, b + 1):
+            if vertex[d] > 0.0:
+                out_z[int(vertex[d])] = z[k] + rise * (s[d] - s[a]) / run
+    return cost, missing
+
+
+@device
+def aim(move, turn, a, v, b, step, bend):  # type: ignore[no-untyped-def]
+    """What a move puts in the place of a vertex ``v`` between ``a`` and ``b``, or of the leg from ``a`` to ``v``.
+
+    Number of points (-1: no such move), the points, and 1 where they stand for the leg alone.
+    """
+    d1 = math.sqrt((v[0] - a[0]) ** 2 + (v[1] - a[1]) ** 2) + 1e-9
+    ux, uy = (v[0] - a[0]) / d1, (v[1] - a[1]) / d1
+    if move >= 7:
+        if d1 < 3.0 * step or d1 < 30.0:
+            return -1, 0.0, 0.0, 0.0, 0.0, 1
+        side = step if move == 7 else -step
+        x, y = a[0] + bend * d1 * ux - side * uy, a[1] + bend * d1 * uy + side * ux
+        return 1, x, y, 0.0, 0.0, 1
+    d2 = math.sqrt((b[0] - v[0]) ** 2 + (b[1] - v[1]) ** 2) + 1e-9
+    wx, wy = (b[0] - v[0]) / d2, (b[1] - v[1]) / d2
+    if move == 0:
+        return 0, 0.0, 0.0, 0.0, 0.0, 0
+    if move == 1 or move == 2:
+        r = min(step, 0.5 * d1, 0.5 * d2)
+        if move == 1:
+            return 2, v[0] - r * ux, v[1] - r * uy, v[0] + r * wx, v[1] + r * wy, 0
+        nx, ny = -(uy + wy), ux + wx
+        length = math.sqrt(nx * nx + ny * ny) + 1e-9
+        side = step / length * (1.0 if ux * wy - uy * wx >= 0.0 else -1.0)
+        return 1, v[0] + side * nx, v[1] + side * ny, 0.0, 0.0, 0
+    if move == 3:
+        nx, ny = -(uy + wy), ux + wx
+        length = math.sqrt(nx * nx + ny * ny) + 1e-9
+        side = step / length * (-1.0 if ux * wy - uy * wx >= 0.0 else 1.0)
+        return 1, v[0] + side * nx, v[1] + side * ny, 0.0, 0.0, 0
+    if move == 4:
+        return 1, v[0] - min(step, d1) * ux, v[1] - min(step, d1) * uy, 0.0, 0.0, 0
+    if move == 5:
+        return 1, v[0] + min(step, d2) * wx, v[1] + min(step, d2) * wy, 0.0, 0.0, 0
+    if turn > 0:
+        return -1, 0.0, 0.0, 0.0, 0.0, 0
+    return 1, 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.0, 0.0, 0
+
+
+@kernel
+def pull(  # type: ignore[no-untyped-def]
+    p, pinned, pz, zs, count, za, zb, floor, ceiling, circles, edges, spec, steps, gain, rounds, around_m,
+    doors, chain, at, z, cand, cand_z, total, sources=SOURCES,
+):  # fmt: skip
+    """Make the track p[:count] cheaper, in place, by moves of ``steps`` metres, largest first; the new count.
+
+    ``pinned``, ``pz`` (MOST_POINTS,): vertices that stay, and altitudes at which to pass them (NaN free). ``zs``: the
+    altitudes of the vertices come out here. A move is judged over a part of the track, ``around_m`` or three vertices
+    to each side, whose ends keep their altitudes, and is kept if it saves ``gain``. ``doors`` and on: see `workspace`;
+    the cost, what is missing, and the number of trials are left in ``total``.
+    """
+    trials = 0
+    for phase in range(len(steps) + 1):
+        last = phase == len(steps)
+        step = 0.0 if last else steps[phase]
+        for turn in range(1 if last else rounds):
+            saved = 0.0
+            bend = 0.5 if turn % 3 == 0 else (0.3 if turn % 3 == 1 else 0.7)
+            i = 0
+            while i < count:
+                # i = 0: the whole track, for its profile; i > 0: the leg before vertex i, and the vertex.
+                if i == 0:
+                    w0, w1 = 0, count - 1
+                elif last:
+                    break
+                else:
+                    w0, w1 = max(i - 1, 0), min(i + 1, count - 1)
+                    way = 0.0
+                    while w0 > max(i - 4, 0) and way < around_m:
+                        way += math.sqrt((p[w0, 0] - p[w0 - 1, 0]) ** 2 + (p[w0, 1] - p[w0 - 1, 1]) ** 2)
+                        w0 -= 1
+                    way = 0.0
+                    while w1 < min(i + 4, count - 1) and way < around_m:
+                        way += math.sqrt((p[w1, 0] - p[w1 + 1, 0]) ** 2 + (p[w1, 1] - p[w1 + 1, 1]) ** 2)
+                        w1 += 1
+                base = math.inf
+                for move in range(-1, 9 if i > 0 else 0):
+                    points, x0, y0, x1, y1, leg = 0, 0.0, 0.0, 0.0, 0.0, 0
+                    i0, i1 = i - 1, i + 1
+                    if move >= 0:
+                        if move < 7 and (i >= count - 1 or pinned[i]):
+                            continue
+                        points, x0, y0, x1, y1, leg = aim(
+                            move, turn, p[i - 1], p[i], p[min(i + 1, count - 1)], step, bend
+                        )
+                        if points < 0 or count + 1 >= len(p):
+                            continue
+                        i1 = i if leg else i + 1
+                    # The part of the track with the move made.
+                    n = 0
+                    for k in range(w0, w1 + 1):
+                        if move >= 0 and i0 < k < i1:
+                            continue
+                        if move >= 0 and k == i1:
+                            for q in range(points):
+                                cand[n, 0], cand[n, 1] = (x0, y0) if q == 0 else (x1, y1)
+                                cand[n, 2], cand[n, 3] = 0.0, math.nan
+                                n += 1
+                        cand[n, 0], cand[n, 1], cand[n, 2], cand[n, 3] = p[k, 0], p[k, 1], pinned[k], pz[k]
+                        n += 1
+                    start_z = za if w0 == 0 else zs[w0]
+                    end_z = zb if w1 == count - 1 else zs[w1]
+                    cost, missing = evaluate(
+                        cand, n, start_z, end_z, floor, ceiling, circles, edges, spec, doors, chain, at, z, cand_z
+                    )
+                    trials += 1
+                    value = cost + spec[PENALTY] * missing
+                    if move < 0:
+                        base = value
+                        if i == 0:
+                            total[0], total[1], total[2] = cost, missing, trials
+                            for k in range(n):
+                                zs[k] = cand_z[k]
+                        continue
+                    worth = gain if move > 0 else -0.05 * gain
+                    if not value < base - worth:
+                        continue
+                    saved += base - value
+                    base = value
+                    # Put it in; what comes after moves up or down.
+                    more = n - (w1 - w0 + 1)
+                    for q in range(count - 1 - w1):
+                        k = count - 1 - q if more > 0 else w1 + 1 + q
+                        p[k + more, 0], p[k + more, 1] = p[k, 0], p[k, 1]
+                        pinned[k + more], pz[k + more], zs[k + more] = pinned[k], pz[k], zs[k]
+                    for k in range(n):
+                        p[w0 + k, 0], p[w0 + k, 1] = cand[k, 0], cand[k, 1]
+                        pinned[w0 + k], pz[w0 + k], zs[w0 + k] = cand[k, 2], cand[k, 3], cand_z[k]
+                    count += more
+                    w1 += more
+                    if move == 0:
+                        i -= 1
+                        break
+                i += 1
+            if saved < 2.0 * gain:
+                break
+    return count
+
+
+def workspace() -> tuple[Floats, ...]:
+    """Room for `pull` to work in."""
+    return (
+        np.empty((4, MOST_DOORS)),
+        np.empty((4, MOST_DOORS + 1)),
+        np.empty(MOST_DOORS),
+        np.empty(MOST_DOORS),
+        np.empty((MOST_POINTS + 2, 4)),
+        np.empty(MOST_POINTS + 2),
+        np.zeros(3),
+    )

@@ -1,0 +1,276 @@
+"""Paths below altitude caps, and the bound of all of them; see `optimal`."""
+
+from __future__ import annotations
+
+import math
+import time
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.band import straight_bound
+from gcsplan.planners.caps import Layer, search_caps
+from gcsplan.planners.finish import way_points
+from gcsplan.planners.lattice import terminals
+from gcsplan.planners.leg import End, Leg
+from gcsplan.planners.polish import fewer, polished
+from gcsplan.planners.problem import Problem, Progress, Solution
+from gcsplan.planners.rising import rise_bound
+from gcsplan.planners.settle import Judge, Unsettled, settle
+from gcsplan.planners.track import Flown, Obstruction, Track, fly, make_track
+from gcsplan.world.path import Path
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+SLACKS = (0.02, 0.15, 0.6)
+"""How much longer than the shortest the tracks are that are looked at, as a part of it, until a path is known."""
+LITTLE, WORTH = 5e-6, 5e-5
+"""What fewer way points may cost, as a part of the cost: on the way, and at last."""
+ZONES_SHUT = 8
+"""Zones whose underside is given up, one after the other, because no profile fits under them."""
+CLOSER = 7
+"""Times that what lies between path and bound is halved: close to the ends a shorter path has less way to climb."""
+
+
+class Below:
+    """One problem: its legs in the plane, the best path so far, and the best bound so far."""
+
+    def __init__(self, problem: Problem, begun_s: float) -> None:
+        self.problem, self.begun_s = problem, begun_s
+        self.judge = Judge(problem)
+        self.best: Floats | None = None
+        self.pinned: Bools | None = None
+        self.cost = math.inf
+        self.bound = straight_bound(problem)
+        self.first_s = math.inf
+        self.proved_shut = False
+        self.timed_out = False
+        limits = problem.limits
+        self.ceiling_m = math.inf if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
+        self.top_m = self.ceiling_m if math.isfinite(self.ceiling_m) else _above_all(problem)
+        stops = terminals(problem)
+        heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
+        ends = [End(*place, z) for place, z in zip(stops, heights, strict=True)]
+        self.legs = [Leg(problem, a, b, self.top_m) for a, b in pairwise(ends) if math.dist(a.place, b.place) > 1e-3]
+        self.known_m = [z for z in heights if z is not None]
+        self.under = np.ones(len(problem.airspace.zones), np.bool_)
+
+    def tell(self, phase: str, cost: float | None = None) -> None:
+        """Report progress."""
+        if self.problem.progress is not None:
+            known = self.cost if cost is None and self.best is not None else cost
+            self.problem.progress(Progress(time.perf_counter() - self.begun_s, known, self.bound, phase))
+
+    def look(self) -> None:
+        """Flood the legs, and find the first path."""
+        for slack in SLACKS:
+            for leg in self.legs:
+                leg.flood(slack)
+                if math.isinf(leg.length_m):
+                    self.proved_shut = True
+                    return
+            self._raise_bound(sum(leg.length_m for leg in self.legs))
+            if self.try_below(self.top_m, fine=False) or self.try_below(self.top_m, fine=True):
+                return
+
+    def try_below(self, cap_m: float, *, fine: bool) -> bool:
+        """Look for a path below a cap; True if it is the best so far."""
+        for _ in range(ZONES_SHUT):
+            ways = []
+            for leg in self.legs:
+                wanted = leg.corridor(self._limit(leg)) if fine and leg.fine > 1 else None
+                way = leg.track(cap_m, leg.fine if fine else 1, wanted, self.under)
+                if way is None:
+                    return False
+                ways.append(way.points)
+            points = np.vstack([ways[0], *(w[1:] for w in ways[1:])])
+            pinned, pin_m = np.zeros(len(points), np.bool_), np.full(len(points), math.nan)
+            pinned[0] = pinned[-1] = True
+            at = 0
+            for leg, way in zip(self.legs[:-1], ways[:-1], strict=True):
+                at += len(way) - 1
+                pinned[at] = True
+                pin_m[at] = math.nan if leg.goal.amsl_m is None else leg.goal.amsl_m
+            track = make_track(self.problem, points, pinned, pin_m)
+            flown = fly(self.problem, track)
+            if isinstance(flown, Flown):
+                found = self._exact(track, flown)
+                if found is None:
+                    return False
+                few, kept = fewer(self.problem, *found, LITTLE * flown.cost)
+                if fine:
+                    few, kept = polished(self.problem, few, kept)
+                return self.take(few, kept)
+            if not self._give_up(flown):
+                return False
+        return False
+
+    def _exact(self, track: Track, flown: Flown) -> tuple[Floats, Bools] | None:
+        """Way points over a track that the exact check passes: of this profile, or of one drawn with more care."""
+        found = way_points(self.problem, track, flown)
+        if not self.judge.violations(found[0]):
+            return found
+        careful = settle(self.problem, self.judge, track.points, track.pinned, track.pin_m)
+        return None if isinstance(careful, Unsettled) else careful
+
+    def _give_up(self, why: Obstruction) -> bool:
+        """Keep out of a zone that could be neither over- nor underflown on the way; False if that was tried."""
+        if why.kind != "zone" or why.zone < 0 or not self.under[why.zone]:
+            return False
+        self.under[why.zone] = False
+        return True
+
+    def take(self, points: Floats, pinned: Bools | None = None) -> bool:
+        """Keep a path if it is the best so far; ``pinned`` (N,) its stops."""
+        cost = self.problem.cost(Path(points))
+        if cost >= self.cost:
+            return False
+        if self.best is None:
+            self.first_s = time.perf_counter() - self.begun_s
+        self.best, self.cost, self.pinned = points, cost, pinned
+        self.tell("improve")
+        return True
+
+    def tighten(self) -> None:
+        """Improve path and bound until they are as near as wanted."""
+        if self._done() or not self._in_time():
+            return
+        # Whatever is not longer than the best path must have been looked at.
+        slack = self._longest() / sum(leg.length_m for leg in self.legs) - 1.0
+        for leg in self.legs:
+            if self._limit(leg) > leg.reach_m:
+                leg.flood(slack * (1.0 + 1e-9))
+        if self.problem.objective == "energy":
+            self._tighten_energy()
+        else:
+            self._tighten_length()
+
+    def _tighten_length(self) -> None:
+        self.try_below(self.top_m, fine=True)
+        low, high = self.bound, self.cost
+        for k in range(CLOSER):
+            # No path is shorter than `low`; is any shorter than `middle`?
+            middle = high if k == 0 else 0.5 * (low + high)
+            found = self._bound_shorter(middle)
+            if found < middle:
+                high = middle
+            low = max(low, min(found, middle))
+            self._raise_bound(low)
+            if self._done() or high - low < 2e-5 * low or not self._in_time():
+                break
+
+    def _bound_shorter(self, longest_m: float) -> float:
+        """A bound of all paths shorter than ``longest_m``: their tracks on the fine lattice, then what they climb."""
+        spare = longest_m - sum(leg.length_m for leg in self.legs)
+        tracks = []
+        for leg in self.legs:
+            limit = leg.length_m + spare
+            wanted = leg.corridor(limit)
+            tracks.append(leg.bound(self.top_m, leg.fine, wanted, limit, True))
+        # Each leg's limit is what the others leave, which is less now that they are known better.
+        spare = max(longest_m - sum(tracks), 0.0)
+        return rise_bound(self.legs, tracks, [track + spare for track in tracks])
+
+    def _track_bound(self, leg: Leg, cap_m: float, limit_m: float) -> float:
+        return leg.bound(cap_m, leg.fine, leg.corridor(limit_m), limit_m, True)
+
+    def _longest(self) -> float:
+        """No track of a path that is better than the best is longer."""
+        p = self.problem
+        if self.best is None:
+            return sum(leg.reach_m for leg in self.legs)
+        if p.objective == "energy":
+            return (self.cost - p.vertical_j_per_m * self._rise(-math.inf)) / p.horizontal_j_per_m
+        return self.cost
+
+    def _limit(self, leg: Leg) -> float:
+        """The same for one leg, the others as short as they can be."""
+        return self._longest() - sum(other.length_m for other in self.legs if other is not leg)
+
+    def _rise(self, touched_m: float) -> float:
+        """Metres climbed and descended in all, at least, by a path that touches a height."""
+        least = sum(abs(b - a) for a, b in pairwise(self.known_m))
+        return least + 2.0 * max(touched_m - max(self.known_m), 0.0)
+
+    def _tighten_energy(self) -> None:
+        p = self.problem
+        tried: set[float] = set()
+
+        def track_m(cap: float, care: int) -> float:
+            if care:
+                return sum(self._track_bound(leg, cap, self._limit(leg)) for leg in self.legs)
+            return sum(leg.bound(cap, 1, None, self._limit(leg)) for leg in self.legs)
+
+        def try_at(cap: float) -> None:
+            if round(cap, 1) not in tried:
+                tried.add(round(cap, 1))
+                if self.try_below(cap, fine=False):
+                    self.try_below(cap, fine=True)
+
+        def cost_of(layer: Layer) -> float:
+            return layer.cost(self._rise, p.vertical_j_per_m, p.horizontal_j_per_m)
+
+        self.try_below(self.top_m, fine=True)
+        layers = [Layer(max(self.known_m), self.top_m, sum(leg.length_m for leg in self.legs))]
+        bound = search_caps(
+            layers, cost_of, track_m, lambda: self.cost, try_at, p.gap_percent / 100.0, self._in_time
+        )
+        self._raise_bound(bound)
+
+    def bound_of_tracks(self) -> float:
+        """The bound of tracks alone, for regimes in which paths are found elsewhere; inf: there is none, proved."""
+        for leg in self.legs:
+            leg.flood(SLACKS[0])
+        length = sum(leg.length_m for leg in self.legs)
+        self._raise_bound(length)
+        return math.inf if math.isinf(length) else self.bound
+
+    def _raise_bound(self, length_m: float) -> None:
+        """A new bound, in metres or joules by the objective, or metres of track where energy knows no more."""
+        p = self.problem
+        if p.objective == "energy" and length_m < math.inf and length_m <= self.cost / p.horizontal_j_per_m:
+            length_m = max(length_m * p.horizontal_j_per_m + p.vertical_j_per_m * self._rise(-math.inf), length_m)
+        # The bound's own arithmetic is rounded.
+        self.bound = max(self.bound, min(length_m * (1.0 - 1e-9), self.cost))
+        self.tell("bound")
+
+    @property
+    def gap(self) -> float:
+        """How far the best path is above the bound, as a part of it."""
+        return (self.cost - self.bound) / max(self.bound, 1e-9)
+
+    def _done(self) -> bool:
+        return self.gap <= self.problem.gap_percent / 100.0
+
+    def _in_time(self) -> bool:
+        self.timed_out = time.perf_counter() - self.begun_s > self.problem.budget_s
+        return not self.timed_out
+
+    def solution(self) -> Solution:
+        """The best path, with as few way points as are worth it, and the bound."""
+        assert self.best is not None
+        if self.pinned is not None:
+            self.best, self.pinned = fewer(self.problem, self.best, self.pinned, WORTH * self.cost)
+            self.cost = self.problem.cost(Path(self.best))
+        self.tell("done")
+        return Solution(
+            path=Path(self.best),
+            lower_bound=self.bound,
+            stopped_by="gap" if self._done() else "time" if self.timed_out else "exhausted",
+            planning_s=time.perf_counter() - self.begun_s,
+            first_path_s=self.first_s,
+        )
+
+
+def _above_all(problem: Problem) -> float:
+    """An altitude above everything that could be in the way."""
+    surface, limits = problem.airspace.surface, problem.limits
+    high = float(np.nanmax(surface.top_m))
+    tops = [0.0]
+    for zone in problem.airspace.zones:
+        if zone.ceiling is not None:
+            tops.append(zone.ceiling.value_m + (high if zone.ceiling.datum == "agl" else 0.0))
+    ends = [problem.start[2], problem.goal[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None)]
+    return max(high + limits.min_agl_m, *tops, *ends) + limits.altitude_error_m + 2.0 * limits.track_error_m + 100.0

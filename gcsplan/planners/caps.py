@@ -1,0 +1,64 @@
+"""The least energy between altitude caps: what no path that goes as high as this, and no higher, can do without.
+
+A path whose highest point lies between two caps flies a track that is legal below the upper one, and climbs at least
+to the lower. So the shortest track below the upper cap and the climb to the lower are a bound for all such paths;
+intervals of caps are halved until none of them can hold anything better than what was found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+MOST_CAPS = 40
+NARROW_M = 0.25
+"""Caps nearer to each other are not told apart."""
+
+
+@dataclass(slots=True)
+class Layer:
+    """Paths whose highest point lies between ``low_m`` and ``high_m``: tracks of ``track_m`` at least, as far as was
+    looked at with that ``care``."""
+
+    low_m: float
+    high_m: float
+    track_m: float
+    care: int = 0
+
+    def cost(self, rise: Callable[[float], float], vertical: float, horizontal: float) -> float:
+        """No such path costs less; ``rise`` metres are climbed and descended in all by one that touches a height."""
+        return vertical * rise(self.low_m) + horizontal * self.track_m
+
+
+def search_caps(
+    layers: list[Layer],
+    cost_of: Callable[[Layer], float],
+    track_m: Callable[[float, int], float],
+    best: Callable[[], float],
+    try_at: Callable[[float], None],
+    gap: float,
+    in_time: Callable[[], bool],
+) -> float:
+    """Split the cheapest layer until it costs no less than the best path, but for ``gap`` (a part). Returns the bound.
+
+    ``track_m(cap, care)`` bounds tracks below a cap; more care costs more and tells more (0 or 1). ``try_at(cap)``
+    looks for a path below a cap.
+    """
+    for _ in range(MOST_CAPS):
+        layers.sort(key=cost_of)
+        layer = layers[0]
+        bound = min(cost_of(layer), best())
+        if bound >= best() * (1.0 - gap) or not in_time():
+            return bound
+        if layer.care == 0:
+            layer.track_m = max(layer.track_m, track_m(layer.high_m, 1))
+            layer.care = 1
+            continue
+        if layer.high_m - layer.low_m < NARROW_M:
+            return bound
+        middle = 0.5 * (layer.low_m + layer.high_m)
+        try_at(middle)
+        lower = Layer(layer.low_m, middle, max(track_m(middle, 0), layer.track_m))
+        layer.low_m = middle
+        layers.append(lower)
+    return min(min(map(cost_of, layers)), best())

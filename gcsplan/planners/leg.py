@@ -1,0 +1,150 @@
+"""The plane between two stops: shortest tracks below an altitude cap, and how long any track must be at least.
+
+The lattice is cut to an ellipse of detours around the stops, and widened when that is not enough. A flood from the far
+stop, over all that may be free below the highest cap, tells every later search how far it still is: lower caps and
+finer lattices only leave less room. So the fine lattices, too, need to be looked at only along the few tracks that may
+be short enough.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.plane import Guide, Plane, Way, make_plane
+from gcsplan.planners.problem import Problem
+
+Floats = NDArray[np.float64]
+
+DETOURS = (1.25, 2.5, math.inf)
+"""How long tracks may be, in times the straight way, before the lattice must be widened."""
+FINE_M, MOST_FINE = 24.0, 8
+"""Cells are cut until they are about as wide, but into no more parts a side."""
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """A stop: where, and how high; None where its height is free."""
+
+    east_m: float
+    north_m: float
+    amsl_m: float | None
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """(east_m, north_m)."""
+        return self.east_m, self.north_m
+
+
+class Leg:
+    """One leg of a problem, from stop to stop, under caps of at most ``top_m``."""
+
+    def __init__(self, problem: Problem, start: End, goal: End, top_m: float) -> None:
+        self.problem, self.start, self.goal, self.top_m = problem, start, goal, top_m
+        self.straight_m = math.dist(start.place, goal.place)
+        self.length_m = math.inf
+        """A lower bound of every track's length below the highest cap; inf: there is none, proved."""
+        self.reach_m = 0.0
+        """Tracks shorter than this lie within the lattice, and within what the flood has seen."""
+        self.plane: Plane
+        self._guide: Guide
+        self._ahead: Guide | None = None
+        cell = problem.airspace.surface.grid.metres_per_cell(*start.place)
+        self.fine = max(1, min(MOST_FINE, round(float(cell.max()) / FINE_M)))
+        """Parts that cells are cut into, along their sides, where it matters."""
+
+    def flood(self, slack: float) -> None:
+        """Look at all that is free below the highest cap, as far as ways ``slack`` longer than the shortest lead.
+
+        Widens the lattice until that way lies within it.
+        """
+        self._ahead = None
+        for detour in DETOURS:
+            if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
+                continue
+            within = detour * self.straight_m if math.isfinite(detour) else math.inf
+            self.plane = self._lattice(detour)
+            way, self._guide = self.plane.mesh(self.top_m, True).flood(self.goal.place, self.start.place, within, slack)
+            if way is not None:
+                self.length_m = way.length_m
+                self.reach_m = min(within, way.length_m * (1.0 + slack))
+                return
+
+    def track(
+        self, cap_m: float, fineness: int, wanted: NDArray[np.bool_] | None, under: NDArray[np.bool_] | None
+    ) -> Way | None:
+        """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``."""
+        limits = self.problem.limits
+        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, 0.0)
+        mesh = self.plane.mesh(cap_m, False, fineness, wanted, cones, under)
+        return mesh.way(self.start.place, self.goal.place, self.reach_m, self._guide)
+
+    def bound(
+        self, cap_m: float, fineness: int, wanted: NDArray[np.bool_] | None, limit_m: float, climbs: bool = False
+    ) -> float:
+        """A lower bound of every track's length below ``cap_m``; ``limit_m``, or `reach_m`, if it is more.
+
+        ``climbs``: near the ends hold tracks to what they can climb to, if they are shorter than ``limit_m``.
+        """
+        limit, limits = min(limit_m, self.reach_m), self.problem.limits
+        cones = None
+        if climbs:
+            cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, max(limit - self.length_m, 0.0))
+        mesh = self.plane.mesh(cap_m, True, fineness, wanted, cones)
+        way = mesh.way(self.start.place, self.goal.place, limit, self._guide)
+        return limit if way is None else way.length_m
+
+    def corridor(self, limit_m: float) -> NDArray[np.bool_]:
+        """(rows - 1, cols - 1) the lattice's cells that a track shorter than ``limit_m`` may meet."""
+        if self._ahead is None:
+            mesh = self._guide.mesh
+            _, self._ahead = mesh.flood(self.start.place, self.goal.place, self.reach_m, math.inf, self._guide)
+        through = np.append(self._ahead.entered + self._guide.entered, np.inf)
+        return np.asarray((through[self._guide.mesh.piece].min(axis=1) <= limit_m).reshape(self.plane.inside.shape))
+
+    def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats]:
+        """Of the cells that tracks shorter than ``limit_m`` may meet: lowest floor, least way there, least way on."""
+        mesh = self.plane.mesh(self.top_m, True, 1, self.corridor(limit_m), single=True)
+        a, b = self.start.place, self.goal.place
+        _, left = mesh.flood(b, a, limit_m, math.inf, self._guide_back())
+        _, away = mesh.flood(a, b, limit_m, math.inf, left)
+        both = mesh.piece.reshape(-1, 2)
+        live = both.max(axis=1) >= 0
+        ways = []
+        for guide in (away, left):
+            entered = np.append(guide.entered, np.inf)
+            ways.append(entered[both[live]].min(axis=1))
+        return mesh.lowest()[live], ways[0], ways[1]
+
+    def _guide_back(self) -> Guide:
+        """Distances from the start over the coarse mesh."""
+        if self._ahead is None:
+            self.corridor(self.reach_m)
+        assert self._ahead is not None
+        return self._ahead
+
+    def _cones(self, climb: float, descent: float, slack_m: float) -> list[tuple[float, float, float, float]]:
+        """Height and slope of what can be reached near the ends, by paths with ``slack_m`` to spare."""
+        ends = ((self.start, climb), (self.goal, descent))
+        return [
+            (end.east_m, end.north_m, end.amsl_m + slope * slack_m, slope)
+            for end, slope in ends
+            if end.amsl_m is not None and math.isfinite(slope)
+        ]
+
+    def _lattice(self, detour: float) -> Plane:
+        a, b, d = self.start.place, self.goal.place, self.straight_m
+        if math.isinf(detour):
+            return make_plane(self.problem, (-math.inf, -math.inf, math.inf, math.inf))
+        more = max(0.5 * d * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * d) + 1.0
+        box = (min(a[0], b[0]) - more, min(a[1], b[1]) - more, max(a[0], b[0]) + more, max(a[1], b[1]) + more)
+        cell = float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
+
+        def inside(x: Floats, y: Floats) -> NDArray[np.bool_]:
+            to = np.hypot(x - a[0], y - a[1]) + np.hypot(x - b[0], y - b[1])
+            return np.asarray(to <= detour * d + 4.0 * cell)
+
+        return make_plane(self.problem, box, inside)

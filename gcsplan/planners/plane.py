@@ -1,0 +1,315 @@
+"""The plane under a mission as a lattice of nodes, and what of it can be crossed below an altitude cap.
+
+The lattice is the terrain model's own, each cell cut into parts where more is wanted, because ground is bilinear in
+those cells and in no others: over a bilinear patch the two ways of cutting it into triangles give one linear surface
+that never lies above it and one that never lies below it. So every question has two answers: a mesh that holds
+every legal track (``low``: for bounds), and one in which every track is legal but for rounding (for paths).
+
+In the plane the raster's lines are not quite straight. Here they are, between the corners of blocks so short that
+nothing moves by more than a few centimetres, for which `SPARE_M` makes up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners._fill import fill, raise_cone
+from gcsplan.planners._mesh import UNDER, UNDER_2, least_of_cells, make_pieces, make_portals, sort_portals, stamp_zones
+from gcsplan.planners._any_angle import search
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.shapes import SPARE_M, Shapes, make_shapes
+from gcsplan.world.surface import GridMap
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+HAIR_M = 0.07
+"""Kept from the ground, upward and sideways, by paths: what the exact check spares, and what the lattice rounds."""
+BENT_M = 0.03
+"""Most that a raster's line may bow between the corners of a block."""
+MOST_OPENED = 3_000_000
+
+
+@dataclass(eq=False, slots=True)
+class Way:
+    """A shortest track over a mesh: ``points`` (N, 2) and its length."""
+
+    points: Floats
+    length_m: float
+
+
+@dataclass(eq=False, slots=True)
+class Mesh:
+    """Convex free pieces and their portals; see `_mesh`."""
+
+    plane: Plane
+    fineness: int
+    excess: Floats
+    floor: Floats
+    diagonal: NDArray[np.int8]
+    piece: Ints
+    start: Ints
+    ends: Floats
+    names: NDArray[np.int64]
+    joins: Ints
+    order: Ints
+
+    def lowest(self) -> Floats:
+        """(cells,) the lowest floor of each; of cells that are not looked at, anything."""
+        f = self.floor
+        return np.minimum(np.minimum(f[:-1, :-1], f[:-1, 1:]), np.minimum(f[1:, :-1], f[1:, 1:])).ravel()
+
+    def pieces_at(self, place: tuple[float, float]) -> list[int]:
+        """The free pieces that a place lies in, or next to where its own is not free."""
+        found: list[int] = []
+        rows, cols = self.excess.shape
+        c, r = (self.fineness * v for v in self.plane.at(place))
+        for dj in (0.0, -1e-3, 1e-3):
+            for di in (0.0, -1e-3, 1e-3):
+                i, j = math.floor(c + di), math.floor(r + dj)
+                if not (0 <= i < cols - 1 and 0 <= j < rows - 1):
+                    continue
+                u, v, k = c - i, r - j, j * (cols - 1) + i
+                lower = u >= v if self.diagonal[k] == 0 else u + v <= 1.0
+                p = int(self.piece[k, 0 if lower else 1])
+                if p >= 0 and p not in found:
+                    found.append(p)
+        return found
+
+    def way(
+        self, start: tuple[float, float], goal: tuple[float, float], limit_m: float = math.inf, guide: Guide | None = None
+    ) -> Way | None:
+        """The shortest way that is shorter than ``limit_m``. ``guide``: distances to ``goal`` over a mesh that leaves
+        no less room."""
+        return self._search(start, goal, limit_m, -1.0, guide, np.zeros(0))
+
+    def flood(
+        self,
+        start: tuple[float, float],
+        goal: tuple[float, float],
+        limit_m: float,
+        slack: float,
+        guide: Guide | None = None,
+    ) -> tuple[Way | None, Guide]:
+        """The same, and how far every piece is from ``start`` at least, as far as ways to ``goal`` lead that are shorter
+        than ``limit_m`` and than the shortest with ``slack`` (as a part of it) added."""
+        entered = np.full(len(self.start) - 1, np.inf)
+        way = self._search(start, goal, limit_m, slack, guide, entered)
+        entered[self.pieces_at(start)] = 0.0
+        return way, Guide(self, entered)
+
+    def _search(
+        self,
+        start: tuple[float, float],
+        goal: tuple[float, float],
+        limit_m: float,
+        slack: float,
+        guide: Guide | None,
+        entered: Floats,
+    ) -> Way | None:
+        pieces, goal_pieces = self.pieces_at(start), self.pieces_at(goal)
+        if not pieces or not goal_pieces:
+            return None
+        sources = np.array([(*start, 0.0)] * len(pieces))
+        remaining = np.zeros(0) if guide is None else guide.over(self)
+        room = 1 << 17
+        while True:
+            best = np.zeros(8 * (self.excess.size + 1))  # costs nothing until it is touched
+            node, link, name = np.empty((room, 8)), np.empty((room, 4), np.int32), np.empty((room, 3), np.int64)
+            out = np.empty((1 << 14, 3))
+            n = search(
+                self.start, self.ends, self.names, self.joins, self.order, best, sources, np.array(pieces, np.int32),
+                np.array(goal), np.array(goal_pieces, np.int32), limit_m, slack, MOST_OPENED, remaining, entered,
+                node, link, name, np.empty(room), np.empty(room, np.int32), out,
+            )  # fmt: skip
+            if n != -1:
+                break
+            room *= 4
+            entered[:] = np.inf
+        if n <= 0:
+            return None
+        points = out[:n][::-1, :2].copy()
+        keep = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
+        keep[-1] = True
+        return Way(points[keep], float(out[1, 2]))
+
+
+@dataclass(eq=False, slots=True)
+class Guide:
+    """``entered`` (pieces,): no way from where a search began to the entrance of a piece is shorter; inf: none was
+    looked for."""
+
+    mesh: Mesh
+    entered: Floats
+
+    def over(self, finer: Mesh) -> Floats:
+        """The same for the pieces of a mesh on the same lattice, or one that is some times finer."""
+        ratio = finer.fineness // self.mesh.fineness
+        out = np.full(len(finer.start) - 1, np.inf)
+        cols, fine_cols = self.mesh.excess.shape[1] - 1, finer.excess.shape[1] - 1
+        least_of_cells(self.mesh.piece, self.entered, cols, finer.piece, fine_cols, ratio, out)
+        return out
+
+
+@dataclass(eq=False, slots=True)
+class Plane:
+    """A lattice over a part of the terrain model: node (j, i) lies at ``x[j, i]``, ``y[j, i]``, north of (j - 1, i).
+
+    ``top``, ``ground`` (rows, cols) AMSL, NaN where unknown; ``steep`` the steepest slope of the cells around a node;
+    ``inside`` (rows - 1, cols - 1) the cells that are looked at; ``block`` cells lie on straight lines.
+    """
+
+    problem: Problem
+    col0: int
+    row1: int
+    block: int
+    x: Floats
+    y: Floats
+    top: Floats
+    ground: Floats
+    steep: Floats
+    inside: NDArray[np.bool_]
+    shapes: Shapes
+
+    def mesh(
+        self,
+        cap_m: float,
+        low: bool,
+        fineness: int = 1,
+        wanted: NDArray[np.bool_] | None = None,
+        cones: list[tuple[float, float, float, float]] | None = None,
+        under: NDArray[np.bool_] | None = None,
+        single: bool = False,
+    ) -> Mesh:
+        """What can be crossed at or below ``cap_m``: by a bound's way (``low``: all of it) or by a path's.
+
+        ``wanted``: only these cells. ``cones`` (east_m, north_m, height, slope): where paths climb from, or, for a
+        bound, how high a path of a length that matters can be near its ends. ``under`` (zones,): which zones may be
+        passed below their floors; None for all. ``single``: each free cell is a piece of its own.
+        """
+        limits, scale = self.problem.limits, self.problem.airspace.scale
+        near = limits.track_error_m * scale
+        rows, cols = ((n - 1) * fineness + 1 for n in self.top.shape)
+        excess = np.full((rows, cols), np.inf)
+        floor, ground, x, y = (np.empty((rows, cols)) for _ in range(4))
+        cells = (rows - 1) * (cols - 1)
+        diagonal = np.empty(cells, np.int8)
+        climbs = np.array([] if low or cones is None else cones).reshape(-1, 4)
+        more = limits.min_agl_m + limits.altitude_error_m
+        beside = near + HAIR_M
+        if limits.horizontal_clearance_m > limits.min_agl_m:
+            # Beside cliffs it is the clearance that binds; this is more than both demand together.
+            beside += limits.horizontal_clearance_m * scale
+        fill(
+            self.top, self.ground, self.steep[:0] if low else self.steep, self.x, self.y,
+            self.inside if wanted is None else wanted, fineness, more + (-SPARE_M if low else HAIR_M), beside, cap_m,
+            climbs, low, excess, floor, ground, x, y, diagonal,
+        )  # fmt: skip
+        of, values = np.zeros(cells, np.int32), np.zeros((1, 4))
+        if len(self.shapes.boxes):
+            zones, edges = self.shapes.low if low else self.shapes.high
+            if under is not None:
+                zones = zones.copy()
+                zones[:, UNDER] *= under[self.shapes.owner[:, 0]]
+                zones[:, UNDER_2] *= under[self.shapes.owner[:, 1]]
+            values = np.empty((1 + self.shapes.cells * fineness**2, 4))
+            boxes = self.shapes.boxes * fineness + np.array([0, fineness - 1, 0, fineness - 1], np.int32)
+            stamp_zones(excess, floor, ground, x, y, zones, edges, boxes, low, of, values)
+        if low and cones:
+            for east, north, height, slope in cones:
+                c, r = self.at((east, north))
+                raise_cone(
+                    excess, floor, of, x, y, east, north, c * fineness, r * fineness, height, slope, cap_m,
+                    np.zeros((rows, cols), np.int8),
+                )  # fmt: skip
+        piece = np.empty((cells, 2), np.int32)
+        block = 1 if single else self.block * fineness
+        count = make_pieces(excess, of, values, diagonal, piece, block)
+        room = 2 * count + 1024
+        scratch = np.empty(2)
+        while True:
+            ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
+            n = make_portals(excess, of, values, diagonal, piece, x, y, block, ends, names, joins, scratch)
+            if n <= room:
+                break
+            room = n
+        start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
+        sort_portals(joins[:n], start, order)
+        return Mesh(self, fineness, excess, floor, diagonal, piece, start, ends[:n], names[:n], joins[:n], order)
+
+    def at(self, place: tuple[float, float]) -> tuple[float, float]:
+        """Column and row of a place on this lattice, in the terrain model's cells."""
+        c, r = self.problem.airspace.surface.grid(*place)
+        return float(c) - self.col0, self.row1 - float(r)
+
+
+def make_plane(
+    problem: Problem,
+    box: tuple[float, float, float, float],
+    inside: Callable[[Floats, Floats], NDArray[np.bool_]] | None = None,
+) -> Plane:
+    """The lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
+
+    ``inside(x, y)`` tells which nodes are to be looked at.
+    """
+    surface = problem.airspace.surface
+    grid = surface.grid
+    rows, cols = surface.ground_m.shape
+    west, south, east, north = box
+    if math.isinf(west):
+        col0, row0, col1, row1 = 0, 0, cols - 1, rows - 1
+    else:
+        e, n = np.meshgrid(np.linspace(west, east, 5), np.linspace(south, north, 5))
+        at = grid(e.ravel(), n.ravel())
+        low, high = at.min(axis=0).clip(-2.0, [cols, rows]), at.max(axis=0).clip(-2.0, [cols, rows])
+        col0, row0 = (min(max(math.floor(v) - 1, 0), m - 2) for v, m in zip(low, (cols, rows), strict=True))
+        col1, row1 = (min(math.ceil(v) + 1, m - 1) for v, m in zip(high, (cols, rows), strict=True))
+        col1, row1 = max(col1, col0 + 1), max(row1, row0 + 1)
+    part = np.s_[row0 : row1 + 1, col0 : col1 + 1]
+    ground = np.ascontiguousarray(surface.ground_m[part][::-1])
+    top = ground if surface.top_m is surface.ground_m else np.ascontiguousarray(surface.top_m[part][::-1])
+    block = problem.airspace.straight_cells(BENT_M)
+    x, y = _places(grid, col0, row1, ground.shape, block)
+    cells = ground.shape[0] - 1, ground.shape[1] - 1
+    looked_at = np.ones(cells, np.bool_)
+    if inside is not None:
+        node = inside(x, y)
+        looked_at = node[:-1, :-1] & node[:-1, 1:] & node[1:, :-1] & node[1:, 1:]
+    return Plane(
+        problem, col0, row1, block, x, y, top, ground, _slopes(top, x, y), looked_at, make_shapes(problem, x, y)
+    )
+
+
+def _slopes(z: Floats, x: Floats, y: Floats) -> Floats:
+    """(rows, cols) steepest slope of the cells around each node."""
+    across = math.dist((x[0, 0], y[0, 0]), (x[0, 1], y[0, 1]))
+    along = math.dist((x[0, 0], y[0, 0]), (x[1, 0], y[1, 0]))
+    east, north = np.abs(np.diff(z, axis=1)) / across, np.abs(np.diff(z, axis=0)) / along
+    a, b = np.zeros_like(z), np.zeros_like(z)
+    a[:, 1:] = east
+    np.maximum(a[:, :-1], east, out=a[:, :-1])
+    b[1:] = north
+    np.maximum(b[:-1], north, out=b[:-1])
+    return np.hypot(a, b)
+
+
+def _places(grid: GridMap, col0: int, row1: int, shape: tuple[int, int], span: int) -> tuple[Floats, Floats]:
+    """(rows, cols) x and y of a lattice's nodes, bilinear between the corners of blocks of ``span`` cells."""
+    rows, cols = shape
+    step = min(span, max(rows, cols))
+    c = np.arange(0, cols - 1 + step, step)
+    r = np.arange(0, rows - 1 + step, step)
+    corner = grid.to_plane(col0 + c[None, :], row1 - r[:, None])
+    j, i = np.arange(rows), np.arange(cols)
+    v, u = (j % step) / step, (i % step) / step
+    out = []
+    for k in range(2):
+        z = np.pad(corner[..., k], ((0, 1), (0, 1)), mode="edge")
+        side = z[:, i // step] * (1.0 - u) + z[:, i // step + 1] * u
+        out.append(np.ascontiguousarray(side[j // step] * (1.0 - v)[:, None] + side[j // step + 1] * v[:, None]))
+    return out[0], out[1]

@@ -1,0 +1,158 @@
+"""True optima that planners are held to: discs in the plane exactly, profiles over a track by linear programme.
+
+Nothing here comes from the planners: the shortest way past discs runs over common tangents and arcs alone, and the
+linear programme sees a sampled floor and ceiling.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.sparse import csr_array, eye_array, hstack, vstack
+from scipy.sparse.csgraph import dijkstra
+
+Floats = NDArray[np.float64]
+
+TOUCH = 1e-9
+"""How far, in radii of the largest disc, a tangent may seem to enter a disc that it touches."""
+NO_WAY = math.inf
+
+
+def shortest_past_discs(start: tuple[float, float], goal: tuple[float, float], discs: Floats) -> float:
+    """Length of the shortest way in the plane past the open ``discs`` (N, 3) x, y, radius; inf where there is none.
+
+    It consists of common tangents (start and goal are discs of radius 0) and arcs between them; discs may overlap.
+    An end inside a disc has no way.
+    """
+    d = _without_nested(np.asarray(discs, dtype=np.float64).reshape(-1, 3))
+    slack = TOUCH * max(1.0, float(d[:, 2].max(initial=0.0)))
+    for end in (start, goal):
+        if (np.hypot(d[:, 0] - end[0], d[:, 1] - end[1]) < d[:, 2] - slack).any():
+            return NO_WAY
+    all_discs = np.vstack([[*start, 0.0], [*goal, 0.0], d])
+    at, of, ends, lengths = _tangents(all_discs, slack)
+    rows, cols, weights = [ends[:, 0]], [ends[:, 1]], [lengths]
+    for disc in range(2):  # every tangent of an end meets the others there
+        nodes = np.flatnonzero(of == disc)
+        rows.append(nodes[:-1])
+        cols.append(nodes[1:])
+        weights.append(np.full(max(len(nodes) - 1, 0), 1e-300))
+    for disc in range(2, len(all_discs)):
+        nodes, arcs = _arcs(disc, at, of, all_discs, slack)
+        if len(nodes):
+            keep = np.isfinite(arcs)
+            rows.append(nodes[keep])
+            cols.append(np.roll(nodes, -1)[keep])
+            weights.append(arcs[keep])
+    first, last = np.flatnonzero(of == 0), np.flatnonzero(of == 1)
+    if not len(first) or not len(last):
+        return NO_WAY
+    # Parallel arcs between the same two nodes: a sparse array would add them up.
+    r, c, w = np.concatenate(rows), np.concatenate(cols), np.concatenate(weights)
+    low, high = np.minimum(r, c), np.maximum(r, c)
+    order = np.lexsort((w, high, low))
+    low, high, w = low[order], high[order], w[order]
+    one = np.ones(len(w), bool)
+    one[1:] = (np.diff(low) != 0) | (np.diff(high) != 0)
+    graph = csr_array((np.maximum(w[one], 1e-300), (low[one], high[one])), shape=(len(at), len(at)))
+    return float(dijkstra(graph, directed=False, indices=first[0])[last[0]])
+
+
+def _without_nested(d: Floats) -> Floats:
+    """Discs that lie in no other."""
+    keep = np.ones(len(d), bool)
+    for i in range(len(d)):
+        for j in range(len(d)):
+            inside = math.dist(d[i, :2], d[j, :2]) <= d[j, 2] - d[i, 2]
+            if i != j and keep[j] and inside and (d[i, 2] < d[j, 2] or j < i):
+                keep[i] = False
+    return d[keep]
+
+
+def _tangents(d: Floats, slack: float) -> tuple[Floats, NDArray[np.intp], NDArray[np.intp], Floats]:
+    """Ends (E, 2) of all free common tangents, the disc of each end (E,), tangents as (T, 2) ends, lengths (T,)."""
+    i, j = np.triu_indices(len(d), 1)
+    i, j, side, same = (
+        a.ravel()
+        for a in np.broadcast_arrays(
+            i[:, None, None], j[:, None, None], np.array([-1.0, 1.0])[None, :, None], np.array([1.0, -1.0])[None, None]
+        )
+    )
+    to = d[j, :2] - d[i, :2]
+    apart = np.hypot(*to.T)
+    # The normal that both circles share makes this cosine with the line of centres; ``same`` -1 is the inner pair.
+    cosine = (d[i, 2] - same * d[j, 2]) / np.maximum(apart, 1e-300)
+    # Where one disc is a point, inner and outer tangents are the same.
+    ok = (np.abs(cosine) <= 1.0) & ((same > 0.0) | ((d[i, 2] > 0.0) & (d[j, 2] > 0.0)))
+    if len(d) > 1:
+        ok &= ~((d[i, 2] == 0.0) & (d[j, 2] == 0.0) & (side < 0.0))
+    i, j, side, same, to, apart, cosine = (a[ok] for a in (i, j, side, same, to, apart, cosine))
+    unit = to / apart[:, None]
+    sine = side * np.sqrt(1.0 - cosine**2)
+    normal = np.stack([unit[:, 0] * cosine - unit[:, 1] * sine, unit[:, 0] * sine + unit[:, 1] * cosine], axis=-1)
+    a = d[i, :2] + d[i, 2, None] * normal
+    b = d[j, :2] + (same * d[j, 2])[:, None] * normal
+    along = b - a
+    length = np.hypot(*along.T)
+    for k in range(len(d)):
+        off = d[k, :2] - a
+        t = np.clip((off * along).sum(axis=1) / np.maximum(length**2, 1e-300), 0.0, 1.0)
+        gap = np.hypot(*(off - t[:, None] * along).T)
+        ok = gap >= d[k, 2] - slack
+        a, b, along, length, i, j = a[ok], b[ok], along[ok], length[ok], i[ok], j[ok]
+    count = len(a)
+    return (
+        np.vstack([a, b]),
+        np.concatenate([i, j]),
+        np.stack([np.arange(count), np.arange(count) + count], axis=-1),
+        length,
+    )
+
+
+def _arcs(disc: int, at: Floats, of: NDArray[np.intp], d: Floats, slack: float) -> tuple[NDArray[np.intp], Floats]:
+    """Ends on a disc by angle, and the arc from each to the next; inf where another disc covers a part of it."""
+    nodes = np.flatnonzero(of == disc)
+    x, y, radius = d[disc]
+    angle = np.arctan2(at[nodes, 1] - y, at[nodes, 0] - x)
+    order = np.argsort(angle, kind="stable")
+    nodes, angle = nodes[order], angle[order]
+    span = np.diff(angle, append=angle[:1] + 2.0 * math.pi)
+    free = np.ones(len(nodes), bool)
+    for k in range(2, len(d)):
+        apart = math.dist(d[k, :2], (x, y))
+        if k == disc or apart >= radius + d[k, 2] - slack:
+            continue
+        # No end lies inside another disc, so an arc is covered where it holds the middle of what the other covers.
+        middle = math.atan2(d[k, 1] - y, d[k, 0] - x)
+        free &= ~((middle - angle) % (2.0 * math.pi) < span)
+    return nodes, np.where(free, radius * span, NO_WAY)
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Altitudes ``amsl_m`` (N,) at the samples, and the least total of climb and descent that the programme found."""
+
+    amsl_m: Floats
+    vertical_m: float
+
+
+def profile_by_programme(
+    s_m: Floats, low_m: Floats, high_m: Floats, climb_slope: float = math.inf, descent_slope: float = math.inf
+) -> Profile | None:
+    """Least climb and descent from sample to sample between ``low_m`` and ``high_m`` (N,); None where none passes."""
+    n = len(s_m)
+    run = np.diff(s_m)
+    one, zero = eye_array(n - 1), csr_array((n - 1, n - 1))
+    rise = eye_array(n - 1, n, k=1) - eye_array(n - 1, n)
+    steep = np.concatenate([np.minimum(climb_slope, 1e6) * run, np.minimum(descent_slope, 1e6) * run])
+    found = linprog(
+        np.concatenate([np.zeros(n), np.ones(n - 1)]),
+        A_ub=vstack([hstack([rise, -one]), hstack([-rise, -one]), hstack([rise, zero]), hstack([-rise, zero])]),
+        b_ub=np.concatenate([np.zeros(2 * (n - 1)), steep]),
+        bounds=np.vstack([np.stack([low_m, high_m], axis=-1), np.tile([0.0, np.inf], (n - 1, 1))]),
+    )
+    return Profile(np.asarray(found.x[:n]), float(found.fun)) if found.status == 0 else None
