@@ -140,13 +140,12 @@ def _sees(excess: Floats, of: Ints, col: float, row: float, i: int, j: int) -> b
             return False
         if of[cj * (nx - 1) + ci] > 0:
             return False
-        if (
+        # The end's own cell may be free in part: it lies on the floor more often than not.
+        if not (ci == int(math.floor(col)) and cj == int(math.floor(row))) and (
             excess[cj, ci] > 0.0 or excess[cj, ci + 1] > 0.0
             or excess[cj + 1, ci] > 0.0 or excess[cj + 1, ci + 1] > 0.0
         ):  # fmt: skip
-            # The end's own cell may be free in part: it lies on the floor more often than not.
-            if not (ci == int(math.floor(col)) and cj == int(math.floor(row))):
-                return False
+            return False
         if ci == end_i and cj == end_j:
             return True
         # To the next cell: the nearer of the two edges ahead.

@@ -404,9 +404,7 @@ def _lid(
             values[n - 1, q] = excess[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)]
     for q in range(4):
         jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-        values[n - 1, q] = max(
-            values[n - 1, q], _level(zones, z, TOP, ground[jj, ii]) - floor[jj, ii] + excess[jj, ii]
-        )
+        values[n - 1, q] = max(values[n - 1, q], _level(zones, z, TOP, ground[jj, ii]) - floor[jj, ii] + excess[jj, ii])
     return count
 
 

@@ -89,8 +89,8 @@ class Below:
             pinned, pin_m = np.zeros(len(points), np.bool_), np.full(len(points), math.nan)
             pinned[0] = pinned[-1] = True
             at = 0
-            for leg, way in zip(self.legs[:-1], ways[:-1], strict=True):
-                at += len(way) - 1
+            for leg, part in zip(self.legs[:-1], ways[:-1], strict=True):
+                at += len(part) - 1
                 pinned[at] = True
                 pin_m[at] = math.nan if leg.goal.amsl_m is None else leg.goal.amsl_m
             track = make_track(self.problem, points, pinned, pin_m)
@@ -214,9 +214,7 @@ class Below:
 
         self.try_below(self.top_m, fine=True)
         layers = [Layer(max(self.known_m), self.top_m, sum(leg.length_m for leg in self.legs))]
-        bound = search_caps(
-            layers, cost_of, track_m, lambda: self.cost, try_at, p.gap_percent / 100.0, self._in_time
-        )
+        bound = search_caps(layers, cost_of, track_m, lambda: self.cost, try_at, p.gap_percent / 100.0, self._in_time)
         self._raise_bound(bound)
 
     def bound_of_tracks(self) -> float:

@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
-
 from gcsplan.planners.band import plan_band
 from gcsplan.planners.below import Below
 from gcsplan.planners.diagnose import Refusal, check_ends, explain

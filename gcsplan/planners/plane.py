@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners._any_angle import search
 from gcsplan.planners._fill import fill, raise_cone
 from gcsplan.planners._mesh import UNDER, UNDER_2, least_of_cells, make_pieces, make_portals, sort_portals, stamp_zones
-from gcsplan.planners._any_angle import search
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.shapes import SPARE_M, Shapes, make_shapes
 from gcsplan.world.surface import GridMap
@@ -82,7 +82,11 @@ class Mesh:
         return found
 
     def way(
-        self, start: tuple[float, float], goal: tuple[float, float], limit_m: float = math.inf, guide: Guide | None = None
+        self,
+        start: tuple[float, float],
+        goal: tuple[float, float],
+        limit_m: float = math.inf,
+        guide: Guide | None = None,
     ) -> Way | None:
         """The shortest way that is shorter than ``limit_m``. ``guide``: distances to ``goal`` over a mesh that leaves
         no less room."""

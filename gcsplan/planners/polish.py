@@ -73,8 +73,10 @@ def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tupl
     while len(points) > 2:
         n = len(points)
         drop = np.array([i for i in range(1, n - 1) if not pinned[i]], np.intp)
-        legs_a, legs_b, choices = [], [], []
-        for i in drop:
+        legs_a: list[Floats] = []
+        legs_b: list[Floats] = []
+        choices: list[tuple[int, Floats | None]] = []
+        for i in drop.tolist():
             legs_a.append(np.stack([points[i - 1]]))
             legs_b.append(np.stack([points[i + 1]]))
             choices.append((i, None))

@@ -50,7 +50,7 @@ def _least(value: Floats, first: NDArray[np.intp], last: NDArray[np.intp], size:
         half = 1 << (level - 1)
         np.minimum(table[level - 1], table[level], out=table[level - 1])
         np.minimum(table[level - 1, half:], table[level, : size - half], out=table[level - 1, half:])
-    return table[0]
+    return np.asarray(table[0])
 
 
 def rise_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> float:

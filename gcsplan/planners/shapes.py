@@ -117,7 +117,7 @@ def _crossing(found: list[tuple[int, Zone, Floats | None]], reach: float) -> lis
         for b in some[n + 1 :]:
             p, q = found[a][1], found[b][1]
             # Both over, or both under, is passed as the higher (lower) of the two.
-            one_way = p.floor is None and q.floor is None or p.ceiling is None and q.ceiling is None
+            one_way = (p.floor is None and q.floor is None) or (p.ceiling is None and q.ceiling is None)
             if found[a][0] == found[b][0] or one_way:
                 continue
             u, v = p.bounds, q.bounds

@@ -9,12 +9,14 @@ climb limit, every profile through those doors does.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from gcsplan.planners._taut import draw
 
 Floats = NDArray[np.float64]
 
@@ -94,95 +96,23 @@ def taut_string(
     return Profile(s, z)
 
 
-@njit(cache=True)
 def _pinch(low: Floats, high: Floats, z0: float, z1: float) -> tuple[int, float]:
     """Index of the tightest door and by how much its floor is over its ceiling (negative: it is open).
 
     NaN in a door is a closed door: unknown is never room.
     """
-    n = len(low)
-    worst, gap = 0, -np.inf
-    for i in range(n):
-        by = low[i] - high[i]
-        if i == 0:
-            by = max(by, max(low[i] - z0, z0 - high[i]))
-        elif i == n - 1:
-            by = max(by, max(low[i] - z1, z1 - high[i]))
-        if by != by:
-            by = np.inf
-        if by > gap:
-            worst, gap = i, by
-    if gap == -np.inf:
-        gap = -1.0  # every door open without end
-    return worst, gap
+    with np.errstate(invalid="ignore"):
+        by = low - high
+    by[0] = max(by[0], low[0] - z0, z0 - high[0])
+    by[-1] = max(by[-1], low[-1] - z1, z1 - high[-1])
+    by[np.isnan(by)] = np.inf
+    worst = int(np.argmax(by))
+    gap = float(by[worst])
+    return worst, -1.0 if gap == -math.inf else gap  # -inf: every door open without end
 
 
-@njit(cache=True)
-def _pull(s: Floats, low: Floats, high: Floats, z0: float, z1: float) -> tuple[NDArray[np.intp], Floats]:
-    """The funnel: the shortest paths to the last door's two edges, from the apex where they part."""
+def _pull(s: Floats, low: Floats, high: Floats, z0: float, z1: float) -> tuple[NDArray[np.int64], Floats]:
     n = len(s)
-    # The string never leaves the range of what it must touch, so an edge beyond it is no edge: no infinities below.
-    top, bottom = max(z0, z1), min(z0, z1)
-    for i in range(1, n - 1):
-        top = max(top, low[i])
-        bottom = min(bottom, high[i])
-    out = np.empty(n, np.intp)
-    out_z = np.empty(n)
-    over = np.empty(n + 1, np.intp)  # chain to the high edge: convex, hangs under ceilings
-    over_z = np.empty(n + 1)
-    under = np.empty(n + 1, np.intp)  # chain to the low edge: concave, lies over floors
-    under_z = np.empty(n + 1)
-    over[0] = under[0] = 0
-    over_z[0] = under_z[0] = z0
-    out[0], out_z[0], count = 0, z0, 1
-    over_head = over_tail = under_head = under_tail = 0  # head is the apex in both
-    for i in range(1, n):
-        if i == n - 1:
-            up = down = z1
-        else:
-            up, down = min(high[i], top), max(low[i], bottom)
-        # High edge: keep slopes rising along its chain.
-        t = over_tail
-        while t > over_head and (over_z[t] - over_z[t - 1]) * (s[i] - s[over[t]]) >= (up - over_z[t]) * (
-            s[over[t]] - s[over[t - 1]]
-        ):
-            t -= 1
-        if t == over_head:
-            # The straight line may dive under the low chain: then the apex walks along that chain.
-            h = under_head
-            while h < under_tail and (under_z[h + 1] - under_z[h]) * (s[i] - s[under[h]]) > (up - under_z[h]) * (
-                s[under[h + 1]] - s[under[h]]
-            ):
-                h += 1
-                out[count], out_z[count] = under[h], under_z[h]
-                count += 1
-            under_head = h
-            t = over_head = 0
-            over[0], over_z[0] = under[h], under_z[h]
-        over_tail = t + 1
-        over[over_tail], over_z[over_tail] = i, up
-        # Low edge: keep slopes falling along its chain.
-        t = under_tail
-        while t > under_head and (under_z[t] - under_z[t - 1]) * (s[i] - s[under[t]]) <= (down - under_z[t]) * (
-            s[under[t]] - s[under[t - 1]]
-        ):
-            t -= 1
-        if t == under_head:
-            h = over_head
-            while h < over_tail and (over_z[h + 1] - over_z[h]) * (s[i] - s[over[h]]) < (down - over_z[h]) * (
-                s[over[h + 1]] - s[over[h]]
-            ):
-                h += 1
-                out[count], out_z[count] = over[h], over_z[h]
-                count += 1
-            over_head = h
-            t = under_head = 0
-            under[0], under_z[0] = over[h], over_z[h]
-        under_tail = t + 1
-        under[under_tail], under_z[under_tail] = i, down
-    # Both chains end in (s[-1], z1) now and have no room between them beyond the apex.
-    for k in range(over_head + 1, over_tail + 1):
-        if over[k] != out[count - 1]:
-            out[count], out_z[count] = over[k], over_z[k]
-            count += 1
-    return out[:count].copy(), out_z[:count].copy()
+    at, chains = np.empty((3, n + 1), np.int64), np.empty((3, n + 1))
+    count = draw(*(np.ascontiguousarray(a, np.float64) for a in (s, low, high)), z0, z1, at, chains)
+    return at[0, :count].copy(), chains[0, :count].copy()

@@ -12,9 +12,9 @@ from heapq import heappop, heappush
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from gcsplan.planners._taut import edge
 from gcsplan.planners.lattice import ENDS_M
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.taut_string import Blocked, Profile, taut_string
@@ -237,18 +237,14 @@ class _Room:
         return out
 
 
-@njit(cache=True)
 def _narrow(low: Floats, high: Floats) -> None:
-    last = len(low) - 1
-    for i in range(last + 1):
-        if i in (0, last):
-            low[i] -= 1e-6
-            high[i] += 1e-6
-        elif high[i] - low[i] >= 2.0 * KEEP_M:
-            low[i] += KEEP_M
-            high[i] -= KEEP_M
-        elif high[i] >= low[i]:
-            low[i] = high[i] = 0.5 * (low[i] + high[i])
+    room = high - low
+    middle = 0.5 * (low + high)
+    wide, open_ = room >= 2.0 * KEEP_M, room >= 0.0
+    ends = low[[0, -1]] - 1e-6, high[[0, -1]] + 1e-6
+    low[:] = np.where(wide, low + KEEP_M, np.where(open_, middle, low))
+    high[:] = np.where(wide, high - KEEP_M, np.where(open_, middle, high))
+    low[[0, -1]], high[[0, -1]] = ends
 
 
 def _rooms(problem: Problem, track: Track, known: Sequence[tuple[float, float, float]]) -> _Room:
@@ -316,26 +312,8 @@ def _forgive(low: Floats, high: Floats, k: int, z: float) -> None:
         high[k] = z
 
 
-@njit(cache=True)
 def _edge(s: Floats, at: Floats, value: Floats, highest: bool) -> Floats:
     """A piecewise-linear function with jumps at rising places ``s``: the higher (lower) limit where it jumps."""
     out = np.empty(len(s))
-    pieces = len(value)
-    k = 0
-    for i in range(len(s)):
-        while k < pieces - 1 and at[k + 1] < s[i] - 1e-9:
-            k += 1
-        a, b = value[k, 0], value[k, 1]
-        width = at[k + 1] - at[k]
-        if s[i] >= at[k + 1] - 1e-9 or width <= 0.0:
-            v = b
-            if k < pieces - 1 and s[i] >= at[k + 1] - 1e-9:
-                v = max(b, value[k + 1, 0]) if highest else min(b, value[k + 1, 0])
-        elif s[i] <= at[k] + 1e-9 or a == b:
-            v = a
-        elif np.isinf(a) or np.isinf(b):
-            v = max(a, b) if highest else min(a, b)
-        else:
-            v = a + (b - a) * (s[i] - at[k]) / width
-        out[i] = v
+    edge(*(np.ascontiguousarray(a, np.float64) for a in (s, at, value)), highest, out)
     return out
