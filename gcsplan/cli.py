@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from gcsplan.benches import bench_app
 from gcsplan.ending import Interrupted, emit, explained, fail, put, speak_plainly, talking
 from gcsplan.errors import CheckFailed, GcsplanError, InputError, NoMission, UsageError
 from gcsplan.options import (
@@ -42,7 +43,6 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 2 bad input, 3 no mission, 4 violation, 5 refused, 6 unknown or dead link, "
     "7 read-back differs, 70 a bug of ours, 130 interrupted.",
 )
-bench_app = typer.Typer(help="Measurements: legs checked a second; upload beside MAVSDK's.", no_args_is_help=True)
 app.add_typer(bench_app, name="bench")
 
 
@@ -342,38 +342,6 @@ def planners(as_json: JsonOption = False) -> None:
         emit({"planners": rows})
     else:
         planners_table(rows)
-
-
-@bench_app.command("check", short_help="Legs checked a second.")
-def bench_check(
-    legs: Annotated[int, typer.Option(metavar="N", help="Random one-kilometre legs.")] = 200_000,
-    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the legs.")] = 1,
-    as_json: JsonOption = False,
-) -> None:
-    """How many one-kilometre legs are checked in a second, on the sample terrain."""
-    from gcsplan.bench import check as bench
-
-    result = bench.run(legs=legs, seed=seed)
-    if as_json:
-        emit(result)
-    else:
-        put(bench.report(result) + "\n")
-
-
-@bench_app.command("upload", short_help="Upload beside MAVSDK's.")
-def bench_upload(
-    items: Annotated[int, typer.Option(metavar="N", help="Items of the mission.")] = 600,
-    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each, in turn.")] = 15,
-    as_json: JsonOption = False,
-) -> None:
-    """Upload to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
-    from gcsplan.bench import upload as bench
-
-    result = bench.run(items=items, runs=runs)
-    if as_json:
-        emit(result)
-    else:
-        put(bench.report(result) + "\n")
 
 
 @app.callback(invoke_without_command=True)

@@ -46,7 +46,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 # Modules beside the rooms that belong to one: the way of the data.
 STEPS = {"outputs", "delivery", "checking"}
 # Likewise of the command line: its options, and how it ends.
-COMMAND_LINE = {"ending", "options"}
+COMMAND_LINE = {"benches", "ending", "options"}
 
 PROJECTION = {"world/frame.py", "world/datum.py", "world/terrain.py"}
 SOCKETS = {"mavlink/link.py", "mavlink/transport.py", "sim/server.py", "sim/sockets.py"}

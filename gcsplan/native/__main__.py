@@ -19,7 +19,7 @@ import time
 
 from gcsplan.native import shelf
 
-ALL = ("gcsplan.world._compiled:KERNELS",)
+ALL = ("gcsplan.world._compiled:KERNELS", "gcsplan.planners.compiled:UNIT")
 
 
 def main() -> None:

@@ -12,12 +12,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.compiled import device, digest, kernel
+from gcsplan.planners.compiled import device, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-SOURCES = digest("compiled.py", "_any_angle.py")
 Names = NDArray[np.int64]
 
 ROOT_X, ROOT_Y, COST, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, AHEAD = range(8)
@@ -91,12 +90,12 @@ def _off(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> fl
     return math.sqrt((ax + t * ex - px) ** 2 + (ay + t * ey - py) ** 2)
 
 
-@kernel
+@kernel("i4[] f8[,] i8[,] i4[,] i4[] f8[] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[] f8[,] i4[,] i8[,] f8[] i4[] f8[,]")
 def search(
     start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats,
     sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float, slack: float, most: int,
     remaining: Floats, entered: Floats,
-    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats, sources: str = SOURCES,
+    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats,
 ) -> int:  # fmt: skip
     """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
 
@@ -124,7 +123,7 @@ def search(
             lx = ly = qx = qy = 0.0
             left = right = np.int64(-1)
             root = np.int64(-2 - source)
-            parent, turns = np.int64(-1), np.int32(0)
+            parent, turns = np.int64(-1), 0
             source += 1
         else:
             if size == 0 or heap[0] >= limit:

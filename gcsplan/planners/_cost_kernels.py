@@ -265,7 +265,7 @@ def _limit_terms(x, y, z, ground, floor, weight, numbers, out):  # type: ignore[
     west, south, bottom = numbers[WEST], numbers[SOUTH], numbers[BOTTOM]
     east, north, top = numbers[EAST], numbers[NORTH], numbers[TOP]
     below, sunk, above, proud, unknown, under, outside, dark = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(len(x)):
+    for i in range(1, len(x) - 1):  # start and goal are given, and stand on the floor itself
         w, h = weight[i], z[i]
         deep, high = max(0.0, floor[i] - h), max(0.0, h - min(ground[i] + agl, amsl))  # NaN comes second: 0 stays
         below += w if deep > 0.0 else 0.0

@@ -7,19 +7,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.compiled import device, digest, kernel
+from gcsplan.planners.compiled import device, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-SOURCES = digest("compiled.py", "_fill.py")
 
-
-@kernel
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] b1[,] i8 f8 f8 f8 f8[,] b1 f8[,] f8[,] f8[,] f8[,] f8[,] i1[]")
 def fill(
     top: Floats, ground: Floats, steep: Floats, x: Floats, y: Floats, wanted: NDArray[np.bool_], fineness: int,
     more: float, beside: float, cap: float, cones: Floats, low: bool, excess: Floats, floor: Floats, under: Floats,
-    fine_x: Floats, fine_y: Floats, diagonal: NDArray[np.int8], sources: str = SOURCES,
+    fine_x: Floats, fine_y: Floats, diagonal: NDArray[np.int8],
 ) -> None:  # fmt: skip
     """Cut each ``wanted`` (rows - 1, cols - 1) cell into ``fineness`` parts a side and give their nodes values.
 
@@ -79,10 +77,10 @@ def _mix(z: Floats, j: int, i: int, a: float, b: float, c: float, d: float) -> f
     return out
 
 
-@kernel
+@kernel("f8[,] f8[,] i4[] f8[,] f8[,] f8 f8 f8 f8 f8 f8 f8 i1[,]")
 def raise_cone(
     excess: Floats, floor: Floats, of: Ints, x: Floats, y: Floats, at_x: float, at_y: float, col: float, row: float,
-    height: float, slope: float, cap: float, seen: NDArray[np.int8], sources: str = SOURCES,
+    height: float, slope: float, cap: float, seen: NDArray[np.int8],
 ) -> None:  # fmt: skip
     """Hold nodes near an end to what can be climbed to from there, where a bound may.
 

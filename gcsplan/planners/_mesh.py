@@ -10,17 +10,14 @@ Only the portals are kept, the parts of edges that two pieces share: walls are w
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.compiled import device, digest, kernel
+from gcsplan.planners.compiled import device, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-SOURCES = digest("compiled.py", "_mesh.py")
 
 OPEN = -1e-9
 """A node with less excess than this is free all around."""
@@ -51,10 +48,9 @@ def _corner(excess: Floats, of: Ints, values: Floats, nx: int, j: int, i: int, k
     return excess[j + (k >> 1), i + ((k ^ (k >> 1)) & 1)]
 
 
-@kernel
+@kernel("f8[,] i4[] f8[,] i1[] i4[,] i8")
 def make_pieces(
     excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], piece: Ints, block: int,
-    sources: str = SOURCES,
 ) -> int:  # fmt: skip
     """Number the pieces: ``piece`` (cells, 2), the lower and the upper triangle's, -1 where nothing is free.
 
@@ -127,10 +123,10 @@ def _is_corner(
     return False
 
 
-@kernel
+@kernel("f8[,] i4[] f8[,] i1[] i4[,] f8[,] f8[,] i8 f8[,] i8[,] i4[,] f8[]")
 def make_portals(
     excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], piece: Ints, x: Floats, y: Floats, block: int,
-    ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats, sources: str = SOURCES,
+    ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats,
 ) -> int:  # fmt: skip
     """Every portal once: ``ends`` (room, 4) from x, y to x, y; ``names`` (room, 2) of its ends; ``joins`` (room, 2)
     the pieces at its left and right. Returns how many there are; room for fewer is filled.
@@ -228,8 +224,12 @@ def make_portals(
     return n
 
 
-@kernel
-def sort_portals(joins: Ints, start: Ints, order: Ints, sources: str = SOURCES) -> None:
+@kernel("i4[,] i4[] i4[]")
+def sort_portals(
+    joins: Ints,
+    start: Ints,
+    order: Ints,
+) -> None:
     """``order`` (2 N,) the portals of piece p at start[p] : start[p + 1]; ``start`` (pieces + 1,) is zeros."""
     pieces = len(start) - 1
     for n in range(len(joins)):
@@ -247,10 +247,9 @@ def sort_portals(joins: Ints, start: Ints, order: Ints, sources: str = SOURCES) 
             order[start[p]] = n
 
 
-@kernel
+@kernel("i4[,] f8[] i8 i4[,] i8 i8 f8[]")
 def least_of_cells(
     piece: Ints, value: Floats, cols: int, fine_piece: Ints, fine_cols: int, ratio: int, out: Floats,
-    sources: str = SOURCES,
 ) -> None:  # fmt: skip
     """For each piece of a finer mesh (``out``, inf before) the least value of the coarse pieces in its cells.
 
@@ -268,170 +267,3 @@ def least_of_cells(
             p = fine_piece[k, half]
             if p >= 0 and least < out[p]:
                 out[p] = least
-
-
-EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
-PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, NUMBERS = range(10, 17)
-
-
-@device
-def _depth(zones: Floats, edges: Floats, z: int, x: float, y: float) -> float:
-    """How far a point is inside a zone's convex shape: concave, above 0 inside."""
-    if zones[z, RADIUS] >= 0.0:
-        return zones[z, RADIUS] - math.sqrt((x - zones[z, EAST]) ** 2 + (y - zones[z, NORTH]) ** 2)
-    depth = np.inf
-    for k in range(int(zones[z, FIRST]), int(zones[z, LAST])):
-        depth = min(depth, _within(edges, k, x, y))
-    return depth
-
-
-@device
-def _within(edges: Floats, k: int, x: float, y: float) -> float:
-    """How far a point is inside a disc or a half-plane."""
-    if edges[k, 3] > 0.0:
-        return edges[k, 0] - math.sqrt((x - edges[k, 1]) ** 2 + (y - edges[k, 2]) ** 2)
-    return edges[k, 0] - edges[k, 1] * x - edges[k, 2] * y
-
-
-@device
-def _level(zones: Floats, z: int, level: int, ground: float) -> float:
-    """A level of a zone where the ground is so high; its datum is told two numbers further on."""
-    return zones[z, level] + (ground if zones[z, level + 2] > 0.0 else 0.0)
-
-
-@device
-def _open(zones: Floats, z: int, floor: float, allowed: float, ground: float) -> bool:
-    """Whether there is an altitude to fly at, over a zone, under it, or between the two of a pair."""
-    bottom, top = _level(zones, z, BOTTOM, ground), _level(zones, z, TOP, ground)
-    if zones[z, PAIR] == 0.0:
-        return top <= allowed or (zones[z, UNDER] > 0.0 and floor <= bottom)
-    bottom_2, top_2 = _level(zones, z, BOTTOM_2, ground), _level(zones, z, TOP_2, ground)
-    under, under_2 = zones[z, UNDER] > 0.0, zones[z, UNDER_2] > 0.0
-    if max(top, top_2) <= allowed or (under and under_2 and floor <= min(bottom, bottom_2)):
-        return True
-    if under_2 and top <= min(bottom_2, allowed) and floor <= bottom_2:
-        return True
-    return under and top_2 <= min(bottom, allowed) and floor <= bottom
-
-
-@kernel
-def stamp_zones(
-    excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
-    low: bool, of: Ints, values: Floats, sources: str = SOURCES,
-) -> int:  # fmt: skip
-    """Give cells that zones shut corner values of their own: how deep in the shape they lie. Returns how many.
-
-    ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells that each may touch. ``low``: only
-    what is shut for certain (of several zones, and ground, the one that shuts most); else all that may be shut.
-    """
-    nx = excess.shape[1]
-    count = 0
-    for z in range(len(zones)):
-        for j in range(boxes[z, 2], boxes[z, 3] + 1):
-            for i in range(boxes[z, 0], boxes[z, 1] + 1):
-                deepest, shallowest = -np.inf, np.inf
-                ways = 0
-                for k in range(4):
-                    jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
-                    g = _depth(zones, edges, z, x[jj, ii], y[jj, ii])
-                    deepest, shallowest = max(deepest, g), min(shallowest, g)
-                    if _open(zones, z, floor[jj, ii], floor[jj, ii] - excess[jj, ii], ground[jj, ii]):
-                        ways += 1
-                if ways == 4:
-                    continue
-                if shallowest > 0.0 and zones[z, PAIR] == 0.0 and zones[z, UNDER] == 0.0 and zones[z, TOP] < np.inf:
-                    # The whole cell is under a lid, which is what must be flown over: bilinear, as ground is.
-                    count = _lid(excess, floor, ground, zones, z, low, of, values, j, i, count)
-                    continue
-                if low and ways > 0:
-                    continue
-                dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
-                square = dx * dx + dy * dy
-                more = 0.0
-                if not low:
-                    # A linear function under a concave one: by so much it may be too low between the corners.
-                    more = 0.02
-                    if zones[z, RADIUS] >= 0.0:
-                        more += square / (8.0 * max(zones[z, RADIUS] - math.sqrt(square), 0.5 * math.sqrt(square)))
-                    elif zones[z, LAST] - zones[z, FIRST] > 1.0 and shallowest < 0.0:
-                        more += _kink(zones, edges, z, x, y, j, i)
-                    if zones[z, RADIUS] >= 0.0 and deepest + more <= 0.0 and _meets(zones, z, x, y, j, i):
-                        more = 0.02 - deepest  # a disc that no corner lies near
-                if deepest + more <= 0.0:
-                    continue
-                k = j * (nx - 1) + i
-                n = of[k]
-                if n == 0:
-                    count += 1
-                    n = of[k] = count
-                    for q in range(4):
-                        values[n - 1, q] = excess[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)]
-                was = now = 0.0
-                for q in range(4):
-                    g = more + _depth(zones, edges, z, x[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)],
-                                      y[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)])  # fmt: skip
-                    if not low:
-                        values[n - 1, q] = max(values[n - 1, q], g)
-                    was += 1e6 if values[n - 1, q] > 0.0 else 0.0
-                    was += min(max(values[n - 1, q], -1e3), 1e3)
-                    now += (1e6 if g > 0.0 else 0.0) + min(max(g, -1e3), 1e3)
-                if low and now > was:
-                    for q in range(4):
-                        values[n - 1, q] = _depth(zones, edges, z, x[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)],
-                                                  y[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)])  # fmt: skip
-    return count
-
-
-@device
-def _lid(
-    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, low: bool, of: Ints, values: Floats,
-    j: int, i: int, count: int,
-) -> int:  # fmt: skip
-    """Give a cell the excess of a zone's ceiling where that is above the floor; returns how many cells have their own."""
-    k = j * (excess.shape[1] - 1) + i
-    more = 0
-    for q in range(4):
-        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-        if _level(zones, z, TOP, ground[jj, ii]) > floor[jj, ii]:
-            more += 1
-    n = of[k]
-    if more == 0 or (low and (more < 4 or n > 0)):
-        return count
-    if n == 0:
-        count += 1
-        n = of[k] = count
-        for q in range(4):
-            values[n - 1, q] = excess[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)]
-    for q in range(4):
-        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-        values[n - 1, q] = max(values[n - 1, q], _level(zones, z, TOP, ground[jj, ii]) - floor[jj, ii] + excess[jj, ii])
-    return count
-
-
-@device
-def _meets(zones: Floats, z: int, x: Floats, y: Floats, j: int, i: int) -> bool:
-    """Whether a disc reaches into the box around a cell."""
-    west, east = min(x[j, i], x[j + 1, i]), max(x[j, i + 1], x[j + 1, i + 1])
-    south, north = min(y[j, i], y[j, i + 1]), max(y[j + 1, i], y[j + 1, i + 1])
-    dx = zones[z, EAST] - min(max(zones[z, EAST], west), east)
-    dy = zones[z, NORTH] - min(max(zones[z, NORTH], south), north)
-    return dx * dx + dy * dy < zones[z, RADIUS] ** 2
-
-
-@device
-def _kink(zones: Floats, edges: Floats, z: int, x: Floats, y: Floats, j: int, i: int) -> float:
-    """How much the least of several linear functions may rise between a cell's corners above its interpolation."""
-    most = 0.0
-    for k in range(int(zones[z, FIRST]), int(zones[z, LAST])):
-        # Where one edge alone binds at all four corners, the function is linear: nothing to add.
-        alone = True
-        for q in range(4):
-            jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-            own = _within(edges, k, x[jj, ii], y[jj, ii])
-            if own > _depth(zones, edges, z, x[jj, ii], y[jj, ii]) + 1e-9:
-                alone = False
-        if alone:
-            return 0.0
-        most = 1.0
-    dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
-    return 0.5 * math.sqrt(dx * dx + dy * dy) * most

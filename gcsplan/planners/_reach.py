@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.planners.compiled import device, digest, kernel
+from gcsplan.planners.compiled import device, kernel
 
 COST, LOW, HIGH, CHEAP_LOW, CHEAP_HIGH = range(5)
 AT, PARENT, NEXT, ALIVE = range(4)
@@ -18,7 +18,6 @@ COUNT, SIZE, OPENED, REACHED, COMPLETE = range(5)
 STEP, GOAL_X, GOAL_Y, GOAL_LOW, GOAL_HIGH, CAP, UP, DOWN, WEIGHT, SPARE = range(10)
 """Places in what the search is told."""
 
-SOURCES = digest("_reach.py", "compiled.py")
 DONE, SHORT = 0, 1
 AT_ONCE = 1024
 """Most labels that one label leads to; so much room there must be."""
@@ -146,11 +145,13 @@ def admit(to, v, value, name, first, held, most, told):  # type: ignore[no-untyp
     return 1 if held[to] < most else -1
 
 
-@kernel
+@kernel(
+    "f8[,] f8[,] i8[,] i8[] f8[] f8[] i8[] i8[] f8[] f8[,] f8[,] f8[] i8 i8 i8 i8[] i8[,] f8[,] f8[] i8[] i8[] i8[]"
+    " i8[] f8[] f8[,]"
+)
 def reach(  # type: ignore[no-untyped-def]
     floor, ceiling, steps, band_at, band_low, band_high, link_at, link_to, link_length, link_low, link_high,
     told, want, most_opened, most_held, state, name, value, keys, ids, first, held, goals, v, door,
-    sources=SOURCES,
 ):  # fmt: skip
     """Search until ``want`` labels have reached the goal; `DONE`, or `SHORT` where there must be more room to go on.
 

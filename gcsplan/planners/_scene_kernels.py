@@ -128,9 +128,10 @@ def shut_by_zones(points, ground, low, high, zones, corners, out, sources=SOURCE
 
 
 @kernel
-def open_edges(
-    starts, ends, step_m, grounded, heights, quadratic, floors, floor_map, numbers, zones, corners, out, sources=SOURCES
-):  # type: ignore[no-untyped-def]
+def open_edges(  # type: ignore[no-untyped-def]
+    starts, ends, step_m, grounded, heights, quadratic, floors, floor_map, numbers, zones, corners, out,
+    sources=SOURCES,
+):  # fmt: skip
     """Lengths of straight edges from ``starts`` (A, 3) to ``ends`` (B, 3) into ``out`` (A, B); inf where a point of
     one, no further than ``step_m`` from the next, is not allowed, or where it is too steep."""
     for a in range(len(starts)):

@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.compiled import device, digest, kernel
+from gcsplan.planners.compiled import device, kernel
 
 Floats = NDArray[np.float64]
 
@@ -24,8 +24,6 @@ MOST_DOORS = 6000
 
 # Numbers that a kernel is told: by these places in `spec`.
 WEST, SOUTH, PER_STEP, SPACING, MARGIN, UP, DOWN, VERTICAL, HORIZONTAL, ENERGY, PENALTY, REACH = range(12)
-
-SOURCES = digest("_string.py", "compiled.py")
 
 
 @device
@@ -213,10 +211,12 @@ def aim(move, turn, a, v, b, step, bend):  # type: ignore[no-untyped-def]
     return 1, 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.0, 0.0, 0
 
 
-@kernel
+@kernel(
+    "f8[,] f8[] f8[] f8[] i8 f8 f8 f8[,] f8[,] f8[,] f8[,] f8[] f8[] f8 i8 f8 f8[,] f8[,] f8[] f8[] f8[,] f8[] f8[]"
+)
 def pull(  # type: ignore[no-untyped-def]
     p, pinned, pz, zs, count, za, zb, floor, ceiling, circles, edges, spec, steps, gain, rounds, around_m,
-    doors, chain, at, z, cand, cand_z, total, sources=SOURCES,
+    doors, chain, at, z, cand, cand_z, total,
 ):  # fmt: skip
     """Make the track p[:count] cheaper, in place, by moves of ``steps`` metres, largest first; the new count.
 

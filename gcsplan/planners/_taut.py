@@ -5,17 +5,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.compiled import digest, kernel
+from gcsplan.planners.compiled import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SOURCES = digest("compiled.py", "_taut.py")
 
-
-@kernel
+@kernel("f8[] f8[] f8[] f8 f8 i8[,] f8[,]")
 def draw(
-    s: Floats, low: Floats, high: Floats, z0: float, z1: float, at: Ints, chains: Floats, sources: str = SOURCES
+    s: Floats,
+    low: Floats,
+    high: Floats,
+    z0: float,
+    z1: float,
+    at: Ints,
+    chains: Floats,
 ) -> int:
     """The funnel: the shortest paths to the last door's two edges, from the apex where they part.
 
@@ -86,8 +90,14 @@ def draw(
     return count
 
 
-@kernel
-def edge(s: Floats, at: Floats, value: Floats, highest: bool, out: Floats, sources: str = SOURCES) -> None:
+@kernel("f8[] f8[] f8[,] b1 f8[]")
+def edge(
+    s: Floats,
+    at: Floats,
+    value: Floats,
+    highest: bool,
+    out: Floats,
+) -> None:
     """A piecewise-linear function with jumps at rising places ``s``: the higher (lower) limit where it jumps."""
     pieces = len(value)
     k = 0

@@ -116,19 +116,9 @@ def open_between(scene: Scene, layers: list[Floats]) -> list[Floats]:
         if lengths.size:
             step_m = max(float(np.hypot(*(b.mean(axis=0) - a.mean(axis=0))[:2])) / EDGE_PARTS, 0.1)
             k.open_edges(
-                a,
-                b,
-                step_m,
-                scene.follows_ground,
-                scene.heights,
-                scene.quadratic,
-                scene.floors,
-                scene.floor_map,
-                scene.numbers,
-                scene.zones,
-                scene.corners,
-                lengths,
-            )
+                a, b, step_m, scene.follows_ground, scene.heights, scene.quadratic, scene.floors, scene.floor_map,
+                scene.numbers, scene.zones, scene.corners, lengths,
+            )  # fmt: skip
         out.append(lengths)
     return out
 

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from gcsplan.planners._any_angle import search
 from gcsplan.planners._fill import fill, raise_cone
-from gcsplan.planners._mesh import UNDER, UNDER_2, least_of_cells, make_pieces, make_portals, sort_portals, stamp_zones
+from gcsplan.planners._mesh import least_of_cells, make_pieces, make_portals, sort_portals
+from gcsplan.planners._stamp import UNDER, UNDER_2, stamp_zones
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.shapes import SPARE_M, Shapes, make_shapes
 from gcsplan.world.surface import GridMap
@@ -100,8 +101,8 @@ class Mesh:
         slack: float,
         guide: Guide | None = None,
     ) -> tuple[Way | None, Guide]:
-        """The same, and how far every piece is from ``start`` at least, as far as ways to ``goal`` lead that are shorter
-        than ``limit_m`` and than the shortest with ``slack`` (as a part of it) added."""
+        """The same, and how far every piece is from ``start`` at least, as far as ways to ``goal`` lead that are
+        shorter than ``limit_m`` and than the shortest with ``slack`` (as a part of it) added."""
         entered = np.full(len(self.start) - 1, np.inf)
         way = self._search(start, goal, limit_m, slack, guide, entered)
         entered[self.pieces_at(start)] = 0.0

@@ -68,7 +68,7 @@ def _moved(problem: Problem, points: Floats, pinned: Bools, parity: int) -> Floa
 
 
 def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tuple[Floats, Bools]:
-    """Fewer points: one left out, or two made one where their outer legs meet, while all of it costs ``worth`` at most."""
+    """Fewer points: one left out, or two made one where their outer legs meet, all of it for ``worth`` at most."""
     spent = 0.0
     while len(points) > 2:
         n = len(points)
@@ -89,11 +89,11 @@ def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tupl
         if not choices:
             break
         extra = []
-        for i, corner in choices:
-            if corner is None:
+        for i, choice in choices:
+            if choice is None:
                 span, new = points[i - 1 : i + 2], points[[i - 1, i + 1]]
             else:
-                span, new = points[i - 1 : i + 3], np.stack([points[i - 1], corner, points[i + 2]])
+                span, new = points[i - 1 : i + 3], np.stack([points[i - 1], choice, points[i + 2]])
             extra.append(_cost(problem, new) - _cost(problem, span))
         cheap = [k for k in np.argsort(extra, kind="stable") if spent + max(extra[k], 0.0) <= worth]
         if not cheap:
@@ -105,29 +105,29 @@ def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tupl
         taken: list[tuple[int, Floats | None]] = []
         busy: set[int] = set()
         for k in legal:
-            i, corner = choices[k]
-            touched = set(range(i - 1, i + (2 if corner is None else 3)))
+            i, choice = choices[k]
+            touched = set(range(i - 1, i + (2 if choice is None else 3)))
             if touched & busy or spent + max(extra[k], 0.0) > worth:
                 continue
             busy |= touched
             spent += max(extra[k], 0.0)
-            taken.append((i, corner))
+            taken.append((i, choice))
         if not taken:
             break
         keep = np.ones(n, np.bool_)
         points = points.copy()
-        for i, corner in taken:
-            if corner is None:
+        for i, place in taken:
+            if place is None:
                 keep[i] = False
             else:
-                points[i] = corner
+                points[i] = place
                 keep[i + 1] = False
         points, pinned = points[keep], pinned[keep]
     return points, pinned
 
 
 def _corners(four: Floats) -> list[Floats]:
-    """Places for one point instead of the two in the middle: where the outer legs meet in the plane, at a few heights."""
+    """Places for one point instead of the two in the middle: where the outer legs meet, at a few heights."""
     a, b, c, d = four
     p, q, w = b - a, c - d, d - a
     det = p[0] * q[1] - p[1] * q[0]

@@ -78,7 +78,8 @@ def _with_profile(problem: Problem, flat: Floats, stops: NDArray[np.intp]) -> Fl
     for i, via in zip(stops[1:-1], problem.via, strict=True):
         pin_m[i] = math.nan if via.amsl_m is None else via.amsl_m
     track = make_track(problem, np.ascontiguousarray(flat), pinned, pin_m)
-    flown = fly(problem, track)
+    with np.errstate(invalid="ignore"):  # a zone without a top under no ceiling: room from infinity to infinity
+        flown = fly(problem, track)
     if not isinstance(flown, Flown):
         return None
     return _checked(problem, track, flown)
@@ -103,7 +104,8 @@ def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
                 known.append((at, -math.inf, v.amsl_m - room))
             else:
                 return None
-        again = fly(problem, track, known=known)
+        with np.errstate(invalid="ignore"):
+            again = fly(problem, track, known=known)
         if not isinstance(again, Flown):
             return None
         flown = again

@@ -196,7 +196,7 @@ def _floors(
     c0, r0, c1, r1 = window
     to_nodes: Floats | None = None
     if 16 < (c1 - c0) * (r1 - r0) <= FLOOR_NODES:
-        at = air.surface.grid.to_plane(*np.meshgrid(np.arange(c0, c1), np.arange(r0, r1)))
+        at = _nodes(air.surface, np.arange(c0, c1), np.arange(r0, r1))
     else:
         west, south, east, north = box
         side = math.isqrt(FLOOR_NODES)
@@ -207,6 +207,20 @@ def _floors(
         to_nodes[1, [0, 2]] = (north - centre[1]) * per_n, -scale_m * per_n
     floor = air.floor_amsl(at[..., 0], at[..., 1], problem.limits) + KEEP_M
     return np.ascontiguousarray(np.where(np.isfinite(floor), floor, np.nan), dtype=np.float32), to_nodes
+
+
+def _nodes(surface: Surface, cols: NDArray[np.intp], rows: NDArray[np.intp]) -> Floats:
+    """(rows, cols, 2) places of nodes, by a quadratic through some: the exact inverse would cost more than floors."""
+    some_c, some_r = np.meshgrid(np.linspace(cols[0], cols[-1], 9), np.linspace(rows[0], rows[-1], 9))
+    places = surface.grid.to_plane(some_c.ravel(), some_r.ravel())
+
+    def basis(c: Floats, r: Floats) -> Floats:
+        u, v = (c - cols[0]) / (cols[-1] - cols[0]), (r - rows[0]) / (rows[-1] - rows[0])
+        return np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
+
+    solved, *_ = np.linalg.lstsq(basis(some_c.ravel(), some_r.ravel()), places, rcond=None)
+    c, r = np.meshgrid(cols.astype(np.float64), rows.astype(np.float64))
+    return np.asarray(basis(c, r) @ solved)
 
 
 def _window(surface: Surface, box: tuple[float, float, float, float]) -> tuple[int, int, int, int]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners._mesh import (
+from gcsplan.planners._stamp import (
     BOTTOM,
     BOTTOM_2,
     EAST,

@@ -1,0 +1,102 @@
+"""``gcsplan bench …``: every measurement; each is one call into `gcsplan.bench`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gcsplan.ending import emit, put
+from gcsplan.errors import UsageError
+from gcsplan.options import JsonOption
+
+bench_app = typer.Typer(
+    help="Measurements: planners on real terrain, the papers' tables, legs checked, uploads.", no_args_is_help=True
+)
+
+
+def _tell(result: dict[str, Any], report: Callable[[Any], str], as_json: bool) -> None:
+    if as_json:
+        emit(result)
+    else:
+        put(report(result) + "\n")
+
+
+@bench_app.command("check", short_help="Legs checked a second.")
+def bench_check(
+    legs: Annotated[int, typer.Option(metavar="N", help="Random one-kilometre legs.")] = 200_000,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the legs.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """How many one-kilometre legs are checked in a second, on the sample terrain."""
+    from gcsplan.bench import check as bench
+
+    result = bench.run(legs=legs, seed=seed)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("upload", short_help="Upload beside MAVSDK's.")
+def bench_upload(
+    items: Annotated[int, typer.Option(metavar="N", help="Items of the mission.")] = 600,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each, in turn.")] = 15,
+    as_json: JsonOption = False,
+) -> None:
+    """Upload to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
+    from gcsplan.bench import upload as bench
+
+    result = bench.run(items=items, runs=runs)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("functions", short_help="SSGWO's nine functions.")
+def bench_functions(
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each (paper: 50).")] = 50,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
+    jobs: Annotated[int | None, typer.Option(metavar="N", help="Processes [default: all cores]")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="CSV and Markdown go there.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """SSGWO's tables 1 and 2 run again, the printed numbers beside ours, optima in the middle and moved."""
+    from gcsplan.bench import functions as bench
+
+    if out is not None:
+        bench.ready(out)  # before the long run
+    result = bench.run(runs=runs, seed=seed, jobs=jobs)
+    if out is not None:
+        bench.write(result, out)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("terrain", short_help="Planners over real terrain, beside OMPL and mealpy.")
+def bench_terrain(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables and figure go there.")] = Path(
+        "bench-terrain"
+    ),
+    kinds: Annotated[str, typer.Option(metavar="LIST", help="Kinds of problems.")] = "main,energy,band,large,many,turn",
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the problems.")] = 1,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of ours; medians are told.")] = 9,
+    seconds: Annotated[str, typer.Option(metavar="LIST", help="OMPL's seconds.")] = "1,10",
+    rivals: Annotated[bool, typer.Option("--rivals/--no-rivals", help="Run OMPL too (extra `bench`).")] = True,
+    swarms: Annotated[bool, typer.Option("--swarms/--no-swarms", help="Run mealpy too (extra `bench`).")] = True,
+    kept: Annotated[bool, typer.Option("--kept", help="Rivals' answers already in DIR only.")] = False,
+    minute: Annotated[bool, typer.Option("--minute", help="Ours once more with 60 s.")] = False,
+    errors: Annotated[bool, typer.Option("--errors", help="With the clearance and errors of a real mission.")] = False,
+    count: Annotated[int | None, typer.Option(metavar="N", help="Problems of each group [default: all]")] = None,
+) -> None:
+    """A set of planning problems made by a seed; every planner held to the same exact check."""
+    from rich.console import Console
+
+    from gcsplan.bench import terrain, terrain_report
+    from gcsplan.console import say
+
+    try:
+        budgets = [float(s) for s in seconds.split(",")]
+    except ValueError:
+        raise UsageError(f"--seconds takes numbers such as 1,10, given {seconds!r}") from None
+    result = terrain.run(
+        out, seed=seed, kinds=kinds.split(","), runs=runs, seconds=budgets, rivals=rivals, swarms=swarms,
+        kept_only=kept, long=minute, errors=errors, count=count, tell=say,
+    )  # fmt: skip
+    Console(width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
