@@ -53,7 +53,7 @@ def shortest_past_discs(start: tuple[float, float], goal: tuple[float, float], d
         return NO_WAY
     # Parallel arcs between the same two nodes: a sparse array would add them up.
     r, c, w = np.concatenate(rows), np.concatenate(cols), np.concatenate(weights)
-    low, high = np.minimum(r, c), np.maximum(r, c)
+    low, high = np.minimum(r, c).astype(np.int32), np.maximum(r, c).astype(np.int32)
     order = np.lexsort((w, high, low))
     low, high, w = low[order], high[order], w[order]
     one = np.ones(len(w), bool)

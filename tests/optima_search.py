@@ -138,7 +138,8 @@ class Lattice:
         if noise > 0.0:
             cost = cost * np.exp(noise * self._weather(rng)[self.start])
         count = len(self.points)
-        graph = csr_array((np.maximum(cost, 1e-9), (self.start, self.end)), shape=(count, count))
+        ends = self.start.astype(np.int32), self.end.astype(np.int32)
+        graph = csr_array((np.maximum(cost, 1e-9), ends), shape=(count, count))
         tail = {int(k): (0.0, self.points[k][None]) for k in self.stops[0][:1]}
         for stop in self.stops[1:]:
             sources = list(tail)

@@ -98,7 +98,7 @@ def pass_height(z: Floats, a: tuple[int, int], b: tuple[int, int]) -> float:
     height = np.concatenate([z.ravel(), saddle[r, c]])
     one = [index[:, :-1].ravel(), index[:-1].ravel(), *[extra] * 4]
     two = [index[:, 1:].ravel(), index[1:].ravel(), index[r, c], index[r, c + 1], index[r + 1, c], index[r + 1, c + 1]]
-    i, j = np.concatenate(one), np.concatenate(two)
+    i, j = (np.concatenate(part).astype(np.int32) for part in (one, two))
     weight = np.maximum(height[i], height[j])
     least = float(weight.min())
     tree = minimum_spanning_tree(csr_array((weight - least + 1.0, (i, j)), shape=(len(height),) * 2)).tocoo()
