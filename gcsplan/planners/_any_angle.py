@@ -67,6 +67,14 @@ def _ahead(rx: float, ry: float, lx: float, ly: float, qx: float, qy: float, gx:
     ex, ey = qx - lx, qy - ly
     side_r = ex * (ry - ly) - ey * (rx - lx)
     side_g = ex * (gy - ly) - ey * (gx - lx)
+    if abs(side_r) <= SAME_M * math.sqrt(ex * ex + ey * ey):
+        # Seen edge-on, left and right may be the wrong way round.
+        to_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
+        to_q = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
+        if max(to_l, to_q) < math.sqrt(ex * ex + ey * ey):
+            return math.sqrt((gx - rx) ** 2 + (gy - ry) ** 2)
+        by_l = to_l + math.sqrt((gx - lx) ** 2 + (gy - ly) ** 2)
+        return min(by_l, to_q + math.sqrt((gx - qx) ** 2 + (gy - qy) ** 2))
     if side_r * side_g > 0.0:  # on the same side: the goal's mirror image
         square = ex * ex + ey * ey
         if square > 0.0:

@@ -247,18 +247,19 @@ def sort_portals(
             order[start[p]] = n
 
 
-@kernel("i4[,] f8[] i8 i4[,] i8 i8 f8[]")
+@kernel("i4[,] f8[] i8 i4[,] i8 i8 i8 i8 f8[]")
 def least_of_cells(
-    piece: Ints, value: Floats, cols: int, fine_piece: Ints, fine_cols: int, ratio: int, out: Floats,
+    piece: Ints, value: Floats, cols: int, fine_piece: Ints, fine_cols: int, ratio: int, row: int, col: int,
+    out: Floats,
 ) -> None:  # fmt: skip
     """For each piece of a finer mesh (``out``, inf before) the least value of the coarse pieces in its cells.
 
-    ``cols``, ``fine_cols``: cells in a row; both lattices begin at the same node.
+    ``cols``, ``fine_cols``: cells in a row; ``row``, ``col``: the coarse cell that the finer mesh begins at.
     """
     for k in range(len(fine_piece)):
         if fine_piece[k, 0] < 0 and fine_piece[k, 1] < 0:
             continue
-        j, i = (k // fine_cols) // ratio, (k % fine_cols) // ratio
+        j, i = (k // fine_cols) // ratio + row, (k % fine_cols) // ratio + col
         least = np.inf
         for half in range(2):
             if piece[j * cols + i, half] >= 0:

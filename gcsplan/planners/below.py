@@ -30,6 +30,8 @@ LITTLE, WORTH = 5e-6, 5e-5
 """What fewer way points may cost, as a part of the cost: on the way, and at last."""
 ZONES_SHUT = 8
 """Zones whose underside is given up, one after the other, because no profile fits under them."""
+CONTENT = 0.4
+"""A first path whose gap is that part of the wanted one is good enough; else both are looked at with more care."""
 CLOSER = 7
 """Times that what lies between path and bound is halved: close to the ends a shorter path has less way to climb."""
 
@@ -71,7 +73,7 @@ class Below:
                 if math.isinf(leg.length_m):
                     self.proved_shut = True
                     return
-            self._raise_bound(sum(leg.length_m for leg in self.legs))
+            self._raise_tracks()
             if self.try_below(self.top_m, fine=False) or self.try_below(self.top_m, fine=True):
                 return
 
@@ -135,7 +137,7 @@ class Below:
 
     def tighten(self) -> None:
         """Improve path and bound until they are as near as wanted."""
-        if self._done() or not self._in_time():
+        if self.gap <= CONTENT * self.problem.gap_percent / 100.0 or not self._in_time():
             return
         # Whatever is not longer than the best path must have been looked at.
         slack = self._longest() / sum(leg.length_m for leg in self.legs) - 1.0
@@ -221,17 +223,24 @@ class Below:
         """The bound of tracks alone, for regimes in which paths are found elsewhere; inf: there is none, proved."""
         for leg in self.legs:
             leg.flood(SLACKS[0])
-        length = sum(leg.length_m for leg in self.legs)
-        self._raise_bound(length)
-        return math.inf if math.isinf(length) else self.bound
+        if any(math.isinf(leg.length_m) for leg in self.legs):
+            return math.inf
+        self._raise_tracks()
+        return self.bound
 
-    def _raise_bound(self, length_m: float) -> None:
-        """A new bound, in metres or joules by the objective, or metres of track where energy knows no more."""
+    def _raise_tracks(self) -> None:
+        """What the shortest tracks alone tell of the cost."""
         p = self.problem
-        if p.objective == "energy" and length_m < math.inf and length_m <= self.cost / p.horizontal_j_per_m:
-            length_m = max(length_m * p.horizontal_j_per_m + p.vertical_j_per_m * self._rise(-math.inf), length_m)
+        metres = sum(leg.length_m for leg in self.legs)
+        if p.objective == "energy":
+            self._raise_bound(p.horizontal_j_per_m * metres + p.vertical_j_per_m * self._rise(-math.inf))
+        else:
+            self._raise_bound(metres)
+
+    def _raise_bound(self, cost: float) -> None:
+        """A new bound, in metres or joules by the objective."""
         # The bound's own arithmetic is rounded.
-        self.bound = max(self.bound, min(length_m * (1.0 - 1e-9), self.cost))
+        self.bound = max(self.bound, min(cost * (1.0 - 1e-9), self.cost))
         self.tell("bound")
 
     @property

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.plane import Guide, Plane, Way, make_plane
 from gcsplan.planners.problem import Problem
+from gcsplan.world.zones import Circle
 
 Floats = NDArray[np.float64]
 
 DETOURS = (1.25, 2.5, math.inf)
 """How long tracks may be, in times the straight way, before the lattice must be widened."""
-FINE_M, MOST_FINE = 24.0, 8
-"""Cells are cut until they are about as wide, but into no more parts a side."""
+FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
+"""Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +53,24 @@ class Leg:
         self.plane: Plane
         self._guide: Guide
         self._ahead: Guide | None = None
-        cell = problem.airspace.surface.grid.metres_per_cell(*start.place)
-        self.fine = max(1, min(MOST_FINE, round(float(cell.max()) / FINE_M)))
-        """Parts that cells are cut into, along their sides, where it matters."""
+        cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
+        wanted_m = self._cell_m()
+        self.parts = max(1, round(cell_m / wanted_m))
+        """Parts a side that the terrain model's cells are cut into, where they are large beside the leg or its zones."""
+        finest_m = min(FINE_M, self.straight_m / FINE_PARTS)
+        self.fine = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
+        """Parts a side that those are cut into again, where it matters."""
+
+    def _cell_m(self) -> float:
+        """How large cells may be for the first look."""
+        least, most = self.straight_m / 250.0, self.straight_m / 60.0
+        radii = [
+            z.shape.radius_m
+            if isinstance(z.shape, Circle)
+            else 0.5 * min(z.bounds[2] - z.bounds[0], z.bounds[3] - z.bounds[1])
+            for z in self.problem.airspace.zones
+        ]
+        return max(least, min([most, *(r / 3.0 for r in radii)]))
 
     def flood(self, slack: float) -> None:
         """Look at all that is free below the highest cap, as far as ways ``slack`` longer than the shortest lead.
@@ -103,7 +119,12 @@ class Leg:
             mesh = self._guide.mesh
             _, self._ahead = mesh.flood(self.start.place, self.goal.place, self.reach_m, math.inf, self._guide)
         through = np.append(self._ahead.entered + self._guide.entered, np.inf)
-        return np.asarray((through[self._guide.mesh.piece].min(axis=1) <= limit_m).reshape(self.plane.inside.shape))
+        mesh = self._guide.mesh
+        out = np.zeros(self.plane.inside.shape, np.bool_)
+        near = through[mesh.piece].min(axis=1) <= limit_m
+        rows, cols = mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1
+        out[mesh.row : mesh.row + rows, mesh.col : mesh.col + cols] = near.reshape(rows, cols)
+        return out
 
     def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats]:
         """Of the cells that tracks shorter than ``limit_m`` may meet: lowest floor, least way there, least way on."""
@@ -138,7 +159,7 @@ class Leg:
     def _lattice(self, detour: float) -> Plane:
         a, b, d = self.start.place, self.goal.place, self.straight_m
         if math.isinf(detour):
-            return make_plane(self.problem, (-math.inf, -math.inf, math.inf, math.inf))
+            return make_plane(self.problem, (-math.inf, -math.inf, math.inf, math.inf), self.parts)
         more = max(0.5 * d * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * d) + 1.0
         box = (min(a[0], b[0]) - more, min(a[1], b[1]) - more, max(a[0], b[0]) + more, max(a[1], b[1]) + more)
         cell = float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
@@ -147,4 +168,4 @@ class Leg:
             to = np.hypot(x - a[0], y - a[1]) + np.hypot(x - b[0], y - b[1])
             return np.asarray(to <= detour * d + 4.0 * cell)
 
-        return make_plane(self.problem, box, inside)
+        return make_plane(self.problem, box, self.parts, inside)

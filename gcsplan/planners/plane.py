@@ -46,10 +46,12 @@ class Way:
 
 @dataclass(eq=False, slots=True)
 class Mesh:
-    """Convex free pieces and their portals; see `_mesh`."""
+    """Convex free pieces and their portals, see `_mesh`; ``row``, ``col``: the plane's cell that it begins at."""
 
     plane: Plane
     fineness: int
+    row: int
+    col: int
     excess: Floats
     floor: Floats
     diagonal: NDArray[np.int8]
@@ -69,7 +71,8 @@ class Mesh:
         """The free pieces that a place lies in, or next to where its own is not free."""
         found: list[int] = []
         rows, cols = self.excess.shape
-        c, r = (self.fineness * v for v in self.plane.at(place))
+        c, r = self.plane.at(place)
+        c, r = self.fineness * (c - self.col), self.fineness * (r - self.row)
         for dj in (0.0, -1e-3, 1e-3):
             for di in (0.0, -1e-3, 1e-3):
                 i, j = math.floor(c + di), math.floor(r + dj)
@@ -157,7 +160,8 @@ class Guide:
         ratio = finer.fineness // self.mesh.fineness
         out = np.full(len(finer.start) - 1, np.inf)
         cols, fine_cols = self.mesh.excess.shape[1] - 1, finer.excess.shape[1] - 1
-        least_of_cells(self.mesh.piece, self.entered, cols, finer.piece, fine_cols, ratio, out)
+        row, col = finer.row - self.mesh.row, finer.col - self.mesh.col
+        least_of_cells(self.mesh.piece, self.entered, cols, finer.piece, fine_cols, ratio, row, col, out)
         return out
 
 
@@ -166,12 +170,14 @@ class Plane:
     """A lattice over a part of the terrain model: node (j, i) lies at ``x[j, i]``, ``y[j, i]``, north of (j - 1, i).
 
     ``top``, ``ground`` (rows, cols) AMSL, NaN where unknown; ``steep`` the steepest slope of the cells around a node;
-    ``inside`` (rows - 1, cols - 1) the cells that are looked at; ``block`` cells lie on straight lines.
+    ``inside`` (rows - 1, cols - 1) the cells that are looked at. A cell of the terrain model is ``parts`` cells wide and
+    long here; ``block`` cells lie on straight lines.
     """
 
     problem: Problem
     col0: int
     row1: int
+    parts: int
     block: int
     x: Floats
     y: Floats
@@ -199,9 +205,15 @@ class Plane:
         """
         limits, scale = self.problem.limits, self.problem.airspace.scale
         near = limits.track_error_m * scale
-        rows, cols = ((n - 1) * fineness + 1 for n in self.top.shape)
+        wanted = self.inside if wanted is None else wanted
+        row, col, last_row, last_col = _box_of(wanted)
+        part, nodes = np.s_[row:last_row, col:last_col], np.s_[row : last_row + 1, col : last_col + 1]
+        top, ground, steep, x, y = (
+            np.ascontiguousarray(a[nodes]) for a in (self.top, self.ground, self.steep, self.x, self.y)
+        )
+        rows, cols = ((n - 1) * fineness + 1 for n in top.shape)
         excess = np.full((rows, cols), np.inf)
-        floor, ground, x, y = (np.empty((rows, cols)) for _ in range(4))
+        floor, under_m, fine_x, fine_y = (np.empty((rows, cols)) for _ in range(4))
         cells = (rows - 1) * (cols - 1)
         diagonal = np.empty(cells, np.int8)
         climbs = np.array([] if low or cones is None else cones).reshape(-1, 4)
@@ -211,10 +223,11 @@ class Plane:
             # Beside cliffs it is the clearance that binds; this is more than both demand together.
             beside += limits.horizontal_clearance_m * scale
         fill(
-            self.top, self.ground, self.steep[:0] if low else self.steep, self.x, self.y,
-            self.inside if wanted is None else wanted, fineness, more + (-SPARE_M if low else HAIR_M), beside, cap_m,
-            climbs, low, excess, floor, ground, x, y, diagonal,
+            top, ground, steep[:0] if low else steep, x, y, np.ascontiguousarray(wanted[part]), fineness,
+            more + (-SPARE_M if low else HAIR_M), beside, cap_m, climbs, low, excess, floor, under_m, fine_x, fine_y,
+            diagonal,
         )  # fmt: skip
+        x, y = fine_x, fine_y
         of, values = np.zeros(cells, np.int32), np.zeros((1, 4))
         if len(self.shapes.boxes):
             zones, edges = self.shapes.low if low else self.shapes.high
@@ -223,14 +236,16 @@ class Plane:
                 zones[:, UNDER] *= under[self.shapes.owner[:, 0]]
                 zones[:, UNDER_2] *= under[self.shapes.owner[:, 1]]
             values = np.empty((1 + self.shapes.cells * fineness**2, 4))
-            boxes = self.shapes.boxes * fineness + np.array([0, fineness - 1, 0, fineness - 1], np.int32)
-            stamp_zones(excess, floor, ground, x, y, zones, edges, boxes, low, of, values)
+            boxes = (self.shapes.boxes - np.array([col, col, row, row])) * fineness
+            boxes = boxes + np.array([0, fineness - 1, 0, fineness - 1])
+            boxes = boxes.clip([0, -1, 0, -1], [cols, cols - 2, rows, rows - 2]).astype(np.int32)
+            stamp_zones(excess, floor, under_m, x, y, zones, edges, boxes, low, of, values)
         if low and cones:
             for east, north, height, slope in cones:
                 c, r = self.at((east, north))
                 raise_cone(
-                    excess, floor, of, x, y, east, north, c * fineness, r * fineness, height, slope, cap_m,
-                    np.zeros((rows, cols), np.int8),
+                    excess, floor, of, x, y, east, north, (c - col) * fineness, (r - row) * fineness, height, slope,
+                    cap_m, np.zeros((rows, cols), np.int8),
                 )  # fmt: skip
         piece = np.empty((cells, 2), np.int32)
         block = 1 if single else self.block * fineness
@@ -245,22 +260,25 @@ class Plane:
             room = n
         start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
         sort_portals(joins[:n], start, order)
-        return Mesh(self, fineness, excess, floor, diagonal, piece, start, ends[:n], names[:n], joins[:n], order)
+        return Mesh(
+            self, fineness, row, col, excess, floor, diagonal, piece, start, ends[:n], names[:n], joins[:n], order
+        )
 
     def at(self, place: tuple[float, float]) -> tuple[float, float]:
-        """Column and row of a place on this lattice, in the terrain model's cells."""
+        """Column and row of a place on this lattice."""
         c, r = self.problem.airspace.surface.grid(*place)
-        return float(c) - self.col0, self.row1 - float(r)
+        return self.parts * (float(c) - self.col0), self.parts * (self.row1 - float(r))
 
 
 def make_plane(
     problem: Problem,
     box: tuple[float, float, float, float],
+    parts: int = 1,
     inside: Callable[[Floats, Floats], NDArray[np.bool_]] | None = None,
 ) -> Plane:
     """The lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
 
-    ``inside(x, y)`` tells which nodes are to be looked at.
+    ``parts``: into how many cells a side the terrain model's are cut. ``inside(x, y)`` tells which nodes are to be looked at.
     """
     surface = problem.airspace.surface
     grid = surface.grid
@@ -276,17 +294,17 @@ def make_plane(
         col1, row1 = (min(math.ceil(v) + 1, m - 1) for v, m in zip(high, (cols, rows), strict=True))
         col1, row1 = max(col1, col0 + 1), max(row1, row0 + 1)
     part = np.s_[row0 : row1 + 1, col0 : col1 + 1]
-    ground = np.ascontiguousarray(surface.ground_m[part][::-1])
-    top = ground if surface.top_m is surface.ground_m else np.ascontiguousarray(surface.top_m[part][::-1])
-    block = problem.airspace.straight_cells(BENT_M)
-    x, y = _places(grid, col0, row1, ground.shape, block)
+    ground = _finer(surface.ground_m[part][::-1], parts)
+    top = ground if surface.top_m is surface.ground_m else _finer(surface.top_m[part][::-1], parts)
+    block = problem.airspace.straight_cells(BENT_M) * parts
+    x, y = _places(grid, col0, row1, ground.shape, parts, block)
     cells = ground.shape[0] - 1, ground.shape[1] - 1
     looked_at = np.ones(cells, np.bool_)
     if inside is not None:
         node = inside(x, y)
         looked_at = node[:-1, :-1] & node[:-1, 1:] & node[1:, :-1] & node[1:, 1:]
     return Plane(
-        problem, col0, row1, block, x, y, top, ground, _slopes(top, x, y), looked_at, make_shapes(problem, x, y)
+        problem, col0, row1, parts, block, x, y, top, ground, _slopes(top, x, y), looked_at, make_shapes(problem, x, y)
     )
 
 
@@ -303,13 +321,36 @@ def _slopes(z: Floats, x: Floats, y: Floats) -> Floats:
     return np.hypot(a, b)
 
 
-def _places(grid: GridMap, col0: int, row1: int, shape: tuple[int, int], span: int) -> tuple[Floats, Floats]:
+def _finer(z: Floats, parts: int) -> Floats:
+    """Bilinear values ``parts`` times as close."""
+    if parts == 1:
+        return np.ascontiguousarray(z)
+    u = np.arange(parts) / parts
+    for _ in range(2):  # along the rows, then, turned, along the columns
+        wide = np.empty((z.shape[0], (z.shape[1] - 1) * parts + 1))
+        wide[:, :-1] = (z[:, :-1, None] * (1.0 - u) + z[:, 1:, None] * u).reshape(len(z), -1)
+        wide[:, ::parts] = z  # a weight of 0 must not carry an unknown neighbour's NaN over
+        z = wide.T
+    return np.ascontiguousarray(z)
+
+
+def _box_of(wanted: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """First row and column, and those after the last, of what is true; the first cell where nothing is."""
+    rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
+    if not len(rows):
+        return 0, 0, 1, 1
+    return int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1
+
+
+def _places(
+    grid: GridMap, col0: int, row1: int, shape: tuple[int, int], parts: int, span: int
+) -> tuple[Floats, Floats]:
     """(rows, cols) x and y of a lattice's nodes, bilinear between the corners of blocks of ``span`` cells."""
     rows, cols = shape
     step = min(span, max(rows, cols))
     c = np.arange(0, cols - 1 + step, step)
     r = np.arange(0, rows - 1 + step, step)
-    corner = grid.to_plane(col0 + c[None, :], row1 - r[:, None])
+    corner = grid.to_plane(col0 + c[None, :] / parts, row1 - r[:, None] / parts)
     j, i = np.arange(rows), np.arange(cols)
     v, u = (j % step) / step, (i % step) / step
     out = []

@@ -142,7 +142,8 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
     east, north = (np.interp(s, exact.s_m, exact.points[:, k]) for k in range(2))
     floor = problem.airspace.floor_amsl(east, north, problem.limits)
     ceiling = problem.airspace.ceiling_amsl(east, north, problem.limits)
-    spare = np.clip(0.25 * (ceiling - floor), 0.0, SPARE_M)
+    with np.errstate(invalid="ignore"):  # unknown ground: infinite on both sides
+        spare = np.clip(0.25 * (ceiling - floor), 0.0, SPARE_M)
     spare[[0, -1]] = 0.0
     spare = np.where(np.isfinite(floor), spare, 0.0)
     floor, ceiling = floor + spare, ceiling - spare

@@ -238,8 +238,8 @@ class _Room:
 
 
 def _narrow(low: Floats, high: Floats) -> None:
-    room = high - low
-    middle = 0.5 * (low + high)
+    with np.errstate(invalid="ignore"):  # a door between infinities has no room, or any
+        room, middle = high - low, 0.5 * (low + high)
     wide, open_ = room >= 2.0 * KEEP_M, room >= 0.0
     ends = low[[0, -1]] - 1e-6, high[[0, -1]] + 1e-6
     low[:] = np.where(wide, low + KEEP_M, np.where(open_, middle, low))
