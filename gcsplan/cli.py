@@ -55,6 +55,12 @@ def plan(
     planner: Annotated[str | None, typer.Option(metavar="NAME", help="A name from `gcsplan planners`.")] = None,
     objective: Annotated[str | None, typer.Option(metavar="WHAT", help="length or energy.")] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of everything random.")] = None,
+    encoding: Annotated[
+        str | None, typer.Option(metavar="NAME", help="A swarm's encoding: box, sections, polar, bspline, offsets.")
+    ] = None,
+    cost: Annotated[
+        str | None, typer.Option(metavar="NAME", help="A swarm's cost: krill, ssgwo, msfoa, abo, ib-abc.")
+    ] = None,
     upload: Annotated[
         list[str] | None,
         typer.Option(
@@ -95,7 +101,10 @@ def plan(
         source = pipeline.load_mission(mission)
         targets = delivery.targets(upload or [], [r.vehicle for r in source.vehicles])
         with planning_status() as tell:
-            planned = pipeline.plan(source, planner=planner, objective=objective, seed=seed, progress=tell)
+            told = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
+            planned = pipeline.plan(
+                source, planner=planner, objective=objective, seed=seed, options=told, progress=tell
+            )
         pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
         files = outputs.outputs_of(planned)
     except UsageError:

@@ -104,7 +104,14 @@ def _vehicle(v: VehiclePlan, delivery: Delivery | None) -> dict[str, Any]:
         "not_judged": list(verdict.not_judged),
         "notes": list(dict.fromkeys((*v.notes, *v.solution.notes, *verdict.notes))),
         "upload": delivery.as_dict() if delivery else None,
-    }
+    } | _of_search(v)
+
+
+def _of_search(v: VehiclePlan) -> dict[str, Any]:
+    """What a search by samples made, before it was mended; nothing of other planners."""
+    if v.solution.raw_violations is None:
+        return {}
+    return {"raw_violations": v.solution.raw_violations, "repaired": v.solution.repaired}
 
 
 def verdict_of(name: str, verdict: Verdict) -> dict[str, Any]:

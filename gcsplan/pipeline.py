@@ -20,6 +20,7 @@ from gcsplan.mavlink.build import LONGEST_LEG_M, MARGINS, Margins, Order, build_
 from gcsplan.mavlink.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest, load_mission
 from gcsplan.planners.problem import Problem, Progress, Solution, Via
+from gcsplan.planners.table import VOLUME_KEYS
 from gcsplan.planners.table import get as get_planner
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
@@ -85,11 +86,13 @@ def plan(
     planner: str | None = None,
     objective: str | None = None,
     seed: int | None = None,
+    options: Mapping[str, object] | None = None,
     progress: Callable[[str, Progress], None] | None = None,
 ) -> Plan:
     """Plan every vehicle of a mission file; nothing is written or sent.
 
-    ``planner``, ``objective`` (length | energy) and ``seed`` override the file's. ``progress(vehicle, what)`` is
+    ``planner``, ``objective`` (length | energy), ``seed`` and ``options`` (what only some planners know, such as a
+    swarm's ``encoding``) override the file's. ``progress(vehicle, what)`` is
     called now and then. Raises InputError for a bad file, NoMission where no safe mission exists or was found.
     """
     if not isinstance(source, MissionFile):
@@ -101,12 +104,13 @@ def plan(
     if goal not in ("length", "energy"):
         raise InputError(f"objective must be length or energy, given {goal!r}")
     number = asked.seed if seed is None else seed
+    told = _options(source, name) | dict(options or {})
     world = world_of(source)
     vehicles = []
     for request in source.vehicles:
         vehicle_name = request.vehicle.name
         tell = None if progress is None else lambda what, who=vehicle_name: progress(who, what)
-        vehicles.append(_plan_vehicle(source, request, world, entry.plan, goal, number, tell))
+        vehicles.append(_plan_vehicle(source, request, world, entry.plan, goal, number, told, tell))
     notes = list(source.notes)
     if len(vehicles) > 1:
         notes.append(
@@ -116,6 +120,15 @@ def plan(
     return Plan(source, world, name, goal, number, tuple(vehicles), tuple(notes))
 
 
+def _options(source: MissionFile, planner: str) -> dict[str, object]:
+    """The file's own options for a planner; of another one than it names, only what suits any."""
+    told = dict(source.planner.extras)
+    own = told.get("parameters")
+    if planner != source.planner.name and isinstance(own, Mapping):
+        told["parameters"] = {k: v for k, v in own.items() if k in VOLUME_KEYS}
+    return told
+
+
 def _plan_vehicle(
     source: MissionFile,
     request: VehicleRequest,
@@ -123,12 +136,13 @@ def _plan_vehicle(
     run: Callable[[Problem], Solution],
     objective: str,
     seed: int,
+    options: Mapping[str, object],
     progress: Callable[[Progress], None] | None,
 ) -> VehiclePlan:
     vehicle = request.vehicle
     margins, failed = MARGINS, None
     for _ in range(ATTEMPTS):
-        problem, notes = make_problem(source, request, world, objective, seed, margins, progress)
+        problem, notes = make_problem(source, request, world, objective, seed, margins, progress, options)
         solution = _run(run, problem, vehicle, world)
         for spaced in (True, False):  # way points nearer than the acceptance radii are dropped where that is legal
             order = Order(request.end, source.altitude_frame, spaced=spaced)
@@ -190,6 +204,7 @@ def make_problem(
     seed: int,
     margins: Margins = MARGINS,
     progress: Callable[[Progress], None] | None = None,
+    options: Mapping[str, object] | None = None,
 ) -> tuple[Problem, tuple[str, ...]]:
     """The planner's question for one vehicle, with the wire's margins in its limits, and notes for the user.
 
@@ -252,6 +267,7 @@ def make_problem(
         gap_percent=asked.gap_percent,
         budget_s=asked.budget_s,
         progress=progress,
+        options=dict(asked.extras if options is None else options),
     )
     if vehicle.autopilot is Autopilot.ARDUPLANE:
         notes.append(

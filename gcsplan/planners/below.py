@@ -26,7 +26,7 @@ Bools = NDArray[np.bool_]
 
 SLACKS = (0.02, 0.15, 0.6)
 """How much longer than the shortest the tracks are that are looked at, as a part of it, until a path is known."""
-LITTLE, WORTH = 5e-6, 5e-5
+LITTLE, WORTH = 5e-6, 2e-5
 """What fewer way points may cost, as a part of the cost: on the way, and at last."""
 ZONES_SHUT = 8
 """Zones whose underside is given up, one after the other, because no profile fits under them."""

@@ -56,7 +56,7 @@ class Leg:
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
         wanted_m = self._cell_m()
         self.parts = max(1, round(cell_m / wanted_m))
-        """Parts a side that the terrain model's cells are cut into, where they are large beside the leg or its zones."""
+        """Parts a side that the terrain model's cells are cut into, where they are large beside leg or zones."""
         finest_m = min(FINE_M, self.straight_m / FINE_PARTS)
         self.fine = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
         """Parts a side that those are cut into again, where it matters."""

@@ -170,8 +170,8 @@ class Plane:
     """A lattice over a part of the terrain model: node (j, i) lies at ``x[j, i]``, ``y[j, i]``, north of (j - 1, i).
 
     ``top``, ``ground`` (rows, cols) AMSL, NaN where unknown; ``steep`` the steepest slope of the cells around a node;
-    ``inside`` (rows - 1, cols - 1) the cells that are looked at. A cell of the terrain model is ``parts`` cells wide and
-    long here; ``block`` cells lie on straight lines.
+    ``inside`` (rows - 1, cols - 1) the cells that are looked at. A cell of the terrain model is ``parts`` cells wide
+    and long here; ``block`` cells lie on straight lines.
     """
 
     problem: Problem
@@ -278,7 +278,8 @@ def make_plane(
 ) -> Plane:
     """The lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
 
-    ``parts``: into how many cells a side the terrain model's are cut. ``inside(x, y)`` tells which nodes are to be looked at.
+    ``parts``: into how many cells a side the terrain model's are cut. ``inside(x, y)`` tells which nodes are to be
+    looked at.
     """
     surface = problem.airspace.surface
     grid = surface.grid

@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 from gcsplan.errors import InputError
 from gcsplan.planners import _scene_kernels as k
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.table import VOLUME_KEYS
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Level, Zone
 
 Floats = NDArray[np.float64]
-
-VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
-"""Names of the flight volume's six sides, metres of the plane and AMSL; those not given follow from the mission."""
 
 GROWN = 0.1
 """Room around the stops on every side, as a part of the longer side; the shorter is first made as long: a mission due

@@ -22,8 +22,9 @@ from gcsplan.planners.encodings import Code
 from gcsplan.planners.objectives import Cost, Earlier, get_objective
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.planners.repair import repair, violations
-from gcsplan.planners.scene import VOLUME_KEYS, Scene
+from gcsplan.planners.scene import Scene
 from gcsplan.planners.smoothing import fewer
+from gcsplan.planners.table import VOLUME_KEYS
 from gcsplan.swarm.driver import Result, State, minimise
 from gcsplan.swarm.table import get as get_optimiser
 from gcsplan.world.airspace import Violation

@@ -12,6 +12,9 @@ from typing import cast
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem, Solution
 
+VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
+"""Those of a swarm's ``parameters`` that tell of the flight volume's six sides, metres of the plane and AMSL."""
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -67,7 +70,7 @@ _IB_ABC: Mapping[str, object] = {
 _ENTRIES = (
     Entry(
         name="optimal",
-        summary="lattice search over reachable altitudes, string pulling, taut-string altitude profile",
+        summary="exact shortest tracks under altitude caps, taut-string profiles, and a bound that no path can beat",
         module="gcsplan.planners.optimal",
         defaults=MappingProxyType({"gap_percent": 0.1, "budget_s": 10.0}),
     ),
