@@ -1,0 +1,65 @@
+"""A picture of how the default planner knows: what stands above the cap, and where any shorter path could run."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path as FilePath
+from typing import IO
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LightSource, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from gcsplan.planners.below import Below
+from gcsplan.planners.problem import Problem
+
+WALL, ROOM = "#b04a3a", "#2c7fb8"
+
+
+def draw(problem: Problem) -> Figure:
+    """The plane of a problem's first leg: walls below the cap, the path, and the cells that a shorter one may meet."""
+    below = Below(problem, time.perf_counter())
+    below.look()
+    below.tighten()
+    solution = below.solution()
+    leg = below.legs[0]
+    plane = leg.plane
+    walls = plane.mesh(below.top_m, True).piece.max(axis=1).reshape(plane.inside.shape) < 0
+    room = leg.corridor(below.cost)
+    points = solution.path.points
+    figure = Figure(figsize=(9.5, 5.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    ax = figure.subplots()
+    x, y = plane.x / 1000.0, plane.y / 1000.0
+    cell_m = float(np.hypot(*np.diff(np.stack([plane.x[0, :2], plane.y[0, :2]]), axis=1).ravel()))
+    ground = np.where(np.isnan(plane.ground), np.nanmin(plane.ground), plane.ground)
+    shade = LightSource(azdeg=315, altdeg=40).hillshade(ground[::-1], vert_exag=1.5, dx=cell_m, dy=cell_m)[::-1]
+    ax.pcolormesh(x, y, shade, cmap="gray", vmin=-0.2, vmax=1.1, shading="gouraud", rasterized=True)
+    for mask, colour, alpha in ((walls & plane.inside, WALL, 0.45), (room, ROOM, 0.75)):
+        layer = np.where(mask, 1.0, np.nan)
+        ax.pcolormesh(x, y, layer, cmap=ListedColormap([colour]), alpha=alpha, lw=0, rasterized=True)
+    ax.plot(points[:, 0] / 1000.0, points[:, 1] / 1000.0, color="#111111", lw=1.8, marker=".", ms=5)
+    far = 0.08 * float(np.ptp(points[:, :2], axis=0).max()) + 200.0
+    low, high = (points[:, :2].min(axis=0) - far) / 1000.0, (points[:, :2].max(axis=0) + far) / 1000.0
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="east, km", ylabel="north, km")
+    ax.set_aspect("equal")
+    gap = 100.0 * (below.cost / below.bound - 1.0)
+    ax.legend(
+        handles=[
+            Patch(fc=WALL, alpha=0.45, label=f"no path below {below.top_m:,.0f} m AMSL can be here"),
+            Patch(fc=ROOM, alpha=0.75, label="a shorter path would have to stay here"),
+            Line2D([], [], color="#111111", marker=".", label=f"path, {below.cost:,.0f} m"),
+        ],
+        loc="upper right",
+        fontsize=8,
+    )
+    ax.set_title(f"no path is shorter than {below.bound:,.0f} m: gap {gap:.2f} %", loc="left", fontsize=10)
+    return figure
+
+
+def save(problem: Problem, file: FilePath | IO[bytes]) -> None:
+    """Write `draw`'s picture as PNG."""
+    draw(problem).savefig(file, format="png", dpi=110, metadata={"Software": None})
