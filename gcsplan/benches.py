@@ -100,3 +100,46 @@ def bench_terrain(
         kept_only=kept, long=minute, errors=errors, count=count, tell=say,
     )  # fmt: skip
     Console(width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
+
+
+@bench_app.command("papers", short_help="The five papers' tables run again.")
+def bench_papers(
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="Runs and report; the same command goes on there.")
+    ] = Path("papers"),
+    scenario: Annotated[
+        list[str] | None, typer.Option("--scenario", metavar="NAME", help="Of missions/papers; repeatable [all].")
+    ] = None,
+    algorithm: Annotated[
+        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="Of the papers' own; repeatable [all].")
+    ] = None,
+    runs: Annotated[int | None, typer.Option(metavar="N", help="Of each [the paper's number, 30 where none].")] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
+    jobs: Annotated[int | None, typer.Option(metavar="N", help="Local processes [all cores].")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler instead (extra `cluster`).")
+    ] = None,
+    missions: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the mission files are.")] = None,
+    speed: Annotated[
+        bool, typer.Option("--speed", help="Measure speed instead, beside mealpy's (extra `bench`).")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Every scenario and algorithm of the five papers, beside their printed numbers, straight line and optimum."""
+    if speed:
+        from gcsplan.bench import papers_speed
+
+        measured = papers_speed.run(missions=missions)
+        if as_json:
+            emit(measured)
+        else:
+            put(papers_speed.report(measured))
+        return
+    from gcsplan.bench import papers, papers_report
+
+    result = papers.run(scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions)
+    files = papers_report.write(result, out)
+    if as_json:
+        emit(papers.plain(result) | {"files": [str(file) for file in files]})
+    else:
+        put(papers_report.report(result))

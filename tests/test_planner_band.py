@@ -131,7 +131,7 @@ def test_the_kernels_string_is_the_taut_string(seed: int, count: int) -> None:
     z0, z1 = rng.uniform(-5.0, 30.0, 2)
     low[[0, -1]] = high[[0, -1]] = z0, z1
     at, z = np.empty(count), np.empty(count)
-    n = _string.funnel.py_func(s, low, high, count, np.empty((4, count + 1)), at, z)
+    n = _string.funnel(s, low, high, count, np.empty((4, count + 1)), at, z)
     mine = Profile(s[at[:n].astype(int)], z[:n])
     best = taut_string(s, low, high, float(z0), float(z1))
     assert isinstance(best, Profile)

@@ -82,8 +82,8 @@ class Below:
         for _ in range(ZONES_SHUT):
             ways = []
             for leg in self.legs:
-                wanted = leg.corridor(self._limit(leg)) if fine and leg.fine > 1 else None
-                way = leg.track(cap_m, leg.fine if fine else 1, wanted, self.under)
+                wanted = leg.corridor(self._limit(leg)) if fine and leg.has_fine else None
+                way = leg.track(cap_m, wanted, self.under)
                 if way is None:
                     return False
                 ways.append(way.points)
@@ -170,13 +170,13 @@ class Below:
         for leg in self.legs:
             limit = leg.length_m + spare
             wanted = leg.corridor(limit)
-            tracks.append(leg.bound(self.top_m, leg.fine, wanted, limit, True))
+            tracks.append(leg.bound(self.top_m, wanted, limit, True))
         # Each leg's limit is what the others leave, which is less now that they are known better.
         spare = max(longest_m - sum(tracks), 0.0)
         return rise_bound(self.legs, tracks, [track + spare for track in tracks])
 
     def _track_bound(self, leg: Leg, cap_m: float, limit_m: float) -> float:
-        return leg.bound(cap_m, leg.fine, leg.corridor(limit_m), limit_m, True)
+        return leg.bound(cap_m, leg.corridor(limit_m), limit_m, True)
 
     def _longest(self) -> float:
         """No track of a path that is better than the best is longer."""
@@ -203,7 +203,7 @@ class Below:
         def track_m(cap: float, care: int) -> float:
             if care:
                 return sum(self._track_bound(leg, cap, self._limit(leg)) for leg in self.legs)
-            return sum(leg.bound(cap, 1, None, self._limit(leg)) for leg in self.legs)
+            return sum(leg.bound(cap, None, self._limit(leg)) for leg in self.legs)
 
         def try_at(cap: float) -> None:
             if round(cap, 1) not in tried:

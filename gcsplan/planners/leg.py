@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.plane import Guide, Plane, Way, make_plane
+from gcsplan.planners.plane import Guide, Mesh, Plane, Way, make_plane
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle
 
@@ -51,15 +51,24 @@ class Leg:
         self.reach_m = 0.0
         """Tracks shorter than this lie within the lattice, and within what the flood has seen."""
         self.plane: Plane
+        self._twin: Plane | None = None
         self._guide: Guide
         self._ahead: Guide | None = None
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
-        wanted_m = self._cell_m()
+        wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
         self.parts = max(1, round(cell_m / wanted_m))
         """Parts a side that the terrain model's cells are cut into, where they are large beside leg or zones."""
-        finest_m = min(FINE_M, self.straight_m / FINE_PARTS)
-        self.fine = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
-        """Parts a side that those are cut into again, where it matters."""
+        self._fine_stride = max(1, round(finest_m / cell_m)) if self.parts == 1 else 1
+        self._stride = self._fine_stride * max(1, round(wanted_m / cell_m / self._fine_stride))
+        if self.parts > 1 or self._stride < 2:
+            self._stride = self._fine_stride = 1
+        # How many parts a side the first look's cells are cut into where it matters, of the plane or of its finer twin.
+        self._ratio = self._stride // self._fine_stride
+        self._cut = 1
+        if self._stride == 1:
+            self._ratio = self._cut = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
+        self.has_fine = self._ratio > 1
+        """Whether there is a lattice finer than that of the first look."""
 
     def _cell_m(self) -> float:
         """How large cells may be for the first look."""
@@ -82,25 +91,40 @@ class Leg:
             if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                 continue
             within = detour * self.straight_m if math.isfinite(detour) else math.inf
-            self.plane = self._lattice(detour)
+            self.plane, self._twin = self._lattice(detour, self._stride), None
+            self._detour = detour
             way, self._guide = self.plane.mesh(self.top_m, True).flood(self.goal.place, self.start.place, within, slack)
             if way is not None:
                 self.length_m = way.length_m
                 self.reach_m = min(within, way.length_m * (1.0 + slack))
                 return
 
-    def track(
-        self, cap_m: float, fineness: int, wanted: NDArray[np.bool_] | None, under: NDArray[np.bool_] | None
-    ) -> Way | None:
+    def _mesh(
+        self,
+        cap_m: float,
+        low: bool,
+        wanted: NDArray[np.bool_] | None,
+        cones: list[tuple[float, float, float, float]] | None = None,
+        under: NDArray[np.bool_] | None = None,
+    ) -> Mesh:
+        """The first look's mesh, or with ``wanted`` (cells of the first look) the finer one there."""
+        if wanted is None or not self.has_fine:
+            return self.plane.mesh(cap_m, low, 1, wanted, cones, under)
+        if self._stride == 1:
+            return self.plane.mesh(cap_m, low, self._cut, wanted, cones, under)
+        if self._twin is None:
+            self._twin = self._lattice(self._detour, self._fine_stride)
+        finer = np.repeat(np.repeat(wanted, self._ratio, axis=0), self._ratio, axis=1)
+        return self._twin.mesh(cap_m, low, 1, finer, cones, under)
+
+    def track(self, cap_m: float, wanted: NDArray[np.bool_] | None, under: NDArray[np.bool_] | None) -> Way | None:
         """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``."""
         limits = self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, 0.0)
-        mesh = self.plane.mesh(cap_m, False, fineness, wanted, cones, under)
+        mesh = self._mesh(cap_m, False, wanted, cones, under)
         return mesh.way(self.start.place, self.goal.place, self.reach_m, self._guide)
 
-    def bound(
-        self, cap_m: float, fineness: int, wanted: NDArray[np.bool_] | None, limit_m: float, climbs: bool = False
-    ) -> float:
+    def bound(self, cap_m: float, wanted: NDArray[np.bool_] | None, limit_m: float, climbs: bool = False) -> float:
         """A lower bound of every track's length below ``cap_m``; ``limit_m``, or `reach_m`, if it is more.
 
         ``climbs``: near the ends hold tracks to what they can climb to, if they are shorter than ``limit_m``.
@@ -109,7 +133,7 @@ class Leg:
         cones = None
         if climbs:
             cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, max(limit - self.length_m, 0.0))
-        mesh = self.plane.mesh(cap_m, True, fineness, wanted, cones)
+        mesh = self._mesh(cap_m, True, wanted, cones)
         way = mesh.way(self.start.place, self.goal.place, limit, self._guide)
         return limit if way is None else way.length_m
 
@@ -156,16 +180,17 @@ class Leg:
             if end.amsl_m is not None and math.isfinite(slope)
         ]
 
-    def _lattice(self, detour: float) -> Plane:
+    def _lattice(self, detour: float, stride: int) -> Plane:
         a, b, d = self.start.place, self.goal.place, self.straight_m
         if math.isinf(detour):
-            return make_plane(self.problem, (-math.inf, -math.inf, math.inf, math.inf), self.parts)
+            everywhere = (-math.inf, -math.inf, math.inf, math.inf)
+            return make_plane(self.problem, everywhere, self.parts, stride, self._stride)
         more = max(0.5 * d * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * d) + 1.0
         box = (min(a[0], b[0]) - more, min(a[1], b[1]) - more, max(a[0], b[0]) + more, max(a[1], b[1]) + more)
-        cell = float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
+        cell = self._stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
 
         def inside(x: Floats, y: Floats) -> NDArray[np.bool_]:
             to = np.hypot(x - a[0], y - a[1]) + np.hypot(x - b[0], y - b[1])
             return np.asarray(to <= detour * d + 4.0 * cell)
 
-        return make_plane(self.problem, box, self.parts, inside)
+        return make_plane(self.problem, box, self.parts, stride, self._stride, inside)

@@ -35,6 +35,8 @@ from gcsplan.world.path import Path
 Floats = NDArray[np.float64]
 
 
+MOST_NODES = 1_500_000
+"""Of terrain on which that is done: its rasters have the terrain's own spacing."""
 FAR = 1e-2
 """Gap, as a part, beyond which the lattice of reachable altitudes is asked for a better path too."""
 
@@ -86,7 +88,7 @@ def _sharp(problem: Problem, begun: float) -> Solution:
     if below.best is None:
         below.take(plan_band(problem, tell, begun).path.points)
     below.tighten()
-    if below.gap > FAR:
+    if below.gap > FAR and problem.airspace.surface.ground_m.size <= MOST_NODES:
         # Over or under, or a climb on the way: other regimes know more about those.
         try:
             better = below.take(plan_band(problem, tell, begun).path.points)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners._any_angle import search
-from gcsplan.planners._fill import fill, raise_cone
+from gcsplan.planners._fill import fill, pool, raise_cone
 from gcsplan.planners._mesh import least_of_cells, make_pieces, make_portals, sort_portals
 from gcsplan.planners._stamp import UNDER, UNDER_2, stamp_zones
 from gcsplan.planners.problem import Problem
@@ -132,7 +132,8 @@ class Mesh:
             out = np.empty((1 << 14, 3))
             n = search(
                 self.start, self.ends, self.names, self.joins, self.order, best, sources, np.array(pieces, np.int32),
-                np.array(goal), np.array(goal_pieces, np.int32), limit_m, slack, MOST_OPENED, remaining, entered,
+                np.array(goal, np.float64), np.array(goal_pieces, np.int32),
+                limit_m, slack, MOST_OPENED, remaining, entered,
                 node, link, name, np.empty(room), np.empty(room, np.int32), out,
             )  # fmt: skip
             if n != -1:
@@ -157,10 +158,12 @@ class Guide:
 
     def over(self, finer: Mesh) -> Floats:
         """The same for the pieces of a mesh on the same lattice, or one that is some times finer."""
-        ratio = finer.fineness // self.mesh.fineness
+        ratio = finer.fineness * self.mesh.plane.stride // (self.mesh.fineness * finer.plane.stride)
         out = np.full(len(finer.start) - 1, np.inf)
         cols, fine_cols = self.mesh.excess.shape[1] - 1, finer.excess.shape[1] - 1
-        row, col = finer.row - self.mesh.row, finer.col - self.mesh.col
+        # A finer lattice's meshes begin at corners of coarse cells.
+        share = self.mesh.plane.stride // finer.plane.stride
+        row, col = finer.row // share - self.mesh.row, finer.col // share - self.mesh.col
         least_of_cells(self.mesh.piece, self.entered, cols, finer.piece, fine_cols, ratio, row, col, out)
         return out
 
@@ -169,20 +172,22 @@ class Guide:
 class Plane:
     """A lattice over a part of the terrain model: node (j, i) lies at ``x[j, i]``, ``y[j, i]``, north of (j - 1, i).
 
-    ``top``, ``ground`` (rows, cols) AMSL, NaN where unknown; ``steep`` the steepest slope of the cells around a node;
+    ``tops``, ``grounds`` (rows, cols) AMSL, NaN where unknown: for bounds and for paths; ``steep`` the
+    steepest slope of the cells around a node;
     ``inside`` (rows - 1, cols - 1) the cells that are looked at. A cell of the terrain model is ``parts`` cells wide
-    and long here; ``block`` cells lie on straight lines.
+    and long here, or each cell here ``stride`` of those; ``block`` cells lie on straight lines.
     """
 
     problem: Problem
     col0: int
     row1: int
     parts: int
+    stride: int
     block: int
     x: Floats
     y: Floats
-    top: Floats
-    ground: Floats
+    tops: tuple[Floats, Floats]
+    grounds: tuple[Floats, Floats]
     steep: Floats
     inside: NDArray[np.bool_]
     shapes: Shapes
@@ -209,7 +214,8 @@ class Plane:
         row, col, last_row, last_col = _box_of(wanted)
         part, nodes = np.s_[row:last_row, col:last_col], np.s_[row : last_row + 1, col : last_col + 1]
         top, ground, steep, x, y = (
-            np.ascontiguousarray(a[nodes]) for a in (self.top, self.ground, self.steep, self.x, self.y)
+            np.ascontiguousarray(a[nodes])
+            for a in (self.tops[not low], self.grounds[not low], self.steep, self.x, self.y)
         )
         rows, cols = ((n - 1) * fineness + 1 for n in top.shape)
         excess = np.full((rows, cols), np.inf)
@@ -267,19 +273,23 @@ class Plane:
     def at(self, place: tuple[float, float]) -> tuple[float, float]:
         """Column and row of a place on this lattice."""
         c, r = self.problem.airspace.surface.grid(*place)
-        return self.parts * (float(c) - self.col0), self.parts * (self.row1 - float(r))
+        scale = self.parts / self.stride
+        return scale * (float(c) - self.col0), scale * (self.row1 - float(r))
 
 
 def make_plane(
     problem: Problem,
     box: tuple[float, float, float, float],
     parts: int = 1,
+    stride: int = 1,
+    whole: int = 1,
     inside: Callable[[Floats, Floats], NDArray[np.bool_]] | None = None,
 ) -> Plane:
     """The lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
 
-    ``parts``: into how many cells a side the terrain model's are cut. ``inside(x, y)`` tells which nodes are to be
-    looked at.
+    ``parts``: into how many cells a side the terrain model's are cut; or ``stride``: how many become one, of lattices
+    that are ``whole`` cells of the terrain model wide and long, times some number. ``inside(x, y)`` tells which nodes
+    are to be looked at.
     """
     surface = problem.airspace.surface
     grid = surface.grid
@@ -295,22 +305,38 @@ def make_plane(
         col1, row1 = (min(math.ceil(v) + 1, m - 1) for v, m in zip(high, (cols, rows), strict=True))
         col1, row1 = max(col1, col0 + 1), max(row1, row0 + 1)
     part = np.s_[row0 : row1 + 1, col0 : col1 + 1]
-    ground = _finer(surface.ground_m[part][::-1], parts)
-    top = ground if surface.top_m is surface.ground_m else _finer(surface.top_m[part][::-1], parts)
-    block = problem.airspace.straight_cells(BENT_M) * parts
-    x, y = _places(grid, col0, row1, ground.shape, parts, block)
-    cells = ground.shape[0] - 1, ground.shape[1] - 1
+    grounds = _nodes(surface.ground_m[part][::-1], parts, stride, whole)
+    tops = grounds
+    if surface.top_m is not surface.ground_m:
+        tops = _nodes(surface.top_m[part][::-1], parts, stride, whole)
+    shape = tops[0].shape
+    block = max(problem.airspace.straight_cells(BENT_M) * parts // stride, 1)
+    x, y = _places(grid, col0, row1, shape, parts / stride, block)
+    cells = shape[0] - 1, shape[1] - 1
     looked_at = np.ones(cells, np.bool_)
     if inside is not None:
         node = inside(x, y)
         looked_at = node[:-1, :-1] & node[:-1, 1:] & node[1:, :-1] & node[1:, 1:]
     return Plane(
-        problem, col0, row1, parts, block, x, y, top, ground, _slopes(top, x, y), looked_at, make_shapes(problem, x, y)
+        problem,
+        col0,
+        row1,
+        parts,
+        stride,
+        block,
+        x,
+        y,
+        tops,
+        grounds,
+        _slopes(tops[1], x, y),
+        looked_at,
+        make_shapes(problem, x, y),
     )
 
 
 def _slopes(z: Floats, x: Floats, y: Floats) -> Floats:
     """(rows, cols) steepest slope of the cells around each node."""
+    z = np.where(np.isfinite(z), z, np.nan)
     across = math.dist((x[0, 0], y[0, 0]), (x[0, 1], y[0, 1]))
     along = math.dist((x[0, 0], y[0, 0]), (x[1, 0], y[1, 0]))
     east, north = np.abs(np.diff(z, axis=1)) / across, np.abs(np.diff(z, axis=0)) / along
@@ -320,6 +346,24 @@ def _slopes(z: Floats, x: Floats, y: Floats) -> Floats:
     b[1:] = north
     np.maximum(b[:-1], north, out=b[:-1])
     return np.hypot(a, b)
+
+
+def _nodes(z: Floats, parts: int, stride: int, whole: int) -> tuple[Floats, Floats]:
+    """Heights at a lattice's nodes for bounds and for paths, from the terrain model's, rows going north."""
+    if stride == 1 and whole == 1:
+        finer = _finer(z, parts)
+        return finer, finer
+    # Beyond the border bounds may do as they like, and paths may not go.
+    more = [(0, -(n - 1) % whole) for n in z.shape]
+    wide = np.pad(np.ascontiguousarray(z), more, mode="edge")
+    low, high = (np.empty(tuple((n - 1) // stride + 1 for n in wide.shape)) for _ in range(2))
+    pool(wide, stride, low, high)
+    for axis, (_, extra) in enumerate(more):
+        if extra:
+            edge = [slice(None), slice(None)]
+            edge[axis] = slice((z.shape[axis] - 1) // stride + 1, None)
+            high[tuple(edge)] = np.inf
+    return low, high
 
 
 def _finer(z: Floats, parts: int) -> Floats:
@@ -344,7 +388,7 @@ def _box_of(wanted: NDArray[np.bool_]) -> tuple[int, int, int, int]:
 
 
 def _places(
-    grid: GridMap, col0: int, row1: int, shape: tuple[int, int], parts: int, span: int
+    grid: GridMap, col0: int, row1: int, shape: tuple[int, int], parts: float, span: int
 ) -> tuple[Floats, Floats]:
     """(rows, cols) x and y of a lattice's nodes, bilinear between the corners of blocks of ``span`` cells."""
     rows, cols = shape

@@ -35,7 +35,7 @@ def draw(problem: Problem) -> Figure:
     ax = figure.subplots()
     x, y = plane.x / 1000.0, plane.y / 1000.0
     cell_m = float(np.hypot(*np.diff(np.stack([plane.x[0, :2], plane.y[0, :2]]), axis=1).ravel()))
-    ground = np.where(np.isnan(plane.ground), np.nanmin(plane.ground), plane.ground)
+    ground = np.where(np.isnan(plane.grounds[0]), np.nanmin(plane.grounds[0]), plane.grounds[0])
     shade = LightSource(azdeg=315, altdeg=40).hillshade(ground[::-1], vert_exag=1.5, dx=cell_m, dy=cell_m)[::-1]
     ax.pcolormesh(x, y, shade, cmap="gray", vmin=-0.2, vmax=1.1, shading="gouraud", rasterized=True)
     for mask, colour, alpha in ((walls & plane.inside, WALL, 0.45), (room, ROOM, 0.75)):

@@ -1,0 +1,165 @@
+"""The five papers' experiments run again: every scenario, every algorithm, the printed numbers beside ours.
+
+What is run stands in `papers_scenarios`, how one run goes in `papers_runs`, what the papers print in `papers_printed`.
+All algorithms get the same seeds. Every finished run is kept in the output directory; the same call goes on from there.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from gcsplan.bench.papers_printed import PRINTED, Least, faults, least_of
+from gcsplan.bench.papers_runs import OPTIMA, Job, Key, Record, Store, carry_out, code_digest
+from gcsplan.bench.papers_scenarios import Scenario, Set, choose, mission_text, prepare
+from gcsplan.bench.papers_statistics import equal_evaluations, judge, row
+from gcsplan.errors import InputError
+
+MOST_RUNS = 10_000
+KEPT = "papers-runs.jsonl"
+
+
+def run(
+    scenarios: Sequence[str] | None = None,
+    algorithms: Sequence[str] | None = None,
+    runs: int | None = None,
+    seed: int = 1,
+    jobs: int | None = None,
+    out: Path = Path("papers"),
+    cluster: str | None = None,
+    done: Callable[[int, int], None] | None = None,
+    *,
+    missions: Path | None = None,
+) -> dict[str, Any]:
+    """Do every run that ``out`` does not hold yet, and sum up.
+
+    Args:
+        scenarios: names; all unless given.
+        algorithms: of the papers' own, by name; all unless given.
+        runs: of each algorithm in each scenario; the paper's number unless given (30 where it names none).
+        seed: of the first vehicle's first run and all others.
+        jobs: local processes; all cores unless given. Of no effect with ``cluster``.
+        out: directory of the runs (`KEPT`) and the report; made if missing.
+        cluster: address of a dask.distributed scheduler that does the runs instead (extra ``cluster``).
+        done: told how many of how many runs are there.
+        missions: directory of the scenarios' mission files, where it is not the usual one.
+
+    Returns:
+        ``settings``; ``scenarios``, each with straight line, optimum, rows and printed numbers; ``claims``.
+
+    Raises:
+        InputError: what cannot be run or written, and a cluster that is not there.
+    """
+    jobs = (os.cpu_count() or 1) if jobs is None else jobs
+    if (runs is not None and not 1 <= runs <= MOST_RUNS) or jobs < 1 or seed < 0:
+        raise InputError(
+            f"1 to {MOST_RUNS} runs, 1 job or more and a seed of 0 or more are wanted, given {runs}, {jobs}, {seed}"
+        )
+    chosen = choose(scenarios, algorithms)
+    asked: dict[tuple[str, str], list[Job]] = {}
+    code = code_digest()
+    texts = {scenario.name: mission_text(scenario.name, missions) for scenario, _ in chosen}
+    for scenario, contenders in chosen:
+        text, count = texts[scenario.name], runs or scenario.paper.runs
+        for name in _optima(scenario):
+            asked[scenario.name, name] = [Job(scenario.name, name, text, 0, 0, code)]
+        for c in contenders:
+            asked[scenario.name, c.name] = [Job(scenario.name, c.name, text, seed, k, code) for k in range(count)]
+    ready(out)
+    store = Store(out / KEPT)
+    there = store.load()
+    every = [job for some in asked.values() for job in some]
+    todo = [job for job in every if job.key not in there]
+    at = [len(every) - len(todo)]
+    if done is not None:
+        done(at[0], len(every))
+
+    def keep(record: Record) -> None:
+        store.append(record)
+        there[_key(record)] = record
+        at[0] += 1
+        if done is not None:
+            done(at[0], len(every))
+
+    carry_out(todo, jobs, cluster, keep)
+    found = {place: [there[job.key] for job in some] for place, some in asked.items()}
+    return {
+        "settings": {"runs": runs, "seed": seed},
+        "scenarios": [
+            _summary(scenario, prepare(scenario.name, texts[scenario.name]), [c.name for c in contenders], found)
+            for scenario, contenders in chosen
+        ],
+        "claims": judge([scenario for scenario, _ in chosen], found),
+    }
+
+
+def ready(out: Path) -> None:
+    """Make the directory. Raises InputError where that cannot be done."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made: {error.strerror or error}", where=str(out)) from error
+
+
+def plain(result: dict[str, Any]) -> dict[str, Any]:
+    """`run`'s result for JSON: without the runs and the world, printed numbers as printed."""
+    left_out = ("set", "records", "best_path", "printed")
+    scenarios = [
+        {key: value for key, value in s.items() if key not in left_out}
+        | {"printed": {name: {m: n.text for m, n in row.items()} for name, row in s["printed"].items()}}
+        for s in result["scenarios"]
+    ]
+    return result | {"scenarios": scenarios}
+
+
+def _optima(scenario: Scenario) -> list[str]:
+    energy = "energy" in scenario.paper.claimed.values()
+    return [name for name, objective in OPTIMA.items() if objective == "length" or energy]
+
+
+def _key(record: Record) -> Key:
+    return (record["scenario"], record["algorithm"], record["seed"], record["number"], record["digest"])
+
+
+def _summary(
+    scenario: Scenario, prepared: Set, names: Sequence[str], found: dict[tuple[str, str], list[Record]]
+) -> dict[str, Any]:
+    """Everything the report says of a scenario; ``set`` and ``records`` are for its pictures."""
+    records = {name: found[scenario.name, name] for name in names}
+    level = equal_evaluations(r for some in records.values() for r in some)
+    least = Least.sum_of(prepared.least)
+    energy = prepared.source.vehicles[0].vehicle.energy
+    rates = (energy.vertical_j_per_m, energy.horizontal_j_per_m)
+    printed = {name: PRINTED[scenario.name, name] for name in names if (scenario.name, name) in PRINTED}
+    optima = {OPTIMA[name]: _optimum(found[scenario.name, name][0]) for name in _optima(scenario)}
+    return {
+        "name": scenario.name,
+        "paper": scenario.paper.name,
+        "source": f"{scenario.paper.title}, {scenario.tables}",
+        "straight_m": least.length_m,
+        "straight_j": least.energy_j(*rates),
+        "optimum_m": optima["length"]["cost"],
+        "bound_m": optima["length"]["bound"],
+        "optimum_j": optima.get("energy", {}).get("cost"),
+        "bound_j": optima.get("energy", {}).get("bound"),
+        "optimum_refused": optima["length"]["refused"],
+        "rows": [row(scenario.name, name, records[name], level) for name in names],
+        "printed": printed,
+        "faults": {name: faults(printed[name], least_of(scenario.name), *rates) for name in printed},
+        "set": prepared,
+        "records": records,
+        "best_path": found[scenario.name, "optimal"][0].get("paths"),
+    }
+
+
+def _optimum(record: Record) -> dict[str, Any]:
+    if record["status"] != "found":
+        return {"cost": None, "bound": None, "refused": record["detail"]}
+    known = all(b is not None for b in record["bounds"])
+    return {
+        "cost": sum(record["costs"]),
+        "bound": sum(record["bounds"]) if known else None,
+        "refused": "",
+    }

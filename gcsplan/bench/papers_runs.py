@@ -1,0 +1,322 @@
+"""One run of one algorithm in one scenario, the file that keeps every run, and how runs are carried out in parallel.
+
+Runs are kept as JSON lines, each on the disk before the next is asked for. A run is known by scenario, algorithm, seed,
+number and a digest of everything that decides its result: mission file, settings and the code itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.bench.papers_scenarios import SCENARIOS, Contender, Set, prepare, settings_of
+from gcsplan.errors import GcsplanError, InputError, NoMission
+from gcsplan.planners import aco
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.smoothing import fewer
+from gcsplan.planners.swarm_planner import Found, Settings, search
+from gcsplan.planners.table import get as get_planner
+from gcsplan.world.path import Path as FlownPath
+from gcsplan.world.zones import Circle
+
+Record = dict[str, Any]
+Key = tuple[str, str, int, int, str]
+
+OPTIMA = {"optimal": "length", "optimal-energy": "energy"}
+"""Names under which the planner `optimal` is run for each objective."""
+
+POINTS_OF_HISTORY = 100
+DRAWN_M = 1e-4
+"""Paths are kept for the map only: by way points, no point of the curve further away than this part of its length."""
+ANSWER_S = 20.0
+"""A cluster's scheduler must answer within this."""
+CLOSE = 0.01
+"""A run has converged when its cost is within this part of its last."""
+
+CODE = (
+    "planners/*.py", "swarm/*.py", "world/*.py", "mission_file/*.py", "pipeline.py", "vehicle.py",
+    "bench/papers_runs.py", "bench/papers_scenarios.py",
+)  # fmt: skip
+"""Source files that decide a run's result, within the package; rather one too many than one too few."""
+
+
+@lru_cache(maxsize=1)
+def code_digest() -> str:
+    """Digest of what decides a run's result beside the run itself: source files, and the libraries' versions."""
+    root, total = Path(__file__).parents[1], hashlib.sha256(f"{np.__version__} {version('scipy')}".encode())
+    for pattern in CODE:
+        for file in sorted(root.glob(pattern)):
+            total.update(file.name.encode())
+            total.update(file.read_bytes())
+    return total.hexdigest()[:16]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One run to do. It carries the mission's text, so that a machine without the file can do it."""
+
+    scenario: str
+    algorithm: str
+    text: str
+    seed: int
+    number: int
+    code: str
+
+    @property
+    def key(self) -> Key:
+        """What the run is known by."""
+        return (self.scenario, self.algorithm, self.seed, self.number, self.digest)
+
+    @property
+    def digest(self) -> str:
+        """Of everything that decides the result."""
+        told: list[object] = [self.text, self.code]
+        if self.algorithm not in OPTIMA:
+            c = self.contender
+            told += [c.planner, {k: dict(v) if isinstance(v, Mapping) else v for k, v in c.options.items()}]
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+
+    @property
+    def contender(self) -> Contender:
+        """The algorithm's entry in the paper's table."""
+        paper = SCENARIOS[self.scenario].paper
+        return next(c for c in paper.contenders if c.name == self.algorithm)
+
+
+class Store:
+    """The file of runs. A line that cannot be read, such as a last one cut short, counts as not written."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def load(self) -> dict[Key, Record]:
+        """Every run in the file. Raises InputError where it cannot be read."""
+        try:
+            lines = self.path.read_bytes().split(b"\n")
+        except FileNotFoundError:
+            return {}
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror or error}", where=str(self.path)) from error
+        out: dict[Key, Record] = {}
+        for line in lines:
+            try:
+                record = json.loads(line)
+                key = tuple(record[name] for name in ("scenario", "algorithm", "seed", "number", "digest"))
+            except (ValueError, KeyError, TypeError):
+                continue
+            out[key] = record
+        return out
+
+    def append(self, record: Record) -> None:
+        """Add a run, on a line of its own even where the line before it was cut short."""
+        try:
+            with self.path.open("ab+") as file:
+                if file.seek(0, os.SEEK_END):
+                    file.seek(-1, os.SEEK_END)
+                    if file.read(1) != b"\n":
+                        file.write(b"\n")
+                file.write(json.dumps(record, separators=(",", ":"), allow_nan=False).encode() + b"\n")
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise InputError(f"cannot be written: {error.strerror or error}", where=str(self.path)) from error
+
+
+def work(job: Job) -> Record:
+    """Do one run. Raises InputError where this machine's code is not that of the one who asks."""
+    optimal = job.algorithm in OPTIMA
+    if job.code != code_digest():
+        raise InputError(
+            "a worker runs another version of gcsplan, numpy or scipy: install the same on every machine of the cluster"
+        )
+    ready = prepare(job.scenario, job.text)
+    record: Record = {
+        "scenario": job.scenario, "algorithm": job.algorithm, "seed": job.seed, "number": job.number,
+        "digest": job.digest,
+    }  # fmt: skip
+    try:
+        record.update(_best(ready, OPTIMA[job.algorithm]) if optimal else _swarm(job, ready))
+    except NoMission as refusal:
+        record.update(status="refused", detail=str(refusal))
+    return record
+
+
+def _best(ready: Set, objective: str) -> Record:
+    """What the planner `optimal` finds, vehicle by vehicle, and below what no path can be."""
+    began = time.thread_time()
+    costs, bounds, paths = [], [], []
+    for problem in ready.problems:
+        asked = replace(problem, objective="energy" if objective == "energy" else "length")
+        solution = get_planner("optimal").plan(asked)
+        costs.append(asked.cost(solution.path))
+        bounds.append(solution.lower_bound)
+        paths.append(solution.path.points)
+    return {
+        "status": "found", "costs": costs, "bounds": bounds, "time_s": time.thread_time() - began,
+        "paths": [np.round(p, 2).tolist() for p in paths],
+    }  # fmt: skip
+
+
+def seed_of(seed: int, number: int, vehicle: int) -> int:
+    """The seed of one vehicle's search: the same for every algorithm and scenario."""
+    return int(np.random.SeedSequence([seed, number, vehicle]).generate_state(1)[0])
+
+
+def _search(problem: Problem, contender: Contender, settings: Settings) -> Found:
+    if contender.planner == "aco":
+        return aco.search(problem, settings)
+    return search(problem, get_planner(contender.planner).optimiser, settings)
+
+
+@lru_cache(maxsize=256)
+def _warm(scenario: str, text: str, algorithm: str) -> None:
+    """Compile and load whatever this contender needs, so that no run's time holds it."""
+    job = Job(scenario, algorithm, text, 1, 0, "")
+    ready = prepare(scenario, text)
+    with suppress(NoMission):  # one round of ants need not arrive
+        _search(ready.problems[0], job.contender, replace(settings_of(job.contender, ready.source), iterations=1))
+
+
+def _swarm(job: Job, ready: Set) -> Record:
+    contender = job.contender
+    settings = settings_of(contender, ready.source)
+    _warm(job.scenario, job.text, job.algorithm)
+    by_priority = SCENARIOS[job.scenario].paper.fleet == "priority"
+    found: list[Found] = []
+    began = time.thread_time()
+    for vehicle, problem in enumerate(ready.problems):
+        own = replace(settings, earlier=tuple(f.curve for f in found)) if by_priority else settings
+        found.append(_search(replace(problem, seed=seed_of(job.seed, job.number, vehicle)), contender, own))
+    took = time.thread_time() - began
+    history = _history(found)
+    cost = sum(f.result.cost for f in found)
+    flown = [FlownPath(f.curve) for f in found]
+    near = [_nearest_m(f, p) for f, p in zip(found, ready.problems, strict=True)]
+    return {
+        "status": "found",
+        "cost": cost if math.isfinite(cost) else None,
+        "length_m": sum(p.length_m for p in flown),
+        "lengths_m": [p.length_m for p in flown],
+        "energy_j": sum(
+            p.energy_j(q.vertical_j_per_m, q.horizontal_j_per_m) for p, q in zip(flown, ready.problems, strict=True)
+        ),
+        "collisions": sum(f.collisions for f in found),
+        "violations": sum(len(f.violations) for f in found),
+        "time_s": took,
+        "evaluations": sum(f.result.evaluations for f in found),
+        "iterations": max(f.result.iterations for f in found),
+        "converged": _converged(history),
+        "pitch_deg": float(np.mean([f.pitch_deg for f in found])),
+        "yaw_deg": float(np.mean([f.yaw_deg for f in found])),
+        "nearest_m": None if None in near else float(np.mean(near)),  # type: ignore[arg-type]
+        "history": history,
+        "paths": [np.round(f.curve[fewer(f.curve, f.stops, DRAWN_M * f.length_m)], 2).tolist() for f in found],
+    }
+
+
+def _history(found: Sequence[Found]) -> dict[str, list[Any]]:
+    """Best cost and evaluations so far at ends of iterations, of the fleet together; None before a cost is finite."""
+    last = max(f.result.iterations for f in found)
+    at = np.unique(np.linspace(0, last, min(last, POINTS_OF_HISTORY) + 1).round().astype(int))
+    cost, evaluations = np.zeros(len(at)), np.zeros(len(at), np.int64)
+    for f in found:
+        h = f.result.history
+        place = np.searchsorted(h.iterations, at, side="right") - 1
+        cost += np.where(place < 0, np.inf, h.cost[np.maximum(place, 0)])
+        evaluations += np.where(place < 0, 0, h.evaluations[np.maximum(place, 0)])
+    plain = [float(f"{c:.8g}") if math.isfinite(c) else None for c in cost.tolist()]
+    return {"iterations": at.tolist(), "evaluations": evaluations.tolist(), "cost": plain}
+
+
+def _converged(history: dict[str, list[Any]]) -> int | None:
+    """The first iteration (of those kept) whose best cost is within `CLOSE` of the last one."""
+    costs = history["cost"]
+    if costs[-1] is None:
+        return None
+    enough = costs[-1] + CLOSE * abs(costs[-1])
+    return int(next(i for i, c in zip(history["iterations"], costs, strict=True) if c is not None and c <= enough))
+
+
+def _nearest_m(found: Found, problem: Problem) -> float | None:
+    """Mean over the curve of the distance in the plane to the nearest cylinder's wall; None where there is none."""
+    zones = [z.shape for z in problem.airspace.zones if isinstance(z.shape, Circle)]
+    if not zones:
+        return None
+    wall: list[NDArray[np.float64]] = [
+        np.hypot(found.curve[:, 0] - c.east_m, found.curve[:, 1] - c.north_m) - c.radius_m for c in zones
+    ]
+    return float(np.maximum(np.min(wall, axis=0), 0.0).mean())
+
+
+def carry_out(todo: Sequence[Job], jobs: int, cluster: str | None, keep: Callable[[Record], None]) -> None:
+    """Do every job, ``keep`` each record as soon as it is there; what Ctrl-C finds at work is finished and kept."""
+    if cluster is not None:
+        _over_cluster(todo, cluster, keep)
+    elif jobs == 1 or len(todo) <= 1:
+        for job in todo:
+            keep(work(job))
+    else:
+        _over_processes(todo, jobs, keep)
+
+
+def _over_processes(todo: Sequence[Job], jobs: int, keep: Callable[[Record], None]) -> None:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(jobs, len(todo)), mp_context=context, initializer=_deaf) as pool:
+        waiting = {pool.submit(work, job) for job in todo}
+        try:
+            for future in as_completed(waiting):
+                waiting.discard(future)
+                keep(future.result())
+        except BrokenProcessPool as error:
+            raise GcsplanError("a process that did runs has died (out of memory?); the same command goes on") from error
+        except BaseException:
+            for future in as_completed({f for f in waiting if not f.cancel()}):
+                if future.exception() is None:
+                    keep(future.result())
+            raise
+
+
+def _deaf() -> None:
+    """Ctrl-C is the parent's to hear: a run that has begun is finished."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _over_cluster(todo: Sequence[Job], address: str, keep: Callable[[Record], None]) -> None:
+    try:
+        distributed = import_module("distributed")
+    except ImportError:
+        raise InputError(
+            "--cluster needs dask.distributed, which is not installed: pip install 'gcsplan[cluster]'"
+        ) from None
+    try:
+        client = distributed.Client(address, timeout=ANSWER_S, set_as_default=False)
+    except (OSError, ValueError) as error:  # TimeoutError is an OSError
+        raise InputError(f"no cluster answers: {error}", where=f"--cluster {address}") from error
+    try:
+        futures = client.map(work, todo, pure=False)
+        for future in distributed.as_completed(futures, loop=client.loop):
+            try:
+                record = future.result()
+            except distributed.KilledWorker as error:
+                raise GcsplanError("a worker of the cluster has died; the same command goes on") from error
+            keep(record)
+    finally:
+        client.close()  # which gives up whatever is still waiting
