@@ -15,6 +15,7 @@ from gcsplan.planners._scene_kernels import (
     BOTTOM,
     CENTRE_E,
     CENTRE_N,
+    CORNERS,
     DOWN,
     EAST,
     EDGE,
@@ -42,6 +43,9 @@ from gcsplan.planners._scene_kernels import (
     gap_to,
     height_at,
     kernel,
+    lookup,
+    lookup_both,
+    one_grid,
 )  # fmt: skip
 
 # Columns of the terms, all >= 0. Metres unless said otherwise; m² are depths summed along the path.
@@ -61,16 +65,24 @@ TERMS = 24
 
 # Groups of terms that cost time of their own: which are wanted, as bits; GROUND: all along the path.
 ANGLES, NODES_NEAR, SAMPLES_NEAR, HEIGHTS, BENDS, HIDING, GROUND = 1, 2, 4, 8, 16, 32, 64
+YAWS = 128  # SSGWO's exponentials of angles
 
 # The papers' constants: compiled in, for no mission changes them.
 D_SAFE, R_UAV, CLAMP_M, PITCH_MAX = 10.0, 1.0, 0.1, math.radians(45.0)  # D: SSGWO
 TAN_PITCH_MAX = math.tan(PITCH_MAX)
-TURN_MAX = math.radians(45.0)  # D: MSFOA, whose φ_max follows from a load that it does not give
+TAN_TURN_MAX = math.tan(math.radians(45.0))  # D: MSFOA, whose φ_max follows from a load that it does not give
 D_HIDE = 20.0  # D: IB-ABC's d_safe
 
 SCRATCH = 7
 """Arrays of a path's samples that `measure` works in: ground, floor, leg, run, weight, column, row. They are arrays of
 their own, not rows of one: only then does the compiler see that a store to one leaves the others, and vectorises."""
+
+
+@device
+def _away(box, zone, reach):  # type: ignore[no-untyped-def]
+    """Whether no point of a path's box is within ``reach`` of a zone's centre, for sure."""
+    e, n = zone[ZE], zone[ZN]
+    return box[0] > e + reach or box[1] < e - reach or box[2] > n + reach or box[3] < n - reach
 
 
 @device
@@ -81,7 +93,7 @@ def _zone_terms(x, y, z, heights, quadratic, numbers, leg, weight, zones, corner
         zone = zones[k]
         reach, e, n = zone[ZR] + zone[REACH], zone[ZE], zone[ZN]
         # Zones away from the path's box cost nothing.
-        if box[0] > e + reach or box[1] < e - reach or box[2] > n + reach or box[3] < n - reach:
+        if _away(box, zone, reach):
             continue
         square = reach * reach
         hits = 0.0
@@ -94,12 +106,15 @@ def _zone_terms(x, y, z, heights, quadratic, numbers, leg, weight, zones, corner
             dx, dy = x[i] - e, y[i] - n
             if dx * dx + dy * dy >= square:
                 continue
-            gap = gap_to(zone, corners, x[i], y[i])
             ground = 0.0
             if zone[LOW_AGL] != 0.0 or zone[HIGH_AGL] != 0.0:
                 ground = height_at(heights, quadratic, numbers, x[i], y[i])
             low, high = zone[Z_LOW] + zone[LOW_AGL] * ground, zone[Z_HIGH] + zone[HIGH_AGL] * ground
-            if gap < zone[REACH] and low < z[i] < high:
+            within = low < z[i] < high
+            if not (within or near):
+                continue
+            gap = gap_to(zone, corners, x[i], y[i])
+            if within and gap < zone[REACH]:
                 out[INSIDE] += weight[i]
                 out[DEEP] += weight[i] * min(zone[REACH] - gap, max(min(z[i] - low, high - z[i]), 0.0))
             if near:
@@ -109,11 +124,13 @@ def _zone_terms(x, y, z, heights, quadratic, numbers, leg, weight, zones, corner
 
 
 @device
-def _near_terms(x, y, z, heights, quadratic, numbers, zones, corners, stride, out):  # type: ignore[no-untyped-def]
+def _near_terms(x, y, z, heights, quadratic, numbers, zones, corners, box, stride, out):  # type: ignore[no-untyped-def]
     """SSGWO's obstacle cost (eq. 31, 32): 1/d over nodes and obstacles nearer than d_safe."""
     for k in range(len(zones)):
         zone = zones[k]
         reach = zone[ZR] + D_SAFE + R_UAV
+        if _away(box, zone, reach):
+            continue
         for i in range(stride, len(x) - 1, stride):
             dx, dy = x[i] - zone[ZE], y[i] - zone[ZN]
             if dx * dx + dy * dy >= reach * reach:
@@ -131,38 +148,54 @@ def _near_terms(x, y, z, heights, quadratic, numbers, zones, corners, stride, ou
 
 @device
 def _angle_terms(x, y, z, stride, bends, out):  # type: ignore[no-untyped-def]
-    """Turns and slopes between nodes, every ``stride``-th sample."""
-    heading, first = 0.0, True
+    """Turns and slopes between nodes, every ``stride``-th sample: how many are too much, and ``bends``, radians."""
+    first = True
+    he, hn = 1.0, 0.0  # the way it heads; climbing on the spot keeps it
     px = py = pz = pl = 0.0
     for i in range(stride, len(x), stride):
-        at = x[i - stride], y[i - stride], z[i - stride]
-        dx, dy, dz = x[i] - at[0], y[i] - at[1], z[i] - at[2]
+        h = z[i - stride]
+        dx, dy, dz = x[i] - x[i - stride], y[i] - y[i - stride], z[i] - h
         run = math.sqrt(dx * dx + dy * dy)
         length = math.sqrt(run * run + dz * dz)
         if length <= 0.0:
+            continue
+        slope = dz / max(run, 1e-9)
+        # MSFOA eq. 27: the steepest climb and descent by altitude.
+        alpha = -1.5377e-10 * h * h - 2.6997e-5 * h + 0.4211
+        beta = 2.5063e-9 * h * h - 6.3014e-6 * h - 0.3257
+        if slope > alpha or slope < beta:
+            out[SLOPES] += 1.0
+        e, n = (dx, dy) if run > 0.0 else (he, hn)
+        if not first:
+            # No angle is needed to know that it is more than 45 degrees.
+            if abs(he * n - hn * e) > (he * e + hn * n) * TAN_TURN_MAX:
+                out[TURNS] += 1.0
+            if bends:
+                cosine = (px * dx + py * dy + pz * dz) / (pl * length)
+                out[BEND] += math.acos(min(max(cosine, -1.0), 1.0))
+        he, hn, first = e, n, False
+        px, py, pz, pl = dx, dy, dz, length
+
+
+@device
+def _yaw_terms(x, y, z, stride, out):  # type: ignore[no-untyped-def]
+    """SSGWO's sums of exponentials of turns and slopes between nodes (eq. 29, 30)."""
+    heading, first = 0.0, True
+    for i in range(stride, len(x), stride):
+        dx, dy, dz = x[i] - x[i - stride], y[i] - y[i - stride], z[i] - z[i - stride]
+        run = math.sqrt(dx * dx + dy * dy)
+        if run <= 0.0 and dz == 0.0:
             continue
         now = math.atan2(dy, dx) if run > 0.0 else heading
         # tan(45 degrees) is 1: the angle itself is needed beyond it alone.
         if abs(dz) > run * TAN_PITCH_MAX:
             out[PITCH] += math.exp(math.atan2(abs(dz), run) - PITCH_MAX)
-        slope = dz / max(run, 1e-9)
-        # MSFOA eq. 27: the steepest climb and descent by altitude.
-        alpha = -1.5377e-10 * at[2] * at[2] - 2.6997e-5 * at[2] + 0.4211
-        beta = 2.5063e-9 * at[2] * at[2] - 6.3014e-6 * at[2] - 0.3257
-        if slope > alpha or slope < beta:
-            out[SLOPES] += 1.0
         if not first:
             turn = abs(now - heading)
             if turn > math.pi:
                 turn = 2.0 * math.pi - turn
             out[YAW] += math.exp(turn) - 1.0
-            if turn > TURN_MAX:
-                out[TURNS] += 1.0
-            if bends:
-                cosine = (px * dx + py * dy + pz * dz) / (pl * length)
-                out[BEND] += math.acos(min(max(cosine, -1.0), 1.0))
         heading, first = now, False
-        px, py, pz, pl = dx, dy, dz, length
 
 
 @device
@@ -177,19 +210,26 @@ def _height_terms(z, ground, numbers, out):  # type: ignore[no-untyped-def]
 
 
 @device
-def _hiding_terms(x, y, z, ground, run, zones, corners, numbers, out):  # type: ignore[no-untyped-def]
-    """IB-ABC's concealment (eq. 4)."""
-    lit, exposed = 3.0 * (numbers[H_MAX] + D_HIDE), 0.0
-    for i in range(1, len(x)):
+def _hiding_terms(x, y, z, ground, run, zones, corners, numbers, box, cost, out):  # type: ignore[no-untyped-def]
+    """IB-ABC's concealment (eq. 4). ``cost`` (S,) is scratch: of a metre at each sample."""
+    lit = 3.0 * (numbers[H_MAX] + D_HIDE)
+    for i in range(len(x)):
         apart = z[i] - ground[i]
-        if apart >= D_HIDE:
-            for k in range(len(zones)):
-                zone = zones[k]
-                dx, dy = x[i] - zone[ZE], y[i] - zone[ZN]
-                reach = zone[ZR] + D_HIDE
-                if dx * dx + dy * dy < reach * reach:
-                    apart = min(apart, gap_to(zone, corners, x[i], y[i]))
-        exposed += (z[i] - ground[i] - D_HIDE if apart >= D_HIDE else lit) * run[i - 1]
+        cost[i] = apart - D_HIDE if apart >= D_HIDE else lit  # NaN is lit
+    for k in range(len(zones)):
+        zone = zones[k]
+        reach = zone[ZR] + D_HIDE
+        if _away(box, zone, reach):
+            continue
+        e, n, square, circle = zone[ZE], zone[ZN], reach * reach, zone[CORNERS] == 0.0
+        for i in range(len(x)):
+            dx, dy = x[i] - e, y[i] - n
+            # What is near ground or another zone already needs no distance.
+            if dx * dx + dy * dy < square and cost[i] != lit and (circle or gap_to(zone, corners, x[i], y[i]) < D_HIDE):
+                cost[i] = lit
+    exposed = 0.0
+    for i in range(1, len(x)):
+        exposed += cost[i] * run[i - 1]
     out[EXPOSED] = exposed
 
 
@@ -225,34 +265,6 @@ def _legs(x, y, z, leg, run, weight, numbers, out):  # type: ignore[no-untyped-d
     for i in range(n - 1):
         weight[i + 1] = 0.5 * (leg[i] + leg[i + 1])
     out[LENGTH], out[FLAT], out[RISE], out[STEEP] = length, flat, rise, steep
-
-
-@device
-def _lookup(heights, quadratic, numbers, x, y, out, column, row):  # type: ignore[no-untyped-def]
-    """Bilinear heights at all samples; NaN where unknown. The map first, for it is straight arithmetic."""
-    q, rows, cols = quadratic, heights.shape[0], heights.shape[1]
-    c0, c1, c2, c3, c4, c5 = q[0, 0], q[0, 1], q[0, 2], q[0, 3], q[0, 4], q[0, 5]
-    r0, r1, r2, r3, r4, r5 = q[1, 0], q[1, 1], q[1, 2], q[1, 3], q[1, 4], q[1, 5]
-    ce, cn, k, right, low = numbers[CENTRE_E], numbers[CENTRE_N], numbers[PER_UNIT], cols - 1.0, rows - 1.0
-    off = 0.0
-    for i in range(len(x)):
-        u, v = (x[i] - ce) * k, (y[i] - cn) * k
-        at = c0 + u * (c1 + c3 * u + c4 * v) + v * (c2 + c5 * v)
-        down = r0 + u * (r1 + r3 * u + r4 * v) + v * (r2 + r5 * v)
-        off += 1.0 if (at < -EDGE) | (at > right + EDGE) | (down < -EDGE) | (down > low + EDGE) else 0.0
-        column[i] = at
-        row[i] = down
-    for t in range(len(x)):
-        at, down = min(max(column[t], 0.0), right), min(max(row[t], 0.0), low)
-        i, j = min(np.int64(at), cols - 2), min(np.int64(down), rows - 2)
-        a, b = at - i, down - j
-        north = heights[j, i] + a * (heights[j, i + 1] - heights[j, i])
-        south = heights[j + 1, i] + a * (heights[j + 1, i + 1] - heights[j + 1, i])
-        out[t] = north + b * (south - north)
-    if off > 0.0:
-        for t in range(len(x)):
-            if column[t] < -EDGE or column[t] > right + EDGE or row[t] < -EDGE or row[t] > low + EDGE:
-                out[t] = math.nan
 
 
 @device
@@ -296,6 +308,7 @@ def measure(  # type: ignore[no-untyped-def]
     arrays (S,), ``box`` (4,).
     """
     ground, floor, leg, run, weight, column, row = scratch
+    shared = one_grid(heights, quadratic, floors, floor_map)
     for p in range(len(paths)):
         x, y, z = paths[p, 0], paths[p, 1], paths[p, 2]
         to = out[p]
@@ -303,18 +316,23 @@ def measure(  # type: ignore[no-untyped-def]
             to[k] = 0.0
         _box_of(x, y, box)
         _legs(x, y, z, leg, run, weight, numbers, to)
-        _lookup(floors, floor_map, numbers, x, y, floor, column, row)
-        if wanted & GROUND:
-            _lookup(heights, quadratic, numbers, x, y, ground, column, row)
+        if shared and wanted & GROUND:
+            lookup_both(floors, heights, floor_map, numbers, x, y, floor, ground, column, row)
+        else:
+            lookup(floors, floor_map, numbers, x, y, floor, column, row)
+            if wanted & GROUND:
+                lookup(heights, quadratic, numbers, x, y, ground, column, row)
         _limit_terms(x, y, z, ground, floor, weight, numbers, to)
         _zone_terms(
             x, y, z, heights, quadratic, numbers, leg, weight, zones, corners, box, (wanted & SAMPLES_NEAR) != 0, to
         )
         if wanted & ANGLES:
             _angle_terms(x, y, z, stride, (wanted & BENDS) != 0, to)
+        if wanted & YAWS:
+            _yaw_terms(x, y, z, stride, to)
         if wanted & NODES_NEAR:
-            _near_terms(x, y, z, heights, quadratic, numbers, zones, corners, stride, to)
+            _near_terms(x, y, z, heights, quadratic, numbers, zones, corners, box, stride, to)
         if wanted & HEIGHTS:
             _height_terms(z, ground, numbers, to)
         if wanted & HIDING:
-            _hiding_terms(x, y, z, ground, run, zones, corners, numbers, to)
+            _hiding_terms(x, y, z, ground, run, zones, corners, numbers, box, column, to)

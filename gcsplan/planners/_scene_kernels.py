@@ -69,6 +69,81 @@ def heights_at(heights, quadratic, numbers, points, out, sources=SOURCES):  # ty
 
 
 @device
+def place(raster, quadratic, numbers, x, y, column, row):  # type: ignore[no-untyped-def]
+    """Columns and rows of all samples in a raster, and how many are off it. Straight arithmetic, on its own."""
+    q, right, low = quadratic, raster.shape[1] - 1.0, raster.shape[0] - 1.0
+    c0, c1, c2, c3, c4, c5 = q[0, 0], q[0, 1], q[0, 2], q[0, 3], q[0, 4], q[0, 5]
+    r0, r1, r2, r3, r4, r5 = q[1, 0], q[1, 1], q[1, 2], q[1, 3], q[1, 4], q[1, 5]
+    ce, cn, k = numbers[CENTRE_E], numbers[CENTRE_N], numbers[PER_UNIT]
+    off = 0.0
+    for i in range(len(x)):
+        u, v = (x[i] - ce) * k, (y[i] - cn) * k
+        at = c0 + u * (c1 + c3 * u + c4 * v) + v * (c2 + c5 * v)
+        down = r0 + u * (r1 + r3 * u + r4 * v) + v * (r2 + r5 * v)
+        off += 1.0 if (at < -EDGE) | (at > right + EDGE) | (down < -EDGE) | (down > low + EDGE) else 0.0
+        column[i] = at
+        row[i] = down
+    return off
+
+
+@device
+def darken(raster, column, row, out):  # type: ignore[no-untyped-def]
+    """NaN where a sample is off the raster."""
+    right, low = raster.shape[1] - 1.0, raster.shape[0] - 1.0
+    for t in range(len(column)):
+        if column[t] < -EDGE or column[t] > right + EDGE or row[t] < -EDGE or row[t] > low + EDGE:
+            out[t] = math.nan
+
+
+@device
+def bilinear(raster, j, i, a, b):  # type: ignore[no-untyped-def]
+    north = raster[j, i] + a * (raster[j, i + 1] - raster[j, i])
+    south = raster[j + 1, i] + a * (raster[j + 1, i + 1] - raster[j + 1, i])
+    return north + b * (south - north)
+
+
+@device
+def lookup(raster, quadratic, numbers, x, y, out, column, row):  # type: ignore[no-untyped-def]
+    """Bilinear heights at all samples; NaN where unknown."""
+    off = place(raster, quadratic, numbers, x, y, column, row)
+    rows, cols = raster.shape
+    right, low = cols - 1.0, rows - 1.0
+    for t in range(len(x)):
+        at, down = min(max(column[t], 0.0), right), min(max(row[t], 0.0), low)
+        i, j = min(np.int64(at), cols - 2), min(np.int64(down), rows - 2)
+        out[t] = bilinear(raster, j, i, at - i, down - j)
+    if off > 0.0:
+        darken(raster, column, row, out)
+
+
+@device
+def lookup_both(raster, other, quadratic, numbers, x, y, out, other_out, column, row):  # type: ignore[no-untyped-def]
+    """`lookup` in two rasters of one grid."""
+    off = place(raster, quadratic, numbers, x, y, column, row)
+    rows, cols = raster.shape
+    right, low = cols - 1.0, rows - 1.0
+    for t in range(len(x)):
+        at, down = min(max(column[t], 0.0), right), min(max(row[t], 0.0), low)
+        i, j = min(np.int64(at), cols - 2), min(np.int64(down), rows - 2)
+        a, b = at - i, down - j
+        out[t] = bilinear(raster, j, i, a, b)
+        other_out[t] = bilinear(other, j, i, a, b)
+    if off > 0.0:
+        darken(raster, column, row, out)
+        darken(raster, column, row, other_out)
+
+
+@device
+def one_grid(heights, quadratic, floors, floor_map):  # type: ignore[no-untyped-def]
+    if heights.shape != floors.shape:
+        return False
+    for k in range(6):
+        if quadratic[0, k] != floor_map[0, k] or quadratic[1, k] != floor_map[1, k]:
+            return False
+    return True
+
+
+@device
 def gap_to(zone, corners, x, y):  # type: ignore[no-untyped-def]
     """Signed horizontal distance from a zone's shape, negative inside."""
     count = int(zone[CORNERS])
@@ -95,16 +170,22 @@ def nearness(paths, clocks, others, other_clocks, apart_m, soon_s, out, sources=
     """MSFOA eq. 28–30 into ``out`` (P,): Σ (soon_s - gap)³ over pairs of points nearer than ``apart_m``.
 
     ``paths`` (P, S, 3) with ``clocks`` (P, S) against ``others`` (Q, 3) with ``other_clocks`` (Q,), seconds.
+    No clock may fall along its path.
     """
     square = apart_m * apart_m
     for p in range(len(paths)):
-        total = 0.0
+        total, first = 0.0, 0
         for i in range(paths.shape[1]):
-            x, y, z = paths[p, i, 0], paths[p, i, 1], paths[p, i, 2]
-            for q in range(len(others)):
+            x, y, z, now = paths[p, i, 0], paths[p, i, 1], paths[p, i, 2], clocks[p, i]
+            # Both clocks rise: what is too long ago for this sample is so for all that follow.
+            while first < len(others) and now - other_clocks[first] >= soon_s:
+                first += 1
+            for q in range(first, len(others)):
+                if other_clocks[q] - now >= soon_s:
+                    break
                 dx, dy, dz = others[q, 0] - x, others[q, 1] - y, others[q, 2] - z
-                gap = soon_s - abs(clocks[p, i] - other_clocks[q])
-                if dx * dx + dy * dy + dz * dz < square and gap > 0.0:
+                if dx * dx + dy * dy + dz * dz < square:
+                    gap = max(soon_s - abs(now - other_clocks[q]), 0.0)
                     total += gap * gap * gap
         out[p] = total
 

@@ -24,7 +24,7 @@ from gcsplan.world.path import Path
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-SLACKS = (0.02, 0.15, 0.6)
+SLACKS = (0.008, 0.15, 0.6)
 """How much longer than the shortest the tracks are that are looked at, as a part of it, until a path is known."""
 LITTLE, WORTH = 5e-6, 2e-5
 """What fewer way points may cost, as a part of the cost: on the way, and at last."""

@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 DETOURS = (1.25, 2.5, math.inf)
 """How long tracks may be, in times the straight way, before the lattice must be widened."""
+COARSE_M = 100.0
+"""Cells of the first look are no larger, if the terrain model's are not."""
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 """Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
 
@@ -54,13 +56,14 @@ class Leg:
         self._twin: Plane | None = None
         self._guide: Guide
         self._ahead: Guide | None = None
+        self._seen: tuple[float, tuple[Floats, Floats, Floats]] | None = None
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
         wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
         self.parts = max(1, round(cell_m / wanted_m))
         """Parts a side that the terrain model's cells are cut into, where they are large beside leg or zones."""
         self._fine_stride = max(1, round(finest_m / cell_m)) if self.parts == 1 else 1
         self._stride = self._fine_stride * max(1, round(wanted_m / cell_m / self._fine_stride))
-        if self.parts > 1 or self._stride < 2:
+        if self.parts > 1 or self._stride < 3 * self._fine_stride:
             self._stride = self._fine_stride = 1
         # How many parts a side the first look's cells are cut into where it matters, of the plane or of its finer twin.
         self._ratio = self._stride // self._fine_stride
@@ -72,7 +75,7 @@ class Leg:
 
     def _cell_m(self) -> float:
         """How large cells may be for the first look."""
-        least, most = self.straight_m / 250.0, self.straight_m / 60.0
+        least, most = self.straight_m / 250.0, min(self.straight_m / 60.0, COARSE_M)
         radii = [
             z.shape.radius_m
             if isinstance(z.shape, Circle)
@@ -86,7 +89,7 @@ class Leg:
 
         Widens the lattice until that way lies within it.
         """
-        self._ahead = None
+        self._ahead = self._seen = None
         for detour in DETOURS:
             if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                 continue
@@ -151,7 +154,9 @@ class Leg:
         return out
 
     def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats]:
-        """Of the cells that tracks shorter than ``limit_m`` may meet: lowest floor, least way there, least way on."""
+        """Of the cells that tracks shorter than ``limit_m`` may meet (and more): lowest floor, ways there and on."""
+        if self._seen is not None and limit_m <= self._seen[0]:
+            return self._seen[1]
         mesh = self.plane.mesh(self.top_m, True, 1, self.corridor(limit_m), single=True)
         a, b = self.start.place, self.goal.place
         _, left = mesh.flood(b, a, limit_m, math.inf, self._guide_back())
@@ -162,7 +167,8 @@ class Leg:
         for guide in (away, left):
             entered = np.append(guide.entered, np.inf)
             ways.append(entered[both[live]].min(axis=1))
-        return mesh.lowest()[live], ways[0], ways[1]
+        self._seen = limit_m, (mesh.lowest()[live], ways[0], ways[1])
+        return self._seen[1]
 
     def _guide_back(self) -> Guide:
         """Distances from the start over the coarse mesh."""

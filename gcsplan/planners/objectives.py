@@ -140,9 +140,12 @@ def _ib_abc(terms: Floats, unit: Unit) -> Floats:
     """
     out = np.zeros(len(terms))
     own = (k.LENGTH, k.BEND, k.EXPOSED, k.SPHERE)
-    for weight, term, least in zip(IB_ABC_WEIGHTS, own, (1.0, math.pi, 1.0, 1.0), strict=True):
+    # The arccos of float noise is some 1e-8 rad a node: a straight line's turns are none below 1e-3.
+    for weight, term, least, none in zip(
+        IB_ABC_WEIGHTS, own, (1.0, math.pi, 1.0, 1.0), (1e-9, 1e-3, 1e-9, 1e-9), strict=True
+    ):
         straight = float(unit.straight[term])
-        out += weight * terms[:, term] / (straight if straight > 1e-9 else least)
+        out += weight * terms[:, term] / (straight if straight > none else least)
     return np.asarray(out + PENALTY * forbidden(terms, unit.straight_m) / unit.straight_m)
 
 
@@ -151,7 +154,7 @@ OBJECTIVES: Mapping[str, Objective] = MappingProxyType(
         o.name: o
         for o in (
             Objective("krill", "length or energy", "krill 12, 13", 0, _krill),
-            Objective("ssgwo", "length, angles, nearness to obstacles", "SSGWO 26-34", k.ANGLES | k.NODES_NEAR, _ssgwo),
+            Objective("ssgwo", "length, angles, nearness to obstacles", "SSGWO 26-34", k.YAWS | k.NODES_NEAR, _ssgwo),
             Objective("msfoa", "height, length, threat, terrain, turns, slopes, nearness to earlier vehicles",
                       "MSFOA 20-30", k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
             Objective("abo", "length, samples under ground or out of the volume", "ABO 4-7", 0, _abo),

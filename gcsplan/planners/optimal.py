@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 
 MOST_NODES = 1_500_000
 """Of terrain on which that is done: its rasters have the terrain's own spacing."""
-FAR = 1e-2
+FAR = 5e-3
 """Gap, as a part, beyond which the lattice of reachable altitudes is asked for a better path too."""
 
 

@@ -77,25 +77,26 @@ def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tupl
         legs_b: list[Floats] = []
         choices: list[tuple[int, Floats | None]] = []
         for i in drop.tolist():
-            legs_a.append(np.stack([points[i - 1]]))
-            legs_b.append(np.stack([points[i + 1]]))
+            legs_a.append(points[i - 1 : i])
+            legs_b.append(points[i + 1 : i + 2])
             choices.append((i, None))
         for i in range(1, n - 2):
             if not pinned[i] and not pinned[i + 1]:
                 for corner in _corners(points[i - 1 : i + 3]):
                     choices.append((i, corner))
-                    legs_a.append(np.stack([points[i - 1], corner]))
-                    legs_b.append(np.stack([corner, points[i + 2]]))
+                    legs_a.append(np.array([points[i - 1], corner]))
+                    legs_b.append(np.array([corner, points[i + 2]]))
         if not choices:
             break
-        extra = []
-        for i, choice in choices:
-            if choice is None:
-                span, new = points[i - 1 : i + 2], points[[i - 1, i + 1]]
-            else:
-                span, new = points[i - 1 : i + 3], np.stack([points[i - 1], choice, points[i + 2]])
-            extra.append(_cost(problem, new) - _cost(problem, span))
-        cheap = [k for k in np.argsort(extra, kind="stable") if spent + max(extra[k], 0.0) <= worth]
+        # Costs of what is now, and of what would be instead: two legs for one, three for two.
+        now = np.concatenate([[0.0], np.cumsum(_leg_cost(problem, points[:-1], points[1:]))])
+        first = np.array([i - 1 for i, _ in choices])
+        last = np.array([i + (1 if choice is None else 2) for i, choice in choices])
+        mids = np.array([points[i - 1] if choice is None else choice for i, choice in choices])
+        extra = (
+            _leg_cost(problem, points[first], mids) + _leg_cost(problem, mids, points[last]) - (now[last] - now[first])
+        )
+        cheap = [k for k in np.argsort(extra, kind="stable").tolist() if spent + max(float(extra[k]), 0.0) <= worth]
         if not cheap:
             break
         sizes = [len(legs_a[k]) for k in cheap]
@@ -107,10 +108,10 @@ def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tupl
         for k in legal:
             i, choice = choices[k]
             touched = set(range(i - 1, i + (2 if choice is None else 3)))
-            if touched & busy or spent + max(extra[k], 0.0) > worth:
+            if touched & busy or spent + max(float(extra[k]), 0.0) > worth:
                 continue
             busy |= touched
-            spent += max(extra[k], 0.0)
+            spent += max(float(extra[k]), 0.0)
             taken.append((i, choice))
         if not taken:
             break
