@@ -83,6 +83,9 @@ def bench_terrain(
     kept: Annotated[bool, typer.Option("--kept", help="Rivals' answers already in DIR only.")] = False,
     minute: Annotated[bool, typer.Option("--minute", help="Ours once more with 60 s.")] = False,
     errors: Annotated[bool, typer.Option("--errors", help="With the clearance and errors of a real mission.")] = False,
+    gap: Annotated[
+        float, typer.Option("--gap", metavar="PERCENT", help="Certified gap at which ours may stop.")
+    ] = 0.05,
     count: Annotated[int | None, typer.Option(metavar="N", help="Problems of each group [default: all]")] = None,
 ) -> None:
     """A set of planning problems made by a seed; every planner held to the same exact check."""
@@ -97,7 +100,7 @@ def bench_terrain(
         raise UsageError(f"--seconds takes numbers such as 1,10, given {seconds!r}") from None
     result = terrain.run(
         out, seed=seed, kinds=kinds.split(","), runs=runs, seconds=budgets, rivals=rivals, swarms=swarms,
-        kept_only=kept, long=minute, errors=errors, count=count, tell=say,
+        kept_only=kept, long=minute, errors=errors, count=count, tell=say, gap_percent=gap,
     )  # fmt: skip
     Console(width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
 

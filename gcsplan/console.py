@@ -201,7 +201,9 @@ def planning_status() -> Iterator[Callable[[str, Progress], None]]:
         def update(who: str, told: Progress) -> None:
             cost = f", best {number(told.cost)}" if told.cost is not None else ""
             bound = f", bound {number(told.lower_bound)}" if told.lower_bound is not None else ""
-            status.update(f"planning {who}: {told.phase}{cost}{bound}")
+            both = told.cost is not None and told.lower_bound
+            gap = f", gap {100.0 * ((told.cost or 0.0) / (told.lower_bound or 1.0) - 1.0):.2f} %" if both else ""
+            status.update(f"planning {who}: {told.phase}{cost}{bound}{gap}")
 
         yield update
 

@@ -16,7 +16,7 @@ from gcsplan.bench.terrain_measure import OURS, Memory, Outcome, flown, passes
 from gcsplan.bench.terrain_problems import KINDS, NamedProblem, key_of, problems
 from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.problem import Problem, Solution
-from gcsplan.world.airspace import Legs
+from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.path import Path as Flight
 from gcsplan.world.zones import Circle
 
@@ -156,8 +156,11 @@ def test_only_a_whole_legal_path_passes(main: list[NamedProblem]) -> None:
 
 def test_corners_are_flown_as_tangent_arcs_that_do_not_overlap() -> None:
     square = np.array([[0.0, 0.0, 10.0], [1000.0, 0.0, 20.0], [1000.0, 1000.0, 30.0]])
-    arc = flown(square, 100.0)
-    assert arc is not None
+    track = flown(square, 100.0)
+    assert track is not None
+    arc, chord = track
+    assert not chord[[0, -1]].any()
+    assert chord[1:-1].all()
     assert np.hypot(*np.diff(arc[:, :2], axis=0).T).sum() == pytest.approx(1800.0 + 50.0 * math.pi, abs=0.1)
     away = np.hypot(arc[1:-1, 0] - 900.0, arc[1:-1, 1] - 100.0)
     assert away == pytest.approx(100.0, abs=1e-6)
@@ -165,9 +168,57 @@ def test_corners_are_flown_as_tangent_arcs_that_do_not_overlap() -> None:
     assert arc[middle, 2] == pytest.approx(20.0)
     right = flown(square * [1.0, -1.0, 1.0], 100.0)
     assert right is not None
-    assert right[:, :2] * [1.0, -1.0] == pytest.approx(arc[:, :2])
+    assert right[0][:, :2] * [1.0, -1.0] == pytest.approx(arc[:, :2])
     assert flown(square, 1001.0) is None
     assert flown(np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [0.0, 0.0, 0.0]]), 10.0) is None
+
+
+def test_a_way_point_without_a_turn_adds_no_leg_that_is_too_short_for_an_angle() -> None:
+    straight_on = np.array([[0.1, 0.2, 10.0], [333.3, 444.4, 20.0], [999.9, 1333.0, 40.0], [1700.0, 900.0, 55.0]])
+    track = flown(straight_on, 100.0)
+    assert track is not None
+    arc, chord = track
+    steps = np.hypot(*np.diff(arc[:, :2], axis=0).T)
+    assert steps.min() > 1e-3
+    assert (np.diff(arc[:, 2]) / steps).max() < 0.03
+    assert tuple(arc[0]) == tuple(straight_on[0])
+    assert tuple(arc[-1]) == tuple(straight_on[-1])
+    assert chord.sum() > 5
+    twice = np.array([[0.0, 0.0, 10.0], [500.0, 0.0, 20.0], [500.0 + 1e-7, 0.0, 20.0], [1000.0, 0.0, 30.0]])
+    merged = flown(twice, 100.0)
+    assert merged is not None
+    assert merged[0] == pytest.approx(twice[[0, 1, 3]])
+    assert not merged[1].any()
+    jump = flown(np.array([[0.0, 0.0, 10.0], [500.0, 0.0, 20.0], [500.0 + 1e-7, 0.0, 60.0]]), 100.0)
+    assert jump is not None
+    assert jump[0][:, 2] == pytest.approx([10.0, 20.0, 60.0])  # a climb on the spot is not smoothed away
+
+
+def test_only_chords_are_widened_by_what_they_cut_off(main: list[NamedProblem]) -> None:
+    p = easy(main).problem
+    a, b = np.array(p.start), np.array(p.goal)
+    across = np.array([a[1] - b[1], b[0] - a[0], 0.0]) / math.hypot(*(b - a)[:2])
+    path = np.array([a, 0.5 * (a + b) + 400.0 * across, b])
+    radius = 200.0
+    track = flown(path, radius)
+    assert track is not None
+    beside_leg = 0.5 * (track[0][0] + track[0][1])
+    ahead = (track[0][1] - track[0][0])[:2] / math.hypot(*(track[0][1] - track[0][0])[:2])
+    aside = np.array([-ahead[1], ahead[0]])
+
+    def among(centre: np.ndarray, distance_m: float) -> Problem:
+        """With a cylinder so far to the side of the nearest part of the track."""
+        at = centre + (50.0 + distance_m) * aside
+        zone = replace(main[45].problem.airspace.zones[0], shape=Circle(*at.tolist(), 50.0), floor=None, ceiling=None)
+        return replace(p, airspace=Airspace(p.airspace.surface, [zone]), turn_radius_m=radius)
+
+    assert passes(among(beside_leg[:2], 0.02), path)
+    assert not passes(among(beside_leg[:2], -0.02), path)
+    chord_middle = 0.5 * (track[0][2] + track[0][3])[:2]
+    ahead = (track[0][3] - track[0][2])[:2] / math.hypot(*(track[0][3] - track[0][2])[:2])
+    aside = np.array([-ahead[1], ahead[0]])
+    assert not passes(among(chord_middle, 0.04), path)
+    assert passes(among(chord_middle, 0.5), path)
 
 
 def test_a_path_with_a_corner_too_sharp_for_the_turn_radius_does_not_pass(main: list[NamedProblem]) -> None:
@@ -360,12 +411,15 @@ def test_the_report_is_written_whole_even_when_the_run_is_interrupted(
     main: list[NamedProblem], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     asked: list[str] = []
+    gaps: list[float] = []
 
     def measure(one: NamedProblem, sweep: object, **more: object) -> Outcome:
         asked.append(one.name)
+        gaps.append(one.problem.gap_percent)
         if len(asked) > 2:
             raise KeyboardInterrupt
-        return replace(several()[len(asked) - 1], key=key_of(one.problem), name=one.name, group=one.group)
+        found = replace(several()[len(asked) - 1], key=key_of(one.problem), name=one.name, group=one.group)
+        return replace(found, gap_asked_percent=one.problem.gap_percent)
 
     monkeypatch.setattr(terrain_ours, "measure", measure)
     monkeypatch.setattr(terrain_ours, "Sweep", lambda: None)
@@ -377,12 +431,16 @@ def test_the_report_is_written_whole_even_when_the_run_is_interrupted(
     assert (tmp_path / "terrain.png").read_bytes().startswith(b"\x89PNG")
     rows = (tmp_path / "terrain.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 3
+    assert set(gaps) == {0.05}
+    assert "certified gap of 0.05 % (gcsplan)" in (tmp_path / "terrain.md").read_text(encoding="utf-8")
     assert rows[0].startswith("key,name,kind,group,method,status")
     assert asked[1].split(",")[0] in rows[2]
     assert "| 0 zones | gcsplan | 1/1 |" in (tmp_path / "terrain.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("wrong", [{"kinds": ["mian"]}, {"runs": 0}, {"count": 0}, {"seconds": [0.0]}])
+@pytest.mark.parametrize(
+    "wrong", [{"kinds": ["mian"]}, {"runs": 0}, {"count": 0}, {"seconds": [0.0]}, {"gap_percent": -1.0}]
+)
 def test_wrong_orders_are_refused_before_anything_is_done(wrong: dict[str, object], tmp_path: Path) -> None:
     with pytest.raises(InputError):
         terrain.run(tmp_path, **wrong)  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -178,9 +179,9 @@ def test_terms_are_those_of_the_equations(name: str) -> None:
     samples = cost.curve.samples(controls)
     measured = cost.terms(controls)
     unwanted = {
-        "ssgwo": {k.HIGH, k.BURIED, k.EXPOSED, k.THREAT, k.SPHERE, k.BEND},
-        "msfoa": {k.NEAR, k.EXPOSED, k.BEND},
-        "ib-abc": {k.NEAR, k.HIGH, k.BURIED},
+        "ssgwo": {k.HIGH, k.BURIED, k.EXPOSED, k.THREAT, k.SPHERE, k.BEND, k.TURNS, k.SLOPES},
+        "msfoa": {k.NEAR, k.EXPOSED, k.BEND, k.YAW, k.PITCH},
+        "ib-abc": {k.NEAR, k.HIGH, k.BURIED, k.YAW, k.PITCH},
     }[name]
     seen = np.zeros(k.TERMS)
     for row, path in zip(measured, samples, strict=True):
@@ -214,7 +215,7 @@ def by_hand(name: str, t: np.ndarray, p: Problem, cost: Cost) -> float:
         return float(formulas[name]())
     s = cost.unit.straight
     parts = [0.4 * t[k.LENGTH] / s[k.LENGTH], 0.2 * t[k.EXPOSED] / s[k.EXPOSED]]
-    parts += [0.2 * t[k.BEND] / (s[k.BEND] if s[k.BEND] > 1e-9 else math.pi)]
+    parts += [0.2 * t[k.BEND] / (s[k.BEND] if s[k.BEND] > 1e-3 else math.pi)]
     parts += [0.2 * t[k.SPHERE] / (s[k.SPHERE] if s[k.SPHERE] > 1e-9 else 1.0)]
     return float(sum(parts) + 100 * bad / straight)
 
@@ -237,6 +238,21 @@ def test_energy_is_r1_on_the_vertical_and_r2_on_the_horizontal() -> None:
     t = cost.terms(controls)
     assert t[:, k.BELOW].max() == 0.0
     np.testing.assert_allclose(cost.of_controls(controls), 120.0 * t[:, k.RISE] + 100.0 * t[:, k.FLAT])
+
+
+def test_floors_on_a_raster_of_their_own_or_on_the_grounds_give_the_same_terms() -> None:
+    cost = cost_of("msfoa", problem())
+    controls = cost.code.controls(np.random.default_rng(6).random((20, cost.dim)))
+    controls[0, 1, :2] = (-900.0, 2900.0)  # off the raster
+    scene = cost.code.scene
+    assert scene.floor_map is scene.quadratic
+    together = cost.terms(controls)
+    apart = np.vstack([scene.floors, scene.floors[-1:]])  # a row that no sample needs: no longer the same nodes
+    cost.code = replace(cost.code, scene=replace(scene, floors=apart))
+    np.testing.assert_allclose(together[1:], cost.terms(controls)[1:], rtol=1e-12, atol=1e-9)
+    assert together[0, k.UNKNOWN] > 0.0
+    assert together[:, k.BURIED].max() > 0.0
+    assert together[:, k.SUNK].max() > 0.0
 
 
 def test_a_population_costs_what_its_members_cost() -> None:
@@ -296,6 +312,61 @@ def test_a_vehicle_with_the_right_of_way_is_kept_apart_from_in_time() -> None:
     )
     cost = Cost(p, code, OBJECTIVES["krill"], earlier=(same,), speed_m_s=15.0, apart_m=20.0)
     assert cost.of_controls(controls)[0] - alone == pytest.approx(100.0 * 100.0 * wanted)
+
+
+def every_pair(path: np.ndarray, clock: np.ndarray, points: np.ndarray, clocks: np.ndarray, apart_m: float) -> float:
+    """Eq. 28-30 over all pairs of points, whatever their times."""
+    return sum(
+        (0.5 - abs(t - s)) ** 3
+        for q, t in zip(path.tolist(), clock.tolist(), strict=True)
+        for r, s in zip(points.tolist(), clocks.tolist(), strict=True)
+        if (q[0] - r[0]) ** 2 + (q[1] - r[1]) ** 2 + (q[2] - r[2]) ** 2 < apart_m * apart_m and 0.5 - abs(t - s) > 0.0
+    )
+
+
+@pytest.mark.parametrize("tick", [None, 0.125, 0.5])
+def test_the_window_of_time_leaves_out_no_pair_of_points(tick: float | None) -> None:
+    # With ticks, clocks stand still, meet, and are apart by exactly what ends the window.
+    rng = np.random.default_rng(12)
+    seen = 0.0
+    for case in range(60):
+        samples, others = int(rng.integers(2, 40)), int(rng.integers(1, 40))
+        paths, points = rng.uniform(0.0, 60.0, (3, samples, 3)), rng.uniform(0.0, 60.0, (others, 3))
+        clocks = np.sort(rng.uniform(0.0, 6.0, (3, samples)), axis=1)
+        other_clocks = np.sort(rng.uniform(0.0, 6.0, others)) + (20.0 if case % 10 == 9 else 0.0)
+        if tick is not None:
+            clocks, other_clocks = np.round(clocks / tick) * tick, np.round(other_clocks / tick) * tick
+        found = np.full(3, np.nan)
+        sk.nearness(paths, clocks, points, other_clocks, 30.0, 0.5, found)
+        wanted = [every_pair(*own, points, other_clocks, 30.0) for own in zip(paths, clocks, strict=True)]
+        np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-15)
+        seen += sum(wanted)
+    assert seen > 1.0
+
+
+def test_clocks_are_lengths_so_far_over_the_speed() -> None:
+    paths = np.random.default_rng(4).uniform(-500.0, 500.0, (5, 30, 3))
+    paths[1, 7:10] = paths[1, 6]  # it stands still
+    found = np.full((5, 30), np.nan)
+    sk.clocks_of(paths, 12.5, found)
+    lengths = np.cumsum(np.linalg.norm(np.diff(paths, axis=1), axis=2), axis=1)
+    np.testing.assert_allclose(found, np.hstack([np.zeros((5, 1)), lengths / 12.5]), rtol=1e-12)
+    assert (np.diff(found, axis=1) >= 0.0).all()
+
+
+def test_float_noise_of_the_straight_line_is_no_turn_to_weigh_bends_by() -> None:
+    p = problem(zones=(), limits=Limits(0.0))
+    cost = cost_of("ib-abc", p)
+    straight = cost.unit.straight
+    assert 1e-9 < straight[k.BEND] < 1e-5
+    controls = cost._straight()[None].copy()
+    controls[0, 2, :2] += (40.0, -30.0)
+    terms = cost.terms(controls)[0]
+    assert terms[k.BEND] > 0.01
+    bends = 0.2 * terms[k.BEND] / math.pi
+    own = 0.4 * terms[k.LENGTH] / straight[k.LENGTH] + 0.2 * terms[k.EXPOSED] / straight[k.EXPOSED]
+    bad = 100.0 * o.forbidden(terms[None], cost.unit.straight_m)[0] / cost.unit.straight_m
+    assert cost.of_controls(controls)[0] == pytest.approx(own + bends + bad)
 
 
 def test_an_unknown_cost_is_refused_by_name() -> None:

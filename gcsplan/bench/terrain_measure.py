@@ -6,7 +6,7 @@ import contextlib
 import ctypes
 import gc
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -22,6 +22,8 @@ Status = Literal["solved", "infeasible", "not found", "unsafe", "failed"]
 OURS = "gcsplan"
 OURS_LONG = "gcsplan 60 s"
 SAGITTA_M = 0.05
+SAME_M = 1e-6
+"""Points of a track no farther apart are one: between them an angle of climb would be that of rounding errors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,7 @@ class Outcome:
     is proved; unsafe that a path was given which the check rejects. ``cost`` and ``bound`` in metres or joules;
     ``raw_cost`` before a rival's path was simplified. ``sweep_s``: the exact check of 100,000 one-kilometre legs, in
     between. ``memory_mb``: peak above what was in use before. ``points``: the path, of rivals only.
+    ``gap_asked_percent``: the certified gap at which ours may stop.
     """
 
     key: str
@@ -49,6 +52,7 @@ class Outcome:
     sweep_s: float | None = None
     memory_mb: float | None = None
     checks: int | None = None
+    gap_asked_percent: float | None = None
     runs: int = 1
     stopped_by: str = ""
     version: str = ""
@@ -71,18 +75,20 @@ def passes(problem: Problem, points: object) -> bool:
     off = max(float(np.abs(p[0] - problem.start).max()), float(np.abs(p[-1] - problem.goal).max()))
     if off > 1e-6:
         return False
-    limits = problem.limits
+    legs = Legs.of_path(p, problem.limits)
     if problem.turn_radius_m > 0.0:
-        arcs = flown(p, problem.turn_radius_m)
-        if arcs is None:
+        track = flown(p, problem.turn_radius_m)
+        if track is None:
             return False
-        p, limits = arcs, replace(limits, track_error_m=limits.track_error_m + SAGITTA_M)
-    return not problem.airspace.examine(Legs.of_path(p, limits), problem.limits).violations
+        legs = Legs.of_path(track[0], problem.limits)
+        legs = replace(legs, track_error_m=legs.track_error_m + SAGITTA_M * track[1])
+    return not problem.airspace.examine(legs, problem.limits).violations
 
 
-def flown(points: Floats, radius_m: float) -> Floats | None:
-    """(M, 3) the track that a fixed wing flies by way points (N, 3): legs, and arcs as chords within `SAGITTA_M`.
+def flown(points: Floats, radius_m: float) -> tuple[Floats, NDArray[np.bool_]] | None:
+    """The track that a fixed wing flies by way points (N, 3): legs, and arcs as chords within `SAGITTA_M`.
 
+    (M, 3) its points, none within `SAME_M` of the one before, and (M - 1,) whether a chord leads to the next.
     The altitude of a way point is reached in the middle of its arc and is linear along the track between. None where
     the arcs of neighbours overlap, so that it cannot be flown. Written for this judgement alone: it shares nothing
     with the planners.
@@ -98,7 +104,7 @@ def flown(points: Floats, radius_m: float) -> Floats | None:
     if (reach[:-1] + reach[1:] > lengths + 1e-3).any():
         return None
     step = 2.0 * math.acos(max(0.0, 1.0 - SAGITTA_M / radius_m))
-    track, middle = [points[0, :2]], [0]
+    track, middle, chord = [points[0, :2]], [0], [False]
     for i, turn in enumerate(turns.tolist()):
         halves = max(1, math.ceil(abs(turn) / (2.0 * step)))
         angle = headings[i] + np.linspace(0.0, turn, 2 * halves + 1)
@@ -107,11 +113,28 @@ def flown(points: Floats, radius_m: float) -> Floats | None:
         turned = np.stack([np.sin(angle) - np.sin(headings[i]), np.cos(headings[i]) - np.cos(angle)], axis=-1)
         middle.append(len(track) + halves)
         track += list(begin + side * radius_m * turned)
+        chord += [False] + [True] * (2 * halves)
     middle.append(len(track))
     track.append(points[-1, :2])
+    chord.append(False)
     flat = np.array(track)
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])
-    return np.column_stack([flat, np.interp(s, s[middle], points[:, 2])])
+    return _distinct(np.column_stack([flat, np.interp(s, s[middle], points[:, 2])]), chord)
+
+
+def _distinct(track: Floats, chord: Sequence[bool]) -> tuple[Floats, NDArray[np.bool_]]:
+    """Without points within `SAME_M` of the last one kept; the first and the last point always stay.
+
+    ``chord``: of each point, whether it is a chord that leads to it. Distances are those in space, so that no climb on
+    the spot is lost.
+    """
+    kept = [0]
+    for i in range(1, len(track)):
+        if math.dist(track[kept[-1]], track[i]) > SAME_M:
+            kept.append(i)
+    if kept[-1] != len(track) - 1:
+        kept[max(1, len(kept) - 1) :] = [len(track) - 1]
+    return track[kept], np.array(chord, dtype=np.bool_)[kept[1:]]
 
 
 class Memory:

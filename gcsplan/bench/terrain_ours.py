@@ -66,6 +66,7 @@ def measure(one: NamedProblem, sweep: Sweep, *, runs: int = 9, planner: str = "o
     base = Outcome(
         key_of(one.problem), one.name, one.kind, one.group, OURS_LONG if long else OURS, "failed",
         planning_s=statistics.median(took), sweep_s=statistics.median(swept), memory_mb=memory.peak_mb, runs=len(took),
+        gap_asked_percent=problem.gap_percent,
     )  # fmt: skip
     if len(found) < len(answers):
         return replace(base, status=_refused(answers[0]), detail=_words(answers[0], len(found), len(answers)))

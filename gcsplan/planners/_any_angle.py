@@ -98,9 +98,11 @@ def _off(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> fl
     return math.sqrt((ax + t * ex - px) ** 2 + (ay + t * ey - py) ** 2)
 
 
-@kernel("i4[] f8[,] i8[,] i4[,] i4[] f8[] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[] f8[,] i4[,] i8[,] f8[] i4[] f8[,]")
+@kernel(
+    "i4[] f8[,] i8[,] i4[,] i4[] f8[] i8[] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[] f8[,] i4[,] i8[,] f8[] i4[] f8[,]"
+)
 def search(
-    start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats,
+    start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats, origin: Names,
     sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float, slack: float, most: int,
     remaining: Floats, entered: Floats,
     node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats,
@@ -108,13 +110,13 @@ def search(
     """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
 
     ``order`` (start[p] : start[p + 1]) lists the portals of piece p. ``sources_at`` (K, 3) x, y, cost so far, each in
-    piece ``sources_piece`` (K,); a goal in any of ``goal_piece``. ``best`` (names,) zeros; ``node`` (room, 8), ``link``
-    (room, 4), ``name`` (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining``
+    piece ``sources_piece`` (K,); a goal in any of ``goal_piece``. ``best``, ``origin`` (names,) zeros; ``node``
+    (room, 8), ``link`` (room, 4), ``name`` (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining``
     (pieces,): no way on from a piece's entrance is shorter. ``slack`` >= 0: go on after the goal is reached, as far as
     that much (as a part of the length) beyond it; ``entered`` (pieces,), inf, receives the least cost at each
-    piece's entrance; both may be empty. Returns the number of corners, ends
-    included, with ``out[0, 2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than ``limit``;
-    -1: no room left; -2: more than ``most`` nodes were opened.
+    piece's entrance; both may be empty. Returns the number of corners, ends included, with ``out[0, 2]`` the source's
+    number and ``out[1, 2]`` the length; 0: no path of less than ``limit``; -1: no room left; -2: more than ``most``
+    nodes were opened, paths shorter than ``out[0, 0]`` all of them.
     """
     room = len(heap)
     gx, gy = goal[0], goal[1]
@@ -161,6 +163,7 @@ def search(
             all_round = False
             opened += 1
             if opened > most:
+                out[0, 0] = node[current, COST] + node[current, AHEAD]
                 return -2
         width_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
         width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
@@ -207,6 +210,13 @@ def search(
                         # Nothing behind it is seen from here; whoever goes on behind it turns at its end, or at a
                         # portal's that is nearer to the root.
                         along = 0 if at_a < at_b else 1
+                        if not all_round:
+                            # Nor is its near end, where the view through the interval does not reach that far round.
+                            ux, uy = (ax - rx, ay - ry) if along == 0 else (bx - rx, by - ry)
+                            if (qx - rx) * uy - (qy - ry) * ux < -SAME_M * width_r or (lx - rx) * uy - (
+                                ly - ry
+                            ) * ux > SAME_M * width_l:
+                                along = -1
             if along >= 0:
                 t0, t1 = 1.0, 0.0
             elif not all_round:
@@ -253,11 +263,16 @@ def search(
                     nx, ny, ncost, nroot = lx, ly, cost + width_l, left
                     if t1 > 0.0:
                         x0, y0, n0 = ax + t1 * (bx - ax), ay + t1 * (by - ay), np.int64(-1)
-                if nroot >= 0:
-                    if best[nroot] > 0.0 and ncost + 1.0 > best[nroot] + SAME_M:
+                if nroot >= 0 and nroot == root:
+                    if ncost + 1.0 > best[nroot] + SAME_M:
                         continue
-                    if best[nroot] == 0.0 or ncost + 1.0 < best[nroot]:
-                        best[nroot] = ncost + 1.0
+                elif nroot >= 0:
+                    # Who comes as dear from elsewhere has nothing to add: along a straight wall with many corners that
+                    # would double the ways at each.
+                    if best[nroot] == 0.0 or ncost + 1.0 < best[nroot] - SAME_M:
+                        best[nroot], origin[nroot] = ncost + 1.0, root
+                    elif ncost + 1.0 > best[nroot] + SAME_M or origin[nroot] != root:
+                        continue
                 if to_goal:
                     ahead = math.sqrt((gx - nx) ** 2 + (gy - ny) ** 2)
                 else:

@@ -9,16 +9,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from gcsplan.planners._scene_kernels import (
     BOTTOM,
-    CENTRE_E,
-    CENTRE_N,
     CORNERS,
     DOWN,
     EAST,
-    EDGE,
     H_MAX,
     H_MIN,
     HIGH_AGL,
@@ -26,7 +21,6 @@ from gcsplan.planners._scene_kernels import (
     MAX_AGL,
     MAX_AMSL,
     NORTH,
-    PER_UNIT,
     REACH,
     SOURCES,
     SOUTH,

@@ -45,6 +45,14 @@ EDGE = 1e-6  # of a cell: float noise at the raster's edge
 
 
 @device
+def bilinear(raster, j, i, a, b):  # type: ignore[no-untyped-def]
+    """Between the nodes of the cell of row ``j`` and column ``i``, by its parts ``a`` along and ``b`` down."""
+    north = raster[j, i] + a * (raster[j, i + 1] - raster[j, i])
+    south = raster[j + 1, i] + a * (raster[j + 1, i + 1] - raster[j + 1, i])
+    return north + b * (south - north)
+
+
+@device
 def height_at(heights, quadratic, numbers, e, n):  # type: ignore[no-untyped-def]
     """Bilinear height at a point of the plane; NaN off the raster and on unknown ground."""
     u, v = (e - numbers[CENTRE_E]) * numbers[PER_UNIT], (n - numbers[CENTRE_N]) * numbers[PER_UNIT]
@@ -55,10 +63,7 @@ def height_at(heights, quadratic, numbers, e, n):  # type: ignore[no-untyped-def
     if not (-EDGE <= col <= cols - 1 + EDGE and -EDGE <= row <= rows - 1 + EDGE):
         return math.nan
     i, j = min(max(int(col), 0), cols - 2), min(max(int(row), 0), rows - 2)
-    a, b = col - i, row - j
-    low = heights[j, i] + a * (heights[j, i + 1] - heights[j, i])
-    high = heights[j + 1, i] + a * (heights[j + 1, i + 1] - heights[j + 1, i])
-    return low + b * (high - low)
+    return bilinear(heights, j, i, col - i, row - j)
 
 
 @kernel
@@ -96,13 +101,6 @@ def darken(raster, column, row, out):  # type: ignore[no-untyped-def]
 
 
 @device
-def bilinear(raster, j, i, a, b):  # type: ignore[no-untyped-def]
-    north = raster[j, i] + a * (raster[j, i + 1] - raster[j, i])
-    south = raster[j + 1, i] + a * (raster[j + 1, i + 1] - raster[j + 1, i])
-    return north + b * (south - north)
-
-
-@device
 def lookup(raster, quadratic, numbers, x, y, out, column, row):  # type: ignore[no-untyped-def]
     """Bilinear heights at all samples; NaN where unknown."""
     off = place(raster, quadratic, numbers, x, y, column, row)
@@ -134,13 +132,12 @@ def lookup_both(raster, other, quadratic, numbers, x, y, out, other_out, column,
 
 
 @device
-def one_grid(heights, quadratic, floors, floor_map):  # type: ignore[no-untyped-def]
-    if heights.shape != floors.shape:
-        return False
+def one_grid(raster, to_raster, other, to_other):  # type: ignore[no-untyped-def]
+    """Whether two rasters have the same nodes."""
+    same = raster.shape == other.shape
     for k in range(6):
-        if quadratic[0, k] != floor_map[0, k] or quadratic[1, k] != floor_map[1, k]:
-            return False
-    return True
+        same = same and to_raster[0, k] == to_other[0, k] and to_raster[1, k] == to_other[1, k]
+    return same
 
 
 @device
@@ -163,6 +160,19 @@ def gap_to(zone, corners, x, y):  # type: ignore[no-untyped-def]
         ex, ey = px - t * dx, py - t * dy
         nearest = min(nearest, ex * ex + ey * ey)
     return -math.sqrt(nearest) if inside else math.sqrt(nearest)
+
+
+@kernel
+def clocks_of(paths, speed_m_s, out, sources=SOURCES):  # type: ignore[no-untyped-def]
+    """Seconds from the start of ``paths`` (P, S, 3) at one speed into ``out`` (P, S)."""
+    for p in range(len(paths)):
+        total = 0.0
+        out[p, 0] = 0.0
+        for i in range(1, paths.shape[1]):
+            dx, dy = paths[p, i, 0] - paths[p, i - 1, 0], paths[p, i, 1] - paths[p, i - 1, 1]
+            dz = paths[p, i, 2] - paths[p, i - 1, 2]
+            total += math.sqrt(dx * dx + dy * dy + dz * dz) / speed_m_s
+            out[p, i] = total
 
 
 @kernel

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.plane import Guide, Mesh, Plane, Way, make_plane
+from gcsplan.planners.plane import Exhausted, Guide, Mesh, Plane, Way, make_plane
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle
 
@@ -63,7 +63,7 @@ class Leg:
         """Parts a side that the terrain model's cells are cut into, where they are large beside leg or zones."""
         self._fine_stride = max(1, round(finest_m / cell_m)) if self.parts == 1 else 1
         self._stride = self._fine_stride * max(1, round(wanted_m / cell_m / self._fine_stride))
-        if self.parts > 1 or self._stride < 3 * self._fine_stride:
+        if self.parts > 1 or self._stride < 3:
             self._stride = self._fine_stride = 1
         # How many parts a side the first look's cells are cut into where it matters, of the plane or of its finer twin.
         self._ratio = self._stride // self._fine_stride
@@ -96,7 +96,15 @@ class Leg:
             within = detour * self.straight_m if math.isfinite(detour) else math.inf
             self.plane, self._twin = self._lattice(detour, self._stride), None
             self._detour = detour
-            way, self._guide = self.plane.mesh(self.top_m, True).flood(self.goal.place, self.start.place, within, slack)
+            mesh = self.plane.mesh(self.top_m, True)
+            a, b = self.goal.place, self.start.place
+            try:
+                way, self._guide = mesh.flood(a, b, within, slack)
+            except Exhausted as given_up:
+                # What was seen is as good as a flood that was asked to go no farther.
+                self.length_m = self.reach_m = given_up.seen_m * (1.0 - 1e-9)
+                self._guide = mesh.flood(a, b, self.reach_m, slack)[1]
+                return
             if way is not None:
                 self.length_m = way.length_m
                 self.reach_m = min(within, way.length_m * (1.0 + slack))
@@ -125,7 +133,10 @@ class Leg:
         limits = self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, 0.0)
         mesh = self._mesh(cap_m, False, wanted, cones, under)
-        return mesh.way(self.start.place, self.goal.place, self.reach_m, self._guide)
+        try:
+            return mesh.way(self.start.place, self.goal.place, self.reach_m, self._guide)
+        except Exhausted:
+            return None
 
     def bound(self, cap_m: float, wanted: NDArray[np.bool_] | None, limit_m: float, climbs: bool = False) -> float:
         """A lower bound of every track's length below ``cap_m``; ``limit_m``, or `reach_m`, if it is more.
@@ -137,14 +148,20 @@ class Leg:
         if climbs:
             cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, max(limit - self.length_m, 0.0))
         mesh = self._mesh(cap_m, True, wanted, cones)
-        way = mesh.way(self.start.place, self.goal.place, limit, self._guide)
+        try:
+            way = mesh.way(self.start.place, self.goal.place, limit, self._guide)
+        except Exhausted as given_up:
+            return max(self.length_m, min(limit, given_up.seen_m))
         return limit if way is None else way.length_m
 
     def corridor(self, limit_m: float) -> NDArray[np.bool_]:
         """(rows - 1, cols - 1) the lattice's cells that a track shorter than ``limit_m`` may meet."""
         if self._ahead is None:
             mesh = self._guide.mesh
-            _, self._ahead = mesh.flood(self.start.place, self.goal.place, self.reach_m, math.inf, self._guide)
+            try:
+                _, self._ahead = mesh.flood(self.start.place, self.goal.place, self.reach_m, math.inf, self._guide)
+            except Exhausted:
+                self._ahead = Guide(mesh, np.zeros(len(mesh.start) - 1))
         through = np.append(self._ahead.entered + self._guide.entered, np.inf)
         mesh = self._guide.mesh
         out = np.zeros(self.plane.inside.shape, np.bool_)
@@ -159,8 +176,11 @@ class Leg:
             return self._seen[1]
         mesh = self.plane.mesh(self.top_m, True, 1, self.corridor(limit_m), single=True)
         a, b = self.start.place, self.goal.place
-        _, left = mesh.flood(b, a, limit_m, math.inf, self._guide_back())
-        _, away = mesh.flood(a, b, limit_m, math.inf, left)
+        try:
+            _, left = mesh.flood(b, a, limit_m, math.inf, self._guide_back())
+            _, away = mesh.flood(a, b, limit_m, math.inf, left)
+        except Exhausted:
+            return (np.full(1, -math.inf), np.zeros(1), np.zeros(1))  # nothing is known to be high
         both = mesh.piece.reshape(-1, 2)
         live = both.max(axis=1) >= 0
         ways = []

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gcsplan.errors import InputError
 from gcsplan.planners import _cost_kernels as k
-from gcsplan.planners._scene_kernels import nearness
+from gcsplan.planners._scene_kernels import clocks_of, nearness
 from gcsplan.planners.encodings import Code, shares
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.scene import Scene
@@ -243,9 +243,8 @@ class Cost:
         if self.earlier:
             # E eq. 30 prints the reciprocal: t is a time. E eq. 29's cubic grows with the gap: C·(0.5 - t)³.
             paths = self.curve.samples(controls)
-            legs = np.linalg.norm(np.diff(paths, axis=1), axis=2) / self.speed_m_s
-            clocks = np.concatenate([np.zeros((len(paths), 1)), np.cumsum(legs, axis=1)], axis=1)
-            near = np.empty(len(paths))
+            clocks, near = np.empty(paths.shape[:2]), np.empty(len(paths))
+            clocks_of(paths, self.speed_m_s, clocks)
             for other in self.earlier:
                 nearness(paths, clocks, other.points, other.clock_s, self.apart_m, SOON_S, near)
                 total = total + PC * C * near

@@ -120,10 +120,12 @@ def _turning(problem: Problem, begun: float) -> Solution:
             f"keep the limits: allow tighter turns, or move what is in the way",
             reason="not_found",
         )
+    near = sharp.lower_bound is not None and found.cost <= sharp.lower_bound * (1.0 + problem.gap_percent / 100.0)
     return replace(
         sharp,
         path=Path(found.way_points),
         flown=Path(found.flown),
+        stopped_by=sharp.stopped_by if near or sharp.stopped_by == "time" else "exhausted",
         planning_s=time.perf_counter() - begun,
         notes=(*sharp.notes, TURNS_NOTE),
     )

@@ -36,6 +36,14 @@ BENT_M = 0.03
 MOST_OPENED = 3_000_000
 
 
+class Exhausted(Exception):
+    """A search was given up; all ways shorter than ``seen_m`` had been looked at, and none led to the goal."""
+
+    def __init__(self, seen_m: float) -> None:
+        super().__init__(f"no way of less than {seen_m:.1f} m, and too much to look at beyond")
+        self.seen_m = seen_m
+
+
 @dataclass(eq=False, slots=True)
 class Way:
     """A shortest track over a mesh: ``points`` (N, 2) and its length."""
@@ -127,19 +135,22 @@ class Mesh:
         remaining = np.zeros(0) if guide is None else guide.over(self)
         room = 1 << 17
         while True:
-            best = np.zeros(8 * (self.excess.size + 1))  # costs nothing until it is touched
+            names = 8 * (self.excess.size + 1)
+            best, origin = np.zeros(names), np.zeros(names, np.int64)  # cost nothing until they are touched
             node, link, name = np.empty((room, 8)), np.empty((room, 4), np.int32), np.empty((room, 3), np.int64)
             out = np.empty((1 << 14, 3))
             n = search(
-                self.start, self.ends, self.names, self.joins, self.order, best, sources, np.array(pieces, np.int32),
-                np.array(goal, np.float64), np.array(goal_pieces, np.int32),
-                limit_m, slack, MOST_OPENED, remaining, entered,
+                self.start, self.ends, self.names, self.joins, self.order, best, origin, sources,
+                np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32), limit_m, slack,
+                MOST_OPENED, remaining, entered,
                 node, link, name, np.empty(room), np.empty(room, np.int32), out,
             )  # fmt: skip
             if n != -1:
                 break
             room *= 4
             entered[:] = np.inf
+        if n == -2:
+            raise Exhausted(float(out[0, 0]))
         if n <= 0:
             return None
         points = out[:n][::-1, :2].copy()
@@ -221,7 +232,7 @@ class Plane:
         excess = np.full((rows, cols), np.inf)
         floor, under_m, fine_x, fine_y = (np.empty((rows, cols)) for _ in range(4))
         cells = (rows - 1) * (cols - 1)
-        diagonal = np.empty(cells, np.int8)
+        diagonal = np.zeros(cells, np.int8)
         climbs = np.array([] if low or cones is None else cones).reshape(-1, 4)
         more = limits.min_agl_m + limits.altitude_error_m
         beside = near + HAIR_M

@@ -28,6 +28,8 @@ def floors(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats]:
     points towards its start by what it is longer at most; the floor is the least within that.
     """
     low, away, left = leg.cells(limit_m)
+    met = np.isfinite(away) & np.isfinite(left)
+    low, away, left = low[met], away[met], left[met]
     at = np.linspace(0.0, track_m, STEPS + 1)[1:-1]
     slack = max(limit_m - track_m, 0.0)
     # Place k is in a cell's range from its nearest to its farthest, moved by the slack.
@@ -39,7 +41,7 @@ def floors(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats]:
 def _least(value: Floats, first: NDArray[np.intp], last: NDArray[np.intp], size: int) -> Floats:
     """For each of ``size`` places the least ``value`` of the ranges first : last that hold it; inf where none does."""
     # Ranges as two overlapping blocks of a power of two, laid down from the largest blocks to single places.
-    keep = (last > first) & np.isfinite(value)
+    keep = last > first
     value, first, last = value[keep], first[keep], last[keep]
     levels = max(size, 1).bit_length()
     table = np.full((levels, size), np.inf)

@@ -51,33 +51,45 @@ class Shapes:
 
 
 def make_shapes(problem: Problem, x: Floats, y: Floats) -> Shapes:
-    """The zones that reach into a lattice of nodes ``x``, ``y`` (rows, cols)."""
+    """The zones that reach into a lattice of nodes ``x``, ``y`` (rows, cols).
+
+    Levels over ground are those over the zone's own ground, which tells what may be flown beside it too. There, a level
+    is known by the ground below but for what that rises within reach. So such a zone is laid down twice: as it is, and
+    grown, with levels moved by so much.
+    """
     air, limits = problem.airspace, problem.limits
     reach = (limits.horizontal_clearance_m + limits.track_error_m) * air.scale
     box = float(x.min()), float(y.min()), float(x.max()), float(y.max())
     found: list[tuple[int, Zone, Floats | None]] = []
+    moved: list[float] = []
+    """By how much levels over ground are moved; 0: by nothing, and the zone is not grown."""
     for number, zone in enumerate(air.zones):
         west, south, east, north = zone.bounds
         # A zone above or below all that may be flown stands in nobody's way.
         if west - reach > box[2] or east + reach < box[0] or south - reach > box[3] or north + reach < box[1]:
             continue
-        if isinstance(zone.shape, Circle):
-            found.append((number, zone, None))
-        else:
-            found.extend((number, zone, part) for part in convex_parts(zone.shape.vertices))
+        parts: list[Floats | None] = [None]
+        if not isinstance(zone.shape, Circle):
+            parts = [*convex_parts(zone.shape.vertices)]
+        rise = _rise(problem, zone, reach, box)
+        for more in (0.0, rise) if rise > 0.0 else (0.0,):
+            found.extend((number, zone, part) for part in parts)
+            moved.extend(more for _ in parts)
     pairs = _crossing(found, reach)
     both: list[tuple[Floats, Floats]] = []
     bounds = np.zeros((len(found) + len(pairs), 4))
     for sign in (-1.0, 1.0):
-        grow = reach + sign * SPARE_M
         rows = np.zeros((len(found) + len(pairs), NUMBERS))
         forms: list[Floats] = []
         for k, (row, (_, zone, part)) in enumerate(zip(rows, found, strict=False)):
+            grow = (0.0 if moved[k] == 0.0 and _follows(zone) else reach) + sign * SPARE_M
             row[[BOTTOM, TOP]] = -np.inf, np.inf
             for level, at, more in ((zone.floor, BOTTOM, -1.0), (zone.ceiling, TOP, 1.0)):
                 if level is not None:
                     row[at] = level.value_m + more * (limits.altitude_error_m + sign * SPARE_M)
                     row[at + 2] = level.datum == "agl"
+                    if level.datum == "agl":
+                        row[at] += more * sign * moved[k]
             row[UNDER] = zone.floor is not None
             row[RADIUS] = -1.0
             if part is None:
@@ -107,6 +119,29 @@ def make_shapes(problem: Problem, x: Floats, y: Floats) -> Shapes:
     numbers = [number for number, *_ in found]
     owner = np.array([(n, n) for n in numbers] + [(numbers[a], numbers[b]) for a, b in pairs], np.intp).reshape(-1, 2)
     return Shapes(both[0], both[1], boxes, owner, int(size.sum()))
+
+
+def _follows(zone: Zone) -> bool:
+    """Whether a level of a zone follows the ground."""
+    return any(level is not None and level.datum == "agl" for level in (zone.floor, zone.ceiling))
+
+
+def _rise(problem: Problem, zone: Zone, reach: float, box: tuple[float, float, float, float]) -> float:
+    """How much the ground under a zone may differ from that at a place within reach; 0 where its levels are fixed."""
+    if reach <= 0.0 or not _follows(zone):
+        return 0.0
+    surface = problem.airspace.surface
+    west, south = (max(a, b) - reach for a, b in zip(zone.bounds[:2], box[:2], strict=True))
+    east, north = (min(a, b) + reach for a, b in zip(zone.bounds[2:], box[2:], strict=True))
+    e, n = np.meshgrid(np.linspace(west, east, 5), np.linspace(south, north, 5))
+    at = surface.grid(e.ravel(), n.ravel())
+    first = np.maximum(np.floor(at.min(axis=0)).astype(np.intp) - 1, 0)
+    last = np.maximum(np.ceil(at.max(axis=0)).astype(np.intp) + 2, first + 1)
+    z = surface.ground_m[first[1] : last[1], first[0] : last[0]]
+    across, along = (float(np.abs(np.diff(z, axis=a)).max(initial=0.0)) for a in (1, 0))
+    turned = surface.grid.jacobian(0.5 * (west + east), 0.5 * (south + north)).T
+    steep = max(math.hypot(*(turned @ (across, along))), math.hypot(*(turned @ (across, -along))))
+    return max(1.01 * reach * steep, 1e-9) if math.isfinite(steep) else math.inf
 
 
 def _crossing(found: list[tuple[int, Zone, Floats | None]], reach: float) -> list[tuple[int, int]]:
