@@ -21,10 +21,8 @@ SOURCES = hashlib.sha256(
     b"".join((Path(__file__).parent / f"_{name}_kernels.py").read_bytes() for name in ("scene", "cost"))
 ).hexdigest()
 
-# Sums may be reordered; NaN stays NaN, for it is unknown ground.
-_OPTIONS: dict[str, Any] = {
-    "nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"},
-}  # fmt: skip
+# No fast math: how sums are reordered changes from one compilation to the next, and a swarm makes another path of it.
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 kernel = njit(cache=True, **_OPTIONS)
 """What Python calls."""
 device = njit(**_OPTIONS)
