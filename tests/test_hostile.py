@@ -26,7 +26,7 @@ import yaml
 from gcsplan import cli, delivery, outputs, pipeline
 from gcsplan.mavlink import session
 from gcsplan.mavlink.files import read_mission_file, write_plan
-from gcsplan.options import MISBEHAVIOURS
+from gcsplan.commands.options import MISBEHAVIOURS
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle

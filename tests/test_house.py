@@ -45,8 +45,8 @@ MAY_IMPORT: dict[str, set[str]] = {
 
 # Modules beside the rooms that belong to one: the way of the data.
 STEPS = {"outputs", "delivery", "checking"}
-# Likewise of the command line: its options, and how it ends.
-COMMAND_LINE = {"benches", "ending", "options"}
+# Likewise of the command line: a folder of its commands.
+COMMAND_LINE = {"commands"}
 
 PROJECTION = {"world/frame.py", "world/datum.py", "world/terrain.py"}
 SOCKETS = {"mavlink/link.py", "mavlink/transport.py", "sim/server.py", "sim/sockets.py"}
@@ -104,7 +104,7 @@ def own(module: str) -> str | None:
     first, *rest = module.split(".")
     if first != "gcsplan" or not rest or rest[0] not in TOPS:
         return None
-    return ".".join(rest[:2]) if (ROOT / rest[0]).is_dir() else room(rest[0])
+    return ".".join(rest[:2]) if rest[0] not in COMMAND_LINE and (ROOT / rest[0]).is_dir() else room(rest[0])
 
 
 def identifiers(tree: ast.AST) -> Iterator[str]:

@@ -50,8 +50,8 @@ class Below:
         self.proved_shut = False
         self.timed_out = False
         limits = problem.limits
-        self.ceiling_m = math.inf if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
-        self.top_m = self.ceiling_m if math.isfinite(self.ceiling_m) else _above_all(problem)
+        top_m = limits.max_amsl_m
+        self.top_m = _above_all(problem) if top_m is None else top_m - limits.altitude_error_m
         stops = terminals(problem)
         heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
         ends = [End(*place, z) for place, z in zip(stops, heights, strict=True)]
@@ -140,10 +140,10 @@ class Below:
         if self.gap <= CONTENT * self.problem.gap_percent / 100.0 or not self._in_time():
             return
         # Whatever is not longer than the best path must have been looked at.
-        slack = self._longest() / sum(leg.length_m for leg in self.legs) - 1.0
         for leg in self.legs:
-            if self._limit(leg) > leg.reach_m:
-                leg.flood(slack * (1.0 + 1e-9))
+            limit = self._limit(leg)
+            if limit > leg.reach_m:
+                leg.flood((limit / leg.length_m - 1.0) * (1.0 + 1e-9))
         if self.problem.objective == "energy":
             self._tighten_energy()
         else:
@@ -175,13 +175,11 @@ class Below:
         spare = max(longest_m - sum(tracks), 0.0)
         return rise_bound(self.legs, tracks, [track + spare for track in tracks])
 
-    def _track_bound(self, leg: Leg, cap_m: float, limit_m: float) -> float:
-        return leg.bound(cap_m, leg.corridor(limit_m), limit_m, True)
-
     def _longest(self) -> float:
         """No track of a path that is better than the best is longer."""
         p = self.problem
-        if self.best is None:
+        free = p.objective == "energy" and p.horizontal_j_per_m == 0.0
+        if self.best is None or free:
             return sum(leg.reach_m for leg in self.legs)
         if p.objective == "energy":
             return (self.cost - p.vertical_j_per_m * self._rise(-math.inf)) / p.horizontal_j_per_m
@@ -201,9 +199,10 @@ class Below:
         tried: set[float] = set()
 
         def track_m(cap: float, care: int) -> float:
-            if care:
-                return sum(self._track_bound(leg, cap, self._limit(leg)) for leg in self.legs)
-            return sum(leg.bound(cap, None, self._limit(leg)) for leg in self.legs)
+            limits = [self._limit(leg) for leg in self.legs]
+            wanted = [leg.corridor(limit) if care else None for leg, limit in zip(self.legs, limits, strict=True)]
+            looked_at = zip(self.legs, wanted, limits, strict=True)
+            return sum(leg.bound(cap, cells, limit, care > 0) for leg, cells, limit in looked_at)
 
         def try_at(cap: float) -> None:
             if round(cap, 1) not in tried:

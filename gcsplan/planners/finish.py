@@ -54,17 +54,8 @@ def clear(problem: Problem, points: Floats) -> NDArray[np.bool_]:
     return problem.airspace.clear(Legs.of_path(points, problem.limits), problem.limits)
 
 
-def _leg_costs(problem: Problem, start: Floats, end: Floats) -> Floats:
-    """(N,) cost of straight legs, as `Problem.cost` sums them."""
-    d = end - start
-    flat = np.hypot(d[:, 0], d[:, 1])
-    if problem.objective == "energy":
-        return np.asarray(problem.horizontal_j_per_m * flat + problem.vertical_j_per_m * np.abs(d[:, 2]))
-    return np.asarray(np.hypot(flat, d[:, 2]))
-
-
 def _cost(problem: Problem, points: Floats) -> float:
-    return float(_leg_costs(problem, points[:-1], points[1:]).sum())
+    return float(problem.leg_costs(points[:-1], points[1:]).sum())
 
 
 def _drop(
@@ -77,18 +68,10 @@ def _drop(
         if n < 3:
             break
         inner = np.arange(1, n - 1)
-        legs = Legs.of_path(np.stack([points[:-2], points[2:]], axis=1).reshape(-1, 3), problem.limits)
-        every_second = np.arange(0, 2 * (n - 2), 2)
-        direct = Legs(
-            legs.start[every_second],
-            legs.end[every_second],
-            legs.column[every_second],
-            legs.track_error_m[every_second],
-            legs.altitude_error_m[every_second],
-        )
+        direct = Legs.between(points[:-2], points[2:], problem.limits)
         legal = problem.airspace.clear(direct, problem.limits) & ~pinned[inner]
-        now = _leg_costs(problem, points[:-1], points[1:])
-        rise = _leg_costs(problem, points[:-2], points[2:]) - now[:-1] - now[1:]
+        now = problem.leg_costs(points[:-1], points[1:])
+        rise = problem.leg_costs(points[:-2], points[2:]) - now[:-1] - now[1:]
         drop = np.zeros(n, bool)
         for i in inner[np.argsort(rise, kind="stable")]:
             extra = max(float(rise[i - 1]), 0.0)

@@ -156,14 +156,8 @@ class Leg:
 
     def corridor(self, limit_m: float) -> NDArray[np.bool_]:
         """(rows - 1, cols - 1) the lattice's cells that a track shorter than ``limit_m`` may meet."""
-        if self._ahead is None:
-            mesh = self._guide.mesh
-            try:
-                _, self._ahead = mesh.flood(self.start.place, self.goal.place, self.reach_m, math.inf, self._guide)
-            except Exhausted:
-                self._ahead = Guide(mesh, np.zeros(len(mesh.start) - 1))
-        through = np.append(self._ahead.entered + self._guide.entered, np.inf)
         mesh = self._guide.mesh
+        through = np.append(self._from_start().entered + self._guide.entered, np.inf)
         out = np.zeros(self.plane.inside.shape, np.bool_)
         near = through[mesh.piece].min(axis=1) <= limit_m
         rows, cols = mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1
@@ -172,15 +166,18 @@ class Leg:
 
     def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats]:
         """Of the cells that tracks shorter than ``limit_m`` may meet (and more): lowest floor, ways there and on."""
+        nothing = np.full(1, -math.inf), np.zeros(1), np.zeros(1)  # of nothing it is known that it is high
+        if limit_m > self.reach_m * (1.0 + 1e-6):
+            return nothing  # a longer track may meet cells that the flood did not
         if self._seen is not None and limit_m <= self._seen[0]:
             return self._seen[1]
         mesh = self.plane.mesh(self.top_m, True, 1, self.corridor(limit_m), single=True)
         a, b = self.start.place, self.goal.place
         try:
-            _, left = mesh.flood(b, a, limit_m, math.inf, self._guide_back())
+            _, left = mesh.flood(b, a, limit_m, math.inf, self._from_start())
             _, away = mesh.flood(a, b, limit_m, math.inf, left)
         except Exhausted:
-            return (np.full(1, -math.inf), np.zeros(1), np.zeros(1))  # nothing is known to be high
+            return nothing
         both = mesh.piece.reshape(-1, 2)
         live = both.max(axis=1) >= 0
         ways = []
@@ -190,11 +187,14 @@ class Leg:
         self._seen = limit_m, (mesh.lowest()[live], ways[0], ways[1])
         return self._seen[1]
 
-    def _guide_back(self) -> Guide:
-        """Distances from the start over the coarse mesh."""
+    def _from_start(self) -> Guide:
+        """Distances from the start over the coarse mesh, as far as the flood from the goal has seen."""
         if self._ahead is None:
-            self.corridor(self.reach_m)
-        assert self._ahead is not None
+            mesh = self._guide.mesh
+            try:
+                _, self._ahead = mesh.flood(self.start.place, self.goal.place, self.reach_m, math.inf, self._guide)
+            except Exhausted:
+                self._ahead = Guide(mesh, np.zeros(len(mesh.start) - 1))
         return self._ahead
 
     def _cones(self, climb: float, descent: float, slack_m: float) -> list[tuple[float, float, float, float]]:

@@ -34,12 +34,9 @@ from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
 
-
-MOST_NODES = 1_500_000
-"""Of terrain on which that is done: its rasters have the terrain's own spacing."""
-FAR = 5e-3
-"""Gap, as a part, beyond which the lattice of reachable altitudes is asked for a better path too."""
-
+FAR, MOST_NODES = 5e-3, 1_500_000
+"""Gap, as a part, beyond which the lattice of reachable altitudes is asked for a better path too; on terrain of so many
+nodes at most, for its rasters are as fine as the terrain."""
 
 TURNS_NOTE = "the lower bound is that of paths with sharp corners: it ignores turn_radius_m"
 BAND_NOTE = "the lower bound knows ground, zones and ceilings, but not the room between min and max AGL"
@@ -63,11 +60,8 @@ def plan(problem: Problem) -> Solution:
 def _sharp(problem: Problem, begun: float) -> Solution:
     check_ends(problem)
     below = Below(problem, begun)
-
-    def tell(phase: str, cost: float | None) -> None:
-        below.tell(phase, cost)
-
-    tell("search", None)
+    tell = below.tell
+    tell("search")
     if not below.legs:
         return plan_band(problem, tell, begun)
     if problem.limits.max_agl_m is not None:
@@ -85,10 +79,11 @@ def _sharp(problem: Problem, begun: float) -> Solution:
     below.look()
     if below.proved_shut:
         raise explain(problem, proved=True)
-    if below.best is None:
+    asked = below.best is None
+    if asked:
         below.take(plan_band(problem, tell, begun).path.points)
     below.tighten()
-    if below.gap > FAR and problem.airspace.surface.ground_m.size <= MOST_NODES:
+    if not asked and below.gap > FAR and problem.airspace.surface.ground_m.size <= MOST_NODES:
         # Over or under, or a climb on the way: other regimes know more about those.
         try:
             better = below.take(plan_band(problem, tell, begun).path.points)

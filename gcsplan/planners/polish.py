@@ -49,8 +49,8 @@ def _moved(problem: Problem, points: Floats, pinned: Bools, parity: int) -> Floa
     aims = np.stack([foot, level, upright], axis=1)  # (n, 3, 3)
     places = here[:, None, None] + PARTS[None, None, :, None] * (aims - here[:, None])[:, :, None]
     places = places.reshape(len(at), -1, 3)
-    old = _leg_cost(problem, before, here) + _leg_cost(problem, here, after)
-    new = _leg_cost(problem, before[:, None], places) + _leg_cost(problem, places, after[:, None])
+    old = problem.leg_costs(before, here) + problem.leg_costs(here, after)
+    new = problem.leg_costs(before[:, None], places) + problem.leg_costs(places, after[:, None])
     gain = old[:, None] - new
     worth = gain > 1e-9 * old[:, None]
     row, column = np.nonzero(worth)
@@ -89,12 +89,12 @@ def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tupl
         if not choices:
             break
         # Costs of what is now, and of what would be instead: two legs for one, three for two.
-        now = np.concatenate([[0.0], np.cumsum(_leg_cost(problem, points[:-1], points[1:]))])
+        now = np.concatenate([[0.0], np.cumsum(problem.leg_costs(points[:-1], points[1:]))])
         first = np.array([i - 1 for i, _ in choices])
         last = np.array([i + (1 if choice is None else 2) for i, choice in choices])
         mids = np.array([points[i - 1] if choice is None else choice for i, choice in choices])
         extra = (
-            _leg_cost(problem, points[first], mids) + _leg_cost(problem, mids, points[last]) - (now[last] - now[first])
+            problem.leg_costs(points[first], mids) + problem.leg_costs(mids, points[last]) - (now[last] - now[first])
         )
         cheap = [k for k in np.argsort(extra, kind="stable").tolist() if spent + max(float(extra[k]), 0.0) <= worth]
         if not cheap:
@@ -142,20 +142,8 @@ def _corners(four: Floats) -> list[Floats]:
 
 
 def _clear(problem: Problem, start: Floats, end: Floats) -> Bools:
-    n, limits = len(start), problem.limits
-    legs = Legs(
-        start, end, np.zeros(n, np.bool_), np.full(n, limits.track_error_m), np.full(n, limits.altitude_error_m)
-    )
-    return problem.airspace.clear(legs, limits)
-
-
-def _leg_cost(problem: Problem, start: Floats, end: Floats) -> Floats:
-    d = end - start
-    flat = np.hypot(d[..., 0], d[..., 1])
-    if problem.objective == "energy":
-        return np.asarray(problem.horizontal_j_per_m * flat + problem.vertical_j_per_m * np.abs(d[..., 2]))
-    return np.asarray(np.hypot(flat, d[..., 2]))
+    return problem.airspace.clear(Legs.between(start, end, problem.limits), problem.limits)
 
 
 def _cost(problem: Problem, points: Floats) -> float:
-    return float(_leg_cost(problem, points[:-1], points[1:]).sum())
+    return float(problem.leg_costs(points[:-1], points[1:]).sum())

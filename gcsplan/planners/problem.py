@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
@@ -57,6 +60,14 @@ class Problem:
     budget_s: float = 10.0
     progress: Callable[[Progress], None] | None = None
     options: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
+
+    def leg_costs(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(...) cost of straight legs between points (..., 3), as `cost` sums them."""
+        d = end - start
+        flat = np.hypot(d[..., 0], d[..., 1])
+        if self.objective == "energy":
+            return np.asarray(self.horizontal_j_per_m * flat + self.vertical_j_per_m * np.abs(d[..., 2]))
+        return np.asarray(np.hypot(flat, d[..., 2]))
 
     def cost(self, path: Path) -> float:
         """Metres or joules of ``path``, by the objective."""

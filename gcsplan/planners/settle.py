@@ -71,11 +71,7 @@ class Judge:
         return np.array([key in self.passed for key in keys], bool)
 
     def _legs(self, legs: Floats) -> Legs:
-        n, limits = len(legs), self.problem.limits
-        return Legs(
-            legs[:, :3], legs[:, 3:], np.zeros(n, bool),
-            np.full(n, limits.track_error_m), np.full(n, limits.altitude_error_m),
-        )  # fmt: skip
+        return Legs.between(legs[:, :3], legs[:, 3:], self.problem.limits)
 
 
 def settle(
@@ -159,8 +155,8 @@ def thinned(problem: Problem, judge: Judge, points: Floats, pinned: Bools, worth
     for _ in range(len(points)):
         if len(points) < 3:
             break
-        now = leg_costs(problem, points[:-1], points[1:])
-        rise = leg_costs(problem, points[:-2], points[2:]) - now[:-1] - now[1:]
+        now = problem.leg_costs(points[:-1], points[1:])
+        rise = problem.leg_costs(points[:-2], points[2:]) - now[:-1] - now[1:]
         wanted = np.flatnonzero((rise <= worth - spent) & ~pinned[1:-1])
         legal = judge.clear(np.hstack([points[wanted], points[wanted + 2]]))
         drop = np.zeros(len(points), bool)
@@ -174,12 +170,3 @@ def thinned(problem: Problem, judge: Judge, points: Floats, pinned: Bools, worth
             break
         points, pinned = points[~drop], pinned[~drop]
     return points
-
-
-def leg_costs(problem: Problem, start: Floats, end: Floats) -> Floats:
-    """(N,) cost of straight legs, as `Problem.cost` sums them."""
-    d = end - start
-    flat = np.hypot(d[:, 0], d[:, 1])
-    if problem.objective == "energy":
-        return np.asarray(problem.horizontal_j_per_m * flat + problem.vertical_j_per_m * np.abs(d[:, 2]))
-    return np.asarray(np.hypot(flat, d[:, 2]))

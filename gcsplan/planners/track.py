@@ -18,7 +18,6 @@ from gcsplan.planners._taut import edge
 from gcsplan.planners.lattice import ENDS_M
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.taut_string import Blocked, Profile, taut_string
-from gcsplan.planners.tubes import cut, join
 from gcsplan.world.airspace import Tube
 
 Floats = NDArray[np.float64]
@@ -95,31 +94,6 @@ def make_track(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_
     tube = problem.airspace.tube(points, problem.limits)
     s = distances(points)
     return Track(points, pinned, pin_m, s * (tube.s_m[-1] / s[-1]), tube)
-
-
-def replace_part(problem: Problem, track: Track, s0_m: float, s1_m: float, between: Floats) -> Track:
-    """The track with the part from ``s0_m`` to ``s1_m`` (no pinned vertex inside) replaced by points ``between``."""
-    inner = np.vstack([track.place(s0_m), between.reshape(-1, 2), track.place(s1_m)])
-    before, after = track.s_m < s0_m - 1e-6, track.s_m > s1_m + 1e-6
-    # An end of the part that is a vertex stays that very vertex, so that pins survive.
-    head = int(before.sum())
-    tail = len(track.s_m) - int(after.sum()) - 1
-    pins = np.zeros(len(inner), bool)
-    pin_m = np.full(len(inner), np.nan)
-    for k, i in ((0, head), (-1, tail)):
-        if abs(track.s_m[i] - (s0_m if k == 0 else s1_m)) <= 1e-6:
-            inner[k], pins[k], pin_m[k] = track.points[i], track.pinned[i], track.pin_m[i]
-    middle = problem.airspace.tube(inner, problem.limits)
-    parts = [cut(track.tube, 0.0, s0_m), middle, cut(track.tube, s1_m, float(track.tube.s_m[-1]))]
-    lengths = distances(inner)
-    shift = s0_m + lengths[-1] - s1_m
-    return Track(
-        np.vstack([track.points[before], inner, track.points[after]]),
-        np.concatenate([track.pinned[before], pins, track.pinned[after]]),
-        np.concatenate([track.pin_m[before], pin_m, track.pin_m[after]]),
-        np.concatenate([track.s_m[before], s0_m + lengths, track.s_m[after] + shift]),
-        join([p for p in parts if p is not None]),
-    )
 
 
 def fly(

@@ -92,9 +92,14 @@ class Legs:
     def of_path(cls, points: ArrayLike, limits: Limits) -> Legs:
         """The legs between neighbours of ``points`` (N + 1, 3), with the errors of ``limits``, no columns."""
         p = np.asarray(points, dtype=np.float64)
-        n = len(p) - 1
+        return cls.between(p[:-1], p[1:], limits)
+
+    @classmethod
+    def between(cls, start: Floats, end: Floats, limits: Limits) -> Legs:
+        """The legs from each of ``start`` (N, 3) to its ``end``, with the errors of ``limits``, no columns."""
+        n = len(start)
         return cls(
-            p[:-1], p[1:], np.zeros(n, np.bool_), np.full(n, limits.track_error_m), np.full(n, limits.altitude_error_m)
+            start, end, np.zeros(n, np.bool_), np.full(n, limits.track_error_m), np.full(n, limits.altitude_error_m)
         )
 
     def __len__(self) -> int:

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from gcsplan.ending import emit, put
+from gcsplan.commands.ending import emit, put
+from gcsplan.commands.options import JsonOption
 from gcsplan.errors import UsageError
-from gcsplan.options import JsonOption
 
 bench_app = typer.Typer(
     help="Measurements: planners on real terrain, the papers' tables, legs checked, uploads.", no_args_is_help=True

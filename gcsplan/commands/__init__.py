@@ -1,0 +1,1 @@
+"""The commands, a module for each kind: options in, one call, tables or JSON out."""
