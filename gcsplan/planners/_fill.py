@@ -12,6 +12,9 @@ from gcsplan.planners.compiled import device, kernel
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+RINGS = 3
+"""How many nodes beyond those that an end sees are reached by known ways."""
+
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] b1[,] i8 f8 f8 f8 f8[,] b1 f8[,] f8[,] f8[,] f8[,] f8[,] i1[]")
 def fill(
@@ -114,50 +117,107 @@ def _mix(z: Floats, j: int, i: int, a: float, b: float, c: float, d: float) -> f
     return out
 
 
-@kernel("f8[,] f8[,] i4[] f8[,] f8[,] f8 f8 f8 f8 f8 f8 f8 i1[,]")
+@kernel("f8[,] f8[,] i4[] f8[,] f8[,] f8 f8 f8 f8 f8 f8 f8 b1 i1[,] f8[,]")
 def raise_cone(
     excess: Floats, floor: Floats, of: Ints, x: Floats, y: Floats, at_x: float, at_y: float, col: float, row: float,
-    height: float, slope: float, cap: float, seen: NDArray[np.int8],
+    height: float, slope: float, cap: float, lone: bool, seen: NDArray[np.int8], away: Floats,
 ) -> None:  # fmt: skip
     """Hold nodes near an end to what can be climbed to from there, where a bound may.
 
-    A node that the end sees over cells which are free as a whole is reached from it in a straight line, so no path
-    short enough to matter is higher there than ``height`` plus ``slope`` times the distance. ``seen`` (rows, cols)
-    is room for one window: zeros. A node counts only if all around it are seen too.
+    A node that the end sees over cells which are free as a whole is reached from it in a straight line, those next to
+    it by little more, so no path short enough to matter is higher there than ``height`` plus ``slope`` times that way.
+    A node counts only if the ways to all around it are known. ``lone``: no other end's cone comes near this one's.
+    Room for the kernel, (rows, cols): ``seen`` (zeros) and ``away`` (inf).
     """
     ny, nx = excess.shape
     if not height < cap:
         return
-    away = (cap - height) / slope
+    farthest = (cap - height) / slope
     i0, j0 = int(col), int(row)
     i0, j0 = min(max(i0, 0), nx - 2), min(max(j0, 0), ny - 2)
     step_x = math.sqrt((x[j0, i0 + 1] - x[j0, i0]) ** 2 + (y[j0, i0 + 1] - y[j0, i0]) ** 2)
     step_y = math.sqrt((x[j0 + 1, i0] - x[j0, i0]) ** 2 + (y[j0 + 1, i0] - y[j0, i0]) ** 2)
     if not (step_x > 0.0 and step_y > 0.0):
         return
-    wide, tall = int(1.05 * away / step_x) + 2, int(1.05 * away / step_y) + 2
+    wide, tall = int(1.05 * farthest / step_x) + 2, int(1.05 * farthest / step_y) + 2
     left, right = max(i0 - wide, 0), min(i0 + wide + 1, nx - 1)
     low, high = max(j0 - tall, 0), min(j0 + tall + 1, ny - 1)
     for j in range(low, high + 1):
         for i in range(left, right + 1):
             if excess[j, i] <= 0.0 and _sees(excess, of, col, row, i, j):
                 seen[j, i] = 1
-    spare = 0.25 * slope * math.sqrt(step_x * step_x + step_y * step_y)
+                away[j, i] = math.sqrt((x[j, i] - at_x) ** 2 + (y[j, i] - at_y) ** 2)
+    for ring in range(2, 2 + RINGS):
+        for j in range(low, high + 1):
+            for i in range(left, right + 1):
+                if seen[j, i] == 0 and excess[j, i] <= 0.0:
+                    near = _beside(excess, of, x, y, seen, away, i, j, ring)
+                    if near < math.inf:
+                        away[j, i] = near
+                        seen[j, i] = ring
+    # The wall's own nodes, as far away as the farthest of those beside them that are free says.
+    for j in range(low, high + 1):
+        for i in range(left, right + 1):
+            if 0.0 < excess[j, i] < math.inf:
+                away[j, i] = _behind(excess, x, y, away, i, j)
+    diagonal = math.sqrt(step_x * step_x + step_y * step_y)
+    spare = 0.25 * slope * diagonal
     for j in range(max(low, 1), min(high, ny - 2) + 1):
         for i in range(max(left, 1), min(right, nx - 2) + 1):
-            if seen[j, i] == 0:
-                continue
-            alone = False
+            known, straight = True, True
             for q in range(-1, 2):
                 for p in range(-1, 2):
-                    if seen[j + q, i + p] == 0:
-                        alone = True
-            if alone:
+                    known = known and away[j + q, i + p] < math.inf
+                    straight = straight and seen[j + q, i + p] == 1
+            if not known:
                 continue
-            cone = height + slope * math.sqrt((x[j, i] - at_x) ** 2 + (y[j, i] - at_y) ** 2)
-            # Where cap and cone meet, a linear function over the cell would be too high.
-            if cone < cap + 4.0 * spare:
+            # Between nodes that are not seen, ways may be longer than between linear values by half a cell.
+            cone = height + slope * (away[j, i] + (0.0 if straight else 0.5 * diagonal))
+            # Cones are hollow, so a linear function over the cell lies below; but not where cap and cone meet, or two.
+            if lone and cone < cap - 8.0 * spare:
+                excess[j, i] = max(excess[j, i], floor[j, i] - cone)
+            elif cone < cap + 4.0 * spare:
                 excess[j, i] = max(excess[j, i], floor[j, i] - cone) - spare
+
+
+@device
+def _beside(
+    excess: Floats, of: Ints, x: Floats, y: Floats, seen: NDArray[np.int8], away: Floats, i: int, j: int, ring: int
+) -> float:
+    """The way to a free node by the best of those around it that belong to an earlier ring."""
+    ny, nx = excess.shape
+    best = math.inf
+    for q in range(-1, 2):
+        for p in range(-1, 2):
+            b, a = j + q, i + p
+            if (p == 0 and q == 0) or not (0 <= b < ny and 0 <= a < nx):
+                continue
+            if seen[b, a] == 0 or seen[b, a] >= ring:
+                continue
+            free = False
+            for cj in range(max(max(j, b) - 1, 0), min(min(j, b), ny - 2) + 1):
+                for ci in range(max(max(i, a) - 1, 0), min(min(i, a), nx - 2) + 1):
+                    whole = p == 0 or q == 0 or (
+                        excess[cj, ci] <= 0.0 and excess[cj, ci + 1] <= 0.0
+                        and excess[cj + 1, ci] <= 0.0 and excess[cj + 1, ci + 1] <= 0.0
+                    )  # fmt: skip
+                    free = free or (whole and of[cj * (nx - 1) + ci] == 0)
+            if free:
+                best = min(best, away[b, a] + math.sqrt((x[b, a] - x[j, i]) ** 2 + (y[b, a] - y[j, i]) ** 2))
+    return best
+
+
+@device
+def _behind(excess: Floats, x: Floats, y: Floats, away: Floats, i: int, j: int) -> float:
+    """The way to a node of a wall by the farthest of the free nodes around it; inf where that is not known, 0 where
+    none is free: nothing there can be flown anyway."""
+    ny, nx = excess.shape
+    most = 0.0
+    for b in range(max(j - 1, 0), min(j + 1, ny - 1) + 1):
+        for a in range(max(i - 1, 0), min(i + 1, nx - 1) + 1):
+            if excess[b, a] <= 0.0:
+                most = max(most, away[b, a] + math.sqrt((x[b, a] - x[j, i]) ** 2 + (y[b, a] - y[j, i]) ** 2))
+    return most
 
 
 @device

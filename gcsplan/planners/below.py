@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.band import straight_bound
 from gcsplan.planners.caps import Layer, search_caps
+from gcsplan.planners.climb import extend
 from gcsplan.planners.finish import way_points
 from gcsplan.planners.lattice import terminals
 from gcsplan.planners.leg import End, Leg
@@ -32,6 +33,8 @@ ZONES_SHUT = 8
 """Zones whose underside is given up, one after the other, because no profile fits under them."""
 CONTENT = 0.4
 """A first path whose gap is that part of the wanted one is good enough; else both are looked at with more care."""
+LAPS = (0.5, 0.25, 1.0)
+"""What part of the gap may be flown in laps near the ends, where a path without them was not good enough."""
 CLOSER = 7
 """Times that what lies between path and bound is halved: close to the ends a shorter path has less way to climb."""
 
@@ -77,13 +80,16 @@ class Below:
             if self.try_below(self.top_m, fine=False) or self.try_below(self.top_m, fine=True):
                 return
 
-    def try_below(self, cap_m: float, *, fine: bool) -> bool:
-        """Look for a path below a cap; True if it is the best so far."""
+    def try_below(self, cap_m: float, *, fine: bool, spare_m: float = 0.0) -> bool:
+        """Look for a path below a cap; True if it is the best so far.
+
+        ``spare_m``: about how much longer than its track it may be made near the ends, to climb.
+        """
         for _ in range(ZONES_SHUT):
             ways = []
             for leg in self.legs:
                 wanted = leg.corridor(self._limit(leg)) if fine and leg.has_fine else None
-                way = leg.track(cap_m, wanted, self.under)
+                way = leg.track(cap_m, wanted, self.under, spare_m)
                 if way is None:
                     return False
                 ways.append(way.points)
@@ -97,6 +103,10 @@ class Below:
                 pin_m[at] = math.nan if leg.goal.amsl_m is None else leg.goal.amsl_m
             track = make_track(self.problem, points, pinned, pin_m)
             flown = fly(self.problem, track)
+            if spare_m > 0.0 and isinstance(flown, Obstruction):
+                longer = extend(self.problem, points, pinned, pin_m)
+                if longer is not None:
+                    track, flown = longer
             if isinstance(flown, Flown):
                 found = self._exact(track, flown)
                 if found is None:
@@ -163,9 +173,18 @@ class Below:
             if self._done() or high - low < 2e-5 * low or not self._in_time():
                 break
 
+        for part in LAPS:
+            if not self._done() and self._climbs() and self._in_time():
+                self.try_below(self.top_m, fine=True, spare_m=part * (self.cost - self.bound))
+
+    def _climbs(self) -> bool:
+        """Whether there is a climb limit."""
+        limits = self.problem.limits
+        return math.isfinite(limits.max_climb_slope) or math.isfinite(limits.max_descent_slope)
+
     def _bound_shorter(self, longest_m: float) -> float:
         """A bound of all paths shorter than ``longest_m``: their tracks on the fine lattice, then what they climb."""
-        spare = longest_m - sum(leg.length_m for leg in self.legs)
+        spare = self._longest_track(longest_m) - sum(leg.length_m for leg in self.legs)
         tracks = []
         for leg in self.legs:
             limit = leg.length_m + spare
@@ -174,6 +193,14 @@ class Below:
         # Each leg's limit is what the others leave, which is less now that they are known better.
         spare = max(longest_m - sum(tracks), 0.0)
         return rise_bound(self.legs, tracks, [track + spare for track in tracks])
+
+    def _longest_track(self, longest_m: float) -> float:
+        """No track of a path shorter than ``longest_m`` is longer than this, for it must climb as well."""
+        if len(self.legs) > 1:
+            return longest_m
+        climbing = rise_bound(self.legs, [longest_m], [longest_m]) - longest_m
+        shorter = longest_m - 0.98 * climbing
+        return shorter if rise_bound(self.legs, [shorter], [longest_m]) >= longest_m else longest_m
 
     def _longest(self) -> float:
         """No track of a path that is better than the best is longer."""

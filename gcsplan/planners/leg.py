@@ -19,6 +19,8 @@ from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle
 
 Floats = NDArray[np.float64]
+Cone = tuple[float, float, float, float]
+"""Where it stands (east_m, north_m), its height there, and its slope."""
 
 DETOURS = (1.25, 2.5, math.inf)
 """How long tracks may be, in times the straight way, before the lattice must be widened."""
@@ -26,6 +28,9 @@ COARSE_M = 100.0
 """Cells of the first look are no larger, if the terrain model's are not."""
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 """Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
+
+RAISED, WORTHWHILE = 4, 0.05
+"""Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +120,7 @@ class Leg:
         cap_m: float,
         low: bool,
         wanted: NDArray[np.bool_] | None,
-        cones: list[tuple[float, float, float, float]] | None = None,
+        cones: list[Cone] | None = None,
         under: NDArray[np.bool_] | None = None,
     ) -> Mesh:
         """The first look's mesh, or with ``wanted`` (cells of the first look) the finer one there."""
@@ -128,10 +133,15 @@ class Leg:
         finer = np.repeat(np.repeat(wanted, self._ratio, axis=0), self._ratio, axis=1)
         return self._twin.mesh(cap_m, low, 1, finer, cones, under)
 
-    def track(self, cap_m: float, wanted: NDArray[np.bool_] | None, under: NDArray[np.bool_] | None) -> Way | None:
-        """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``."""
+    def track(
+        self, cap_m: float, wanted: NDArray[np.bool_] | None, under: NDArray[np.bool_] | None, spare_m: float = 0.0
+    ) -> Way | None:
+        """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``.
+
+        ``spare_m``: metres that may be added near the ends to climb.
+        """
         limits = self.problem.limits
-        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, 0.0)
+        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare_m)
         mesh = self._mesh(cap_m, False, wanted, cones, under)
         try:
             return mesh.way(self.start.place, self.goal.place, self.reach_m, self._guide)
@@ -144,15 +154,24 @@ class Leg:
         ``climbs``: near the ends hold tracks to what they can climb to, if they are shorter than ``limit_m``.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
-        cones = None
-        if climbs:
-            cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, max(limit - self.length_m, 0.0))
-        mesh = self._mesh(cap_m, True, wanted, cones)
-        try:
-            way = mesh.way(self.start.place, self.goal.place, limit, self._guide)
-        except Exhausted as given_up:
-            return max(self.length_m, min(limit, given_up.seen_m))
-        return limit if way is None else way.length_m
+        cones: list[Cone] = []
+        known = self.length_m
+        for _ in range(RAISED):
+            spare = max(limit - known, 0.0)
+            if climbs:
+                cones += self._cones(limits.max_climb_slope, limits.max_descent_slope, spare)
+            mesh = self._mesh(cap_m, True, wanted, cones)
+            try:
+                way = mesh.way(self.start.place, self.goal.place, limit, self._guide)
+            except Exhausted as given_up:
+                return max(known, min(limit, given_up.seen_m))
+            if way is None:
+                return limit
+            # Ways are longer between the walls that the cones raised, so there is less to spare for a climb: again.
+            if not cones or way.length_m < known + WORTHWHILE * spare:
+                return max(known, way.length_m)
+            known = way.length_m
+        return known
 
     def corridor(self, limit_m: float) -> NDArray[np.bool_]:
         """(rows - 1, cols - 1) the lattice's cells that a track shorter than ``limit_m`` may meet."""
@@ -197,7 +216,7 @@ class Leg:
                 self._ahead = Guide(mesh, np.zeros(len(mesh.start) - 1))
         return self._ahead
 
-    def _cones(self, climb: float, descent: float, slack_m: float) -> list[tuple[float, float, float, float]]:
+    def _cones(self, climb: float, descent: float, slack_m: float) -> list[Cone]:
         """Height and slope of what can be reached near the ends, by paths with ``slack_m`` to spare."""
         ends = ((self.start, climb), (self.goal, descent))
         return [

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -258,11 +259,13 @@ class Plane:
             boxes = boxes.clip([0, -1, 0, -1], [cols, cols - 2, rows, rows - 2]).astype(np.int32)
             stamp_zones(excess, floor, under_m, x, y, zones, edges, boxes, low, of, values)
         if low and cones:
+            cell_m = self.stride * float(self.problem.airspace.surface.grid.metres_per_cell(*cones[0][:2]).max())
+            lone = _apart(cones, cap_m, 8.0 * cell_m)
             for east, north, height, slope in cones:
                 c, r = self.at((east, north))
                 raise_cone(
                     excess, floor, of, x, y, east, north, (c - col) * fineness, (r - row) * fineness, height, slope,
-                    cap_m, np.zeros((rows, cols), np.int8),
+                    cap_m, lone, np.zeros((rows, cols), np.int8), np.full((rows, cols), np.inf),
                 )  # fmt: skip
         piece = np.empty((cells, 2), np.int32)
         block = 1 if single else self.block * fineness
@@ -342,6 +345,15 @@ def make_plane(
         _slopes(tops[1], x, y),
         looked_at,
         make_shapes(problem, x, y),
+    )
+
+
+def _apart(cones: list[tuple[float, float, float, float]], cap_m: float, more_m: float) -> bool:
+    """Whether cones about different places do not come nearer than ``more_m`` to each other below a cap."""
+    wide = [max(cap_m - height, 0.0) / slope for *_, height, slope in cones]
+    return all(
+        a[:2] == b[:2] or math.dist(a[:2], b[:2]) > reach_a + reach_b + more_m
+        for (a, reach_a), (b, reach_b) in combinations(zip(cones, wide, strict=True), 2)
     )
 
 
