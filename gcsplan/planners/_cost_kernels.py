@@ -1,46 +1,26 @@
-"""The terms of every swarm cost for a whole population at once, from samples to numbers, in one pass.
+"""The terms of every swarm cost for a whole population at once, from control points to numbers, in one pass.
 
-Paths come as samples, (P, 3, S), which one product of matrices made from control points. Heights are bilinear in the
-raster's own grid, whose map from the plane is taken as quadratic (`scene.Scene`). Sampled, so it guides a search and
-never passes a mission.
+Heights are bilinear in the raster's own grid, whose map from the plane is taken as quadratic (`scene.Scene`). Sampled,
+so it guides a search and never passes a mission. The papers' own terms are sums over their samples; what breaks a limit
+is measured on samples that are nowhere further apart than `SPACING`, or little more than the path's mean: a swarm that
+may bunch its samples anywhere else leaps through walls between two of them.
 """
 
 from __future__ import annotations
 
 import math
 
-from gcsplan.planners._scene_kernels import (
-    BOTTOM,
-    CORNERS,
-    DOWN,
-    EAST,
-    H_MAX,
-    H_MIN,
-    HIGH_AGL,
-    LOW_AGL,
-    MAX_AGL,
-    MAX_AMSL,
-    NORTH,
-    REACH,
-    SOURCES,
-    SOUTH,
-    TOP,
-    UP,
-    WEST,
-    Z_HIGH,
-    Z_LOW,
-    Z_MIDDLE,
-    ZE,
-    ZN,
-    ZR,
-    device,
-    gap_to,
-    height_at,
-    kernel,
-    lookup,
-    lookup_both,
-    one_grid,
-)  # fmt: skip
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners import _scene_kernels as s
+from gcsplan.planners._curve_kernels import CURVE, angle, chords, divide, draw, exponential, weigh
+from gcsplan.planners._scene_kernels import SCENE, gap_to, height_at, lookup, lookup_both, one_grid, place
+from gcsplan.planners.compiled_swarm import device, kernel
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Ints = NDArray[np.int64]
 
 # Columns of the terms, all >= 0. Metres unless said otherwise; m² are depths summed along the path.
 LENGTH, FLAT, RISE = 0, 1, 2  # length in space, in the plane, Σ|Δz|
@@ -57,9 +37,11 @@ TURNS, SLOPES = 19, 20  # MSFOA's: how many turns, slopes are out of bounds
 BEND, EXPOSED, SPHERE = 21, 22, 23  # IB-ABC's: radians turned in space, m² exposed, metres of threat
 TERMS = 24
 
-# Groups of terms that cost time of their own: which are wanted, as bits; GROUND: all along the path.
-ANGLES, NODES_NEAR, SAMPLES_NEAR, HEIGHTS, BENDS, HIDING, GROUND = 1, 2, 4, 8, 16, 32, 64
+# Groups of terms that cost time of their own: which are wanted, as bits.
+ANGLES, NODES_NEAR, SAMPLES_NEAR, HEIGHTS, BENDS, HIDING = 1, 2, 4, 8, 16, 32
+CEILING = 64  # the ceiling follows the ground
 YAWS = 128  # SSGWO's exponentials of angles
+COUNTS = 256  # ABO's counts of samples
 
 # The papers' constants: compiled in, for no mission changes them.
 D_SAFE, R_UAV, CLAMP_M, PITCH_MAX = 10.0, 1.0, 0.1, math.radians(45.0)  # D: SSGWO
@@ -67,183 +49,42 @@ TAN_PITCH_MAX = math.tan(PITCH_MAX)
 TAN_TURN_MAX = math.tan(math.radians(45.0))  # D: MSFOA, whose φ_max follows from a load that it does not give
 D_HIDE = 20.0  # D: IB-ABC's d_safe
 
-SCRATCH = 7
-"""Arrays of a path's samples that `measure` works in: ground, floor, leg, run, weight, column, row. They are arrays of
-their own, not rows of one: only then does the compiler see that a store to one leaves the others, and vectorises."""
+UNEVEN = 2.0
+"""Legs of more than so many times the mean are divided, where they are longer than `SPACING`."""
 
 
 @device
-def _away(box, zone, reach):  # type: ignore[no-untyped-def]
+def _box_of(controls: Floats, box: Floats) -> None:
+    """West, east, south, north of a path, which lies within the hull of its control points."""
+    box[0], box[1], box[2], box[3] = controls[0, 0], controls[0, 0], controls[0, 1], controls[0, 1]
+    for i in range(1, len(controls)):
+        box[0], box[1] = min(box[0], controls[i, 0]), max(box[1], controls[i, 0])
+        box[2], box[3] = min(box[2], controls[i, 1]), max(box[3], controls[i, 1])
+
+
+@device
+def _away(box: Floats, zone: Floats, reach: float) -> bool:
     """Whether no point of a path's box is within ``reach`` of a zone's centre, for sure."""
-    e, n = zone[ZE], zone[ZN]
-    return box[0] > e + reach or box[1] < e - reach or box[2] > n + reach or box[3] < n - reach
+    e, n = zone[s.ZE], zone[s.ZN]
+    return bool(box[0] > e + reach or box[1] < e - reach or box[2] > n + reach or box[3] < n - reach)
 
 
 @device
-def _zone_terms(x, y, z, heights, quadratic, numbers, leg, weight, zones, corners, box, near, out):  # type: ignore[no-untyped-def]
-    """Length inside zones and its depth; with ``near`` also MSFOA's threat and IB-ABC's spheres, on every sample."""
-    samples = len(x)
-    for k in range(len(zones)):
-        zone = zones[k]
-        reach, e, n = zone[ZR] + zone[REACH], zone[ZE], zone[ZN]
-        # Zones away from the path's box cost nothing.
-        if _away(box, zone, reach):
-            continue
-        square = reach * reach
-        hits = 0.0
-        for i in range(samples):
-            dx, dy = x[i] - e, y[i] - n
-            hits += 1.0 if dx * dx + dy * dy < square else 0.0
-        if hits == 0.0:
-            continue
-        for i in range(samples):
-            dx, dy = x[i] - e, y[i] - n
-            if dx * dx + dy * dy >= square:
-                continue
-            ground = 0.0
-            if zone[LOW_AGL] != 0.0 or zone[HIGH_AGL] != 0.0:
-                ground = height_at(heights, quadratic, numbers, x[i], y[i])
-            low, high = zone[Z_LOW] + zone[LOW_AGL] * ground, zone[Z_HIGH] + zone[HIGH_AGL] * ground
-            within = low < z[i] < high
-            if not (within or near):
-                continue
-            gap = gap_to(zone, corners, x[i], y[i])
-            if within and gap < zone[REACH]:
-                out[INSIDE] += weight[i]
-                out[DEEP] += weight[i] * min(zone[REACH] - gap, max(min(z[i] - low, high - z[i]), 0.0))
-            if near:
-                out[THREAT] += leg[i] * max(0.0, -gap) / zone[ZR]
-                dz = z[i] - (zone[Z_MIDDLE] + zone[HIGH_AGL] * ground)
-                out[SPHERE] += max(0.0, zone[ZR] - math.sqrt(dx * dx + dy * dy + dz * dz))
-
-
-@device
-def _near_terms(x, y, z, heights, quadratic, numbers, zones, corners, box, stride, out):  # type: ignore[no-untyped-def]
-    """SSGWO's obstacle cost (eq. 31, 32): 1/d over nodes and obstacles nearer than d_safe."""
-    for k in range(len(zones)):
-        zone = zones[k]
-        reach = zone[ZR] + D_SAFE + R_UAV
-        if _away(box, zone, reach):
-            continue
-        for i in range(stride, len(x) - 1, stride):
-            dx, dy = x[i] - zone[ZE], y[i] - zone[ZN]
-            if dx * dx + dy * dy >= reach * reach:
-                continue
-            ground = 0.0
-            if zone[LOW_AGL] != 0.0 or zone[HIGH_AGL] != 0.0:
-                ground = height_at(heights, quadratic, numbers, x[i], y[i])
-            low, high = zone[Z_LOW] + zone[LOW_AGL] * ground, zone[Z_HIGH] + zone[HIGH_AGL] * ground
-            beside = max(gap_to(zone, corners, x[i], y[i]) - R_UAV, 0.0)
-            over = max(max(z[i] - high, low - z[i]) - R_UAV, 0.0)
-            d = math.sqrt(beside * beside + over * over)
-            if d < D_SAFE:
-                out[NEAR] += 1.0 / max(d, CLAMP_M)
-
-
-@device
-def _angle_terms(x, y, z, stride, bends, out):  # type: ignore[no-untyped-def]
-    """Turns and slopes between nodes, every ``stride``-th sample: how many are too much, and ``bends``, radians."""
-    first = True
-    he, hn = 1.0, 0.0  # the way it heads; climbing on the spot keeps it
-    px = py = pz = pl = 0.0
-    for i in range(stride, len(x), stride):
-        h = z[i - stride]
-        dx, dy, dz = x[i] - x[i - stride], y[i] - y[i - stride], z[i] - h
-        run = math.sqrt(dx * dx + dy * dy)
-        length = math.sqrt(run * run + dz * dz)
-        if length <= 0.0:
-            continue
-        slope = dz / max(run, 1e-9)
-        # MSFOA eq. 27: the steepest climb and descent by altitude.
-        alpha = -1.5377e-10 * h * h - 2.6997e-5 * h + 0.4211
-        beta = 2.5063e-9 * h * h - 6.3014e-6 * h - 0.3257
-        if slope > alpha or slope < beta:
-            out[SLOPES] += 1.0
-        e, n = (dx, dy) if run > 0.0 else (he, hn)
-        if not first:
-            # No angle is needed to know that it is more than 45 degrees.
-            if abs(he * n - hn * e) > (he * e + hn * n) * TAN_TURN_MAX:
-                out[TURNS] += 1.0
-            if bends:
-                cosine = (px * dx + py * dy + pz * dz) / (pl * length)
-                out[BEND] += math.acos(min(max(cosine, -1.0), 1.0))
-        he, hn, first = e, n, False
-        px, py, pz, pl = dx, dy, dz, length
-
-
-@device
-def _yaw_terms(x, y, z, stride, out):  # type: ignore[no-untyped-def]
-    """SSGWO's sums of exponentials of turns and slopes between nodes (eq. 29, 30)."""
-    heading, first = 0.0, True
-    for i in range(stride, len(x), stride):
-        dx, dy, dz = x[i] - x[i - stride], y[i] - y[i - stride], z[i] - z[i - stride]
-        run = math.sqrt(dx * dx + dy * dy)
-        if run <= 0.0 and dz == 0.0:
-            continue
-        now = math.atan2(dy, dx) if run > 0.0 else heading
-        # tan(45 degrees) is 1: the angle itself is needed beyond it alone.
-        if abs(dz) > run * TAN_PITCH_MAX:
-            out[PITCH] += math.exp(math.atan2(abs(dz), run) - PITCH_MAX)
-        if not first:
-            turn = abs(now - heading)
-            if turn > math.pi:
-                turn = 2.0 * math.pi - turn
-            out[YAW] += math.exp(turn) - 1.0
-        heading, first = now, False
-
-
-@device
-def _height_terms(z, ground, numbers, out):  # type: ignore[no-untyped-def]
-    """MSFOA's altitude and terrain costs (eq. 21, 23)."""
-    h_min, high, buried = numbers[H_MIN], 0.0, 0.0
-    for i in range(len(z)):
-        agl = z[i] - ground[i]
-        high += max(0.0, agl - h_min)
-        buried += max(0.0, -agl)
-    out[HIGH], out[BURIED] = high / len(z), buried
-
-
-@device
-def _hiding_terms(x, y, z, ground, run, zones, corners, numbers, box, cost, out):  # type: ignore[no-untyped-def]
-    """IB-ABC's concealment (eq. 4). ``cost`` (S,) is scratch: of a metre at each sample."""
-    lit = 3.0 * (numbers[H_MAX] + D_HIDE)
+def _hits(x: Floats, y: Floats, e: float, n: float, square: float) -> float:
+    """How many samples are within a circle."""
+    hits = 0.0
     for i in range(len(x)):
-        apart = z[i] - ground[i]
-        cost[i] = apart - D_HIDE if apart >= D_HIDE else lit  # NaN is lit
-    for k in range(len(zones)):
-        zone = zones[k]
-        reach = zone[ZR] + D_HIDE
-        if _away(box, zone, reach):
-            continue
-        e, n, square, circle = zone[ZE], zone[ZN], reach * reach, zone[CORNERS] == 0.0
-        for i in range(len(x)):
-            dx, dy = x[i] - e, y[i] - n
-            # What is near ground or another zone already needs no distance.
-            if dx * dx + dy * dy < square and cost[i] != lit and (circle or gap_to(zone, corners, x[i], y[i]) < D_HIDE):
-                cost[i] = lit
-    exposed = 0.0
-    for i in range(1, len(x)):
-        exposed += cost[i] * run[i - 1]
-    out[EXPOSED] = exposed
+        dx, dy = x[i] - e, y[i] - n
+        hits += 1.0 if dx * dx + dy * dy < square else 0.0
+    return hits
 
 
 @device
-def _box_of(x, y, box):  # type: ignore[no-untyped-def]
-    """West, east, south, north of a path's samples."""
-    west, east, south, north = x[0], x[0], y[0], y[0]
-    for i in range(len(x)):
-        west, east = min(west, x[i]), max(east, x[i])
-        south, north = min(south, y[i]), max(north, y[i])
-    box[0], box[1], box[2], box[3] = west, east, south, north
-
-
-@device
-def _legs(x, y, z, leg, run, weight, numbers, out):  # type: ignore[no-untyped-def]
-    """Lengths, climbs and the length that each sample stands for."""
-    n = len(x)
-    length, flat, rise, steep = 0.0, 0.0, 0.0, 0.0
-    up, down = numbers[UP], numbers[DOWN]
-    for i in range(n - 1):
+def _legs(x: Floats, y: Floats, z: Floats, leg: Floats, run: Floats, numbers: Floats, out: Floats) -> float:
+    """Lengths and climbs; how many legs are longer than samples should be apart."""
+    length, flat, rise, steep, long = 0.0, 0.0, 0.0, 0.0, 0.0
+    up, down, most = numbers[s.UP], numbers[s.DOWN], numbers[s.SPACING]
+    for i in range(len(leg)):
         dx, dy, dz = x[i + 1] - x[i], y[i + 1] - y[i], z[i + 1] - z[i]
         square = dx * dx + dy * dy
         r, d = math.sqrt(square), math.sqrt(square + dz * dz)
@@ -253,80 +94,300 @@ def _legs(x, y, z, leg, run, weight, numbers, out):  # type: ignore[no-untyped-d
         flat += r
         rise += abs(dz)
         steep += max(max(dz - up * r, -dz - down * r), 0.0)
-    run[n - 1] = 0.0
-    leg[n - 1] = 0.0
-    weight[0] = 0.5 * leg[0]
-    for i in range(n - 1):
-        weight[i + 1] = 0.5 * (leg[i] + leg[i + 1])
+        long += 1.0 if d > most else 0.0
     out[LENGTH], out[FLAT], out[RISE], out[STEEP] = length, flat, rise, steep
+    return long
 
 
 @device
-def _limit_terms(x, y, z, ground, floor, weight, numbers, out):  # type: ignore[no-untyped-def]
-    """How much of a path is under its floor, over its ceiling, over unknown ground, out of the volume.
-
-    Counted in floats and in short loops: mixed with whole numbers, or all in one, they would not be vectorised.
-    """
-    agl, amsl = numbers[MAX_AGL], numbers[MAX_AMSL]
-    west, south, bottom = numbers[WEST], numbers[SOUTH], numbers[BOTTOM]
-    east, north, top = numbers[EAST], numbers[NORTH], numbers[TOP]
-    below, sunk, above, proud, unknown, under, outside, dark = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(1, len(x) - 1):  # start and goal are given, and stand on the floor itself
-        w, h = weight[i], z[i]
-        deep, high = max(0.0, floor[i] - h), max(0.0, h - min(ground[i] + agl, amsl))  # NaN comes second: 0 stays
-        below += w if deep > 0.0 else 0.0
-        sunk += w * deep
-        above += w if high > 0.0 else 0.0
-        proud += w * high
-        under += 1.0 if deep > 0.0 else 0.0
-    for i in range(len(x)):
-        away = (x[i] < west) | (x[i] > east) | (y[i] < south) | (y[i] > north) | (z[i] < bottom) | (z[i] > top)
-        outside += 1.0 if away else 0.0
-    for i in range(len(x)):
+def _unknown(floor: Floats, weight: Floats) -> float:
+    """Length over unknown ground."""
+    dark, unknown = 0.0, 0.0
+    for i in range(len(floor)):
         dark += 1.0 if floor[i] != floor[i] else 0.0
     if dark > 0.0:
-        for i in range(len(x)):
+        for i in range(len(floor)):
             unknown += weight[i] if floor[i] != floor[i] else 0.0
-    out[BELOW], out[SUNK], out[ABOVE], out[PROUD], out[UNKNOWN] = below, sunk, above, proud, unknown
-    out[UNDER], out[OUTSIDE] = under + dark, outside
+    return unknown
 
 
-@kernel
-def measure(  # type: ignore[no-untyped-def]
-    paths, heights, quadratic, floors, floor_map, numbers, zones, corners, stride, wanted, scratch, box, out,
-    sources=SOURCES,
-):  # fmt: skip
-    """Terms of P paths into ``out`` (P, TERMS).
+@device
+def _limit_terms(
+    z: Floats, weight: Floats, ground: Floats, floor: Floats, follows: bool, numbers: Floats, out: Floats
+) -> None:
+    """How much of a path is under its floor, over its ceiling, which ``follows`` the ``ground`` or not.
 
-    ``paths`` (P, 3, S) samples; ``stride`` of them between two nodes; ``wanted`` groups of terms; ``scratch`` SCRATCH
-    arrays (S,), ``box`` (4,).
+    Counted in floats and in short loops: mixed with whole numbers, or all in one, they would not be cut to vectors.
     """
-    ground, floor, leg, run, weight, column, row = scratch
+    below, sunk, above, proud = 0.0, 0.0, 0.0, 0.0
+    agl, amsl = numbers[s.MAX_AGL], numbers[s.MAX_AMSL]
+    for i in range(len(z)):
+        deep, high = max(0.0, floor[i] - z[i]), max(0.0, z[i] - amsl)  # NaN comes second: 0 stays
+        below += weight[i] if deep > 0.0 else 0.0
+        sunk += weight[i] * deep
+        above += weight[i] if high > 0.0 else 0.0
+        proud += weight[i] * high
+    if follows:
+        above, proud = 0.0, 0.0
+        for i in range(len(z)):
+            high = max(0.0, z[i] - min(ground[i] + agl, amsl))
+            above += weight[i] if high > 0.0 else 0.0
+            proud += weight[i] * high
+    out[BELOW], out[SUNK], out[ABOVE], out[PROUD] = below, sunk, above, proud
+
+
+@device
+def _zone_terms(
+    x: Floats, y: Floats, z: Floats, weight: Floats, leg: Floats, heights: Singles, quadratic: Floats, numbers: Floats,
+    zones: Floats, corners: Floats, box: Floats, near: bool, out: Floats,
+) -> None:  # fmt: skip
+    """Length inside zones and its depth; ``near``: also MSFOA's threat and IB-ABC's spheres, of samples alone."""
+    inside, depth, threat, sphere = 0.0, 0.0, 0.0, 0.0
+    for k in range(len(zones)):
+        zone = zones[k]
+        e, n, radius, margin = zone[s.ZE], zone[s.ZN], zone[s.ZR], zone[s.REACH]
+        reach = radius + margin
+        # Zones away from the path's box cost nothing, and of the others the samples away from them next to nothing.
+        if _away(box, zone, reach):
+            continue
+        square, follows = reach * reach, zone[s.LOW_AGL] != 0.0 or zone[s.HIGH_AGL] != 0.0
+        hits = _hits(x, y, e, n, square)
+        i = 0
+        while hits > 0.0:
+            dx, dy = x[i] - e, y[i] - n
+            apart = dx * dx + dy * dy
+            if apart < square:
+                hits -= 1.0
+                ground = height_at(heights, quadratic, numbers, x[i], y[i]) if follows else 0.0
+                low, high = zone[s.Z_LOW] + zone[s.LOW_AGL] * ground, zone[s.Z_HIGH] + zone[s.HIGH_AGL] * ground
+                within = low < z[i] < high
+                own = near and i <= len(leg)
+                if within or own:
+                    gap = gap_to(zone, corners, x[i], y[i])
+                    if within and gap < margin:
+                        inside += weight[i]
+                        depth += weight[i] * min(margin - gap, max(min(z[i] - low, high - z[i]), 0.0))
+                    if own:
+                        if i < len(leg):
+                            threat += leg[i] * max(0.0, -gap) / radius
+                        dz = z[i] - (zone[s.Z_MIDDLE] + zone[s.HIGH_AGL] * ground)
+                        sphere += max(0.0, radius - math.sqrt(apart + dz * dz))
+            i += 1
+    out[INSIDE], out[DEEP], out[THREAT], out[SPHERE] = inside, depth, threat, sphere
+
+
+@device
+def _near_terms(
+    x: Floats, y: Floats, z: Floats, heights: Singles, quadratic: Floats, numbers: Floats, zones: Floats,
+    corners: Floats, box: Floats, stride: int, east: Floats, north: Floats, out: Floats,
+) -> None:  # fmt: skip
+    """SSGWO's obstacle cost (eq. 31, 32): 1/d over nodes and obstacles nearer than d_safe. ``east``, ``north`` are
+    scratch."""
+    near, count = 0.0, 0
+    for i in range(stride, len(x) - 1, stride):
+        east[count], north[count] = x[i], y[i]
+        count += 1
+    for k in range(len(zones)):
+        zone = zones[k]
+        reach = zone[s.ZR] + D_SAFE + R_UAV
+        if _away(box, zone, reach):
+            continue
+        e, n, square = zone[s.ZE], zone[s.ZN], reach * reach
+        hits = _hits(east[:count], north[:count], e, n, square)
+        i = 0
+        while hits > 0.0:
+            i += stride
+            dx, dy = x[i] - e, y[i] - n
+            if dx * dx + dy * dy >= square:
+                continue
+            hits -= 1.0
+            ground = 0.0
+            if zone[s.LOW_AGL] != 0.0 or zone[s.HIGH_AGL] != 0.0:
+                ground = height_at(heights, quadratic, numbers, x[i], y[i])
+            low, high = zone[s.Z_LOW] + zone[s.LOW_AGL] * ground, zone[s.Z_HIGH] + zone[s.HIGH_AGL] * ground
+            beside = max(gap_to(zone, corners, x[i], y[i]) - R_UAV, 0.0)
+            over = max(max(z[i] - high, low - z[i]) - R_UAV, 0.0)
+            d = math.sqrt(beside * beside + over * over)
+            if d < D_SAFE:
+                near += 1.0 / max(d, CLAMP_M)
+    out[NEAR] = near
+
+
+@device
+def _angle_terms(
+    count: int, east: Floats, north: Floats, run: Floats, rise: Floats, base: Floats, bends: bool, out: Floats
+) -> None:
+    """Turns and slopes between nodes: how many are too much, and ``bends``, radians."""
+    slopes, turns, bend = 0.0, 0.0, 0.0
+    for i in range(count):
+        slope, h = rise[i] / max(run[i], 1e-9), base[i]
+        # MSFOA eq. 27: the steepest climb and descent by altitude.
+        alpha = -1.5377e-10 * h * h - 2.6997e-5 * h + 0.4211
+        beta = 2.5063e-9 * h * h - 6.3014e-6 * h - 0.3257
+        slopes += 1.0 if (slope > alpha) | (slope < beta) else 0.0
+    for i in range(count - 1):
+        cross = abs(east[i] * north[i + 1] - north[i] * east[i + 1])
+        dot = east[i] * east[i + 1] + north[i] * north[i + 1]
+        # No angle is needed to know that it is more than 45 degrees.
+        turns += 1.0 if cross > dot * TAN_TURN_MAX else 0.0
+    if bends:
+        for i in range(count - 1):
+            # On the spot it heads nowhere.
+            e, n = (east[i], north[i]) if run[i] > 0.0 else (0.0, 0.0)
+            f, m = (east[i + 1], north[i + 1]) if run[i + 1] > 0.0 else (0.0, 0.0)
+            u, v = rise[i], rise[i + 1]
+            a, b, c = n * v - u * m, u * f - e * v, e * m - n * f
+            bend += angle(math.sqrt(a * a + b * b + c * c), e * f + n * m + u * v)
+    out[SLOPES], out[TURNS], out[BEND] = slopes, turns, bend
+
+
+@device
+def _yaw_terms(count: int, east: Floats, north: Floats, run: Floats, rise: Floats, out: Floats) -> None:
+    """SSGWO's sums of exponentials of turns and slopes between nodes (eq. 29, 30)."""
+    steep, pitch, yaw = 0.0, 0.0, 0.0
+    for i in range(count - 1):
+        cross = abs(east[i] * north[i + 1] - north[i] * east[i + 1])
+        yaw += exponential(angle(cross, east[i] * east[i + 1] + north[i] * north[i + 1])) - 1.0
+    for i in range(count):
+        steep += 1.0 if abs(rise[i]) > run[i] * TAN_PITCH_MAX else 0.0
+    if steep > 0.0:
+        for i in range(count):
+            more = angle(abs(rise[i]), run[i]) - PITCH_MAX
+            pitch += exponential(max(more, 0.0)) if abs(rise[i]) > run[i] * TAN_PITCH_MAX else 0.0
+    out[YAW], out[PITCH] = yaw, pitch
+
+
+@device
+def _count_terms(x: Floats, y: Floats, z: Floats, floor: Floats, numbers: Floats, out: Floats) -> None:
+    """ABO's samples under the floor or over unknown ground, and out of the volume."""
+    west, south, bottom = numbers[s.WEST], numbers[s.SOUTH], numbers[s.BOTTOM]
+    east, north, top = numbers[s.EAST], numbers[s.NORTH], numbers[s.TOP]
+    under, outside = 0.0, 0.0
+    for i in range(1, len(z) - 1):
+        under += 1.0 if floor[i] > z[i] else 0.0
+    for i in range(len(z)):
+        under += 1.0 if floor[i] != floor[i] else 0.0
+        away = (x[i] < west) | (x[i] > east) | (y[i] < south) | (y[i] > north) | (z[i] < bottom) | (z[i] > top)
+        outside += 1.0 if away else 0.0
+    out[UNDER], out[OUTSIDE] = under, outside
+
+
+@device
+def _height_terms(z: Floats, ground: Floats, numbers: Floats, out: Floats) -> None:
+    """MSFOA's altitude and terrain costs (eq. 21, 23)."""
+    h_min, high, buried = numbers[s.H_MIN], 0.0, 0.0
+    for i in range(len(z)):
+        agl = z[i] - ground[i]
+        high += max(0.0, agl - h_min)
+        buried += max(0.0, -agl)
+    out[HIGH], out[BURIED] = high / len(z), buried
+
+
+@device
+def _hiding_terms(
+    x: Floats, y: Floats, z: Floats, ground: Floats, run: Floats, zones: Floats, corners: Floats, numbers: Floats,
+    box: Floats, cost: Floats, out: Floats,
+) -> None:  # fmt: skip
+    """IB-ABC's concealment (eq. 4). ``cost`` (S,) is scratch: of a metre at each sample."""
+    lit = 3.0 * (numbers[s.H_MAX] + D_HIDE)
+    for i in range(len(x)):
+        apart = z[i] - ground[i]
+        cost[i] = apart - D_HIDE if apart >= D_HIDE else lit  # NaN is lit
+    for k in range(len(zones)):
+        zone = zones[k]
+        reach = zone[s.ZR] + D_HIDE
+        if _away(box, zone, reach):
+            continue
+        e, n, square = zone[s.ZE], zone[s.ZN], reach * reach
+        if zone[s.CORNERS] == 0.0:
+            for i in range(len(x)):
+                dx, dy = x[i] - e, y[i] - n
+                cost[i] = lit if dx * dx + dy * dy < square else cost[i]
+            continue
+        for i in range(len(x)):
+            dx, dy = x[i] - e, y[i] - n
+            # What is near ground or another zone already needs no distance.
+            if dx * dx + dy * dy < square and cost[i] != lit and gap_to(zone, corners, x[i], y[i]) < D_HIDE:
+                cost[i] = lit
+    exposed = 0.0
+    for i in range(len(run)):
+        exposed += cost[i + 1] * run[i]
+    out[EXPOSED] = exposed
+
+
+SAMPLE_ARRAYS, FINE_ARRAYS, CHORD_ARRAYS = 3, 8, 5
+"""Arrays of scratch that `measure` wants: of a path's samples, of twice as many, and of its nodes."""
+
+ROOM = " ".join(["f8[]"] * (SAMPLE_ARRAYS + FINE_ARRAYS + CHORD_ARRAYS + 1))
+"""Forms of all scratch. Arrays of their own, no rows of one: a store to one is known to leave the others."""
+
+
+def room(samples: int) -> list[Floats]:
+    """Scratch for paths of so many samples."""
+    sizes = [samples, samples - 1, samples - 1] + [2 * samples] * FINE_ARRAYS
+    return [np.zeros(n) for n in (*sizes, *[samples] * CHORD_ARRAYS, 4)]
+
+
+@kernel(f"f8[,,] {CURVE} {SCENE} i8 i8 {ROOM} f8[,]")
+def measure(
+    controls: Floats, bands: Floats, spans: Ints,
+    heights: Singles, quadratic: Floats, floors: Singles, floor_map: Floats, numbers: Floats, zones: Floats,
+    corners: Floats, stride: int, wanted: int,
+    cost: Floats, leg: Floats, run: Floats,
+    all_x: Floats, all_y: Floats, all_z: Floats, weight: Floats, floor: Floats, ground: Floats,
+    column: Floats, row: Floats,
+    east: Floats, north: Floats, flat: Floats, rise: Floats, base: Floats,
+    box: Floats,
+    out: Floats,
+) -> None:  # fmt: skip
+    """Terms of P paths of N control points, ``controls`` (P, N, 3), into ``out`` (P, TERMS).
+
+    ``stride`` samples between two nodes; ``wanted`` groups of terms. Then scratch, see `room`: of samples and legs; of
+    samples and what is added on long legs, after them; of chords between nodes; a box.
+    """
+    count = len(cost)
+    x, y, z = all_x[:count], all_y[:count], all_z[:count]
+    grounded = (wanted & (CEILING | HEIGHTS | HIDING)) != 0
     shared = one_grid(heights, quadratic, floors, floor_map)
-    for p in range(len(paths)):
-        x, y, z = paths[p, 0], paths[p, 1], paths[p, 2]
+    for p in range(len(controls)):
         to = out[p]
         for k in range(TERMS):
             to[k] = 0.0
-        _box_of(x, y, box)
-        _legs(x, y, z, leg, run, weight, numbers, to)
-        if shared and wanted & GROUND:
-            lookup_both(floors, heights, floor_map, numbers, x, y, floor, ground, column, row)
+        _box_of(controls[p], box)
+        draw(controls[p], bands, spans, x, y, z)
+        long = _legs(x, y, z, leg, run, numbers, to)
+        weigh(leg, weight)
+        many = count
+        if long > 0.0:
+            step_m = max(numbers[s.SPACING], UNEVEN * to[LENGTH] / len(leg))
+            many = divide(leg, step_m, all_x, all_y, all_z, weight)
+        off = place(floors, floor_map, numbers, all_x[:many], all_y[:many], column, row)
+        if grounded and shared:
+            lookup_both(floors, heights, column, row, off, floor[:many], ground[:many])
         else:
-            lookup(floors, floor_map, numbers, x, y, floor, column, row)
-            if wanted & GROUND:
-                lookup(heights, quadratic, numbers, x, y, ground, column, row)
-        _limit_terms(x, y, z, ground, floor, weight, numbers, to)
+            lookup(floors, column, row, off, floor[:many])
+            if grounded:
+                off = place(heights, quadratic, numbers, all_x[:many], all_y[:many], column, row)
+                lookup(heights, column, row, off, ground[:many])
+        to[UNKNOWN] = _unknown(floor[:many], weight)
         _zone_terms(
-            x, y, z, heights, quadratic, numbers, leg, weight, zones, corners, box, (wanted & SAMPLES_NEAR) != 0, to
-        )
-        if wanted & ANGLES:
-            _angle_terms(x, y, z, stride, (wanted & BENDS) != 0, to)
-        if wanted & YAWS:
-            _yaw_terms(x, y, z, stride, to)
+            all_x[:many], all_y[:many], all_z, weight, leg, heights, quadratic, numbers, zones, corners, box,
+            (wanted & SAMPLES_NEAR) != 0, to,
+        )  # fmt: skip
+        weight[0] = weight[count - 1] = 0.0  # start and goal are given, and stand on the floor itself
+        _limit_terms(all_z[:many], weight, ground, floor, (wanted & CEILING) != 0, numbers, to)
+
+        if wanted & COUNTS:
+            _count_terms(x, y, z, floor, numbers, to)
         if wanted & NODES_NEAR:
-            _near_terms(x, y, z, heights, quadratic, numbers, zones, corners, box, stride, to)
+            _near_terms(x, y, z, heights, quadratic, numbers, zones, corners, box, stride, east, north, to)
+        if wanted & (ANGLES | YAWS):
+            legs = chords(x, y, z, stride, east, north, flat, rise, base)
+            if wanted & ANGLES:
+                _angle_terms(legs, east, north, flat, rise, base, (wanted & BENDS) != 0, to)
+            if wanted & YAWS:
+                _yaw_terms(legs, east, north, flat, rise, to)
         if wanted & HEIGHTS:
             _height_terms(z, ground, numbers, to)
         if wanted & HIDING:
-            _hiding_terms(x, y, z, ground, run, zones, corners, numbers, box, column, to)
+            _hiding_terms(x, y, z, ground, run, zones, corners, numbers, box, cost, to)

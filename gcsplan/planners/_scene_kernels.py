@@ -1,39 +1,26 @@
-"""What the cost kernels share: a scene's numbers by name, heights and distances; and the kernels of ants and repair.
-
-numba notices a change of the file that a kernel stands in, but not of those that it calls into: each cached kernel
-takes `SOURCES` as the default of its last parameter, which numba keeps as a part of the key.
-"""
+"""What the cost kernels share: a scene's numbers by name, heights and distances; and the kernels of ants and repair."""
 
 from __future__ import annotations
 
-import hashlib
 import math
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from gcsplan.planners.compiled_swarm import device, kernel
+
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
 
-SOURCES = hashlib.sha256(
-    b"".join((Path(__file__).parent / f"_{name}_kernels.py").read_bytes() for name in ("scene", "cost"))
-).hexdigest()
-
-# No fast math: how sums are reordered changes from one compilation to the next, and a swarm makes another path of it.
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-kernel = njit(cache=True, **_OPTIONS)
-"""What Python calls."""
-device = njit(**_OPTIONS)
-"""What only kernels call."""
+SCENE = "f4[,] f8[,] f4[,] f8[,] f8[] f8[,] f8[,]"
+"""Forms of a scene's heights, quadratic, floors, floor_map, numbers, zones and corners."""
 
 # What the numbers of a scene are.
 (
     MAX_AGL, MAX_AMSL, UP, DOWN, WEST, SOUTH, BOTTOM, EAST, NORTH, TOP, CENTRE_E, CENTRE_N, PER_UNIT,
-    H_MIN, H_MAX,
-) = range(15)  # fmt: skip
-NUMBERS = 15
+    H_MIN, H_MAX, SPACING,
+) = range(16)  # fmt: skip
+NUMBERS = 16
 
 # What the columns of a zone are: shape 0 a circle, else a polygon with so many corners from ``first``.
 ZE, ZN, ZR, REACH, Z_LOW, Z_HIGH, LOW_AGL, HIGH_AGL, CORNERS, FIRST, Z_MIDDLE = range(11)
@@ -43,15 +30,15 @@ EDGE = 1e-6  # of a cell: float noise at the raster's edge
 
 
 @device
-def bilinear(raster, j, i, a, b):  # type: ignore[no-untyped-def]
+def bilinear(raster: Singles, j: int | np.uint32, i: int | np.uint32, a: float, b: float) -> float:
     """Between the nodes of the cell of row ``j`` and column ``i``, by its parts ``a`` along and ``b`` down."""
     north = raster[j, i] + a * (raster[j, i + 1] - raster[j, i])
     south = raster[j + 1, i] + a * (raster[j + 1, i + 1] - raster[j + 1, i])
-    return north + b * (south - north)
+    return float(north + b * (south - north))
 
 
 @device
-def height_at(heights, quadratic, numbers, e, n):  # type: ignore[no-untyped-def]
+def height_at(heights: Singles, quadratic: Floats, numbers: Floats, e: float, n: float) -> float:
     """Bilinear height at a point of the plane; NaN off the raster and on unknown ground."""
     u, v = (e - numbers[CENTRE_E]) * numbers[PER_UNIT], (n - numbers[CENTRE_N]) * numbers[PER_UNIT]
     q = quadratic
@@ -64,15 +51,17 @@ def height_at(heights, quadratic, numbers, e, n):  # type: ignore[no-untyped-def
     return bilinear(heights, j, i, col - i, row - j)
 
 
-@kernel
-def heights_at(heights, quadratic, numbers, points, out, sources=SOURCES):  # type: ignore[no-untyped-def]
+@kernel("f4[,] f8[,] f8[] f8[,] f8[]")
+def heights_at(heights: Singles, quadratic: Floats, numbers: Floats, points: Floats, out: Floats) -> None:
     """Bilinear heights under points (N, 2 or more) into ``out`` (N,)."""
     for k in range(len(points)):
         out[k] = height_at(heights, quadratic, numbers, points[k, 0], points[k, 1])
 
 
 @device
-def place(raster, quadratic, numbers, x, y, column, row):  # type: ignore[no-untyped-def]
+def place(
+    raster: Singles, quadratic: Floats, numbers: Floats, x: Floats, y: Floats, column: Floats, row: Floats
+) -> float:
     """Columns and rows of all samples in a raster, and how many are off it. Straight arithmetic, on its own."""
     q, right, low = quadratic, raster.shape[1] - 1.0, raster.shape[0] - 1.0
     c0, c1, c2, c3, c4, c5 = q[0, 0], q[0, 1], q[0, 2], q[0, 3], q[0, 4], q[0, 5]
@@ -90,47 +79,49 @@ def place(raster, quadratic, numbers, x, y, column, row):  # type: ignore[no-unt
 
 
 @device
-def darken(raster, column, row, out):  # type: ignore[no-untyped-def]
+def darken(raster: Singles, column: Floats, row: Floats, out: Floats) -> None:
     """NaN where a sample is off the raster."""
     right, low = raster.shape[1] - 1.0, raster.shape[0] - 1.0
-    for t in range(len(column)):
+    for t in range(len(out)):
         if column[t] < -EDGE or column[t] > right + EDGE or row[t] < -EDGE or row[t] > low + EDGE:
             out[t] = math.nan
 
 
 @device
-def lookup(raster, quadratic, numbers, x, y, out, column, row):  # type: ignore[no-untyped-def]
-    """Bilinear heights at all samples; NaN where unknown."""
-    off = place(raster, quadratic, numbers, x, y, column, row)
+def lookup(raster: Singles, column: Floats, row: Floats, off: float, out: Floats) -> None:
+    """Bilinear heights at places in a raster, ``off`` of them off it; NaN where unknown."""
     rows, cols = raster.shape
     right, low = cols - 1.0, rows - 1.0
-    for t in range(len(x)):
+    last_i, last_j = np.int32(cols - 2), np.int32(rows - 2)
+    for t in range(len(out)):
         at, down = min(max(column[t], 0.0), right), min(max(row[t], 0.0), low)
-        i, j = min(np.int64(at), cols - 2), min(np.int64(down), rows - 2)
-        out[t] = bilinear(raster, j, i, at - i, down - j)
+        i, j = min(np.int32(at), last_i), min(np.int32(down), last_j)
+        out[t] = bilinear(raster, np.uint32(j), np.uint32(i), at - i, down - j)
     if off > 0.0:
         darken(raster, column, row, out)
 
 
 @device
-def lookup_both(raster, other, quadratic, numbers, x, y, out, other_out, column, row):  # type: ignore[no-untyped-def]
+def lookup_both(
+    raster: Singles, other: Singles, column: Floats, row: Floats, off: float, out: Floats, other_out: Floats
+) -> None:
     """`lookup` in two rasters of one grid."""
-    off = place(raster, quadratic, numbers, x, y, column, row)
     rows, cols = raster.shape
     right, low = cols - 1.0, rows - 1.0
-    for t in range(len(x)):
+    last_i, last_j = np.int32(cols - 2), np.int32(rows - 2)
+    for t in range(len(out)):
         at, down = min(max(column[t], 0.0), right), min(max(row[t], 0.0), low)
-        i, j = min(np.int64(at), cols - 2), min(np.int64(down), rows - 2)
+        i, j = min(np.int32(at), last_i), min(np.int32(down), last_j)
         a, b = at - i, down - j
-        out[t] = bilinear(raster, j, i, a, b)
-        other_out[t] = bilinear(other, j, i, a, b)
+        out[t] = bilinear(raster, np.uint32(j), np.uint32(i), a, b)
+        other_out[t] = bilinear(other, np.uint32(j), np.uint32(i), a, b)
     if off > 0.0:
         darken(raster, column, row, out)
-        darken(raster, column, row, other_out)
+        darken(other, column, row, other_out)
 
 
 @device
-def one_grid(raster, to_raster, other, to_other):  # type: ignore[no-untyped-def]
+def one_grid(raster: Singles, to_raster: Floats, other: Singles, to_other: Floats) -> bool:
     """Whether two rasters have the same nodes."""
     same = raster.shape == other.shape
     for k in range(6):
@@ -139,12 +130,12 @@ def one_grid(raster, to_raster, other, to_other):  # type: ignore[no-untyped-def
 
 
 @device
-def gap_to(zone, corners, x, y):  # type: ignore[no-untyped-def]
+def gap_to(zone: Floats, corners: Floats, x: float, y: float) -> float:
     """Signed horizontal distance from a zone's shape, negative inside."""
     count = int(zone[CORNERS])
     if count == 0:
         dx, dy = x - zone[ZE], y - zone[ZN]
-        return math.sqrt(dx * dx + dy * dy) - zone[ZR]
+        return math.sqrt(dx * dx + dy * dy) - float(zone[ZR])
     first = int(zone[FIRST])
     nearest, inside = 1e300, False
     for k in range(count):
@@ -160,8 +151,8 @@ def gap_to(zone, corners, x, y):  # type: ignore[no-untyped-def]
     return -math.sqrt(nearest) if inside else math.sqrt(nearest)
 
 
-@kernel
-def clocks_of(paths, speed_m_s, out, sources=SOURCES):  # type: ignore[no-untyped-def]
+@kernel("f8[,,] f8 f8[,]")
+def clocks_of(paths: Floats, speed_m_s: float, out: Floats) -> None:
     """Seconds from the start of ``paths`` (P, S, 3) at one speed into ``out`` (P, S)."""
     for p in range(len(paths)):
         total = 0.0
@@ -173,8 +164,10 @@ def clocks_of(paths, speed_m_s, out, sources=SOURCES):  # type: ignore[no-untype
             out[p, i] = total
 
 
-@kernel
-def nearness(paths, clocks, others, other_clocks, apart_m, soon_s, out, sources=SOURCES):  # type: ignore[no-untyped-def]
+@kernel("f8[,,] f8[,] f8[,] f8[] f8 f8 f8[]")
+def nearness(
+    paths: Floats, clocks: Floats, others: Floats, other_clocks: Floats, apart_m: float, soon_s: float, out: Floats
+) -> None:
     """MSFOA eq. 28–30 into ``out`` (P,): Σ (soon_s - gap)³ over pairs of points nearer than ``apart_m``.
 
     ``paths`` (P, S, 3) with ``clocks`` (P, S) against ``others`` (Q, 3) with ``other_clocks`` (Q,), seconds.
@@ -198,8 +191,10 @@ def nearness(paths, clocks, others, other_clocks, apart_m, soon_s, out, sources=
         out[p] = total
 
 
-@kernel
-def shut_by_zones(points, ground, low, high, zones, corners, out, sources=SOURCES):  # type: ignore[no-untyped-def]
+@kernel("f8[,] f8[] f8[] f8[] f8[,] f8[,] b1[]")
+def shut_by_zones(
+    points: Floats, ground: Floats, low: Floats, high: Floats, zones: Floats, corners: Floats, out: NDArray[np.bool_]
+) -> None:
     """True in ``out`` (N,) where a zone leaves no room, over or under it, between ``low`` and ``high`` (N,)."""
     for i in range(len(points)):
         out[i] = False
@@ -216,11 +211,11 @@ def shut_by_zones(points, ground, low, high, zones, corners, out, sources=SOURCE
                 break
 
 
-@kernel
-def open_edges(  # type: ignore[no-untyped-def]
-    starts, ends, step_m, grounded, heights, quadratic, floors, floor_map, numbers, zones, corners, out,
-    sources=SOURCES,
-):  # fmt: skip
+@kernel(f"f8[,] f8[,] f8 b1 {SCENE} f8[,]")
+def open_edges(
+    starts: Floats, ends: Floats, step_m: float, grounded: bool, heights: Singles, quadratic: Floats, floors: Singles,
+    floor_map: Floats, numbers: Floats, zones: Floats, corners: Floats, out: Floats,
+) -> None:  # fmt: skip
     """Lengths of straight edges from ``starts`` (A, 3) to ``ends`` (B, 3) into ``out`` (A, B); inf where a point of
     one, no further than ``step_m`` from the next, is not allowed, or where it is too steep."""
     for a in range(len(starts)):

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.errors import InputError
+from gcsplan.errors import unknown_name
 from gcsplan.planners import _scene_kernels as k
 from gcsplan.planners.diagnose import Refusal, check_ends
 from gcsplan.planners.encodings import LATERAL, Code
@@ -58,9 +58,9 @@ def plan(problem: Problem, optimiser: str, defaults: Mapping[str, object]) -> So
 def search(problem: Problem, settings: Settings) -> Found:
     """Send the ants once. Raises InputError for options that do not fit, Refusal where none arrives."""
     volume, parameters = settings.split()
-    unknown = parameters.keys() - Rule.__dataclass_fields__.keys()
-    if unknown:
-        raise InputError(f"aco has no parameter {min(unknown)!r}; it has: {', '.join(Rule.__dataclass_fields__)}")
+    for name in parameters:
+        if name not in Rule.__dataclass_fields__:
+            raise unknown_name(f"aco has no parameter {name!r}", name, Rule.__dataclass_fields__)
     rule = Rule(**{key: float(value) for key, value in parameters.items()})
     scene = Scene.of(problem, volume)
     code = Code.of("sections", scene, settings.points)
@@ -136,7 +136,8 @@ def march(
         rounds = limit
     eager = [np.where(np.isfinite(d), np.maximum(d, 1e-9), np.inf) ** -rule.beta for d in lengths]
     scent = [np.full(d.shape, rule.first) for d in lengths]
-    best, best_cost, spent, trace = None, np.inf, 0, []
+    best, best_cost, spent = None, np.inf, 0
+    trace = [(0, 0, np.inf)]  # before the first colony nothing is known
     begun = time.perf_counter()
     for turn in range(rounds):
         count = ants if limit is None else min(ants, limit - spent)
@@ -161,7 +162,7 @@ def march(
     evaluations, iterations, history = (np.array(column) for column in zip(*trace, strict=True))
     stopped = "evaluations" if spent == limit else "iterations"
     account = History(evaluations, iterations, history)
-    return Result(np.zeros(0), best_cost, spent, len(trace), account, stopped, "aco"), best  # type: ignore[arg-type]
+    return Result(np.zeros(0), best_cost, spent, len(trace) - 1, account, stopped, "aco"), best  # type: ignore[arg-type]
 
 
 def _walk(

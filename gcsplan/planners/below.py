@@ -111,6 +111,8 @@ class Below:
                 found = self._exact(track, flown)
                 if found is None:
                     return False
+                if self.best is None:  # what follows makes it better; it could be flown now
+                    self.first_s = time.perf_counter() - self.begun_s
                 few, kept = fewer(self.problem, *found, LITTLE * flown.cost)
                 if fine:
                     few, kept = polished(self.problem, few, kept)
@@ -140,7 +142,7 @@ class Below:
         if cost >= self.cost:
             return False
         if self.best is None:
-            self.first_s = time.perf_counter() - self.begun_s
+            self.first_s = min(self.first_s, time.perf_counter() - self.begun_s)
         self.best, self.cost, self.pinned = points, cost, pinned
         self.tell("improve")
         return True

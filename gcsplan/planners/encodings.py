@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.errors import InputError
+from gcsplan.errors import unknown_name
 from gcsplan.planners.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -108,7 +108,7 @@ def get_encoding(name: str) -> Encoding:
     """The encoding called ``name``. Raises InputError that lists the known ones."""
     found = ENCODINGS.get(name)
     if found is None:
-        raise InputError(f"there is no encoding {name!r}; known: {', '.join(ENCODINGS)}")
+        raise unknown_name(f"there is no encoding {name!r}", name, ENCODINGS)
     return found
 
 

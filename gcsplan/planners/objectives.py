@@ -15,9 +15,11 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.errors import InputError
+from gcsplan.errors import unknown_name
+from gcsplan.native.form import Held
 from gcsplan.planners import _cost_kernels as k
-from gcsplan.planners._scene_kernels import clocks_of, nearness
+from gcsplan.planners._curve_kernels import CURVE
+from gcsplan.planners._scene_kernels import SCENE, clocks_of, nearness
 from gcsplan.planners.encodings import Code, shares
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.scene import Scene
@@ -43,11 +45,6 @@ class Unit:
     vertical_j_per_m: float
     horizontal_j_per_m: float
 
-
-WITH_GROUND = k.HEIGHTS | k.HIDING
-
-CHUNK = 128
-"""Paths whose samples stay in the processor's cache between being made and being measured."""
 
 Weigh = Callable[[Floats, Unit], Floats]
 
@@ -157,7 +154,7 @@ OBJECTIVES: Mapping[str, Objective] = MappingProxyType(
             Objective("ssgwo", "length, angles, nearness to obstacles", "SSGWO 26-34", k.YAWS | k.NODES_NEAR, _ssgwo),
             Objective("msfoa", "height, length, threat, terrain, turns, slopes, nearness to earlier vehicles",
                       "MSFOA 20-30", k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
-            Objective("abo", "length, samples under ground or out of the volume", "ABO 4-7", 0, _abo),
+            Objective("abo", "length, samples under ground or out of the volume", "ABO 4-7", k.COUNTS, _abo),
             Objective("ib-abc", "length, smoothness, concealment, threat", "IB-ABC 2-6",
                       k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
         )
@@ -169,7 +166,7 @@ def get_objective(name: str) -> Objective:
     """The cost called ``name``. Raises InputError that lists the known ones."""
     found = OBJECTIVES.get(name)
     if found is None:
-        raise InputError(f"there is no swarm cost {name!r}; known: {', '.join(OBJECTIVES)}")
+        raise unknown_name(f"there is no swarm cost {name!r}", name, OBJECTIVES)
     return found
 
 
@@ -213,11 +210,12 @@ class Cost:
         self.earlier, self.speed_m_s, self.apart_m = tuple(earlier), speed_m_s, apart_m
         scene = code.scene
         self.curve, self.stride = sampled(scene, code.points)
-        self._wanted = objective.wanted | (
-            k.GROUND if objective.wanted & WITH_GROUND or scene.ceiling_follows_ground else 0
-        )
-        self._scratch = tuple(np.zeros(self.curve.basis.shape[1]) for _ in range(k.SCRATCH))
-        self._box = np.empty(4)
+        wanted = objective.wanted | (k.CEILING if scene.ceiling_follows_ground else 0)
+        self._before = Held(
+            f"{CURVE} {SCENE} i8 i8 {k.ROOM}",
+            self.curve.bands, self.curve.spans, scene.heights, scene.quadratic, scene.floors, scene.floor_map,
+            scene.numbers, scene.zones, scene.corners, self.stride, wanted, *k.room(self.curve.basis.shape[1]),
+        )  # fmt: skip
         straight = self.terms(self._straight()[None])[0]
         self.unit = Unit(
             straight,
@@ -252,13 +250,8 @@ class Cost:
 
     def terms(self, controls: Floats) -> Floats:
         """(n, TERMS) terms of control points (n, N, 3)."""
-        scene, out = self.code.scene, np.empty((len(controls), k.TERMS))
-        for i in range(0, len(controls), CHUNK):
-            k.measure(
-                self.curve.rows(controls[i : i + CHUNK]), scene.heights, scene.quadratic, scene.floors, scene.floor_map,
-                scene.numbers, scene.zones, scene.corners, self.stride, self._wanted, self._scratch, self._box,
-                out[i : i + CHUNK],
-            )  # fmt: skip
+        out = np.empty((len(controls), k.TERMS))
+        k.measure(controls, self._before, out)
         return out
 
     def straight_cost(self) -> float:

@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners._any_angle import search
-from gcsplan.planners._fill import fill, pool, raise_cone
+from gcsplan.planners._fill import fill, raise_cone
 from gcsplan.planners._mesh import least_of_cells, make_pieces, make_portals, sort_portals
 from gcsplan.planners._stamp import UNDER, UNDER_2, stamp_zones
+from gcsplan.planners.ground_nodes import nodes, places, slopes
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.shapes import SPARE_M, Shapes, make_shapes
-from gcsplan.world.surface import GridMap
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -319,13 +319,13 @@ def make_plane(
         col1, row1 = (min(math.ceil(v) + 1, m - 1) for v, m in zip(high, (cols, rows), strict=True))
         col1, row1 = max(col1, col0 + 1), max(row1, row0 + 1)
     part = np.s_[row0 : row1 + 1, col0 : col1 + 1]
-    grounds = _nodes(surface.ground_m[part][::-1], parts, stride, whole)
+    grounds = nodes(surface.ground_m[part][::-1], parts, stride, whole)
     tops = grounds
     if surface.top_m is not surface.ground_m:
-        tops = _nodes(surface.top_m[part][::-1], parts, stride, whole)
+        tops = nodes(surface.top_m[part][::-1], parts, stride, whole)
     shape = tops[0].shape
     block = max(problem.airspace.straight_cells(BENT_M) * parts // stride, 1)
-    x, y = _places(grid, col0, row1, shape, parts / stride, block)
+    x, y = places(grid, col0, row1, shape, parts / stride, block)
     cells = shape[0] - 1, shape[1] - 1
     looked_at = np.ones(cells, np.bool_)
     if inside is not None:
@@ -342,7 +342,7 @@ def make_plane(
         y,
         tops,
         grounds,
-        _slopes(tops[1], x, y),
+        slopes(tops[1], x, y),
         looked_at,
         make_shapes(problem, x, y),
     )
@@ -357,73 +357,9 @@ def _apart(cones: list[tuple[float, float, float, float]], cap_m: float, more_m:
     )
 
 
-def _slopes(z: Floats, x: Floats, y: Floats) -> Floats:
-    """(rows, cols) steepest slope of the cells around each node."""
-    z = np.where(np.isfinite(z), z, np.nan)
-    across = math.dist((x[0, 0], y[0, 0]), (x[0, 1], y[0, 1]))
-    along = math.dist((x[0, 0], y[0, 0]), (x[1, 0], y[1, 0]))
-    east, north = np.abs(np.diff(z, axis=1)) / across, np.abs(np.diff(z, axis=0)) / along
-    a, b = np.zeros_like(z), np.zeros_like(z)
-    a[:, 1:] = east
-    np.maximum(a[:, :-1], east, out=a[:, :-1])
-    b[1:] = north
-    np.maximum(b[:-1], north, out=b[:-1])
-    return np.hypot(a, b)
-
-
-def _nodes(z: Floats, parts: int, stride: int, whole: int) -> tuple[Floats, Floats]:
-    """Heights at a lattice's nodes for bounds and for paths, from the terrain model's, rows going north."""
-    if stride == 1 and whole == 1:
-        finer = _finer(z, parts)
-        return finer, finer
-    # Beyond the border bounds may do as they like, and paths may not go.
-    more = [(0, -(n - 1) % whole) for n in z.shape]
-    wide = np.pad(np.ascontiguousarray(z), more, mode="edge")
-    low, high = (np.empty(tuple((n - 1) // stride + 1 for n in wide.shape)) for _ in range(2))
-    pool(wide, stride, low, high)
-    for axis, (_, extra) in enumerate(more):
-        if extra:
-            edge = [slice(None), slice(None)]
-            edge[axis] = slice((z.shape[axis] - 1) // stride + 1, None)
-            high[tuple(edge)] = np.inf
-    return low, high
-
-
-def _finer(z: Floats, parts: int) -> Floats:
-    """Bilinear values ``parts`` times as close."""
-    if parts == 1:
-        return np.ascontiguousarray(z)
-    u = np.arange(parts) / parts
-    for _ in range(2):  # along the rows, then, turned, along the columns
-        wide = np.empty((z.shape[0], (z.shape[1] - 1) * parts + 1))
-        wide[:, :-1] = (z[:, :-1, None] * (1.0 - u) + z[:, 1:, None] * u).reshape(len(z), -1)
-        wide[:, ::parts] = z  # a weight of 0 must not carry an unknown neighbour's NaN over
-        z = wide.T
-    return np.ascontiguousarray(z)
-
-
 def _box_of(wanted: NDArray[np.bool_]) -> tuple[int, int, int, int]:
     """First row and column, and those after the last, of what is true; the first cell where nothing is."""
     rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if not len(rows):
         return 0, 0, 1, 1
     return int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1
-
-
-def _places(
-    grid: GridMap, col0: int, row1: int, shape: tuple[int, int], parts: float, span: int
-) -> tuple[Floats, Floats]:
-    """(rows, cols) x and y of a lattice's nodes, bilinear between the corners of blocks of ``span`` cells."""
-    rows, cols = shape
-    step = min(span, max(rows, cols))
-    c = np.arange(0, cols - 1 + step, step)
-    r = np.arange(0, rows - 1 + step, step)
-    corner = grid.to_plane(col0 + c[None, :] / parts, row1 - r[:, None] / parts)
-    j, i = np.arange(rows), np.arange(cols)
-    v, u = (j % step) / step, (i % step) / step
-    out = []
-    for k in range(2):
-        z = np.pad(corner[..., k], ((0, 1), (0, 1)), mode="edge")
-        side = z[:, i // step] * (1.0 - u) + z[:, i // step + 1] * u
-        out.append(np.ascontiguousarray(side[j // step] * (1.0 - v)[:, None] + side[j // step + 1] * v[:, None]))
-    return out[0], out[1]

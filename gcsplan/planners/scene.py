@@ -113,6 +113,7 @@ class Scene:
         straight = float(np.linalg.norm(np.diff(stops, axis=0), axis=1).sum())
         # Between two samples a chord dips into a circle by at most spacing² / 8R.
         spacing = 1.5 * straight / samples
+        numbers[k.SPACING] = spacing
         zones = scene.zones.copy()
         zones[:, k.REACH] += np.minimum(spacing**2 / (8.0 * zones[:, k.ZR]), 0.2 * zones[:, k.ZR]) + KEEP_M
         return cls(heights, quadratic, floors, floor_map, numbers, zones, scene.corners, low, high, stops, straight)

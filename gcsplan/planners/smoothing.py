@@ -1,7 +1,7 @@
 """Cubic B-splines from stop to stop, and few way points that stay beside the curve.
 
 E: the krill paper's eq. 11 prints the second numerator as ``u - u_{i+1}``; de Boor's is ``u_{i+k} - u``. The basis is
-scipy's, clamped, so that a curve begins and ends in its stops; with two or three control points its degree falls.
+clamped, so that a curve begins and ends in its stops; with two or three control points its degree falls.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners._curve_kernels import samples_of
+
 Floats = NDArray[np.float64]
 
 DEGREE = 3
@@ -19,18 +21,23 @@ DEGREE = 3
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Control points (N, 3) to samples (S, 3): ``basis`` (N, S); ``stops`` (M,) samples that are stops."""
+    """Control points (N, 3) to samples (S, 3): ``basis`` (N, S); ``stops`` (M,) samples that are stops.
+
+    ``bands`` (4, S), ``spans`` (n, 3): the same as kernels want it, without its zeros (`_curve_kernels.draw`).
+    """
 
     basis: Floats
     stops: NDArray[np.intp]
+    bands: Floats
+    spans: NDArray[np.int64]
 
     def samples(self, controls: Floats) -> Floats:
         """(..., S, 3) samples of control points (..., N, 3)."""
-        return np.ascontiguousarray(np.swapaxes(self.rows(controls), -1, -2))
-
-    def rows(self, controls: Floats) -> Floats:
-        """The same as (..., 3, S), which is how kernels want them."""
-        return np.asarray(np.ascontiguousarray(np.swapaxes(controls, -1, -2)) @ self.basis)
+        count = self.basis.shape[1]
+        paths = np.ascontiguousarray(controls).reshape(-1, *controls.shape[-2:])
+        out = np.empty((len(paths), count, 3))
+        samples_of(paths, self.bands, self.spans, *np.empty((3, count)), out)
+        return out.reshape(*controls.shape[:-2], count, 3)
 
 
 @lru_cache(maxsize=64)
@@ -47,17 +54,36 @@ def curve(points: tuple[int, ...], legs: tuple[int, ...]) -> Curve:
         row, column = row + free + 1, column + count
         stops.append(column)
     basis.setflags(write=False)
-    return Curve(basis, np.array(stops))
+    return Curve(basis, np.array(stops), *_bands(basis))
+
+
+def _bands(basis: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """`Curve.bands` and `Curve.spans` of a basis."""
+    controls, samples = basis.shape
+    width = DEGREE + 1
+    first = np.minimum((basis != 0.0).argmax(axis=0), max(controls - width, 0))
+    begins = np.flatnonzero(np.diff(first, prepend=-1))
+    spans = np.stack([begins, np.append(begins[1:], samples), first[begins]], axis=-1)
+    rows = first + np.arange(width)[:, None]
+    bands = np.where(rows < controls, basis[np.minimum(rows, controls - 1), np.arange(samples)], 0.0)
+    return np.ascontiguousarray(bands), np.ascontiguousarray(spans, dtype=np.int64)
 
 
 def _basis(controls: int, samples: int) -> Floats:
     """(controls, samples) values of the clamped basis of degree 3, or less where there are too few controls."""
-    from scipy.interpolate import BSpline
-
     degree = min(DEGREE, controls - 1)
     knots = np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, controls - degree + 1), np.ones(degree)])
-    matrix = BSpline.design_matrix(np.linspace(0.0, 1.0, samples), knots, degree)
-    return np.ascontiguousarray(matrix.toarray().T)
+    u = np.linspace(0.0, 1.0, samples)[:, None]
+    last = controls - 1  # the interval that the end belongs to
+    here = (knots[:-1] <= u) & (u < knots[1:])
+    here[-1, last] = True
+    basis = here.astype(float)
+    for k in range(1, degree + 1):
+        width = knots[k:] - knots[:-k]
+        share = np.divide(u - knots[:-k], width, out=np.zeros((samples, len(width))), where=width > 0.0)
+        rest = np.where(width > 0.0, 1.0 - share, 0.0)
+        basis = share[:, :-1] * basis[:, :-1] + rest[:, 1:] * basis[:, 1:]
+    return np.ascontiguousarray(basis.T)
 
 
 def fewer(points: Floats, kept: NDArray[np.intp], corridor_m: float) -> NDArray[np.intp]:

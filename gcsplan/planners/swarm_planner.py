@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.errors import InputError
+from gcsplan.errors import unknown_name
 from gcsplan.planners.diagnose import Refusal, check_ends
 from gcsplan.planners.encodings import Code
 from gcsplan.planners.objectives import Cost, Earlier, get_objective
@@ -66,7 +66,7 @@ class Settings:
         known = cls.__dataclass_fields__
         for key in options:
             if key not in known:
-                raise InputError(f"swarm planners know no option {key!r}; known: {', '.join(known)}")
+                raise unknown_name(f"swarm planners know no option {key!r}", key, known)
         given = {key: value for key, value in options.items() if value is not None}
         both = {**defaults, **given}
         if "points" not in given and both.get("encoding") != defaults.get("encoding"):

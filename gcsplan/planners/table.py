@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from importlib import import_module
 from types import MappingProxyType
 from typing import cast
 
-from gcsplan.errors import InputError
+from gcsplan.errors import unknown_name
 from gcsplan.planners.problem import Problem, Solution
 
 VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
@@ -106,7 +105,5 @@ def get(name: str) -> Entry:
     """The planner called ``name``. Raises InputError that names the nearest known one."""
     entry = TABLE.get(name)
     if entry is None:
-        near = get_close_matches(name, TABLE, n=1, cutoff=0.5)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise InputError(f"there is no planner {name!r}.{hint} Known: {', '.join(TABLE)}")
+        raise unknown_name(f"there is no planner {name!r}", name, TABLE)
     return entry
