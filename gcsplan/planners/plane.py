@@ -224,9 +224,9 @@ class Plane:
         near = limits.track_error_m * scale
         wanted = self.inside if wanted is None else wanted
         row, col, last_row, last_col = _box_of(wanted)
-        part, nodes = np.s_[row:last_row, col:last_col], np.s_[row : last_row + 1, col : last_col + 1]
+        part, corners = np.s_[row:last_row, col:last_col], np.s_[row : last_row + 1, col : last_col + 1]
         top, ground, steep, x, y = (
-            np.ascontiguousarray(a[nodes])
+            np.ascontiguousarray(a[corners])
             for a in (self.tops[not low], self.grounds[not low], self.steep, self.x, self.y)
         )
         rows, cols = ((n - 1) * fineness + 1 for n in top.shape)
