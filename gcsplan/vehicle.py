@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -38,7 +39,13 @@ class Energy:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """An airframe with its limits; speeds in m/s over ground (cruise) and vertically (climb, descent)."""
+    """An airframe with its limits; speeds in m/s over ground (cruise) and vertically (climb, descent).
+
+    ``accel_m_s2`` speeds up and brakes along the path, ``corner_accel_m_s2`` bounds the speed in a rounded corner,
+    ``vertical_accel_m_s2`` holds in the columns of take-off and landing, ``land_m_s`` is the descent just above ground.
+    An accel of ``inf`` is instant speed, a corner accel of ``inf`` a sharp corner at full speed; a climb or descent of
+    ``inf`` means that the cruise speed counts in space, whatever the slope: the ideal vehicle of the papers.
+    """
 
     name: str
     sysid: int
@@ -51,8 +58,23 @@ class Vehicle:
     turn_radius_m: float = 0.0
     energy: Energy = field(default_factory=Energy)
     link: str | None = None
+    accel_m_s2: float = 1.5
+    corner_accel_m_s2: float = 2.5
+    land_m_s: float = 0.5
+    vertical_accel_m_s2: float = 1.0
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether its mission can make it wait in the air for a set time.
+
+        A multicopter's can. ArduPlane, a VTOL too, goes on at once while it is armed (``ModeAuto::verify_nav_delay``)
+        and ignores a way point's hold; what turns with a radius circles instead.
+        """
+        return self.autopilot is not Autopilot.ARDUPLANE and self.turn_radius_m <= 0.0
 
     def leg_time_s(self, horizontal_m: float, rise_m: float, speed_m_s: float) -> float:
         """Seconds for a straight leg: cruise speed, or slower where the climb or descent rate is the tight one."""
-        vertical_s = rise_m / self.climb_m_s if rise_m >= 0 else -rise_m / self.descent_m_s
-        return max(horizontal_m / speed_m_s, vertical_s)
+        rate_m_s = self.climb_m_s if rise_m >= 0 else self.descent_m_s
+        if math.isinf(rate_m_s):
+            return math.hypot(horizontal_m, rise_m) / speed_m_s
+        return max(horizontal_m / speed_m_s, abs(rise_m) / rate_m_s)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
@@ -43,7 +43,7 @@ from gcsplan.mission_file.world import (
     settle_zones,
 )  # fmt: skip
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zones_sha256
-from gcsplan.world.frame import Frame
+from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
 from gcsplan.world.zones import Zone
@@ -55,11 +55,17 @@ TERRAIN_ERROR_M = 30.0
 
 
 def load_mission(
-    path: str | os.PathLike[str], *, text: str | None = None, planner_names: Collection[str] | None = None
+    path: str | os.PathLike[str],
+    *,
+    text: str | None = None,
+    planner_names: Collection[str] | None = None,
+    around: Sequence[tuple[float, float]] = (),
 ) -> MissionFile:
     """Read and judge the mission file at ``path``; other files are found relative to it.
 
-    ``text`` stands for the file's content; ``planner_names`` for the table of planners. Raises InputError with every
+    ``text`` stands for the file's content; ``planner_names`` for the table of planners. ``around``:
+    places (latitude, longitude) besides the mission's own that the terrain shall be loaded for, where it holds them.
+    Raises InputError with every
     problem that was found.
     """
     file = Path(path)
@@ -69,7 +75,7 @@ def load_mission(
         raise InputError(f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}", where=where)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         raise InputError(f"this gcsplan reads version 1, given {shown(raw['version'])}", where=f"{where}: version")
-    return _Reading(file, where, raw, planner_names).mission()
+    return _Reading(file, where, raw, planner_names, around).mission()
 
 
 def _text(file: Path, where: str) -> str:
@@ -94,8 +100,15 @@ def _text(file: Path, where: str) -> str:
 class _Reading:
     """One pass over one file: the steps in order, and what has been found wrong so far."""
 
-    def __init__(self, file: Path, where: str, raw: dict[str, Any], planner_names: Collection[str] | None) -> None:
-        self.file, self.raw, self.planner_names = file, raw, planner_names
+    def __init__(
+        self,
+        file: Path,
+        where: str,
+        raw: dict[str, Any],
+        planner_names: Collection[str] | None,
+        around: Sequence[tuple[float, float]],
+    ) -> None:
+        self.file, self.raw, self.planner_names, self.around = file, raw, planner_names, around
         self.where = f"{where}: "
         self.problems: list[Problem] = []
         self.notes: list[str] = []
@@ -136,7 +149,9 @@ class _Reading:
         if frame is not None and terrain is not None:
             placed, far = place_zones(drafts, frame)
             self._far(far, frame)
-            box = make_box([p.in_plane(frame) for p in places], [z for _, z in placed], local=self.local)
+            others = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in self.around if terrain.covers(*p))]
+            others = [p for p in others if math.hypot(*p) <= FARTHEST_M]
+            box = make_box([*(p.in_plane(frame) for p in places), *others], [z for _, z in placed], local=self.local)
             scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
             try:
                 surface = terrain.load(frame, box)
@@ -244,6 +259,9 @@ class _Reading:
                 self.problems.append(
                     Problem(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")
                 )
+            if altitude_frame == "terrain" and keys.turn_radius_m > 0.0:
+                words = "a fixed wing's turns are planned above home or sea level: use altitude_frame: relative or amsl"
+                self.problems.append(Problem(f"{at}.turn_radius_m", words))
             start = make_place(keys.start, f"{at}.start", self.problems, local=self.local)
             goal = make_place(keys.goal, f"{at}.goal", self.problems, local=self.local)
             via = [make_place(p, f"{at}.via[{j}]", self.problems, local=self.local) for j, p in enumerate(keys.via)]

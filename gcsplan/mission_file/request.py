@@ -17,12 +17,25 @@ End = Literal["land", "loiter", "rtl", "none"]
 
 @dataclass(frozen=True, slots=True)
 class ArrivalRequest:
-    """How the fleet arrives; ``order`` names every vehicle once; ``interval_s`` holds for a sequence."""
+    """How the fleet arrives; ``order`` names every vehicle once; ``interval_s`` holds for a sequence.
+
+    ``best_order``: the order is looked for, ``order`` is only that of the file. ``arrive_s``: when the first of a
+    sequence, or all together, are to be there; None: as ``clock`` has it, when the first can (``first``) or when the
+    whole fleet can (``fleet``). ``hold``: how a vehicle waits that would come too early: on the ground, at the gate
+    (the top of take-off), or not. ``window_s``: each may arrive this much earlier or later. ``pad_clear_s``: so long
+    after landing the pad is free again; None: never.
+    """
 
     mode: Literal["sequence", "together", "none"]
     order: tuple[str, ...]
     interval_s: float
     separation_m: float
+    best_order: bool = False
+    arrive_s: float | None = None
+    clock: Literal["first", "fleet"] | None = None
+    hold: Literal["ground", "gate", "none"] = "ground"
+    window_s: float = 0.0
+    pad_clear_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

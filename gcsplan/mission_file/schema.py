@@ -12,7 +12,17 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 from gcsplan.errors import Problem
 
@@ -24,6 +34,8 @@ Length = Annotated[float, Field(ge=0.0, le=_FAR)]
 Positive = Annotated[float, Field(gt=0.0, le=_FAR)]
 Angle = Annotated[float, Field(gt=0.0, le=90.0)]
 Speed = Annotated[float, Field(gt=0.0, le=300.0)]
+Accel = Annotated[float, Field(gt=0.0, le=100.0)]
+Seconds = Annotated[float, Field(ge=0.0, le=86400.0)]
 Text = Annotated[str, Field(min_length=1, max_length=300)]
 Encoding = Literal["box", "sections", "polar", "bspline", "offsets"]
 SwarmCost = Literal["krill", "ssgwo", "msfoa", "abo", "ib-abc"]
@@ -161,18 +173,36 @@ class VehicleKeys(LimitKeys):
     speed_m_s: Annotated[list[Speed], Field(min_length=2, max_length=2)] = [3.0, 15.0]
     climb_m_s: Speed = 2.5
     descent_m_s: Speed = 1.5
+    land_m_s: Speed = 0.5
+    accel_m_s2: Accel = 1.5
+    corner_accel_m_s2: Accel = 2.5
+    vertical_accel_m_s2: Accel = 1.0
     turn_radius_m: Length = 0.0
     energy: EnergyKeys = EnergyKeys()
     link: Text | None = None
     limits: LimitKeys | None = None
 
 
+def _order_form(value: Any) -> Any:
+    if value is not None and not isinstance(value, list) and value != "best":
+        raise ValueError(f"must be a list of the vehicles' names, or best, given {shown(value)}")
+    return value
+
+
+_Order = Annotated[Annotated[Literal["best"], Tag("one")] | Annotated[list[str], Tag("several")], Discriminator(_count)]
+
+
 class ArrivalKeys(_Section):
     """``arrival:``."""
 
     mode: Literal["sequence", "together", "none"]
-    order: list[str] | None = None
-    interval_s: Annotated[float, Field(ge=0.0, le=86400.0)] | None = None
+    order: Annotated[_Order | None, BeforeValidator(_order_form)] = None
+    interval_s: Seconds | None = None
+    arrive_s: Annotated[float, Field(gt=0.0, le=86400.0)] | None = None
+    clock: Literal["first", "fleet"] | None = None
+    hold: Literal["ground", "gate", "none"] = "ground"
+    window_s: Seconds = 0.0
+    pad_clear_s: Seconds | None = None
     separation_m: Length | None = None
 
 

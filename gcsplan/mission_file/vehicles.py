@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import fields
 from typing import Any
@@ -18,7 +19,18 @@ ERRORS = {"horizontal_clearance_m": 30.0, "track_error_m": 3.0, "altitude_error_
 PLANE_CLIMB_DEG = 15.0
 """A fixed wing is never taken to climb at any angle."""
 
+STEEPEST_WING_DEG = 45.0
+
+MOST_BANK_DEG = 45.0
+"""ArduPlane's ROLL_LIMIT_DEG, default."""
+
+GRAVITY_M_S2 = 9.80665
+
 SEPARATION_M = 30.0
+
+MOTION = ("climb_m_s", "descent_m_s", "land_m_s", "accel_m_s2", "corner_accel_m_s2", "vertical_accel_m_s2")
+"""What bounds a vehicle's motion besides its cruise speed. In local metres (the papers' worlds) what is not given does
+not bound it: speed is instant, and counts in space."""
 
 
 def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -> tuple[str, ...]:
@@ -58,13 +70,7 @@ def make_vehicle(
         words = f"the slowest speed must not be above the fastest, given [{slow:g}, {fast:g}]"
         problems.append(Problem(f"{where}.speed_m_s", words))
     if keys.turn_radius_m > 0.0:
-        problems.append(
-            Problem(
-                f"{where}.turn_radius_m",
-                f"turns with a radius are not yet planned, given {keys.turn_radius_m:g}; use 0, and a track_error_m "
-                "that holds the turn radius",
-            )
-        )
+        _check_wing(keys, limits, where, problems)
     if keys.end == "rtl" and keys.rtl_rel_home_m is None:
         problems.append(
             Problem(
@@ -78,9 +84,61 @@ def make_vehicle(
         return None
     return Vehicle(
         name=keys.name, sysid=keys.sysid, autopilot=Autopilot(keys.autopilot), limits=limits,
-        speed_min_m_s=slow, speed_max_m_s=fast, climb_m_s=keys.climb_m_s, descent_m_s=keys.descent_m_s,
-        turn_radius_m=keys.turn_radius_m, energy=Energy(**keys.energy.model_dump()), link=keys.link,
+        speed_min_m_s=slow, speed_max_m_s=fast, turn_radius_m=keys.turn_radius_m,
+        energy=Energy(**keys.energy.model_dump()), link=keys.link,
+        **(_wing_motion(keys, limits) if keys.turn_radius_m > 0.0 else _motion(keys, notes, local=local)),
     )  # fmt: skip
+
+
+def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Problem]) -> None:
+    """What turns with a radius must fly: only ArduPlane begins them where the mission says."""
+    radius, at = keys.turn_radius_m, f"{where}.turn_radius_m"
+    if keys.autopilot == "arducopter":
+        words = f"a multicopter has no turn radius: use 0, or autopilot: arduplane for a fixed wing, given {radius:g}"
+        problems.append(Problem(at, words))
+        return
+    if keys.autopilot == "px4":
+        words = (
+            f"px4 begins a fixed wing's turns at a distance of its own and not at the mission's, so its arcs cannot be "
+            f"vouched for: use autopilot: arduplane, or 0 for a multicopter, given {radius:g}"
+        )
+        problems.append(Problem(at, words))
+        return
+    bank_deg = math.degrees(math.atan(keys.speed_m_s[1] ** 2 / (GRAVITY_M_S2 * radius)))
+    if bank_deg > MOST_BANK_DEG:
+        least = math.ceil(keys.speed_m_s[1] ** 2 / GRAVITY_M_S2 / math.tan(math.radians(MOST_BANK_DEG)))
+        words = (
+            f"turns of {radius:g} m at {keys.speed_m_s[1]:g} m/s need a bank of {bank_deg:.0f}°, and ArduPlane's "
+            f"ROLL_LIMIT_DEG is {MOST_BANK_DEG:g}°: give at least {least}, or a lower speed"
+        )
+        problems.append(Problem(at, words))
+    if limits is not None and not 1.0 <= limits.max_climb_deg <= STEEPEST_WING_DEG:
+        words = f"a fixed wing climbs at 1 to {STEEPEST_WING_DEG:g}°, given {limits.max_climb_deg:g}"
+        problems.append(Problem(f"{where}.max_climb_deg", words))
+    if limits is not None and limits.max_descent_deg > STEEPEST_WING_DEG:
+        words = f"a fixed wing descends at {STEEPEST_WING_DEG:g}° at most, given {limits.max_descent_deg:g}"
+        problems.append(Problem(f"{where}.max_descent_deg", words))
+
+
+def _wing_motion(keys: VehicleKeys, limits: Limits) -> dict[str, float]:
+    """A fixed wing's speed is constant: its slopes are its limits', unless rates are given."""
+    fast = keys.speed_m_s[1]
+    rates = {
+        "climb_m_s": fast * limits.max_climb_slope,
+        "descent_m_s": fast * limits.max_descent_slope,
+    }
+    own = {key: getattr(keys, key) for key in rates if key in keys.model_fields_set}
+    return {key: math.inf for key in MOTION if key.endswith("_m_s2")} | {"land_m_s": math.inf} | rates | own
+
+
+def _motion(keys: VehicleKeys, notes: list[str], *, local: bool) -> dict[str, float]:
+    free = [key for key in MOTION if local and key not in keys.model_fields_set]
+    if free:
+        notes.append(
+            f"in local metres {', '.join(free)} bound nothing unless they are given: flight times are the ideal ones "
+            "of the papers"
+        )
+    return {key: math.inf if key in free else getattr(keys, key) for key in MOTION}
 
 
 def _limits(
@@ -152,7 +210,7 @@ def make_arrival(
     """The order of arrival; ``names`` are the vehicles' as written."""
     if keys is None:
         return None
-    order = list(names) if keys.order is None else keys.order
+    order = keys.order if isinstance(keys.order, list) else list(names)
     for i, name in enumerate(order):
         if name not in names:
             problems.append(Problem(f"{where}.order[{i}]", f"no vehicle is named {name[:64]!r}{nearest(name, names)}"))
@@ -163,7 +221,18 @@ def make_arrival(
         problems.append(Problem(f"{where}.order", f"must name every vehicle, missing: {', '.join(missing)[:200]}"))
     if keys.mode == "sequence" and keys.interval_s is None:
         problems.append(Problem(f"{where}.interval_s", "is missing: seconds between one arrival and the next"))
+    if keys.mode == "none":
+        unused = [k for k in ("arrive_s", "clock", "hold") if getattr(keys, k) is not None and k in keys.given]
+        problems += [Problem(f"{where}.{k}", "counts with mode: sequence or together only") for k in unused]
+    if keys.clock is not None and keys.arrive_s is not None:
+        problems.append(Problem(f"{where}.clock", "arrive_s sets the time of the first already; keep one"))
+    elif keys.clock is not None and keys.mode == "together":
+        problems.append(
+            Problem(f"{where}.clock", "counts with mode: sequence only; together the slowest sets the time")
+        )
     return ArrivalRequest(
         keys.mode, tuple(order), keys.interval_s or 0.0,
-        SEPARATION_M if keys.separation_m is None else keys.separation_m,
+        SEPARATION_M if keys.separation_m is None else keys.separation_m, best_order=keys.order == "best",
+        arrive_s=keys.arrive_s, clock=keys.clock, hold=keys.hold, window_s=keys.window_s,
+        pad_clear_s=keys.pad_clear_s,
     )  # fmt: skip

@@ -1,0 +1,258 @@
+"""What may be changed about one vehicle's flight so that it keeps clear of those before it, least cost first.
+
+A change costs joules beyond the flight as it was scheduled, and seconds by which anything moves; energy counts first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.fleet._taken import Spans, Taken
+from gcsplan.fleet.arrival import WITHIN_S, Craft, Crew, Hold, Mode, Slot
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.timing import Route, speed_for
+from gcsplan.vehicle import Vehicle
+
+Floats = NDArray[np.float64]
+How = Literal["as scheduled", "departure", "speed", "hold", "path"]
+
+EARLIER_LATER_S = (1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0, 34.0, 55.0, 89.0, 144.0, 233.0)
+"""Changes of departure that are tried, with the speed that keeps the arrival; then `EVENLY` over all that is left."""
+
+EVENLY = 12
+CLOSER = 4
+"""Halvings between the last departure that does not do and the first that does."""
+
+SPARE_M = 0.02
+"""What is changed keeps this much more than needed: whoever times the mission anew finds it kept, rounding and all."""
+
+HOLDS_S = (2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)
+SLOWER = (0.9, 0.8, 0.7, 0.6, 0.5)
+LONG_S = 20.0
+"""A change of departure beyond which a lower speed is tried as well; lower ones than `SLOWER` block the others' way."""
+
+HORIZONS_S = (40.0, 160.0, 640.0, math.inf)
+"""How far the least change of departure is looked for, one after the other."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Option:
+    """One way to fly: joules more than scheduled, the seconds by which departure, arrival or hold move, the slot, and
+    its motion."""
+
+    extra_j: float
+    moved_s: float
+    how: How
+    slot: Slot
+    path: TimedPath
+
+    @property
+    def cost(self) -> tuple[float, float]:
+        """Least first: energy, then seconds."""
+        return max(0.0, round(self.extra_j, 6)), self.moved_s
+
+
+@dataclass(frozen=True, slots=True)
+class Freedom:
+    """What may be changed: with ``mode`` sequence or together the arrival stays, with none it is free.
+
+    Nobody leaves before 0 s; or, where nothing else is free, up to ``before_s`` earlier: the whole fleet then starts,
+    and arrives, so much later.
+    """
+
+    mode: Mode
+    hold: Hold
+    before_s: float = 0.0
+
+    @property
+    def keeps_arrival(self) -> bool:
+        """Whether a change of departure goes with a change of speed."""
+        return self.mode != "none"
+
+
+class Chooser:
+    """The options of one vehicle on one route, against those that have the right of way."""
+
+    def __init__(self, vehicle: Vehicle, route: Route, was: Slot, freedom: Freedom, taken: Taken) -> None:
+        self.craft = Craft(Crew(vehicle, route))
+        self.was, self.freedom, self.taken = was, freedom, taken
+
+    def base(self) -> Option | None:
+        """As scheduled; on another route, with what keeps the arrival. None where that cannot be."""
+        was, craft = self.was, self.craft
+        if craft.crew.route is was.route:
+            return Option(0.0, 0.0, "as scheduled", was, self._motion(was))
+        if not self.freedom.keeps_arrival:
+            slot = craft.fly(was.speed_m_s, was.depart_s, was.hold_s)
+        else:
+            found = craft.at(was.arrive_s, self.freedom.hold)
+            early_s = was.arrive_s - craft.fast_s
+            if found is None and self.freedom.hold == "ground" and -self.freedom.before_s <= early_s < 0.0:
+                found = craft.fly(craft.fastest_m_s, early_s)  # longer than there is time for: before all others
+            if found is None:
+                return None
+            slot = found
+        return self._option("path", slot)
+
+    def best(self, base: Option) -> Option | None:
+        """The cheapest option that keeps clear; None where none of those tried does."""
+        if self.clear(base):
+            return base
+        if not self.freedom.keeps_arrival:
+            found = self._delays(base)
+        else:
+            found = self._departures(base, 0.0)
+            if found is None and self.freedom.before_s > 0.0:
+                found = self._departures(base, -self.freedom.before_s)
+        return self._holds(base) if found is None else found  # what is free before what costs energy
+
+    def clear(self, option: Option) -> bool:
+        """Whether an option meets nobody."""
+        spare_m = 0.0 if option.how == "as scheduled" else SPARE_M
+        return self.taken.forbidden(option.path, spare_m=spare_m).free(0.0)
+
+    # -- the arrival is free ------------------------------------------------------------------------------------
+
+    def _delays(self, base: Option) -> Option | None:
+        """The least change of departure that does, exactly; a lower speed where that is long, and moves less."""
+        found = self._shifted(base, "departure")
+        if found is not None and found.moved_s <= LONG_S:
+            return found
+        for part in SLOWER:
+            slot = self.craft.fly(part * base.slot.speed_m_s, base.slot.depart_s, base.slot.hold_s)
+            option: Option | None = self._option("speed", slot)
+            assert option is not None
+            if found is not None and option.moved_s >= found.moved_s:
+                break  # slower still moves more
+            if not self.clear(option):
+                option = None if found is not None else self._shifted(option, "speed")
+            if option is not None and (found is None or option.cost < found.cost):
+                found = option
+        return found
+
+    def _shifted(self, option: Option, how: How) -> Option | None:
+        """The same flight, earlier or later by as little as does."""
+        if self.freedom.hold != "ground":
+            return option if self.clear(option) else None
+        last = max((p.end_s for p in self.taken.paths), default=0.0)
+        latest = max(last - option.path.begin_s, 0.0) + 2.0 * self.taken.rules.window_s + 1.0
+        spans, low, high = Spans.none(), 0.0, 0.0
+        for horizon in HORIZONS_S:
+            earlier, later = max(-horizon, -option.slot.depart_s), min(horizon, latest)
+            if later > high or high == 0.0:
+                spans = spans.joined(self.taken.forbidden(option.path, high, later, SPARE_M))
+            if earlier < low:
+                spans = spans.joined(self.taken.forbidden(option.path, earlier, low, SPARE_M))
+            low, high = earlier, later
+            shift = spans.least(low, high)
+            if shift is not None:
+                slot = option.slot
+                slot = replace(slot, depart_s=slot.depart_s + shift, arrive_s=slot.arrive_s + shift)
+                moved = self._option("departure" if option.how == "as scheduled" else how, slot)
+                return moved if self.clear(moved) else None
+        return None
+
+    # -- the arrival stays --------------------------------------------------------------------------------------
+
+    def _departures(self, base: Option, earliest_s: float) -> Option | None:
+        """The nearest other departure that does, at the speed that keeps the arrival."""
+        if self.freedom.hold != "ground":
+            return None
+        low, high = self._range(base.slot.hold_s, earliest_s)
+        now = base.slot.depart_s
+        offsets = [s for step in EARLIER_LATER_S for s in (now + step, now - step)]
+        tried = sorted({d for d in [*offsets, *np.linspace(low, high, EVENLY)] if low <= d <= high},
+                       key=lambda d: (abs(d - now), -d))  # fmt: skip
+        last = {True: now, False: now}
+        for depart in tried:
+            option = self._arriving(float(depart), base.slot.hold_s, "departure")
+            if option is None:
+                continue
+            if self.clear(option):
+                return self._closer(option, last[depart > now], float(depart), base.slot.hold_s)
+            last[depart > now] = float(depart)
+        return None
+
+    def _closer(self, option: Option, bad_s: float, good_s: float, hold_s: float) -> Option:
+        """A departure between one that does not do and one that does, as near the former as a few halvings find."""
+        for _ in range(CLOSER):
+            middle = 0.5 * (bad_s + good_s)
+            other = self._arriving(middle, hold_s, "departure")
+            if other is not None and self.clear(other):
+                option, good_s = other, middle
+            else:
+                bad_s = middle
+        return option
+
+    def _range(self, hold_s: float, earliest_s: float = 0.0) -> tuple[float, float]:
+        """Departures with which the arrival can be kept, with so long a hold; empty: the first above the second."""
+        arrive = self.was.arrive_s
+        return max(earliest_s, arrive - self.craft.slow_s - hold_s), arrive - self.craft.fast_s - hold_s
+
+    def _arriving(self, depart_s: float, hold_s: float, how: How) -> Option | None:
+        """The flight that leaves about then, holds so long, and arrives as scheduled."""
+        craft, arrive = self.craft, self.was.arrive_s
+        wanted = arrive - depart_s - hold_s
+        if not craft.fast_s - WITHIN_S <= wanted <= craft.slow_s + WITHIN_S:
+            return None
+        speed = speed_for(craft.course.time_to_goal_s, wanted, craft.slowest_m_s, craft.fastest_m_s, 1e-3)
+        slot = craft.fly(speed, depart_s, hold_s)
+        # The departure makes up for what the speed, a float32 and found roughly, does not.
+        depart = depart_s + arrive - slot.arrive_s
+        if depart_s >= 0.0:
+            depart = max(0.0, depart)
+        slot = replace(slot, depart_s=depart, arrive_s=slot.arrive_s + depart - depart_s)
+        return self._option(how, slot)
+
+    # -- a hold at the gate -------------------------------------------------------------------------------------
+
+    def _holds(self, base: Option) -> Option | None:
+        if self.freedom.hold == "none" or not self.craft.vehicle.can_hold:
+            return None
+        found: Option | None = None
+        for hold in HOLDS_S:
+            for option in self._with_hold(base, hold):
+                if (found is None or option.cost < found.cost) and self.clear(option):
+                    found = option
+            if found is not None and self.craft.vehicle.energy.hover_w > 0.0:
+                break  # a longer hold costs more
+        return found
+
+    def _with_hold(self, base: Option, hold_s: float) -> Iterator[Option]:
+        was = base.slot
+        total = was.hold_s + hold_s
+        if not self.freedom.keeps_arrival:
+            option = self._option("hold", self.craft.fly(was.speed_m_s, was.depart_s, total))
+            yield option
+            shifted = self._shifted(option, "hold")
+            if shifted is not None:
+                yield shifted
+            return
+        low, high = self._range(total)
+        if high < low:
+            return
+        departs = (
+            [0.0] if self.freedom.hold == "gate" else np.unique(np.append(np.linspace(low, high, 4), was.depart_s))
+        )
+        for depart in departs:
+            if low <= depart <= high:
+                option_or_none = self._arriving(float(depart), total, "hold")
+                if option_or_none is not None:
+                    yield option_or_none
+
+    # -----------------------------------------------------------------------------------------------------------
+
+    def _option(self, how: How, slot: Slot) -> Option:
+        was = self.was
+        moved = max(abs(slot.depart_s - was.depart_s), abs(slot.arrive_s - was.arrive_s))
+        moved += abs(slot.hold_s - was.hold_s)
+        return Option(slot.energy_j - was.energy_j, moved, how, slot, self._motion(slot))
+
+    def _motion(self, slot: Slot) -> TimedPath:
+        return self.craft.course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s)

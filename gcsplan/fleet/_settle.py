@@ -1,0 +1,228 @@
+"""Vehicle after vehicle given its place in time, in order of priority; again with a later clock, or other paths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gcsplan.fleet._changes import Chooser, Freedom, Option
+from gcsplan.fleet._taken import Taken
+from gcsplan.fleet.arrival import Craft, Crew, Hold, Schedule, Slot, schedule
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Rules, Where, in_metres, separation
+from gcsplan.fleet.timing import Route
+
+Replan = Callable[[str, Sequence[Conflict], int], Route | None]
+"""``replan(name, avoid, attempt)``: another route for a vehicle that keeps away from the places of ``avoid`` (or flies
+higher); ``attempt`` counts from 1; None: no more ideas."""
+
+Again = Callable[[float], Schedule]
+"""``again(interval_s)``: the schedule of the sequence with that interval."""
+
+ATTEMPTS = 4
+PROMOTIONS = 3
+"""How many vehicles that nothing helps may be put before the one in their way, where no priority was asked for."""
+
+LATER_S = 600.0
+"""By how much the whole fleet may arrive later where its clock leaves somebody no room."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Change:
+    """What was changed about one vehicle, and the first conflict that made it necessary."""
+
+    name: str
+    how: str
+    was: Slot
+    slot: Slot
+    extra_j: float
+    because: Conflict
+
+    def describe(self, where: Where = in_metres) -> str:
+        """One line for people."""
+        said = []
+        later = self.slot.depart_s - self.was.depart_s
+        if abs(later) > 0.005:
+            said.append(f"leaves {abs(later):.1f} s {'later' if later > 0.0 else 'earlier'}")
+        if abs(self.slot.speed_m_s - self.was.speed_m_s) > 0.005:
+            said.append(f"flies at {self.slot.speed_m_s:.2f} instead of {self.was.speed_m_s:.2f} m/s")
+        if self.slot.hold_s > self.was.hold_s:
+            said.append(f"holds {self.slot.hold_s - self.was.hold_s:g} s at the gate")
+        if self.how == "path":
+            said.append("takes another path")
+        if abs(self.extra_j) >= 1.0:
+            said.append(f"needs {self.extra_j:+.0f} J")
+        a, b = self.because.worst.vehicles
+        other = b if a == self.name else a
+        at = f"{self.because.worst.time_s:.1f} s, {where(self.because.worst.middle)}"
+        return f"{self.name} {', '.join(said)}: to keep clear of {other} ({at})"
+
+
+def maker(plan: Schedule, crews: Sequence[Crew], hold: Hold) -> Again:
+    """Schedules like ``plan`` with another interval, the first arrival as it is."""
+    first_s = min(s.arrive_s for s in plan.slots)
+
+    def again(interval_s: float) -> Schedule:
+        return schedule(crews, plan.mode, order=plan.order, interval_s=interval_s, hold=hold, arrive_s=first_s)
+
+    return again
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """What stays the same however often it is tried."""
+
+    crews: Sequence[Crew]
+    rules: Rules
+    priority: Sequence[str] | None
+    hold: Hold
+    later_s: float
+    replan: Replan | None = None
+    attempts: int = 0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Stuck:
+    """A vehicle that nothing helps, what it meets first, the names of all that it meets, and whether that is where
+    their goals are: then another order does not help either."""
+
+    name: str
+    conflict: Conflict
+    others: tuple[str, ...]
+    at_goals: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Choice:
+    """How a vehicle flies, and what was changed for that."""
+
+    option: Option
+    change: Change | None
+
+    def later(self, by_s: float) -> Choice:
+        """The same, ``by_s`` later; what was, too."""
+        option = replace(self.option, slot=_late(self.option.slot, by_s), path=self.option.path.delayed(by_s))
+        if self.change is None:
+            return Choice(option, None)
+        return Choice(option, replace(self.change, slot=option.slot, was=_late(self.change.was, by_s)))
+
+
+def _late(slot: Slot, by_s: float) -> Slot:
+    return replace(slot, depart_s=slot.depart_s + by_s, arrive_s=slot.arrive_s + by_s)
+
+
+Settled = dict[str, Choice]
+"""By name, in the order in which they were fixed."""
+
+
+def settle(plan: Schedule, ask: Ask) -> Settled | Stuck:
+    """All as they fly, none of them before 0 s; other paths only where nothing else helps."""
+    settled = _settle(plan, replace(ask, replan=None))
+    if isinstance(settled, Stuck) and ask.replan is not None:
+        settled = _settle(plan, ask)
+    return settled
+
+
+def moved(settled: Settled) -> tuple[Settled, float]:
+    """All later by the same, so that nobody leaves before 0 s; and by how much."""
+    later = max(0.0, -min(choice.option.slot.depart_s for choice in settled.values()))
+    return (settled if later <= 0.0 else {name: choice.later(later) for name, choice in settled.items()}), later
+
+
+def _settle(plan: Schedule, ask: Ask) -> Settled | Stuck:
+    """Fix all in order; who is stuck goes before those in its way, where no priority was asked for."""
+    order = list(plan.order if ask.priority is None else ask.priority)
+    promoted: set[str] = set()
+    done: Settled = {}
+    while True:
+        stuck = _in_order(plan, ask, order, done)
+        if stuck is None:
+            return done
+        if ask.priority is not None or stuck.at_goals or stuck.name in promoted or len(promoted) >= PROMOTIONS:
+            return stuck
+        promoted.add(stuck.name)
+        order.remove(stuck.name)
+        turn = min(order.index(other) for other in stuck.others)
+        order.insert(turn, stuck.name)
+        done = {name: done[name] for name in order[:turn]}
+
+
+def _in_order(plan: Schedule, ask: Ask, order: Sequence[str], done: Settled) -> Stuck | None:
+    """Fix vehicle after vehicle, those in ``done`` as they are there, and add the others to it until one is stuck."""
+    vehicles = {c.name: c.vehicle for c in ask.crews}
+    taken = Taken(ask.rules)
+    freedom = Freedom(plan.mode, ask.hold, ask.later_s)
+    for name in order:
+        if name not in done:
+            was = plan.of(name)
+            found = _choice(Chooser(vehicles[name], was.route, was, freedom, taken), plan, ask)
+            if isinstance(found, Stuck):
+                return found
+            done[name] = found
+        taken.add(done[name].option.path)
+    return None
+
+
+def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
+    """The best option of one vehicle against those before it."""
+    was, taken = chooser.was, chooser.taken
+    base = chooser.base()
+    assert base is not None
+    best = chooser.best(base)
+    if best is base:
+        return Choice(base, None)
+    met = _conflicts(base.path, taken)
+    if best is None and ask.replan is not None:
+        best = _other_path(was.name, chooser, met, ask.replan, ask.attempts)
+    if best is None:
+        others = tuple({n for c in met for n in c.worst.vehicles} - {was.name})
+        return Stuck(was.name, met[0], others, any(_at_goals(c, plan, ask.rules) for c in met))
+    change = Change(was.name, best.how, was, best.slot, best.extra_j, met[0])
+    note = change.describe(lambda place: f"{place[2]:.0f} m above sea level")
+    best = replace(best, slot=replace(best.slot, notes=(*best.slot.notes, note)))
+    return Choice(best, replace(change, slot=best.slot))
+
+
+def _other_path(name: str, chooser: Chooser, met: Sequence[Conflict], replan: Replan, attempts: int) -> Option | None:
+    """The first other route, as the caller has them, with which something keeps clear."""
+    avoid = list(met)
+    for attempt in range(1, attempts + 1):
+        route = replan(name, tuple(avoid), attempt)
+        if route is None:
+            return None
+        other = Chooser(chooser.craft.vehicle, route, chooser.was, chooser.freedom, chooser.taken)
+        base = other.base()
+        if base is None:
+            continue  # too long to arrive in time, or too short without waiting
+        best = other.best(base)
+        if best is not None:
+            return replace(best, how="path")
+        avoid += _conflicts(base.path, chooser.taken)
+    return None
+
+
+def _conflicts(path: TimedPath, taken: Taken) -> list[Conflict]:
+    """What a motion meets among those that have the right of way, by time."""
+    spans = taken.forbidden(path)
+    others = sorted(set(spans.who[spans.holds(0.0)].tolist()))
+    judged = separation([path, *(taken.paths[k] for k in others)], taken.rules)
+    return [c for c in judged.conflicts if path.name in c.worst.vehicles]
+
+
+def _at_goals(conflict: Conflict, plan: Schedule, rules: Rules) -> bool:
+    """Whether two meet about where both arrive."""
+    goals = [plan.of(name).route.points[-1, :2] for name in conflict.worst.vehicles]
+    apart = float(np.hypot(*(goals[0] - goals[1])))
+    away = [float(np.hypot(*(np.array(p[:2]) - g))) for p, g in zip(conflict.worst.places, goals, strict=True)]
+    return apart < rules.needed_m - TOLERANCE_M and max(away) < 2.0 * rules.needed_m
+
+
+def with_leaving(rules: Rules, plan: Schedule) -> Rules:
+    gone = frozenset(s.name for s in plan.slots if s.route.end == "none")
+    return replace(rules, leaving=rules.leaving | gone)
+
+
+def motion_of(slot: Slot, crew: Crew) -> TimedPath:
+    return Craft(crew).course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s)

@@ -1,0 +1,226 @@
+"""What others have taken of space and time, and by how much a motion must be shifted to keep clear of it.
+
+A motion that leaves ``d`` seconds later meets another where its place at t1 is near the other's at t2 = t1 + d: for
+two straight pieces these delays are one interval in closed form (`_nearest.shifts`), so that the least change of
+departure that works is found at once, without trying.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.fleet._nearest import Pieces, shifts
+from gcsplan.fleet._sweep import pieces_of
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.separation import TOLERANCE_M, Rules
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+GROUP, LEVELS = 6, 3
+"""So many boxes are gathered into one, so many times over: what does not touch is passed over together."""
+
+WHOLE = GROUP**LEVELS
+
+BLOCK = 4000
+"""Pairs of groups opened together."""
+
+EDGE_S = 1e-6
+"""Every forbidden span is this much wider on both sides: what rounding may take."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Boxes:
+    """``low``, ``high`` (n, 4): east_m, north_m, amsl_m and seconds of n pieces, or groups of them; an empty one has
+    its low above its high."""
+
+    low: Floats
+    high: Floats
+
+    @classmethod
+    def of(cls, pieces: Pieces) -> Boxes:
+        """One box for each piece, and empty ones up to a whole number of the largest groups."""
+        ends = pieces.places + pieces.velocity * (pieces.to_s - pieces.from_s)[:, None]
+        size = -(-len(ends) // WHOLE) * WHOLE
+        low, high = np.full((size, 4), np.inf), np.full((size, 4), -np.inf)
+        low[: len(ends)] = np.column_stack([np.minimum(pieces.places, ends), pieces.from_s])
+        high[: len(ends)] = np.column_stack([np.maximum(pieces.places, ends), pieces.to_s])
+        return cls(low, high)
+
+    def grouped(self) -> Boxes:
+        """One box for each `GROUP` of them."""
+        return Boxes(
+            self.low.reshape(-1, GROUP, 4).min(axis=1), self.high.reshape(-1, GROUP, 4).max(axis=1)
+        )  # fmt: skip
+
+    def levels(self) -> tuple[Boxes, ...]:
+        """The largest groups first, these last."""
+        out = [self]
+        for _ in range(LEVELS):
+            out.insert(0, out[0].grouped())
+        return tuple(out)
+
+    def joined(self, other: Boxes) -> Boxes:
+        """These, then others."""
+        return Boxes(np.concatenate([self.low, other.low]), np.concatenate([self.high, other.high]))
+
+    def grown(self, less: Floats, more: Floats) -> Boxes:
+        """Wider by ``less`` and ``more`` (4,)."""
+        return Boxes(self.low - less, self.high + more)
+
+
+def _touching(a: Boxes, i: Ints, b: Boxes, j: Ints) -> tuple[Ints, Ints]:
+    """Those of the pairs ``i`` of ``a`` with ``j`` of ``b`` (n,) that touch."""
+    for axis in (3, 0, 1, 2):
+        touch = np.flatnonzero((b.high[j, axis] >= a.low[i, axis]) & (b.low[j, axis] <= a.high[i, axis]))
+        i, j = i[touch], j[touch]
+    return i, j
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Spans:
+    """Forbidden shifts, seconds: from ``low`` to ``high`` (n,), and the number of the vehicle met, ``who`` (n,)."""
+
+    low: Floats
+    high: Floats
+    who: Ints
+
+    @classmethod
+    def none(cls) -> Spans:
+        """Everything is allowed."""
+        return cls(np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp))
+
+    def joined(self, other: Spans) -> Spans:
+        """What either forbids."""
+        return Spans(
+            np.concatenate([self.low, other.low]),
+            np.concatenate([self.high, other.high]),
+            np.concatenate([self.who, other.who]),
+        )
+
+    def holds(self, shift_s: float) -> NDArray[np.bool_]:
+        """(n,) which of them forbid a shift."""
+        return np.asarray((self.low < shift_s) & (shift_s < self.high))
+
+    def free(self, shift_s: float) -> bool:
+        """Whether a shift is allowed."""
+        return not self.holds(shift_s).any()
+
+    def least(self, low_s: float, high_s: float) -> float | None:
+        """The allowed shift from ``low_s`` to ``high_s`` nearest to none; None where all are forbidden."""
+        # A little beyond each span: at its very end the next look would turn on rounding.
+        ends = np.concatenate([[0.0, low_s, high_s], self.low - EDGE_S, self.high + EDGE_S])
+        ends = np.unique(ends[(ends >= low_s) & (ends <= high_s)])
+        # An end is inside some open span exactly if more spans have begun before it than have ended at or before it.
+        begun = np.searchsorted(np.sort(self.low), ends, side="left")
+        ended = np.searchsorted(np.sort(self.high), ends, side="right")
+        free = ends[begun <= ended]
+        if not len(free):
+            return None
+        return float(free[np.lexsort((-free, np.abs(free)))[0]])
+
+
+class Taken:
+    """Motions that have the right of way, one added after the other."""
+
+    def __init__(self, rules: Rules) -> None:
+        self.rules = rules
+        self.paths: list[TimedPath] = []
+        empty = np.zeros(0)
+        self._pieces = Pieces(empty, empty, np.zeros((0, 3)), np.zeros((0, 3)))
+        self._pads = np.zeros((0, 7))  # east and north of start and goal, begin, end, and whether it stands there then
+        self._first: list[int] = []  # of each vehicle, among all pieces and among all boxes
+        self._first_box: list[int] = []
+        self._levels = Boxes(np.zeros((0, 4)), np.zeros((0, 4))).levels()
+
+    def add(self, path: TimedPath) -> None:
+        """Give ``path`` the right of way over all that come later."""
+        pieces = pieces_of(path)
+        self._first.append(len(self._pieces.from_s))
+        self._first_box.append(len(self._levels[-1].low))
+        self._pieces = self._pieces.joined(pieces)
+        levels = Boxes.of(pieces).levels()
+        self._levels = tuple(all_.joined(new) for all_, new in zip(self._levels, levels, strict=True))
+        row = [*path.points[0, :2], *path.points[-1, :2], path.begin_s, path.end_s, float(self._lands(path))]
+        self._pads = np.vstack([self._pads, row])
+        self.paths.append(path)
+
+    def forbidden(self, path: TimedPath, low_s: float = 0.0, high_s: float = 0.0, spare_m: float = 0.0) -> Spans:
+        """The shifts of ``path`` from ``low_s`` to ``high_s`` that bring it, in the air or on a pad, nearer than needed
+        and ``spare_m`` to one that has the right of way; a span may reach beyond the two."""
+        needed_m = self.rules.needed_m - TOLERANCE_M + spare_m
+        parts = [*self._in_the_air(path, low_s, high_s, needed_m), self._on_the_pads(path, needed_m)]
+        low, high = (np.concatenate([p[k] for p in parts]).astype(np.float64) for k in (0, 1))
+        who = np.concatenate([p[2] for p in parts]).astype(np.intp)
+        wider = 2.0 * self.rules.window_s + EDGE_S
+        low, high = low - wider, high + wider
+        keep = (low <= high_s) & (high >= low_s)
+        return Spans(low[keep], high[keep], who[keep])
+
+    def _in_the_air(
+        self, path: TimedPath, low_s: float, high_s: float, needed_m: float
+    ) -> list[tuple[Floats, Floats, Ints]]:
+        if not self.paths:
+            return []
+        near, window = needed_m, 2.0 * self.rules.window_s
+        own = pieces_of(path)
+        # Own boxes at any allowed shift, a separation larger: what they do not touch is clear.
+        less = np.array([near, near, near, window - low_s])
+        levels = [boxes.grown(less, np.array([near, near, near, window + high_s])) for boxes in Boxes.of(own).levels()]
+        mine, theirs = np.meshgrid(np.arange(len(levels[0].low)), np.arange(len(self._levels[0].low)), indexing="ij")
+        a, b = _touching(levels[0], mine.ravel(), self._levels[0], theirs.ravel())
+        return [self._met(own, i, j, needed_m) for i, j in self._descend(levels, a, b, 1)]
+
+    def _descend(self, levels: Sequence[Boxes], a: Ints, b: Ints, level: int) -> Iterator[tuple[Ints, Ints]]:
+        """Pairs of pieces whose boxes touch, in blocks, within pairs of groups (n,) of the level above."""
+        step = np.arange(GROUP)
+        for start in range(0, len(a), BLOCK):
+            some = slice(start, start + BLOCK)
+            zero = np.zeros((len(a[some]), GROUP, GROUP), dtype=np.intp)
+            i = (zero + a[some, None, None] * GROUP + step[None, :, None]).ravel()
+            j = (zero + b[some, None, None] * GROUP + step[None, None, :]).ravel()
+            i, j = _touching(levels[level], i, self._levels[level], j)
+            if level == LEVELS:
+                yield i, j
+            else:
+                yield from self._descend(levels, i, j, level + 1)
+
+    def _met(self, own: Pieces, a: Ints, box: Ints, needed_m: float) -> tuple[Floats, Floats, Ints]:
+        who = np.searchsorted(self._first_box, box, side="right") - 1
+        b = box - np.asarray(self._first_box, dtype=np.intp)[who] + np.asarray(self._first, dtype=np.intp)[who]
+        low, high = shifts(own.take(a), self._pieces.take(b), needed_m)
+        met = low <= high
+        return low[met], high[met], who[met]
+
+    def _on_the_pads(self, path: TimedPath, needed_m: float) -> tuple[Floats, Floats, Ints]:
+        """Spans of shifts in which one takes off or lands beside another that stands on the ground."""
+        if not self.paths:
+            return np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp)
+        starts, goals = self._pads[:, 0:2], self._pads[:, 2:4]
+        begins, ends, lands = self._pads[:, 4], self._pads[:, 5], self._pads[:, 6] > 0.0
+        mine = self._lands(path)
+        clear = self.rules.pad_clear_s
+        rows: list[tuple[NDArray[np.bool_], Floats, Floats]] = []
+
+        def near(place: Floats, others: Floats) -> NDArray[np.bool_]:
+            return np.asarray(np.hypot(others[:, 0] - place[0], others[:, 1] - place[1]) < needed_m)
+
+        never = np.full(len(begins), math.inf)
+        start, goal, begin, end = path.points[0], path.points[-1], path.begin_s, path.end_s
+        # Another lands where this one waits (and then takes off): the other way round; both land.
+        rows.append((lands & near(start, goals), ends - begin, never))
+        if mine:
+            rows.append((near(goal, starts), -never, begins - end))
+            rows.append((lands & near(goal, goals), ends - end - clear, ends - end + clear))
+        who = np.concatenate([np.flatnonzero(hit) for hit, _, _ in rows])
+        low = np.concatenate([a[hit] for hit, a, _ in rows])
+        high = np.concatenate([b[hit] for hit, _, b in rows])
+        return low, high, who.astype(np.intp)
+
+    def _lands(self, path: TimedPath) -> bool:
+        return not path.ends_in_air and path.name not in self.rules.leaving

@@ -1,0 +1,228 @@
+"""When each vehicle leaves, how fast it flies, and when it arrives: fleets that come together or one after the other.
+
+After Tan et al. 2023 ("Multi-UAV path planning based on IB-ABC with restricted planned arrival sequence"): all leave at
+the same time; in a sequence the first flies at its fastest and sets the clock, `T_i = T_1 + (i - 1)·interval`; together
+the slowest sets it; the speeds follow, `v_i = L_i / T_i`. Here the time model of `timing` stands in the place of
+`L / v`: the speed is found as a root, for time never rises with speed.
+
+A vehicle that would have to fly slower than its slowest speed leaves later (costs nothing), or holds at the gate, or
+is given a longer path. For one that cannot come early enough at its fastest the first waits; if that is not wanted
+(``clock="first"``, as in the paper) or cannot be, there is no schedule.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from gcsplan.errors import NoMission
+from gcsplan.fleet.craft import LONGEST_HOLD_S, Craft, Crew, Hold, Longer, Slot
+from gcsplan.fleet.order import WITHIN_S, Clock, Floats, best_order, earliest_first, interval_range
+
+__all__ = [
+    "WITHIN_S", "Clock", "Craft", "Crew", "Hold", "Longer", "Mode", "NoSchedule", "Schedule", "Slot",
+    "least_interval_s", "schedule",
+]  # fmt: skip
+
+Mode = Literal["sequence", "together", "none"]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Schedule:
+    """Slots in the order of ``order``: of arrival for a sequence and none, as given for together."""
+
+    mode: Mode
+    order: tuple[str, ...]
+    slots: tuple[Slot, ...]
+    interval_s: float = 0.0
+
+    def of(self, name: str) -> Slot:
+        """The slot of a vehicle."""
+        return next(s for s in self.slots if s.name == name)
+
+    @property
+    def energy_j(self) -> float:
+        """Energy of all flights."""
+        return sum(s.energy_j for s in self.slots)
+
+
+class NoSchedule(NoMission):
+    """The vehicles cannot arrive as asked; ``vehicle`` names the one that cannot.
+
+    ``interval_s`` is the smallest interval with which the same order works, ``arrive_s`` the earliest clock (the
+    first arrival of a sequence, the common one of ``together``); None where there is none.
+    """
+
+    def __init__(
+        self, message: str, *, vehicle: str, interval_s: float | None = None, arrive_s: float | None = None
+    ) -> None:
+        super().__init__(message, reason="time")
+        self.vehicle = vehicle
+        self.interval_s = interval_s
+        self.arrive_s = arrive_s
+
+
+def schedule(
+    crews: Sequence[Crew],
+    mode: Mode,
+    *,
+    order: Sequence[str] | Literal["best"] | None = None,
+    interval_s: float = 0.0,
+    hold: Hold = "ground",
+    clock: Clock = "fleet",
+    arrive_s: float | None = None,
+    longer: Longer | None = None,
+) -> Schedule:
+    """Departures and speeds with which the fleet arrives as asked.
+
+    ``mode``: ``sequence``: in ``order`` (names; None: as handed in; ``best``: finishing earliest, exact, see
+    `order.best_order`), ``interval_s`` apart; ``together``; ``none``: everybody at once, at its fastest.
+    The sequence begins as early as all can follow (``clock="fleet"``: the first at its fastest, or later where another
+    one could not keep its turn), or with the first at its fastest whatever the others can (``first``), or the first is
+    there at ``arrive_s`` (of ``together`` the common arrival; else the slowest at its fastest).
+    Who must come later than its slowest speed takes it leaves later (``hold="ground"``: costs nothing), or all leave at
+    once and it holds at the gate (``gate``: multicopters; costs ``hover_w``), or nobody waits (``none``); where it
+    cannot wait ``longer(name, length_m)`` is asked for a path of that length.
+
+    Raises NoSchedule where somebody cannot, with the smallest interval or the earliest arrival that works.
+    """
+    craft = [Craft(c) for c in crews]
+    if not craft or len({c.name for c in craft}) != len(craft):
+        raise ValueError("a schedule needs vehicles of different names")
+    if mode == "none":
+        slots = sorted((c.fly(c.fastest_m_s) for c in craft), key=lambda s: s.arrive_s)
+        return Schedule(mode, tuple(s.name for s in slots), tuple(slots))
+    craft = _ordered(craft, mode, order, interval_s, hold, clock, arrive_s, longer)
+    step_s = interval_s if mode == "sequence" else 0.0
+    fast = np.array([c.fast_s for c in craft])
+    if arrive_s is not None:
+        first_s = arrive_s
+    elif mode == "together" or clock == "fleet":
+        first_s = float((fast - np.arange(len(craft)) * step_s).max())
+    else:
+        first_s = float(fast[0])
+    slots = []
+    for turn, one in enumerate(craft):
+        slot = one.at(first_s + turn * step_s, hold, longer)
+        if slot is None:
+            raise _refusal(craft, turn, mode, step_s, hold, clock, arrive_s, first_s)
+        slots.append(slot)
+    if mode == "sequence" and arrive_s is None and first_s > craft[0].fast_s + WITHIN_S:
+        slots[0] = replace(slots[0], notes=(*slots[0].notes, _why_later(craft, first_s, step_s)))
+    return Schedule(mode, tuple(s.name for s in slots), tuple(slots), step_s)
+
+
+def _why_later(craft: Sequence[Craft], first_s: float, step_s: float) -> str:
+    last = max(range(len(craft)), key=lambda k: craft[k].fast_s - k * step_s)
+    return (
+        f"the first arrives at {first_s:.1f} s instead of {craft[0].fast_s:.1f} s, so that {craft[last].name}, which "
+        f"needs {craft[last].fast_s:.1f} s at its fastest, can follow"
+    )
+
+
+def least_interval_s(
+    crews: Sequence[Crew],
+    order: Sequence[str] | None = None,
+    *,
+    hold: Hold = "ground",
+    clock: Clock = "fleet",
+    arrive_s: float | None = None,
+) -> float | None:
+    """The smallest interval with which this order can arrive in sequence (time alone); None where none works."""
+    craft = _by_name([Craft(c) for c in crews], order)
+    return _least_interval(craft, hold, clock, arrive_s)
+
+
+def _least_interval(craft: Sequence[Craft], hold: Hold, clock: Clock, arrive_s: float | None) -> float | None:
+    fast, latest = np.array([c.fast_s for c in craft]), np.array([c.latest_s(hold) for c in craft])
+    low, high = interval_range(fast, latest, clock, arrive_s)
+    return low if low <= high + WITHIN_S else None
+
+
+def _by_name(craft: Sequence[Craft], order: Sequence[str] | None) -> list[Craft]:
+    if order is None:
+        return list(craft)
+    known: Mapping[str, Craft] = {c.name: c for c in craft}
+    if sorted(order) != sorted(known):
+        raise ValueError(f"an order names every vehicle once: {', '.join(known)}; given {', '.join(order)}")
+    return [known[name] for name in order]
+
+
+def _ordered(
+    craft: list[Craft], mode: Mode, order: Sequence[str] | None, interval_s: float, hold: Hold, clock: Clock,
+    arrive_s: float | None, longer: Longer | None,
+) -> list[Craft]:  # fmt: skip
+    if order != "best":
+        return _by_name(craft, order)
+    if mode != "sequence":
+        return craft
+    return _best(craft, interval_s, hold, clock, arrive_s, longer) or sorted(craft, key=lambda c: c.fast_s)
+
+
+def _best(
+    craft: Sequence[Craft], interval_s: float, hold: Hold, clock: Clock, arrive_s: float | None, longer: Longer | None
+) -> list[Craft] | None:
+    fast, slow = np.array([c.fast_s for c in craft]), np.array([c.slow_s for c in craft])
+    latest = np.array([math.inf if longer is not None else c.latest_s(hold) for c in craft])
+    watts = np.array([c.waiting_w(hold) for c in craft])
+
+    def joules(times: Floats) -> Floats:
+        cost: Floats = watts[:, None] * np.maximum(times[None, :] - slow[:, None], 0.0)
+        return cost
+
+    found = best_order(fast, latest, interval_s, clock, arrive_s, joules)
+    return None if found is None else [craft[k] for k in found]
+
+
+def _refusal(
+    craft: Sequence[Craft], turn: int, mode: Mode, step_s: float, hold: Hold, clock: Clock, arrive_s: float | None,
+    first_s: float,
+) -> NoSchedule:  # fmt: skip
+    """Why this turn cannot be taken, and what would work."""
+    one, at_s = craft[turn], first_s + turn * step_s
+    fast, latest = np.array([c.fast_s for c in craft]), np.array([c.latest_s(hold) for c in craft])
+    earliest = earliest_first(fast, latest, step_s)
+    interval = _least_interval(craft, hold, clock, arrive_s) if mode == "sequence" else None
+    late = at_s < one.fast_s
+    what = f"the common arrival is {at_s:.1f} s" if mode == "together" else f"its turn is {at_s:.1f} s"
+    speed_m_s, needs_s = (one.fastest_m_s, one.fast_s) if late else (one.slowest_m_s, one.slow_s)
+    why = f"{one.name} cannot arrive {'in time' if late else 'so late'}: {what} after the start, and at its "
+    why += f"{'fastest' if late else 'slowest'} ({speed_m_s:g} m/s) it needs {needs_s:.1f} s"
+    if not late:
+        why += "; nobody may wait" if hold == "none" else f"; {_cannot_wait(one)}"
+    cures = []
+    if mode == "together":
+        cures.append(
+            "there is no common arrival of all" if earliest is None
+            else f"the earliest common arrival is arrive_s: {_up(earliest)}"
+        )  # fmt: skip
+    else:
+        low, high = interval_range(fast, latest, clock, arrive_s)
+        if interval is None:
+            cures.append("no interval_s works in this order")
+        elif late:
+            cures.append(f"the earliest feasible interval_s is {_up(interval)}")
+        else:
+            cures.append(f"an interval_s from {_up(low)} to {math.floor(high * 1e3 + 1e-6) / 1e3:.3f} works")
+        if earliest is not None:
+            cures.append(f"with this interval all can follow a first at {_up(earliest)} s (clock: fleet)")
+        if _best(craft, step_s, hold, clock, arrive_s, None) is not None:
+            cures.append("order: best finds an order that works")
+    if hold != "ground" and not late:
+        cures.append("hold: ground lets it leave later")
+    return NoSchedule(f"{why}; {'; '.join(cures)}", vehicle=one.name, interval_s=interval, arrive_s=earliest)
+
+
+def _cannot_wait(one: Craft) -> str:
+    if one.vehicle.can_hold:
+        return f"a hold is at most {LONGEST_HOLD_S:.0f} s"
+    return f"{one.vehicle.autopilot} cannot hold in the air for a set time"
+
+
+def _up(seconds: float) -> str:
+    """Milliseconds, rounded up: what a user copies must work."""
+    return f"{math.ceil(seconds * 1e3 - 1e-6) / 1e3:.3f}"

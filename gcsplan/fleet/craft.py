@@ -1,0 +1,182 @@
+"""What arrivals are within one vehicle's reach, and how it flies to be there at a given time.
+
+It flies slower; where that would be slower than its slowest speed it leaves later, holds at the gate, or is given a
+longer path.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.order import WITHIN_S
+from gcsplan.fleet.timing import Course, Route, fly, speed_for
+from gcsplan.vehicle import Autopilot, Vehicle
+
+Hold = Literal["ground", "gate", "none"]
+Longer = Callable[[str, float], Route | None]
+
+LONGEST_HOLD_S = 65535.0
+"""A hold is stored as whole seconds in 16 bits (ArduPilot); one of 70000 s came back as 4464."""
+
+LONGER_TRIES = 4
+
+# ArduCopter leans no further than ANGLE_MAX (hundredths of a degree): what was measured, whatever is commanded.
+COPTER_CAPS = ((10.0, 3000), (15.0, 4500))
+
+
+@dataclass(frozen=True, slots=True)
+class Crew:
+    """One vehicle and its route."""
+
+    vehicle: Vehicle
+    route: Route
+
+    @property
+    def name(self) -> str:
+        """The vehicle's name."""
+        return self.vehicle.name
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Slot:
+    """One vehicle's part of a schedule.
+
+    It leaves the ground at ``depart_s`` after the common start, holds ``hold_s`` (whole seconds) at the gate, flies
+    at ``speed_m_s`` (a float32, as DO_CHANGE_SPEED carries it) and is at the goal at ``arrive_s``. ``energy_j`` is that
+    of the whole flight. ``route`` is the one to fly: longer than the one handed in where that was asked for.
+    """
+
+    name: str
+    depart_s: float
+    hold_s: float
+    speed_m_s: float
+    arrive_s: float
+    energy_j: float
+    route: Route
+    notes: tuple[str, ...] = ()
+
+    def motion(self, vehicle: Vehicle) -> TimedPath:
+        """The whole flight of this slot in time (within `timing.motion_error_m`)."""
+        return fly(self.route, vehicle, self.speed_m_s, self.depart_s, self.hold_s)
+
+
+class Craft:
+    """A crew laid out in time: what arrivals are within its reach.
+
+    From leaving the ground at the common start it is at the goal ``fast_s`` later at its fastest and ``slow_s`` later
+    at its slowest; both speeds are float32 within its range.
+    """
+
+    def __init__(self, crew: Crew) -> None:
+        self.crew, self.name = crew, crew.name
+        self.vehicle = crew.vehicle
+        self.course = Course(crew.route, crew.vehicle)
+        self.slowest_m_s, self.fastest_m_s = _float32_range(crew.vehicle.speed_min_m_s, crew.vehicle.speed_max_m_s)
+        self.fast_s = self.course.time_to_goal_s(self.fastest_m_s)
+        self.slow_s = self.course.time_to_goal_s(self.slowest_m_s)
+
+    def latest_s(self, hold: Hold) -> float:
+        """Its latest arrival, with the kind of waiting that is allowed."""
+        if hold == "ground":
+            return math.inf
+        return self.slow_s + (LONGEST_HOLD_S if hold == "gate" and self.vehicle.can_hold else 0.0)
+
+    def waiting_w(self, hold: Hold) -> float:
+        """What a second costs by which it must be later than its slowest speed takes it.
+
+        Nothing on the ground, hovering at the gate; where it cannot wait, about the way of that second.
+        """
+        energy = self.vehicle.energy
+        if hold == "ground":
+            return 0.0
+        if hold == "gate" and self.vehicle.can_hold:
+            return energy.hover_w
+        return max(energy.horizontal_j_per_m, 1.0) * self.slowest_m_s
+
+    def fly(self, speed_m_s: float, depart_s: float = 0.0, hold_s: float = 0.0, notes: Sequence[str] = ()) -> Slot:
+        """The slot of flying so."""
+        speed = min(max(float(np.float32(speed_m_s)), self.slowest_m_s), self.fastest_m_s)
+        arrive_s = depart_s + self.course.time_to_goal_s(speed, hold_s)
+        joules = self.crew.route.energy_j(self.vehicle, hold_s)
+        said = (*notes, *_speed_notes(self.vehicle, speed))
+        return Slot(self.name, depart_s, hold_s, speed, arrive_s, joules, self.crew.route, said)
+
+    def at(self, arrive_s: float, hold: Hold = "ground", longer: Longer | None = None) -> Slot | None:
+        """The slot that arrives then: at a lower speed if that does; else at its slowest, and later as allowed.
+
+        None where it can't: too early for its fastest, or too late for its slowest without waiting.
+        """
+        if arrive_s < self.fast_s - WITHIN_S:
+            return None
+        spare_s = arrive_s - self.slow_s
+        if spare_s <= WITHIN_S:
+            return self.fly(self._speed_for(arrive_s))
+        if hold == "ground":
+            return self.fly(self.slowest_m_s, spare_s, notes=[f"waits {spare_s:.1f} s on the ground"])
+        if hold == "gate" and self.vehicle.can_hold and spare_s <= LONGEST_HOLD_S:
+            return self._held(arrive_s, spare_s)
+        return None if longer is None else self._longer(arrive_s, longer)
+
+    def _speed_for(self, time_s: float) -> float:
+        return speed_for(self.course.time_to_goal_s, time_s, self.slowest_m_s, self.fastest_m_s)
+
+    def _held(self, arrive_s: float, spare_s: float) -> Slot:
+        """Whole seconds at the gate; the speed makes up for the fraction, or the departure where it cannot."""
+        hold_s = math.ceil(spare_s - WITHIN_S)
+        joules = self.vehicle.energy.hover_w * hold_s
+        if arrive_s - hold_s >= self.fast_s:
+            note = f"holds {hold_s} s at the gate ({joules:.0f} J)"
+            return self.fly(self._speed_for(arrive_s - hold_s), 0.0, float(hold_s), [note])
+        hold_s = math.floor(spare_s)
+        note = f"holds {hold_s} s at the gate ({self.vehicle.energy.hover_w * hold_s:.0f} J); a hold is whole seconds: "
+        note += f"the rest, {spare_s - hold_s:.2f} s, it waits on the ground"
+        return self.fly(self.slowest_m_s, spare_s - hold_s, float(hold_s), [note])
+
+    def _longer(self, arrive_s: float, longer: Longer) -> Slot | None:
+        """A longer path at the slowest speed, or a little faster: asked for until it fits."""
+        wanted_m = self.crew.route.length_m + (arrive_s - self.slow_s) * self.slowest_m_s
+        for _ in range(LONGER_TRIES):
+            route = longer(self.name, wanted_m)
+            if route is None:
+                return None
+            other = Craft(Crew(self.vehicle, route))
+            if other.fast_s - WITHIN_S <= arrive_s <= other.slow_s + WITHIN_S:
+                more_m = route.length_m - self.crew.route.length_m
+                slot = other.at(arrive_s, "none")
+                assert slot is not None
+                note = f"flies {more_m:.0f} m more, to arrive so late"
+                return other.fly(slot.speed_m_s, notes=[note])
+            off_s = arrive_s - (other.slow_s if arrive_s > other.slow_s else 0.5 * (other.slow_s + other.fast_s))
+            wanted_m += off_s * self.slowest_m_s
+        return None
+
+
+def _float32_range(low: float, high: float) -> tuple[float, float]:
+    """The range of float32 numbers within a range; where there is none, the nearest one twice."""
+    inside_low, inside_high = np.float32(low), np.float32(high)
+    if float(inside_low) < low:
+        inside_low = np.nextafter(inside_low, np.float32(math.inf))
+    if float(inside_high) > high:
+        inside_high = np.nextafter(inside_high, np.float32(0.0))
+    if inside_low > inside_high:
+        return float(np.float32(high)), float(np.float32(high))
+    return float(inside_low), float(inside_high)
+
+
+def _speed_notes(vehicle: Vehicle, speed_m_s: float) -> list[str]:
+    if vehicle.autopilot is not Autopilot.ARDUCOPTER:
+        return []
+    over = [(cap, angle) for cap, angle in COPTER_CAPS if speed_m_s > cap]
+    if not over:
+        return []
+    cap, angle = over[-1]
+    return [
+        f"{speed_m_s:.2f} m/s needs an ANGLE_MAX above {angle}, with which ArduCopter flies about {cap:g} m/s at most "
+        "and would arrive late"
+    ]

@@ -1,0 +1,320 @@
+"""How near the vehicles of a fleet come to each other, exactly, in space and time, from take-off to landing.
+
+Motions are piecewise linear, so the distance of two vehicles is the root of a quadratic on every pair of overlapping
+pieces; the fleet's time is cut into slices whose bounds say which pieces need no look (`_sweep`). Nothing is sampled.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.errors import InputError
+from gcsplan.fleet._nearest import below, nearest
+from gcsplan.fleet._sweep import Fleet, Least
+from gcsplan.fleet.motion import TimedPath
+
+Floats = NDArray[np.float64]
+Place = tuple[float, float, float]
+Where = Callable[[Place], str]
+"""Turns east_m, north_m, amsl_m into words for people; whoever knows degrees hands one in."""
+
+Kind = Literal["air", "take-off", "landing"]
+
+TOLERANCE_M = 1e-6
+"""Touching the separation is legal; this is what rounding may take."""
+
+
+def in_metres(place: Place) -> str:
+    """A place in words, where nobody handed in better ones."""
+    return f"east {place[0]:.0f} m, north {place[1]:.0f} m, {place[2]:.0f} m above sea level"
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What is asked: ``separation_m`` between any two, of which each may be ``error_m`` away from its place in the
+    model, and up to ± ``window_s`` early or late, independently of the others.
+
+    A landed vehicle stands where it landed for ``pad_clear_s`` (inf: for good). ``leaving`` names those that fly on and
+    away where their motion ends, so that they stand nowhere.
+    """
+
+    separation_m: float
+    error_m: float = 0.0
+    window_s: float = 0.0
+    pad_clear_s: float = math.inf
+    leaving: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        for name in ("separation_m", "error_m", "window_s", "pad_clear_s"):
+            value = getattr(self, name)
+            if math.isnan(value) or value < 0.0 or (math.isinf(value) and name != "pad_clear_s"):
+                raise InputError(f"{name} must be a number of at least 0, given {value:g}")
+
+    @property
+    def needed_m(self) -> float:
+        """Distance in the model that keeps the separation in the air."""
+        return self.separation_m + 2.0 * self.error_m
+
+
+@dataclass(frozen=True, slots=True)
+class Encounter:
+    """Two vehicles where they are nearest: names, metres, the moment (with a window: the middle of the two in
+    ``times_s``, when each is there by its own plan), both places, and the number of each one's piece (-1: none)."""
+
+    vehicles: tuple[str, str]
+    distance_m: float
+    time_s: float
+    times_s: tuple[float, float]
+    places: tuple[Place, Place]
+    pieces: tuple[int, int]
+
+    @property
+    def middle(self) -> Place:
+        """Half-way between the two."""
+        a, b = self.places
+        return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict:
+    """Two vehicles nearer than ``needed_m`` from ``from_s`` until ``until_s`` (inf: for good); the worst of that time.
+
+    ``kind``: both in the ``air``; or the *first* of the two takes off from, or lands, beside the second, which stands
+    on the ground. With a window the span is that of the pieces that may meet, rounded outward.
+    """
+
+    kind: Kind
+    worst: Encounter
+    needed_m: float
+    from_s: float
+    until_s: float
+
+    def describe(self, where: Where = in_metres) -> str:
+        """One sentence: who, how near, when, and where."""
+        a, b = self.worst.vehicles
+        near = f"{self.worst.distance_m:.1f} m, needed {self.needed_m:g} m"
+        at = f"at {self.worst.time_s:.1f} s ({where(self.worst.middle)})"
+        if self.kind == "air":
+            return f"{a} and {b} come as near as {near}, {at}"
+        verb = "takes off from" if self.kind == "take-off" else "lands at"
+        return f"{a} {verb} a place {near} from where {b} stands, {at}"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Separation:
+    """What was found: ``distance_m`` (V, V) the exact least distance of every pair while both are in the air (inf:
+    never both), ``least`` of all, ``conflicts`` by time, and ``notes`` for people."""
+
+    rules: Rules
+    names: tuple[str, ...]
+    distance_m: Floats
+    least: Encounter | None
+    conflicts: tuple[Conflict, ...]
+    notes: tuple[str, ...]
+    _pairs: Pairs = field(repr=False)
+
+    @property
+    def safe(self) -> bool:
+        """Whether every pair keeps its distance."""
+        return not self.conflicts
+
+    def between(self, a: str, b: str) -> Encounter | None:
+        """Where two vehicles are nearest; None if they are never both in the air."""
+        return self._pairs.encounter(self.names.index(a), self.names.index(b))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pairs:
+    """Pairs ``i``, ``j`` (M,) of a fleet's vehicles, and the least distance of each."""
+
+    fleet: Fleet
+    i: NDArray[np.intp]
+    j: NDArray[np.intp]
+    least: Least
+
+    def encounter(self, a: int, b: int) -> Encounter | None:
+        """Of two vehicles by number, in this order."""
+        rows = np.flatnonzero(((self.i == a) & (self.j == b)) | ((self.i == b) & (self.j == a)))
+        if not len(rows) or not math.isfinite(self.least.distance_m[rows[0]]):
+            return None
+        m = int(rows[0])
+        found = encounter(
+            self.fleet, (int(self.i[m]), int(self.j[m])), float(self.least.distance_m[m]),
+            (float(self.least.first_s[m]), float(self.least.second_s[m])),
+            (int(self.least.pieces[m, 0]), int(self.least.pieces[m, 1])),
+        )  # fmt: skip
+        return found if self.i[m] == a else swapped(found)
+
+
+def separation(paths: Sequence[TimedPath], rules: Rules) -> Separation:
+    """Judge a fleet: every pair's exact least distance (within 1e-6 m, never optimistic beyond it), every conflict.
+
+    Pairs are judged while both are in the air (a vehicle that ends in the air stays there for good); then the pads: a
+    vehicle that takes off from, or lands, nearer than ``rules.needed_m`` (horizontally) to where another has landed
+    and stands, or lands so near to one that still waits. Those that wait are not judged against each other, nor against
+    one that takes off beside them; a note tells. Who flies over one that stands on the ground is not judged against it:
+    that is min AGL's part. Raises InputError for two vehicles of one name.
+    """
+    names = tuple(p.name for p in paths)
+    if len(set(names)) != len(names):
+        raise InputError(f"every vehicle needs a name of its own, given {', '.join(names)}")
+    distance = np.full((len(paths), len(paths)), np.inf)
+    if len(paths) < 2:
+        fleet = Fleet.of(paths, rules.window_s) if paths else None
+        none = np.zeros(0, dtype=np.intp)
+        if fleet is None:
+            raise InputError("separation was asked of no vehicle at all")
+        return Separation(rules, names, distance, None, (), (), Pairs(fleet, none, none, Least.none(0)))
+    fleet = Fleet.of(paths, rules.window_s)
+    i, j = (index.astype(np.intp) for index in np.triu_indices(len(paths), 1))
+    pairs = Pairs(fleet, i, j, fleet.least(i, j))
+    distance[i, j] = distance[j, i] = pairs.least.distance_m
+    best = int(pairs.least.distance_m.argmin())
+    conflicts = [*in_the_air(pairs, rules), *on_the_pads(paths, rules)]
+    conflicts.sort(key=lambda c: (c.from_s, c.worst.vehicles))
+    return Separation(
+        rules, names, distance, pairs.encounter(int(i[best]), int(j[best])), tuple(conflicts),
+        waiting_note(paths, rules), pairs,
+    )  # fmt: skip
+
+
+def in_the_air(pairs: Pairs, rules: Rules) -> list[Conflict]:
+    """Every span of time in which a pair is nearer than needed, with its worst moment."""
+    needed = rules.needed_m - TOLERANCE_M
+    bad = np.flatnonzero(pairs.least.distance_m < needed)
+    found: list[Conflict] = []
+    fleet, w = pairs.fleet, pairs.fleet.window_s
+    for m in bad.tolist():
+        i, j = pairs.i[m : m + 1], pairs.j[m : m + 1]
+        bound, _ = fleet.bounds(i, j)
+        k = np.flatnonzero(bound[0] < needed)
+        spans: list[tuple[float, float, float, float, float, int, int]] = []
+        for _, a, b in fleet.rows(np.repeat(i, len(k)), np.repeat(j, len(k)), k):
+            pa, pb = fleet.pieces.take(a), fleet.pieces.take(b)
+            distance, t1, t2 = nearest(pa, pb, 2.0 * w)
+            if w > 0.0:
+                first, last = np.maximum(pa.from_s, pb.from_s) - w, np.minimum(pa.to_s, pb.to_s) + w
+                close = distance < needed
+            else:
+                first, last = below(pa, pb, rules.needed_m)
+                close = (first <= last) & (distance < needed)
+            rows = (x[close].tolist() for x in (first, last, distance, t1, t2, a, b))
+            spans.extend(zip(*rows, strict=True))
+        for group in _merged(sorted(set(spans))):
+            worst = min(group, key=lambda s: (s[2], s[3]))
+            met = encounter(
+                fleet, (int(i[0]), int(j[0])), worst[2], (worst[3], worst[4]), (int(worst[5]), int(worst[6]))
+            )
+            until = max(s[1] for s in group)
+            until = math.inf if until > fleet.horizon_s + w + 1.0 else until
+            found.append(Conflict("air", met, rules.needed_m, group[0][0], until))
+    return found
+
+
+Span = tuple[float, float, float, float, float, int, int]
+
+
+def _merged(spans: list[Span]) -> list[list[Span]]:
+    """Spans that touch, together."""
+    groups: list[list[Span]] = []
+    end = -math.inf
+    for span in spans:
+        if not groups or span[0] > end + 1e-6:
+            groups.append([])
+            end = -math.inf
+        groups[-1].append(span)
+        end = max(end, span[1])
+    return groups
+
+
+def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
+    """Vehicles that take off or land beside one that stands on the ground."""
+    begins, ends = np.array([p.begin_s for p in paths]), np.array([p.end_s for p in paths])
+    starts, goals = np.array([p.points[0] for p in paths]), np.array([p.points[-1] for p in paths])
+    landing = np.array([not p.ends_in_air and p.name not in rules.leaving for p in paths])
+    needed, apart = rules.needed_m - TOLERANCE_M, 2.0 * rules.window_s
+
+    def near(a: Floats, b: Floats) -> NDArray[np.bool_]:
+        d = a[:, None, :2] - b[None, :, :2]
+        out = np.asarray(np.hypot(d[..., 0], d[..., 1]) < needed)
+        np.fill_diagonal(out, False)
+        return out
+
+    cleared = ends + rules.pad_clear_s
+    # [y, x]: y moves, x stands.
+    stands = landing[None, :] & (begins[:, None] >= ends[None, :] - apart) & (begins[:, None] < cleared[None] + apart)
+    leaves_beside = near(starts, goals) & stands
+    later = ends[:, None] - ends[None, :]
+    order = np.arange(len(paths))
+    second = (later > 0.0) | ((later == 0.0) & (order[:, None] > order[None, :]))
+    stands = landing[None, :] & landing[:, None] & second & (ends[:, None] < cleared[None] + apart)
+    lands_beside = near(goals, goals) & stands
+    waits = landing[:, None] & (ends[:, None] <= begins[None, :] + apart)
+    lands_before = near(goals, starts) & waits
+
+    def conflict(kind: Kind, y: int, x: int, place: Floats, stand: Floats, time_s: float, until: float) -> Conflict:
+        here, there = (float(place[0]), float(place[1]), float(place[2])), (
+            float(stand[0]), float(stand[1]), float(stand[2]))  # fmt: skip
+        apart_m = math.hypot(here[0] - there[0], here[1] - there[1])
+        number = _number(paths[y], 0 if kind == "take-off" else -1)
+        other = _number(paths[x], 0 if stand is starts[x] else -1)
+        names = (paths[y].name, paths[x].name)
+        met = Encounter(names, apart_m, time_s, (time_s, time_s), (here, there), (number, other))
+        return Conflict(kind, met, rules.needed_m, time_s, until)
+
+    found: list[Conflict] = []
+    for y, x in np.argwhere(leaves_beside).tolist():
+        found.append(conflict("take-off", y, x, starts[y], goals[x], float(begins[y]), float(begins[y])))
+    for y, x in np.argwhere(lands_beside).tolist():
+        found.append(conflict("landing", y, x, goals[y], goals[x], float(ends[y]), float(cleared[x])))
+    for y, x in np.argwhere(lands_before).tolist():
+        found.append(conflict("landing", y, x, goals[y], starts[x], float(ends[y]), float(begins[x])))
+    return found
+
+
+def waiting_note(paths: Sequence[TimedPath], rules: Rules) -> tuple[str, ...]:
+    """A note on start pads nearer to each other than needed."""
+    starts = np.array([p.points[0, :2] for p in paths])
+    i, j = np.triu_indices(len(paths), 1)
+    apart = np.hypot(*(starts[i] - starts[j]).T)
+    near = apart < rules.needed_m - TOLERANCE_M
+    if not near.any():
+        return ()
+    m = int(apart.argmin())
+    return (
+        f"{int(near.sum())} pairs of start places are nearer than {rules.needed_m:g} m (nearest: {paths[i[m]].name}, "
+        f"{paths[j[m]].name}: {apart[m]:.1f} m): vehicles that wait on the ground are not judged against each other",
+    )
+
+
+def encounter(
+    fleet: Fleet, pair: tuple[int, int], distance_m: float, times_s: tuple[float, float], pieces: tuple[int, int]
+) -> Encounter:
+    """Two vehicles at two moments on two pieces, counted over all vehicles."""
+    a, b = pair
+    places = [np.asarray(fleet.paths[v].at(t)[0]).tolist() for v, t in zip(pair, times_s, strict=True)]
+    numbers = [_number(fleet.paths[v], piece - int(fleet.offset[v])) for v, piece in zip(pair, pieces, strict=True)]
+    return Encounter(
+        (fleet.paths[a].name, fleet.paths[b].name), distance_m, 0.5 * (times_s[0] + times_s[1]), times_s,
+        (tuple(places[0]), tuple(places[1])), (numbers[0], numbers[1]),
+    )  # fmt: skip
+
+
+def swapped(met: Encounter) -> Encounter:
+    """The same with the two vehicles in the other order."""
+    return Encounter(
+        met.vehicles[::-1], met.distance_m, met.time_s, met.times_s[::-1], met.places[::-1], met.pieces[::-1]
+    )
+
+
+def _number(path: TimedPath, piece: int) -> int:
+    """The caller's number of a piece; of the last one where it is that of standing in the air."""
+    if path.pieces is None:
+        return -1
+    return int(path.pieces[min(piece, len(path.pieces) - 1)])

@@ -1,0 +1,319 @@
+"""From a path to a motion in time: take-off, gate, way-point legs with acceleration and corners, landing.
+
+A multicopter that follows way points: vertical take-off from rest to rest; an optional hold at the top (the gate), then
+the speed is set from a standstill; legs at the largest speed that cruise, climb and descent rates, corners and the
+acceleration allow, looking ahead (`speeds`); way points without a hold are passed in a rounded corner, the goal is
+reached with a stop: that moment is the arrival. Wind and noise are not in here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column, legs
+from gcsplan.vehicle import Vehicle
+
+__all__ = ["POSITION_ERROR_M", "Course", "End", "Route", "fly", "motion_error_m", "speed_for", "time_to_goal_s"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+End = Literal["land", "loiter", "rtl", "none"]
+
+LAND_SLOWLY_M = 10.0
+"""Height above ground below which a landing is slow (ArduCopter's LAND_ALT_LOW)."""
+
+_LEAST_S = 1e-9
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Route:
+    """Where one vehicle flies, without when.
+
+    ``points`` (N, 3), N >= 2: east_m, north_m, amsl_m from the top of take-off to the approach point. Grounds are
+    amsl; without ``start_ground_amsl_m`` the flight begins in the air at the first point (the papers'), without
+    ``goal_ground_amsl_m`` there is no landing. ``end`` as in a mission file; ``rtl`` climbs to ``rtl_amsl_m`` if it is
+    lower, flies straight home at cruise speed, and lands; ``none`` is gone on arrival. ``holds_s`` (N,): seconds of
+    standing at each point; the first one's is the gate. ``items`` (N + 1,): the caller's number of the take-off, of
+    each way point but the first, and of what ends the flight.
+
+    A fixed wing has no columns: ``climb_out`` (K, 3) leads from the ground to the first point, ``glide`` (K, 3) from
+    the last one down to the ground where it lands; home after a return it circles, and stays in the air.
+    """
+
+    name: str
+    points: Floats
+    start_ground_amsl_m: float | None = None
+    goal_ground_amsl_m: float | None = None
+    end: End = "land"
+    rtl_amsl_m: float | None = None
+    holds_s: Floats | None = None
+    items: Ints | None = None
+    climb_out: Floats | None = None
+    glide: Floats | None = None
+
+    def __post_init__(self) -> None:
+        p = self.points
+        if p.ndim != 2 or p.shape[1] != 3 or len(p) < 2 or not np.isfinite(p).all():
+            raise ValueError(f"a route is (N, 3) finite metres with N >= 2, given shape {p.shape}")
+        if self.holds_s is not None and (self.holds_s.shape != (len(p),) or not (self.holds_s >= 0.0).all()):
+            raise ValueError(f"{len(p)} points need as many holds of 0 s or more, given {self.holds_s}")
+        if self.items is not None and self.items.shape != (len(p) + 1,):
+            raise ValueError(f"{len(p)} points need {len(p) + 1} item numbers, given {len(self.items)}")
+        if self.start_ground_amsl_m is not None and self.start_ground_amsl_m > p[0, 2]:
+            raise ValueError(f"{self.name}: the ground at the start lies above the top of take-off")
+        if self.end == "rtl":
+            _home(self)
+        if self.end == "land" and self.goal_ground_amsl_m is not None and self.goal_ground_amsl_m > p[-1, 2]:
+            raise ValueError(f"{self.name}: the ground at the goal lies above the approach point")
+
+    @property
+    def length_m(self) -> float:
+        """Length in space of the way-point legs, corners not cut."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+    def energy_j(self, vehicle: Vehicle, hold_s: float = 0.0) -> float:
+        """Energy of the flight (krill paper, Table 1: R1 a vertical metre, R2 a horizontal one; ``hover_w`` in holds).
+
+        Corners are not cut; ``hold_s`` comes on top of the route's own holds. Standing on the ground costs nothing.
+        """
+        corners = _flown(self)
+        d = np.diff(corners, axis=0)
+        held = hold_s + (0.0 if self.holds_s is None else float(self.holds_s.sum()))
+        energy = vehicle.energy
+        return (
+            energy.vertical_j_per_m * float(np.abs(d[:, 2]).sum())
+            + energy.horizontal_j_per_m * float(np.hypot(d[:, 0], d[:, 1]).sum())
+            + energy.hover_w * held
+        )
+
+
+class Course:
+    """A route laid out for a vehicle: its stretches, ready for any speed.
+
+    ``to_goal`` is what lies before the arrival, ``after`` what follows; each entry is a stretch and the seconds of
+    standing behind it.
+    """
+
+    def __init__(self, route: Route, vehicle: Vehicle) -> None:
+        self.route, self.vehicle = route, vehicle
+        holds = np.zeros(len(route.points)) if route.holds_s is None else route.holds_s
+        self.gate_s = float(holds[0])
+        self.takeoff = _takeoff(route, vehicle)
+        self.to_goal: list[tuple[Stretch, float]] = []
+        stops = [0, *(np.flatnonzero(holds[1:-1] > 0.0) + 1).tolist(), len(holds) - 1]
+        waited = 0.0
+        for i, j in pairwise(stops):
+            stretch = legs(route.points[i : j + 1], vehicle, np.arange(i + 1, j + 1, dtype=np.intp))
+            held = float(holds[j]) if j < stops[-1] else 0.0
+            if stretch is not None:
+                self.to_goal.append((stretch, held))
+            else:
+                waited += held  # a hold where it stands already: at the gate, or longer at the last one
+                if self.to_goal:
+                    last, before = self.to_goal[-1]
+                    self.to_goal[-1], waited = (last, before + waited), 0.0
+        self.gate_s += waited
+        self.goal_s = float(holds[-1])
+        self.after = _after(route, vehicle)
+
+    def time_to_goal_s(self, speed_m_s: float, hold_s: float = 0.0) -> float:
+        """Seconds from leaving the ground to the arrival at a cruise speed, with ``hold_s`` more at the gate."""
+        first = 0.0 if self.takeoff is None else self.takeoff.time_s(speed_m_s)
+        return first + self.gate_s + hold_s + sum(s.time_s(speed_m_s) + held for s, held in self.to_goal)
+
+    def fly(
+        self, speed_m_s: float, depart_s: float = 0.0, hold_s: float = 0.0, error_m: float = POSITION_ERROR_M
+    ) -> TimedPath:
+        """The motion of the whole flight, within ``error_m`` of the true one at every moment; see `fly`."""
+        route = self.route
+        start = route.points[0] if self.takeoff is None else self.takeoff.start[0]
+        motion = _Motion(depart_s, start)
+        if self.takeoff is not None:
+            motion.go(self.takeoff, speed_m_s, error_m)
+        motion.wait(self.gate_s + hold_s, 0)
+        for stretch, held in self.to_goal:
+            motion.go(stretch, speed_m_s, error_m)
+            motion.wait(held, int(stretch.owner[-1]))
+        arrive_s = motion.now_s
+        if self.after:
+            motion.wait(self.goal_s, len(route.points) - 1)
+        for stretch in self.after:
+            motion.go(stretch, speed_m_s, error_m)
+        return motion.path(route, arrive_s)
+
+
+def fly(
+    route: Route,
+    vehicle: Vehicle,
+    speed_m_s: float,
+    depart_s: float = 0.0,
+    hold_s: float = 0.0,
+    error_m: float = POSITION_ERROR_M,
+) -> TimedPath:
+    """The motion of a whole flight at a cruise speed, leaving at ``depart_s``, with ``hold_s`` at the gate.
+
+    Accelerated and curved parts are cut into straight pieces of constant speed that stray at most ``error_m`` from
+    the true motion at any moment (`motion_error_m`). Pieces carry the route's item numbers.
+    """
+    return Course(route, vehicle).fly(speed_m_s, depart_s, hold_s, error_m)
+
+
+def time_to_goal_s(route: Route, vehicle: Vehicle, speed_m_s: float) -> float:
+    """Seconds from leaving the ground to the arrival; never rises with the speed. For many speeds: `Course`."""
+    return Course(route, vehicle).time_to_goal_s(speed_m_s)
+
+
+def motion_error_m(vehicle: Vehicle, error_m: float = POSITION_ERROR_M) -> float:
+    """How far a `TimedPath` made here may be from the true motion: 0 where nothing accelerates or turns."""
+    sharp = math.isinf(vehicle.corner_accel_m_s2)
+    instant = math.isinf(vehicle.accel_m_s2) and math.isinf(vehicle.vertical_accel_m_s2)
+    return 0.0 if sharp and instant else error_m
+
+
+def speed_for(
+    time_s: Callable[[float], float], wanted_s: float, slow_m_s: float, fast_m_s: float, within_s: float = 1e-9
+) -> float:
+    """The speed between two at which ``time_s`` (falling) takes ``wanted_s``: the faster end where it is flat.
+
+    ``wanted_s`` must lie between the times at the two ends, or the nearer end is given.
+    """
+    low, high = slow_m_s, fast_m_s
+    t_low, t_high = time_s(low) - wanted_s, time_s(high) - wanted_s
+    if t_high >= -within_s:
+        return high
+    if t_low <= within_s:
+        return low
+    # Regula falsi in 1/v, in which time is nearly a straight line (Illinois: an end that stays is halved).
+    x_low, x_high = 1.0 / low, 1.0 / high
+    side = 0
+    for _ in range(200):
+        x = (x_low * t_high - x_high * t_low) / (t_high - t_low)
+        if not x_high < x < x_low:
+            x = 0.5 * (x_low + x_high)
+        t = time_s(1.0 / x) - wanted_s
+        if abs(t) <= within_s or x_low - x_high <= 1e-15 * x_low:
+            break
+        if t > 0.0:
+            x_low, t_low, t_high = x, t, t_high * (0.5 if side > 0 else 1.0)
+            side = 1
+        else:
+            x_high, t_high, t_low = x, t, t_low * (0.5 if side < 0 else 1.0)
+            side = -1
+    return 1.0 / x
+
+
+class _Motion:
+    """Breakpoints of a flight, gathered one stretch after the other."""
+
+    def __init__(self, depart_s: float, start: Floats) -> None:
+        self.now_s = depart_s
+        self.times = [np.array([depart_s])]
+        self.points = [start[None, :]]
+        self.legs: list[Ints] = []
+
+    def go(self, stretch: Stretch, speed_m_s: float, error_m: float) -> None:
+        times, points, owner = stretch.motion(speed_m_s, error_m)
+        self.times.append(self.now_s + times)
+        self.points.append(points)
+        self.legs.append(owner)
+        self.now_s = float(self.times[-1][-1])
+
+    def wait(self, seconds: float, leg: int) -> None:
+        if seconds > 0.0:
+            self.now_s += seconds
+            self.times.append(np.array([self.now_s]))
+            self.points.append(self.points[-1][-1:])
+            self.legs.append(np.array([leg], dtype=np.intp))
+
+    def path(self, route: Route, arrive_s: float) -> TimedPath:
+        times, points = np.concatenate(self.times), np.concatenate(self.points)
+        if len(times) < 2:
+            raise ValueError(f"{route.name} does not move")
+        legs_ = np.concatenate(self.legs)
+        keep = np.append(True, np.diff(times) > _LEAST_S)
+        keep[-1] = True
+        if times[-1] - times[keep][-2] <= _LEAST_S:  # the last point stays, a sliver before it goes
+            keep[np.flatnonzero(keep)[-2]] = False
+        items = np.full(len(legs_), -1, dtype=np.intp) if route.items is None else route.items[legs_]
+        stays = route.end == "loiter" or (route.end == "rtl" and route.climb_out is not None)
+        return TimedPath(route.name, times[keep], points[keep], arrive_s, stays, items[keep[1:]])
+
+
+def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | None:
+    ground, top = route.start_ground_amsl_m, route.points[0]
+    if route.climb_out is not None:
+        return legs(route.climb_out, vehicle, np.zeros(len(route.climb_out) - 1, dtype=np.intp))
+    if ground is None or ground >= top[2]:
+        return None
+    return column(np.array([ground, top[2]]), np.array([vehicle.climb_m_s]), top[:2], vehicle, 0, stops=True)
+
+
+def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
+    """What follows the arrival."""
+    goal, home = route.points[-1], route.points[0]
+    number = len(route.points)
+    slanted = route.glide
+    if route.climb_out is not None and route.end == "rtl":
+        slanted = np.array([goal, [*route.climb_out[0, :2], _home(route)[1]]])
+    if slanted is not None or route.climb_out is not None:
+        down = None if slanted is None else legs(slanted, vehicle, np.full(len(slanted) - 1, number, dtype=np.intp))
+        return [] if down is None else [down]
+    if route.end == "land" and route.goal_ground_amsl_m is not None:
+        return _landing(goal, route.goal_ground_amsl_m, vehicle, number)
+    if route.end != "rtl":
+        return []
+    home_amsl, rtl_amsl = _home(route)
+    level = max(float(goal[2]), rtl_amsl)
+    stretches = []
+    if level > goal[2]:
+        climb = np.array([vehicle.climb_m_s])
+        stretches.append(column(np.array([goal[2], level]), climb, goal[:2], vehicle, number, stops=True))
+    above = np.array([[goal[0], goal[1], level], [home[0], home[1], level]])
+    way = legs(above, vehicle, np.array([number], dtype=np.intp))
+    stretches += [way] if way is not None else []
+    return stretches + _landing(above[1], home_amsl, vehicle, number)
+
+
+def _home(route: Route) -> tuple[float, float]:
+    """Ground at home and height of the way there, amsl, of a route that ends with a return."""
+    if route.start_ground_amsl_m is None or route.rtl_amsl_m is None:
+        raise ValueError(f"{route.name}: a return needs rtl_amsl_m and the ground at home")
+    return route.start_ground_amsl_m, route.rtl_amsl_m
+
+
+def _landing(top: Floats, ground: float, vehicle: Vehicle, number: int) -> list[Stretch]:
+    slow_from = ground + LAND_SLOWLY_M
+    slow = min(vehicle.land_m_s, vehicle.descent_m_s)
+    if top[2] <= ground:
+        return []
+    if top[2] <= slow_from:
+        return [column(np.array([top[2], ground]), np.array([slow]), top[:2], vehicle, number, stops=False)]
+    heights = np.array([top[2], slow_from, ground])
+    return [column(heights, np.array([vehicle.descent_m_s, slow]), top[:2], vehicle, number, stops=False)]
+
+
+def _flown(route: Route) -> Floats:
+    """The corners of the whole flight as a polyline, columns and the way home included."""
+    first, last = route.points[0], route.points[-1]
+    before, behind = [], []
+    if route.climb_out is not None:
+        before, behind = list(route.climb_out[:-1]), [] if route.glide is None else list(route.glide[1:])
+        if route.end == "rtl":
+            behind = [np.array([*route.climb_out[0, :2], _home(route)[1]])]
+        return np.array([*before, *route.points, *behind], dtype=np.float64)
+    if route.start_ground_amsl_m is not None:
+        before.append([first[0], first[1], route.start_ground_amsl_m])
+    if route.end == "land" and route.goal_ground_amsl_m is not None:
+        behind.append([last[0], last[1], route.goal_ground_amsl_m])
+    if route.end == "rtl":
+        level = max(float(last[2]), _home(route)[1])
+        behind += [[last[0], last[1], level], [first[0], first[1], level], before[0]]
+    return np.array([*before, *route.points, *behind], dtype=np.float64)

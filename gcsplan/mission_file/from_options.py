@@ -1,0 +1,175 @@
+"""A world without a mission file: terrain, zones and limits as options of a command give them, in the same words.
+
+Everything is judged by the same rules as in a mission file; what is wrong is named by its option.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from gcsplan.errors import InputError, Problem
+from gcsplan.mission_file.load import TERRAIN_ERROR_M
+from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys, read_section
+from gcsplan.mission_file.vehicles import make_vehicle
+from gcsplan.mission_file.world import Box, make_spec, settle_zones
+from gcsplan.mission_file.zone_draft import ZoneDraft, one_line, place_zones, zones_sha256
+from gcsplan.mission_file.zone_geojson import read_zones
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
+from gcsplan.world.terrain import Terrain, open_terrain
+from gcsplan.world.world import World
+from gcsplan.world.zones import Zone
+
+MARGIN_M, MARGIN_MOST_M = 500.0, 3000.0
+"""Terrain around what is flown: metres, or a tenth of its extent, at most."""
+
+OPTIONS = {
+    "min_agl_m": "--min-agl", "max_agl_m": "--max-agl", "max_amsl_m": "--max-amsl", "speed_m_s": "--speed",
+    "horizontal_clearance_m": "--clearance", "track_error_m": "--track-error", "climb_m_s": "--climb-rate",
+    "altitude_error_m": "--altitude-error", "max_climb_deg": "--max-climb", "max_descent_deg": "--max-descent",
+    "descent_m_s": "--descent-rate", "dem": "--dem", "vertical_datum": "--vertical-datum", "autopilot": "--autopilot",
+    "geoid_grid": "--geoid-grid", "obstacle_height_m": "--obstacle-height", "start": "--home",
+    "rtl_rel_home_m": "--rtl-altitude", "crs": "--crs",
+}  # fmt: skip
+"""The option that stands for each key of a mission file."""
+
+
+@dataclass(frozen=True)
+class WorldOptions:
+    """What the options say, under the mission file's names; paths as given, None where not given.
+
+    ``home`` (latitude, longitude) stands for the home of every file.
+    """
+
+    terrain: Mapping[str, object] = field(default_factory=dict)
+    zones: tuple[str, ...] = ()
+    limits: Mapping[str, float] = field(default_factory=dict)
+    vehicle: Mapping[str, object] = field(default_factory=dict)
+    home: tuple[float, float] | None = None
+    rtl_rel_home_m: float | None = None
+    terrain_error_m: float = TERRAIN_ERROR_M
+
+
+class OpenWorld:
+    """Terrain and zones of the options, opened and found good; `around` loads what some places need of them."""
+
+    def __init__(self, options: WorldOptions) -> None:
+        problems: list[Problem] = []
+        self.options = options
+        self.notes: list[str] = []
+        self._drafts = _drafts(options.zones, problems, self.notes)
+        self._terrain: Terrain | None = None
+        keys = read_section(TerrainKeys, dict(options.terrain), "", problems)
+        if keys is not None:
+            self._obstacle_m = keys.obstacle_height_m
+            try:
+                self._terrain = open_terrain(make_spec(keys, Path()), where="--dem")
+            except InputError as why:
+                problems += why.problems
+        self._limits = read_section(LimitKeys, dict(options.limits), "", problems) or LimitKeys()
+        if not problems:
+            self.vehicle("file", "arducopter")  # the limits' own contradictions, before any file is opened
+        if problems:
+            raise InputError.of([_renamed(p) for p in problems])
+
+    def vehicle(self, name: str, autopilot: str) -> Vehicle:
+        """The vehicle that the options describe, for a file of that autopilot. Raises InputError."""
+        problems: list[Problem] = []
+        notes: list[str] = []
+        given = {"name": "file", "sysid": 1, "autopilot": autopilot, "start": [0.0, 0.0], "goal": [0.0, 0.0]}
+        keys = read_section(VehicleKeys, given | dict(self.options.vehicle), "", problems)
+        made = None
+        if keys is not None:
+            made = make_vehicle(keys, self._limits, "", problems, notes, local=False, obstacle_m=self._obstacle_m)
+        if made is None:
+            raise InputError.of([_renamed(p) for p in problems])
+        self.notes += [n.removeprefix("file: ") for n in notes if n.removeprefix("file: ") not in self.notes]
+        return replace(made, name=name)
+
+    def around(self, places: Sequence[tuple[float, float]], reach_m: float = 0.0) -> tuple[World, dict[str, object]]:
+        """The world that holds ``places`` (latitude, longitude), and what is to be said of its sources.
+
+        ``reach_m``: how far beyond them the terrain is wanted; `MARGIN_M` or a tenth of their extent come on top, and
+        the clearance.
+
+        Places that the terrain does not know are left out: what flies there is found to. Raises InputError where none
+        is left, or where they lie too far apart for one plane.
+        """
+        assert self._terrain is not None
+        known = [p for p in places if self._terrain.covers(*p)]
+        if not known:
+            swapped = any(abs(lon) <= 90.0 and self._terrain.covers(lon, lat) for lat, lon in places)
+            hint = "; latitude and longitude look swapped" if swapped else ""
+            raise InputError(f"the DEM holds none of the mission's places{hint}; add the tile", where="--dem")
+        frame = Frame(*centre_of([p[0] for p in known], [p[1] for p in known]))
+        in_plane = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in known)]
+        if not all(math.hypot(*p) <= FARTHEST_M for p in in_plane):
+            raise InputError(
+                f"the places lie more than {FARTHEST_M / 1000:.0f} km from their middle: too far for one plane",
+                where="--dem",
+            )
+        problems: list[Problem] = []
+        placed, far = place_zones(self._drafts, frame)
+        box = self._box(in_plane, reach_m)
+        scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
+        surface = self._terrain.load(frame, box)
+        zones: list[Zone] = []
+        for draft, zone in placed:
+            own: list[Problem] = []
+            settled = settle_zones([(draft, zone)], surface, own)
+            west, south, east, north = zone.bounds
+            if own and not (west > box[0] and south > box[1] and east < box[2] and north < box[3]):
+                settled, own = [zone], []  # under ground here, and elsewhere nobody looked
+            zones += settled
+            problems += own
+        if problems:
+            raise InputError.of([_renamed(p) for p in problems])
+        notes = surface.info.get("notes", ())
+        told = [*self.notes, *(str(n) for n in (notes if isinstance(notes, tuple) else ()))]
+        if far:
+            told.append(f"{len(far)} zone(s) of files lie too far away to matter and are left out")
+        inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}
+        inputs["zones_sha256"] = zones_sha256(self._drafts)
+        inputs["notes"] = tuple(dict.fromkeys(told))
+        return World(frame, Airspace(surface, zones, scale=scale)), inputs
+
+    def _box(self, points: Sequence[tuple[float, float]], reach_m: float) -> Box:
+        """Nobody looks for detours here, so that terrain of a metre's resolution can be held against a long mission."""
+        east, north = [p[0] for p in points], [p[1] for p in points]
+        low, high = (min(east), min(north)), (max(east), max(north))
+        extent = max(high[0] - low[0], high[1] - low[1])
+        near = [self._limits.horizontal_clearance_m, self._limits.track_error_m]
+        margin = reach_m + max(MARGIN_M, min(0.1 * extent, MARGIN_MOST_M)) + sum(x for x in near if x is not None)
+        return low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin
+
+
+def _drafts(files: Sequence[str], problems: list[Problem], notes: list[str]) -> list[ZoneDraft]:
+    """The zones of all files, each with a name of its own."""
+    drafts: list[ZoneDraft] = []
+    for file in files:
+        try:
+            found = read_zones(Path(file), where="--zones")
+        except InputError as why:
+            problems += why.problems
+            continue
+        problems += found.problems
+        notes += found.notes
+        drafts += found.zones
+    seen: Counter[str] = Counter()
+    for k, draft in enumerate(drafts):
+        name = one_line(draft.name)
+        seen[name] += 1
+        drafts[k] = replace(draft, name=f"{name} #{seen[name]}" if seen[name] > 1 else name)
+    return drafts
+
+
+def _renamed(problem: Problem) -> Problem:
+    """``.min_agl_m`` and the like, as the option that says so."""
+    key = problem.where.removeprefix(".").split(".")[-1].split("[")[0]
+    option = OPTIONS.get(key)
+    return Problem(option, problem.message) if option is not None else problem
