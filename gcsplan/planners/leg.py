@@ -61,7 +61,7 @@ class Leg:
         self._twin: Plane | None = None
         self._guide: Guide
         self._ahead: Guide | None = None
-        self._seen: tuple[float, tuple[Floats, Floats, Floats]] | None = None
+        self._seen: tuple[Floats, Floats, Floats] | None = None
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
         wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
         self.parts = max(1, round(cell_m / wanted_m))
@@ -185,26 +185,20 @@ class Leg:
 
     def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats]:
         """Of the cells that tracks shorter than ``limit_m`` may meet (and more): lowest floor, ways there and on."""
-        nothing = np.full(1, -math.inf), np.zeros(1), np.zeros(1)  # of nothing it is known that it is high
-        if limit_m > self.reach_m * (1.0 + 1e-6):
-            return nothing  # a longer track may meet cells that the flood did not
-        if self._seen is not None and limit_m <= self._seen[0]:
-            return self._seen[1]
-        mesh = self.plane.mesh(self.top_m, True, 1, self.corridor(limit_m), single=True)
-        a, b = self.start.place, self.goal.place
-        try:
-            _, left = mesh.flood(b, a, limit_m, math.inf, self._from_start())
-            _, away = mesh.flood(a, b, limit_m, math.inf, left)
-        except Exhausted:
-            return nothing
-        both = mesh.piece.reshape(-1, 2)
-        live = both.max(axis=1) >= 0
-        ways = []
-        for guide in (away, left):
-            entered = np.append(guide.entered, np.inf)
-            ways.append(entered[both[live]].min(axis=1))
-        self._seen = limit_m, (mesh.lowest()[live], ways[0], ways[1])
-        return self._seen[1]
+        if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that the flood did not
+            return np.full(1, -math.inf), np.zeros(1), np.zeros(1)  # of nothing it is known that it is high
+        if self._seen is None:
+            # A piece is as near as its entrance, and no cell of it nearer than straight ahead.
+            mesh = self._guide.mesh
+            both = mesh.piece.reshape(-1, 2)
+            ways = []
+            for guide, end in ((self._from_start(), self.start), (self._guide, self.goal)):
+                entered = np.append(guide.entered, np.inf)[both].min(axis=1)
+                ways.append(np.maximum(entered, mesh.straight_to(end.place)))
+            self._seen = mesh.lowest(), ways[0], ways[1]
+        low, away, left = self._seen
+        near = away + left <= limit_m
+        return low[near], away[near], left[near]
 
     def _from_start(self) -> Guide:
         """Distances from the start over the coarse mesh, as far as the flood from the goal has seen."""

@@ -76,6 +76,16 @@ class Mesh:
         f = self.floor
         return np.minimum(np.minimum(f[:-1, :-1], f[:-1, 1:]), np.minimum(f[1:, :-1], f[1:, 1:])).ravel()
 
+    def straight_to(self, place: tuple[float, float]) -> Floats:
+        """(cells,) metres that no way from a place to each is shorter than; of meshes as fine as their plane."""
+        rows, cols = self.excess.shape
+        part = np.s_[self.row : self.row + rows, self.col : self.col + cols]
+        x, y = self.plane.x[part] - place[0], self.plane.y[part] - place[1]
+        middle = (0.25 * (z[:-1, :-1] + z[:-1, 1:] + z[1:, :-1] + z[1:, 1:]) for z in (x, y))
+        across = np.hypot(x[1:, 1:] - x[:-1, :-1], y[1:, 1:] - y[:-1, :-1])
+        other = np.hypot(x[1:, :-1] - x[:-1, 1:], y[1:, :-1] - y[:-1, 1:])
+        return np.asarray((np.hypot(*middle) - 0.5 * np.maximum(across, other)).ravel())
+
     def pieces_at(self, place: tuple[float, float]) -> list[int]:
         """The free pieces that a place lies in, or next to where its own is not free."""
         found: list[int] = []
