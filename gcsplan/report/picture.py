@@ -1,7 +1,9 @@
-"""One picture of a plan: the map from above, and each vehicle's altitude profile."""
+"""Pictures of a plan as PNG: the map from above, each vehicle's altitude profile, and the fleet in time."""
 
 from __future__ import annotations
 
+import io
+from itertools import combinations
 from pathlib import Path as FilePath
 from typing import IO, TYPE_CHECKING
 
@@ -18,6 +20,9 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from gcsplan.check.verdict import Verdict
+from gcsplan.report import space_picture
+from gcsplan.report.fleet_view import apart_m, flown_m, instants
+from gcsplan.report.samples import line_of
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Zone
 
@@ -48,6 +53,77 @@ def save(plan: Plan, file: FilePath | IO[bytes]) -> None:
     """Write `draw`'s picture as PNG."""
     with rc_context({"text.parse_math": False}):  # a dollar sign in a name is one
         draw(plan).savefig(file, format="png", dpi=110, metadata={"Software": None})
+
+
+def figures(plan: Plan) -> dict[str, bytes]:
+    """File name to PNG of each figure alone: report-map.png, report-space.png, report-profile.png, and a fleet's
+    report-fleet.png."""
+    drawn = {"report-map.png": _map_alone(plan), "report-profile.png": _profiles_alone(plan)}
+    tracks = [
+        (v.name, colour, line)
+        for v, colour in zip(plan.vehicles, _colours(len(plan.vehicles)), strict=True)
+        if (line := line_of(v.verdict, plan.world, v.request.vehicle.limits, samples=400)) is not None
+    ]
+    space = space_picture.draw(plan.source.name, plan.world, tracks)
+    if space is not None:
+        drawn["report-space.png"] = space
+    if plan.fleet is not None and len(plan.vehicles) > 1:
+        drawn["report-fleet.png"] = _fleet_alone(plan)
+    out = {}
+    with rc_context({"text.parse_math": False}):
+        for name, figure in drawn.items():
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
+            out[name] = buffer.getvalue()
+    return out
+
+
+def _figure(width: float, height: float) -> Figure:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _map_alone(plan: Plan) -> Figure:
+    extent = _extent(plan)
+    west, south, east, north = extent
+    figure = _figure(11, min(max(9.0 * (north - south) / (east - west) + 0.8, 2.5), 14.0))
+    _map(figure.subplots(), plan, extent)
+    return figure
+
+
+def _profiles_alone(plan: Plan) -> Figure:
+    rows = len(plan.vehicles)
+    figure = _figure(11, 2.8 * rows)
+    axes = figure.subplots(rows, 1, squeeze=False)[:, 0]
+    for ax, vehicle, colour in zip(axes, plan.vehicles, _colours(rows), strict=True):
+        _profile(ax, plan.world, vehicle.verdict, vehicle.request.vehicle.limits.min_agl_m, colour)
+        ax.set_title(f"{vehicle.name}: {vehicle.verdict.length_m:,.0f} m", loc="left", fontsize=10)
+    return figure
+
+
+def _fleet_alone(plan: Plan) -> Figure:
+    assert plan.fleet is not None
+    motions = list(enumerate(plan.fleet.motions))
+    times = instants(motions)
+    figure = _figure(11, 6.5)
+    way, apart = figure.subplots(2, 1, sharex=True)
+    for (_, motion), colour in zip(motions, _colours(len(motions)), strict=True):
+        way.plot(times, flown_m(motion, times) / 1000.0, color=colour, lw=1.6, label=motion.name)
+    way.set(ylabel="way flown, km", xlim=(times[0], times[-1]))
+    way.legend(fontsize=8, ncols=2)
+    every = np.stack([apart_m(a, b, times) for (_, a), (_, b) in combinations(motions, 2)])
+    some = ~np.isnan(every).all(axis=0)
+    if some.any():
+        apart.plot(times[some], np.nanmin(every[:, some], axis=0), color="#111111", lw=1.4, label="nearest two")
+    if plan.fleet.separation is not None:
+        needed = plan.fleet.separation.rules.needed_m
+        apart.axhline(needed, color="#d62728", lw=1.0, ls="--", label=f"needed, {needed:g} m")
+    apart.set(xlabel="time, s", ylabel="apart, m", ylim=(0, None))
+    apart.legend(fontsize=8)
+    for ax in (way, apart):
+        ax.grid(alpha=0.3)
+    return figure
 
 
 def _colours(n: int) -> list[str]:

@@ -1,0 +1,111 @@
+// What every figure shares: the numbers of the page, their wording, the tip beside the pointer, and who is pointed at.
+const data = JSON.parse(document.getElementById('data').textContent);
+// Paper is white, whatever the screen is; registered first, so that every figure is drawn anew in its colours.
+window.addEventListener('beforeprint', () => document.documentElement.classList.add('paper'));
+window.addEventListener('afterprint', () => document.documentElement.classList.remove('paper'));
+
+const GAP = '\u202f', THIN = '\u202f';
+
+function num(value, decimals, unit) {
+  if (value === null || value === undefined || !isFinite(value)) return '–';
+  let text = value.toFixed(decimals);
+  if (Number(text) === 0) text = text.replace('-', '');
+  text = text.replace(/\B(?=(\d{3})+(?!\d))/g, (m, g, at) => (text.indexOf('.') >= 0 && at > text.indexOf('.') ? '' : THIN));
+  return text + (unit ? (unit === '°' ? '' : GAP) + unit : '');
+}
+
+// Room is rounded down, as everywhere on the page.
+const least = (v, d, unit) => num(v === null ? null : Math.floor(v * 10 ** d + 1e-6) / 10 ** d, d, unit);
+
+function minutes(s) {
+  const whole = Math.round(s);
+  return whole < 60 ? num(whole, 0, 's') : `${Math.floor(whole / 60)}${GAP}min ${String(whole % 60).padStart(2, '0')}${GAP}s`;
+}
+
+// -- the ground -------------------------------------------------------------------------------------------------------
+const ground = (() => {
+  const g = data.grid, [west, south, east, north] = g.box;
+  const bytes = Uint8Array.from(atob(g.heights), (c) => c.charCodeAt(0));
+  const z = new Float32Array(g.cols * g.rows);
+  for (let i = 0; i < z.length; i++) {
+    const whole = bytes[2 * i] + 256 * bytes[2 * i + 1];
+    z[i] = whole === g.unknown ? NaN : g.base + g.step * whole;
+  }
+  const mix = (values, cols, rows, e, n) => {
+    const c = ((e - west) / (east - west)) * (cols - 1), r = ((north - n) / (north - south)) * (rows - 1);
+    if (!(c >= 0 && c <= cols - 1 && r >= 0 && r <= rows - 1)) return NaN;
+    const i = Math.min(Math.floor(c), cols - 2), j = Math.min(Math.floor(r), rows - 2), u = c - i, v = r - j;
+    const at = (a, b) => values[b * cols + a];
+    return (1 - v) * ((1 - u) * at(i, j) + u * at(i + 1, j)) + v * ((1 - u) * at(i, j + 1) + u * at(i + 1, j + 1));
+  };
+  return {
+    z, cols: g.cols, rows: g.rows, west, south, east, north, width: east - west, height: north - south,
+    at: (e, n) => mix(z, g.cols, g.rows, e, n),
+    degrees: (e, n) => [mix(g.lat, g.lattice, g.lattice, e, n), mix(g.lon, g.lattice, g.lattice, e, n)],
+  };
+})();
+
+function placeWords(e, n) {
+  const [lat, lon] = ground.degrees(e, n);
+  return isNaN(lat) ? '' : `${lat.toFixed(5)}, ${lon.toFixed(5)}`;
+}
+
+function groundWords(e, n) {
+  const z = ground.at(e, n);
+  return isNaN(z) ? 'ground unknown' : `ground about ${num(z, 0, 'm AMSL')}`;
+}
+
+// Everything that is known of one sample of one line, a row each.
+function sampleRows(k, i) {
+  const line = data.lines[k], leg = line.legs[line.leg[i]], top = line.o ? line.o[i] : line.g[i];
+  const rows = [
+    [line.name, `to item ${leg.seq}, ${leg.kind}`],
+    ['along the track', line.s[line.s.length - 1] > 2000 ? num(line.s[i] / 1000, 2, 'km') : num(line.s[i], 1, 'm')],
+    ['path', num(line.z[i], 1, 'm AMSL')],
+    ['above ' + (line.o ? 'trees' : 'ground'), least(top === null ? null : line.z[i] - top, 1, 'm')],
+    ['ground', num(line.g[i], 1, 'm AMSL')],
+  ];
+  if (!leg.column && line.f[i] !== null) rows.push(['lowest allowed', num(line.f[i], 1, 'm AMSL')]);
+  if (line.c[i] !== null) rows.push(['highest allowed', num(line.c[i], 1, 'm AMSL')]);
+  rows.push(['climb', num(leg.climb, 1, '°')], ['since take-off', minutes(line.t[i])]);
+  rows.push(['energy used', num(line.j[i], 0, 'kJ') + (line.battery ? `, ${num((100 * line.j[i]) / line.battery, 1, '%')}` : '')]);
+  rows.push(['at', placeWords(line.e[i], line.n[i])]);
+  return rows;
+}
+
+// -- the tip ----------------------------------------------------------------------------------------------------------
+const tip = (() => {
+  const box = document.getElementById('tip');
+  const show = (event, fill) => {
+    box.textContent = '';
+    fill(box);
+    box.hidden = false;
+    const pad = 14, w = box.offsetWidth, h = box.offsetHeight;
+    const vw = document.documentElement.clientWidth, vh = window.innerHeight;
+    let x = event.clientX + pad, y = event.clientY + pad;
+    if (x + w > vw - 4) x = event.clientX - w - pad;
+    if (y + h > vh - 4) y = event.clientY - h - pad;
+    box.style.left = `${Math.max(4, Math.min(x, vw - w - 4))}px`;
+    box.style.top = `${Math.max(4, y)}px`;
+  };
+  return {
+    words: (event, text) => show(event, (b) => { b.className = ''; b.textContent = text; }),
+    rows: (event, rows) => show(event, (b) => {
+      b.className = 'rows';
+      for (const [name, value] of rows) {
+        const left = document.createElement('span'), right = document.createElement('b');
+        left.textContent = name;
+        right.textContent = value;
+        b.append(left, right);
+      }
+    }),
+    hide: () => { box.hidden = true; },
+  };
+})();
+
+// -- who is pointed at: one sample of one line, shown in every figure --------------------------------------------------
+const watchers = [];
+function pointAt(k, i) {
+  for (const watch of watchers) watch(k, i);
+}
+const nowhere = () => pointAt(-1, -1);

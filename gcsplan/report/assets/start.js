@@ -1,0 +1,16 @@
+// Each figure on its own: what fails in one is told in the console, and the others are there all the same.
+document.documentElement.classList.add('live');
+const starts = [startMap, ...[...document.querySelectorAll('figure.chart')].map((f) => () => startChart(f)), startScene];
+for (const start of starts) {
+  try { start(); } catch (error) { console.error(error); }
+}
+// A tap beside every figure puts the tip away.
+document.addEventListener('pointerdown', (event) => { if (!event.target.closest('.view')) { tip.hide(); nowhere(); } });
+// What is folded is unfolded on paper.
+window.addEventListener('beforeprint', () => {
+  for (const part of document.querySelectorAll('details:not([open])')) { part.open = true; part.dataset.folded = ''; }
+});
+window.addEventListener('afterprint', () => {
+  for (const part of document.querySelectorAll('details[data-folded]')) { part.open = false; delete part.dataset.folded; }
+});
+document.documentElement.dataset.ready = 'yes';

@@ -1,0 +1,176 @@
+"""A fleet in time: how far each vehicle is when, how near they come to each other, and the schedule in numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.report.chart import Axes, Floats, chart_html
+from gcsplan.report.markup import esc, least, num, table, tools
+from gcsplan.report.plan_view import COLOURS
+from gcsplan.report.subject import Page
+
+INSTANTS = 600
+MOST_PAIRS = 6
+"""Drawn one by one; of more only the nearest at each moment."""
+TALL = 0.34
+
+
+def motions_of(page: Page) -> list[tuple[int, TimedPath]]:
+    """The subjects that have a place in the fleet's time, by number; empty for a single one."""
+    found = [(i, s.motion) for i, s in enumerate(page.subjects) if s.motion is not None]
+    return found if len(found) > 1 else []
+
+
+def fleet_html(page: Page, charts: dict[str, object]) -> str:
+    """The two pictures and the table; their numbers are added to ``charts`` for the page's script."""
+    motions = motions_of(page)
+    if not motions:
+        return ""
+    times = instants(motions)
+    words = "The distances are drawn at sampled moments, while both of two vehicles are in the air."
+    return (
+        f'<section id="fleet"><h2>The fleet in time</h2><p>{separation_words(page)}</p>'
+        + _schedule(page, motions)
+        + "<h3>Way flown over time</h3>"
+        + tools("distance")
+        + _distance_chart(motions, times, charts)
+        + "<h3>Separation over time</h3>"
+        + tools("separation")
+        + _separation_chart(page, motions, times, charts)
+        + f'<p class="note">{words}</p></section>'
+    )
+
+
+def instants(motions: Sequence[tuple[int, TimedPath]]) -> Floats:
+    """Moments for the pictures: even ones, and every moment at which some vehicle begins a new piece."""
+    begin, end = min(m.begin_s for _, m in motions), max(m.end_s for _, m in motions)
+    own = np.concatenate([m.times_s for _, m in motions])
+    if len(own) > 2 * INSTANTS:
+        own = own[:0]
+    return np.unique(np.round(np.concatenate([np.linspace(begin, end, INSTANTS), own]), 2))
+
+
+def flown_m(motion: TimedPath, times_s: Floats) -> Floats:
+    """(M,) horizontal way at each moment; NaN before take-off and after the end."""
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(motion.points[:, :2], axis=0).T))])
+    inside = (times_s >= motion.begin_s - 1e-6) & (times_s <= motion.end_s + 1e-6)
+    return np.where(inside, np.interp(times_s, motion.times_s, run), np.nan)
+
+
+def apart_m(a: TimedPath, b: TimedPath, times_s: Floats) -> Floats:
+    """(M,) distance in space at each moment while both are in the air; NaN else."""
+    begin = max(a.begin_s, b.begin_s)
+    end = min(math.inf if a.ends_in_air else a.end_s, math.inf if b.ends_in_air else b.end_s)
+    inside = (times_s >= begin) & (times_s <= end)
+    return np.where(inside, np.linalg.norm(a.at(times_s) - b.at(times_s), axis=1), np.nan)
+
+
+def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
+    order = {name: i + 1 for i, name in enumerate(page.order)}
+    rows = []
+    for i, motion in sorted(motions, key=lambda m: m[1].arrive_s):
+        slot = page.subjects[i].slot
+        rows.append(
+            (
+                f'<i class="swatch t{i % COLOURS}"></i>{esc(motion.name)}', str(order.get(motion.name, "–")),
+                num(motion.begin_s, 1, "s"), num(slot.hold_s if slot else None, 0, "s"),
+                num(slot.speed_m_s if slot else None, 2, "m/s"), num(motion.arrive_s, 1, "s"),
+                "in the air" if motion.ends_in_air else num(motion.end_s, 1, "s"),
+                num(float(flown_m(motion, np.array([motion.end_s]))[0]), 0, "m"),
+            )
+        )  # fmt: skip
+    head = (
+        "vehicle|",
+        "place in the order",
+        "takes off",
+        "holds",
+        "speed",
+        "at its goal",
+        "on the ground",
+        "horizontal way",
+    )
+    return table("Schedule: seconds since the fleet's common start", head, rows)
+
+
+def separation_words(page: Page) -> str:
+    """The fleet's exact least distance in a sentence, ready HTML; empty where none was judged."""
+    found = page.separation
+    if found is None:
+        return ""
+    asked = f"{num(found.rules.separation_m, 1, 'm')} asked, {num(found.rules.needed_m, 1, 'm')} needed in the model"
+    if found.least is None:
+        return f"No two vehicles are ever in the air at the same time ({asked})."
+    a, b = found.least.vehicles
+    near = f"{least(found.least.distance_m, 1, 'm')} at {num(found.least.time_s, 1, 's')}"
+    word = "kept" if found.safe else "<b>broken</b>"
+    return f"Separation {word}: {esc(a)} and {esc(b)} come nearest, {near} ({asked}; exact, not sampled)."
+
+
+def _distance_chart(motions: Sequence[tuple[int, TimedPath]], times: Floats, charts: dict[str, object]) -> str:
+    ways = [flown_m(m, times) / 1000.0 for _, m in motions]
+    longest = max(float(np.nanmax(w)) for w in ways)
+    axes = Axes(float(times[0]), float(times[-1]), 0.0, 1.05 * max(longest, 1e-3), "time, s", "way flown, km")
+    shapes = [axes.line(times, w, f"track t{i % COLOURS}") for (i, _), w in zip(motions, ways, strict=True)]
+    marks = []
+    for i, m in motions:
+        y = float(flown_m(m, np.array([min(max(m.arrive_s, m.begin_s), m.end_s)]))[0]) / 1000.0
+        tip = f"{m.name} reaches its goal after {num(m.arrive_s, 1, 's')}"
+        marks.append(axes.mark(m.arrive_s, y, f"goal t{i % COLOURS}", m.name, tip, 1))
+    charts["distance"] = _numbers(times, [(m.name, "km", 3, w) for (_, m), w in zip(motions, ways, strict=True)])
+    words = f"Way flown over time by {len(motions)} vehicles, from {num(times[0], 0, 's')} to {num(times[-1], 0, 's')}"
+    return chart_html("distance", axes, shapes, marks, words, TALL)
+
+
+def _separation_chart(
+    page: Page, motions: Sequence[tuple[int, TimedPath]], times: Floats, charts: dict[str, object]
+) -> str:
+    pairs = [(a, b, apart_m(a[1], b[1], times)) for a, b in combinations(motions, 2)]
+    every = np.stack([p[2] for p in pairs])
+    some = ~np.isnan(every).all(axis=0)
+    if not some.any():
+        return '<p class="note">No two vehicles are ever in the air at the same time.</p>'
+    nearest = np.full(len(times), np.nan)
+    nearest[some] = np.nanmin(every[:, some], axis=0)
+    asked = page.separation.rules.needed_m if page.separation is not None else None
+    high = max(float(np.nanmax(nearest)), 1.4 * (asked or 0.0), 1.0)
+    axes = Axes(float(times[0]), float(times[-1]), 0.0, 1.08 * high, "time, s", "apart, m")
+    shapes, numbers = [], [("nearest two", "m", 1, nearest)]
+    if asked:
+        ends, zero = [times[0], times[-1]], [0.0, 0.0]
+        shapes += [axes.area(ends, zero, [asked, asked], "below"), axes.line(ends, [asked, asked], "floor")]
+    if len(pairs) <= MOST_PAIRS:
+        shapes += [axes.line(times, d, "pair") for _, _, d in pairs]
+        numbers += [(f"{a[1].name} – {b[1].name}", "m", 1, d) for a, b, d in pairs]
+    shapes.append(axes.line(times, nearest, "nearest"))
+    at = int(np.nanargmin(nearest))
+    a, b, _ = pairs[int(np.nanargmin(every[:, at]))]
+    label = f"{least(float(nearest[at]), 1, 'm')}"
+    tip = f"{a[1].name} and {b[1].name} are nearest at {num(float(times[at]), 1, 's')}: about {label}"
+    kind = "broken" if asked and nearest[at] < asked - 1e-6 else "tight"
+    marks = [axes.mark(float(times[at]), float(nearest[at]), kind, label, tip, 0)]
+    charts["separation"] = _numbers(times, numbers)
+    words = f"Distance of the nearest two vehicles over time; {tip}; asked for: {num(asked, 0, 'm')}"
+    key = (
+        '<ul class="legend"><li><i class="stroke nearest"></i>nearest two</li>'
+        + ('<li><i class="stroke pair"></i>each pair</li>' if len(pairs) <= MOST_PAIRS else "")
+        + ('<li><i class="swatch below"></i>nearer than needed</li>' if asked else "")
+        + "</ul>"
+    )
+    return chart_html("separation", axes, shapes, marks, words, TALL) + key
+
+
+def _numbers(times: Floats, series: Sequence[tuple[str, str, int, Floats]]) -> dict[str, object]:
+    """What the page's script tells of a chart under the pointer."""
+    return {
+        "x": [round(float(t), 2) for t in times], "xunit": "s",
+        "series": [
+            {"name": name, "unit": unit, "decimals": decimals,
+             "y": [None if math.isnan(v) else round(float(v), decimals) for v in y]}
+            for name, unit, decimals, y in series
+        ],
+    }  # fmt: skip

@@ -1,0 +1,183 @@
+"""The way home on the page: how high a return must be from where, where none is safe, and the battery leg by leg."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gcsplan.check.return_verdict import WayHome
+from gcsplan.report.chart import Axes, Floats, chart_html
+from gcsplan.report.markup import esc, num, place, table, tools
+from gcsplan.report.plan_view import COLOURS
+from gcsplan.report.profile_view import unit_of
+from gcsplan.report.samples import Line
+from gcsplan.report.subject import Page, Subject
+
+TALL = 0.3
+
+
+MOST_LINES = 4
+
+
+def home_lines(page: Page) -> str:
+    """Lines for the page's head on ways home that are not safe, or were not judged; of many vehicles, one on all."""
+    several = len(page.subjects) > 1
+    lines = [(s, line) for s in page.subjects if (line := _home_line(s, several))]
+    if len(lines) <= MOST_LINES:
+        return "".join(line for _, line in lines)
+    names = ", ".join(esc(s.name) for s, _ in lines[:MOST_LINES])
+    told = f"<b>the way home of {len(lines)} vehicles is not safe, or not judged</b> ({names} …)"
+    return f'<p class="bare bad">{told}: see <a href="#home">below</a></p>'
+
+
+def _home_line(subject: Subject, several: bool) -> str:
+    """One line for the page's head where the way home is not safe, or not judged; empty otherwise."""
+    home = subject.home
+    if home is None or home.safe is True:
+        return ""
+    who = f"{esc(subject.name)}: " if several else ""
+    if home.safe is None:
+        return f'<p class="bare">{who}the way home could not be judged: {esc("; ".join(home.not_judged))}</p>'
+    words = []
+    if home.unsafe:
+        words.append(f"not safe from {num(home.unsafe_m / 1000, 2, 'km')} of the way")
+    if home.battery is not None and home.battery.short:
+        words.append("beyond the battery from some of it")
+    judged = f"{esc(home.parameter)} {num(home.rtl_rel_home_m, 0, 'm')} above home"
+    told = f"<b>{who}the way home is {' and '.join(words)}</b> ({judged})"
+    return f'<p class="bare bad">{told}: see <a href="#home">below</a></p>'
+
+
+def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object]) -> str:
+    """The section; empty where nobody's way home was judged. The charts' numbers are added to ``charts``."""
+    parts = []
+    for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
+        if subject.home is not None:
+            parts.append(_one(subject, subject.home, line, i, charts, open_=i < 1))
+    return f'<section id="home"><h2>The way home after a failsafe</h2>{"".join(parts)}</section>' if parts else ""
+
+
+def _one(
+    subject: Subject, home: WayHome, line: Line | None, index: int, charts: dict[str, object], *, open_: bool
+) -> str:
+    word = {True: "safe from everywhere", False: "not safe from everywhere", None: "not judged"}[home.safe]
+    chart = ""
+    if line is not None and home.profile:
+        name = f"home-{index}"
+        chart = tools(name) + _chart(name, subject, home, line, index, charts) + _legend(home)
+    listed = "".join(f"<li>{esc(n)}</li>" for n in (*home.not_judged, *home.notes))
+    return (
+        f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: the way home is {word}</summary>"
+        f"{chart}{_facts(home)}{_stretches(subject, home)}{_battery(subject, home)}"
+        + (f"<ul>{listed}</ul>" if listed else "")
+        + "</details>"
+    )
+
+
+def _facts(home: WayHome) -> str:
+    told = home.rows()
+    rows = [
+        (esc(label), esc(words)) for label, words in told if label not in ("not clear", "not judged", "left unsafe")
+    ]
+    left = [words for label, words in told if label == "left unsafe"]
+    folded = "".join(f"<li>{esc(words)}</li>" for words in left)
+    return table(
+        f"Return of {esc(home.vehicle)}, judged from every point of its mission", ("what|", "found|"), rows
+    ) + (
+        f"<details><summary>Unsafe even so: {len(left)} stretches</summary><ul>{folded}</ul></details>" if left else ""
+    )
+
+
+def _chart(name: str, subject: Subject, home: WayHome, line: Line, index: int, charts: dict[str, object]) -> str:
+    unit, unit_name = unit_of(line)
+    x = np.array([(p.from_m, p.to_m) for p in home.profile]).ravel() / unit
+    clear, legal = (
+        np.repeat([np.nan if v is None else v for v in values], 2)
+        for values in ([p.clear_amsl_m for p in home.profile], [p.legal_amsl_m for p in home.profile])
+    )
+    level = home.home[2] + home.rtl_rel_home_m
+    known = np.concatenate([line.amsl_m, line.ground_m[np.isfinite(line.ground_m)], [level], clear[np.isfinite(clear)],
+                            legal[np.isfinite(legal)]])  # fmt: skip
+    low, high = float(known.min()), float(known.max())
+    room, long = 0.06 * max(high - low, 1.0), max(line.length_m / unit, 1e-3)
+    axes = Axes(-0.012 * long, 1.012 * long, low - room, high + 1.6 * room, f"along the track, {unit_name}", "m AMSL")
+    run = line.run_m / unit
+    shapes = [axes.area(run, np.full(len(run), -np.inf), line.ground_m, "ground")]
+    for s in home.unsafe:
+        ends = [s.from_m / unit, max(s.to_m / unit, s.from_m / unit + 0.002 * long)]
+        shapes.append(axes.area(ends, [-np.inf, -np.inf], [np.inf, np.inf], "nowhere", f"no safe way home: {s.why}"))
+    shapes += [
+        axes.line(x, legal, "legal"), axes.line(x, clear, "clear"),
+        axes.line([0.0, long], [level, level], "level"),
+        axes.line(run, line.amsl_m, f"track t{index % COLOURS}"),
+    ]  # fmt: skip
+    tip = f"the return flies at {num(level, 1, 'm AMSL')}, or higher where it begins higher"
+    marks = [axes.mark(0.08 * long, level, "tag", f"return at {num(home.rtl_rel_home_m, 0, 'm')}", tip, 1)]
+    charts[name] = _numbers(x, clear, legal, np.interp(x, run, line.amsl_m), level, unit_name)
+    words = f"Return altitude needed along the way of {subject.name}, beside {num(level, 0, 'm AMSL')} that is set"
+    return chart_html(name, axes, shapes, marks, words, TALL)
+
+
+def _legend(home: WayHome) -> str:
+    return (
+        '<ul class="legend"><li><i class="stroke level"></i>return altitude judged</li>'
+        '<li><i class="stroke clear"></i>needed to be clear of everything</li>'
+        '<li><i class="stroke legal"></i>needed to keep min AGL too</li>'
+        + ('<li><i class="swatch nowhere"></i>no safe way home from here</li>' if home.unsafe else "")
+        + '<li><i class="swatch ground"></i>ground under the track</li></ul>'
+    )
+
+
+def _numbers(x: Floats, clear: Floats, legal: Floats, amsl: Floats, level: float, unit: str) -> dict[str, object]:
+    def tenths(values: Floats) -> list[float | None]:
+        return [round(float(v), 1) if np.isfinite(v) else None for v in values]
+
+    series = (
+        ("path", amsl),
+        ("return judged at", np.full(len(x), level)),
+        ("clear from", clear),
+        ("legal from", legal),
+    )
+    return {
+        "x": [round(float(v), 3) for v in x], "xunit": unit, "xname": "along the track", "xdecimals": 2,
+        "series": [{"name": n, "unit": "m AMSL", "decimals": 1, "y": tenths(y)} for n, y in series],
+    }  # fmt: skip
+
+
+def _stretches(subject: Subject, home: WayHome) -> str:
+    rows, marks = [], []
+    for kind, stretches in (("unsafe", home.unsafe), ("min AGL broken", home.irregular)):
+        for s in stretches:
+            rows.append(
+                (
+                    esc(s.items), kind, f"{num(s.from_m / 1000, 2)} – {num(s.to_m / 1000, 2, 'km')}", esc(s.why),
+                    place(*s.obstacle[:2]) + f", {num(s.obstacle[2], 0, 'm AMSL')}" if s.obstacle else "–",
+                    num(s.lowest_rel_home_m, 0, "m") if s.lowest_rel_home_m is not None else "none",
+                )
+            )  # fmt: skip
+            marks.append("bad" if kind == "unsafe" else "close")
+    if not rows:
+        return ""
+    head = ("on the way to|", "|", "along the track", "why|", "in the way|", "safe from, above home")
+    return table(f"Where the way home of {esc(subject.name)} breaks something", head, rows, marks=marks)
+
+
+def _battery(subject: Subject, home: WayHome) -> str:
+    battery = home.battery
+    if battery is None:
+        return ""
+    may = 100.0 * battery.usable_j / battery.battery_j
+    rows, marks = [], []
+    for leg in battery.legs:
+        rows.append(
+            (
+                f"{leg.seq} {esc(leg.kind)}", num(leg.energy_j / 1000, 1, "kJ"), num(leg.used_percent, 1, "%"),
+                num(leg.return_j / 1000, 1, "kJ"), num(leg.with_return_percent, 1, "%"),
+            )
+        )  # fmt: skip
+        marks.append("bad" if leg.with_return_percent is not None and leg.with_return_percent > may else "")
+    head = ("to item|", "energy", "used so far", "return from there", "used with the return")
+    caption = f"Battery of {esc(subject.name)} by leg; with the return at most {num(may, 0, '%')} may be used"
+    inner = table(caption, head, rows, marks=marks)
+    return f"<details><summary>Battery by leg, with the return</summary>{inner}</details>"

@@ -1,0 +1,96 @@
+"""Words and numbers as HTML: everything that comes from a file is escaped here, every number gets its unit here."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import unicodedata
+from collections.abc import Iterable, Sequence
+
+THIN, UNIT_GAP = "\u202f", "\u202f"
+_DIRECTION = frozenset("\u200e\u200f\u061c\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+"""Marks that turn the direction of writing: a name that holds one could make its neighbours read otherwise."""
+
+
+def plain(text: object) -> str:
+    """``text`` without control characters, marks of direction and halves of surrogate pairs; not yet escaped."""
+    words = "".join(c for c in str(text) if c not in _DIRECTION)
+    return "".join("\ufffd" if unicodedata.category(c) in ("Cc", "Cs") and c not in "\n\t" else c for c in words)
+
+
+def esc(text: object) -> str:
+    """``text`` as it may stand in HTML, in an attribute too."""
+    return html.escape(plain(text), quote=True)
+
+
+def num(value: float | None, decimals: int = 0, unit: str = "") -> str:
+    """A figure with its unit; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    text = f"{value:,.{decimals}f}".replace(",", THIN)
+    if float(f"{value:.{decimals}f}") == 0.0:
+        text = text.lstrip("-")
+    return text + (("" if unit == "°" else UNIT_GAP) + unit if unit else "")
+
+
+def least(value: float | None, decimals: int = 1, unit: str = "") -> str:
+    """The same, rounded down: room that is left is never told larger than it is."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    power = 10.0**decimals
+    # 65.25 that came out as 65.2499999 is 65.25: what is smaller than the sixth place is noise.
+    return num(math.floor(value * power + 1e-3 * min(power, 1.0) + 1e-6 * power) / power, decimals, unit)
+
+
+def minutes(seconds: float | None) -> str:
+    """A time as 12 min 34 s."""
+    if seconds is None or not math.isfinite(seconds):
+        return "–"
+    whole = round(seconds)
+    sign, whole = ("-", -whole) if whole < 0 else ("", whole)
+    hours, rest = divmod(whole, 3600)
+    words = f"{rest // 60}{UNIT_GAP}min {rest % 60:02d}{UNIT_GAP}s" if whole >= 60 else f"{whole}{UNIT_GAP}s"
+    return sign + (f"{hours}{UNIT_GAP}h " if hours else "") + words
+
+
+def place(lat_deg: float, lon_deg: float) -> str:
+    """Latitude and longitude to a metre; a dash where there is no place."""
+    return f"{lat_deg:.5f}, {lon_deg:.5f}" if math.isfinite(lat_deg) and math.isfinite(lon_deg) else "–"
+
+
+def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]], *, marks: Sequence[str] = ()) -> str:
+    """A table of ready HTML cells; the first cell of a row is its header. ``marks``: a class for each row.
+
+    Columns whose head ends in a bar hold words and stand left; all others hold numbers.
+    """
+    words = [h.endswith("|") for h in head]
+    kinds = ["" if w else ' class="n"' for w in words]
+    out = [f'<div class="scroll"><table><caption>{caption}</caption><thead><tr>']
+    out += [f'<th scope="col"{k}>{h.rstrip("|")}</th>' for h, k in zip(head, kinds, strict=True)]
+    out.append("</tr></thead><tbody>")
+    for i, row in enumerate(rows):
+        mark = marks[i] if i < len(marks) and marks[i] else ""
+        out.append(f'<tr class="{mark}">' if mark else "<tr>")
+        for j, (cell, kind) in enumerate(zip(row, kinds, strict=True)):
+            out.append(f'<th scope="row"{kind}>{cell}</th>' if j == 0 else f"<td{kind}>{cell}</td>")
+        out.append("</tr>")
+    out.append("</tbody></table></div>")
+    return "".join(out)
+
+
+def tools(name: str) -> str:
+    """The buttons of the figure ``name``; the page's script shows them."""
+    return (
+        f'<div class="tools" data-for="{name}" hidden>'
+        '<button type="button" data-do="in" aria-label="zoom in">+</button>'
+        '<button type="button" data-do="out" aria-label="zoom out">−</button>'
+        '<button type="button" data-do="home" aria-label="show all">⤢</button></div>'
+    )
+
+
+def data_block(name: str, value: object) -> str:
+    """``value`` as a JSON block for the page's own script; nothing in it can end the block or begin another."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False, sort_keys=True)
+    text = text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return f'<script type="application/json" id="{name}">{text}</script>'

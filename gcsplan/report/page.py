@@ -1,0 +1,312 @@
+"""The report: one self-contained HTML page for a plan, or for files that were checked.
+
+`render` and `render_check` give the whole page as text: no address outside, no clock, the same bytes for the same
+input. Style and script stand in `assets/`; the script may do nothing but draw (the page's policy says so), and without
+it the page still holds every number, the map and the profiles.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gcsplan import __version__
+from gcsplan.check.return_verdict import WayHome
+from gcsplan.report import tables
+from gcsplan.report.fleet_view import fleet_html
+from gcsplan.report.home_view import home_html, home_lines
+from gcsplan.report.markup import data_block, esc, least, minutes, num, place, tools
+from gcsplan.report.plan_view import COLOURS, map_html
+from gcsplan.report.profile_view import profile_html, profile_legend, unit_of
+from gcsplan.report.relief import Relief, extent_of, relief_of
+from gcsplan.report.samples import MOST_SAMPLES, Line, Passage, line_of, passages
+from gcsplan.report.scene_data import exaggeration, zone_meshes
+from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check, page_of_plan
+from gcsplan.world.world import World
+
+if TYPE_CHECKING:
+    from gcsplan.delivery import Delivery
+    from gcsplan.pipeline import Plan
+
+__all__ = ["render", "render_check", "render_page"]
+
+BARE_DEM = "bare DEM: trees, masts and wires are not in it"
+OPEN_VEHICLES = 3
+"""Profiles of the first few vehicles stand open; the others open on a tap, and on paper. So do a fleet's tables."""
+MOST_CARDS = 6
+"""Of more vehicles the key figures stand in one table."""
+SCRIPTS = ("base.js", "view.js", "charts.js", "mesh.js", "scene.js", "start.js")
+
+
+def render(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Mapping[str, WayHome] | None = None) -> str:
+    """The report of ``plan`` as HTML text, with how its uploads ended; ``homes``: vehicle to its way home."""
+    return render_page(page_of_plan(plan, deliveries, homes))
+
+
+def render_check(
+    title: str,
+    world: World,
+    checked: Sequence[CheckedFile],
+    *,
+    inputs: Mapping[str, object],
+    notes: Sequence[str] = (),
+    homes: Sequence[WayHome | None] = (),
+) -> str:
+    """The report of files that were checked in ``world``, as HTML text.
+
+    ``inputs`` are those of a mission file, or a surface's ``info``: where ``bare_dem`` is true, the page says so.
+    ``homes``: the way home of each of ``checked``, in the same order, where it was judged.
+    """
+    return render_page(page_of_check(title, world, checked, inputs=inputs, notes=notes, homes=homes))
+
+
+def render_page(page: Page) -> str:
+    """A `Page` as HTML text."""
+    samples = max(150, min(1200, MOST_SAMPLES // max(len(page.subjects), 1)))
+    lines = [line_of(s.verdict, page.world, s.vehicle.limits, samples=samples) for s in page.subjects]
+    drawn = [line for line in lines if line is not None]
+    zones, surface = page.world.airspace.zones, page.world.airspace.surface
+    relief = relief_of(page.world, extent_of(drawn, zones, surface))
+    found = [
+        passages(line, zones, _reach_m(subject)) if line is not None else []
+        for subject, line in zip(page.subjects, lines, strict=True)
+    ]
+    charts: dict[str, object] = {}
+    fleet, home = fleet_html(page, charts), home_html(page, lines, charts)
+    data = {
+        "grid": relief.grid,
+        "lines": [
+            _line_data(i, s, line) | {"broken": _broken(s, page.world)}
+            for i, (s, line) in enumerate(zip(page.subjects, lines, strict=True))
+            if line is not None
+        ],
+        "zones": zone_meshes(zones, surface, relief, drawn),
+        "exaggeration": exaggeration(relief, drawn),
+        "charts": charts,
+    }
+    body = "".join(
+        (
+            _header(page), _vehicles(page),
+            f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief)}</section>',
+            _scene(page, relief),
+            *_profiles(page, lines, found), home, fleet, *_details(page, lines, found), _end(page),
+        )
+    )  # fmt: skip
+    return _document(page.title, body, data_block("data", data))
+
+
+def _reach_m(subject: Subject) -> float:
+    limits = subject.vehicle.limits
+    return limits.horizontal_clearance_m + limits.track_error_m
+
+
+def _asset(name: str) -> str:
+    return resources.files("gcsplan.report").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def _document(title: str, body: str, data: str) -> str:
+    script = "(function(){\n'use strict';\n" + "\n".join(_asset(name) for name in SCRIPTS) + "\n})();"
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    # Nothing may be loaded from anywhere, and no script may run but this one, whatever a file's names try.
+    policy = (
+        f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; base-uri 'none'"
+    )
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        '<meta name="color-scheme" content="light dark">'
+        f'<meta name="generator" content="gcsplan {esc(__version__)}">'
+        f"<title>{esc(title)} – mission report</title><style>\n{_asset('report.css')}</style></head>"
+        f'<body>{body}<div id="tip" role="status" hidden></div>{data}<script>{script}</script></body></html>\n'
+    )
+
+
+VERDICTS = {
+    True: ("safe", "✓", "SAFE", "Every metre was checked and keeps every limit."),
+    False: ("unsafe", "✕", "NOT SAFE", "Limits are broken: do not fly this."),
+    None: ("unjudged", "?", "NOT JUDGED", "No limit is broken, but not everything could be judged."),
+}
+
+
+def _header(page: Page) -> str:
+    kind, sign, word, words = VERDICTS[page.safe]
+    wrong = [(s, f.message) for s in page.subjects for f in s.verdict.findings]
+    wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
+    several = len(page.subjects) > 1
+    listed = "".join(f"<li>{f'<b>{esc(s.name)}</b>: ' if several else ''}{esc(text)}</li>" for s, text in wrong)
+    bare = f'<p class="bare"><b>{BARE_DEM}</b></p>' if page.inputs.get("bare_dem", True) else ""
+    return (
+        f'<header><p class="brand">gcsplan mission report</p><h1>{esc(page.title)}</h1>'
+        f'<div class="verdict {kind}"><span class="sign" aria-hidden="true">{sign}</span>'
+        f"<div><strong>{word}</strong><p>{words}</p></div></div>"
+        + (f'<ul class="findings">{listed}</ul>' if listed else "")
+        + bare
+        + home_lines(page)
+        + "</header>"
+    )
+
+
+def _vehicles(page: Page) -> str:
+    if len(page.subjects) > MOST_CARDS:
+        words = [VERDICTS[s.verdict.safe][1] + " " + VERDICTS[s.verdict.safe][2].lower() for s in page.subjects]
+        return f"<section>{tables.vehicles_table(page, words)}</section>"
+    return (
+        f'<section class="cards" aria-label="Key figures">{"".join(map(_card, page.subjects, range(10**6)))}</section>'
+    )
+
+
+def _card(subject: Subject, index: int) -> str:
+    verdict, limits, c = subject.verdict, subject.vehicle.limits, subject.certificate
+    kind, sign, word, _ = VERDICTS[verdict.safe]
+    low, near = verdict.lowest, verdict.nearest
+    figures = [("path", num(verdict.length_m, 0, "m"), _bound_words(subject))]
+    if low is not None:
+        figures.append(
+            ("lowest above ground", least(low.min_agl_m, 1, "m"),
+             f"min AGL {num(limits.min_agl_m, 0, 'm')}; on the leg to item {low.seq}, {place(*low.min_agl_at)}")
+        )  # fmt: skip
+    figures.append(
+        ("nearest zone", least(near.zone_clearance_m, 1, "m"),
+         f"{esc(near.nearest_zone)}; clearance {num(limits.horizontal_clearance_m, 0, 'm')}")
+        if near is not None else ("nearest zone", "none", "no zone at the path's height")
+    )  # fmt: skip
+    limit = f"limit {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90 else "no limit"
+    figures.append(("steepest", num(verdict.max_climb_deg, 1, "°"), limit))
+    energy = subject.vehicle.energy
+    figures.append(
+        ("battery", num(verdict.battery_used_percent, 1, "%"),
+         f"{num(verdict.energy_j / 1000, 0, 'kJ')} of {num((energy.battery_j or 0) / 1000, 0, 'kJ')}; "
+         f"{num(100 * energy.reserve, 0, '%')} must be left")
+        if verdict.battery_used_percent is not None
+        else ("energy", num(verdict.energy_j / 1000, 0, "kJ"), "battery capacity not given")
+    )  # fmt: skip
+    arrive = subject.slot.arrive_s if subject.slot is not None else verdict.arrive_s
+    since = "after the fleet's start" if subject.slot is not None else "after take-off"
+    figures.append(("arrives", minutes(arrive), f"{since}; {len(verdict.mission.wire_items())} mission items"))
+    if c is not None and c.objective == "energy":
+        figures.insert(1, ("path energy", num(c.cost / 1000, 1, "kJ"), _gap_words(c.bound, c.gap_percent, 1e-3, "kJ")))
+    cells = "".join(f"<div><dt>{name}</dt><dd>{value}<small>{more}</small></dd></div>" for name, value, more in figures)
+    return (
+        f'<article class="card t{index % COLOURS}"><h2><i class="swatch t{index % COLOURS}"></i>{esc(subject.name)}'
+        f'<span class="pill {kind}">{sign} {word.lower()}</span></h2><dl>{cells}</dl></article>'
+    )
+
+
+def _bound_words(subject: Subject) -> str:
+    c = subject.certificate
+    if c is None or c.objective != "length":
+        return f"{num(subject.verdict.time_s, 0, 's')} in the air"
+    return _gap_words(c.bound, c.gap_percent, 1.0, "m")
+
+
+def _gap_words(bound: float | None, gap_percent: float | None, share: float, unit: str) -> str:
+    if bound is None:
+        return "no bound: this planner proves none"
+    return f"no path is below {least(bound * share, 0, unit)}; gap {num(gap_percent, 2, '%')}"
+
+
+def _scene(page: Page, relief: Relief) -> str:
+    if not math.isfinite(relief.low_m):
+        return ""
+    return (
+        f'<section id="space"><h2>In space</h2>{tools("scene")}<figure class="view scene" id="scene"><canvas '
+        f'role="img" tabindex="0" aria-label="{esc(page.title)} in space: ground, no-fly zones and tracks; the map and '
+        'the profiles show the same"></canvas><canvas class="over" aria-hidden="true"></canvas>'
+        '<p class="nothing">This view needs a browser that runs scripts.</p></figure>'
+        '<label class="stretch" hidden>heights × <input type="range" min="1" max="8" step="0.5"> '
+        "<output></output></label>"
+        f'<p class="note">Drag to turn, two fingers or the right button to move. The ground is drawn every '
+        f"{num(relief.cell_m, 0 if relief.cell_m >= 10 else 1, 'm')}: do not read clearances off this view.</p>"
+        "</section>"
+    )
+
+
+def _profiles(page: Page, lines: Sequence[Line | None], found: Sequence[list[Passage]]) -> list[str]:
+    parts = ['<section id="profiles"><h2>Altitude along the way</h2>']
+    for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
+        if line is None or not np.isfinite(line.ground_m).any():
+            parts.append(f'<p class="note">{esc(subject.name)}: there is no line over known ground to draw.</p>')
+            continue
+        shown = " open" if i < OPEN_VEHICLES else ""
+        unit, name = unit_of(line)
+        parts.append(
+            f"<details{shown}><summary>{esc(subject.name)}: {num(line.length_m / unit, 2, name)} along the track"
+            f"</summary>{tools(f'profile-{i}')}{profile_html(subject, line, found[i], i, page.world)}"
+            f"{profile_legend(subject, line, found[i])}</details>"
+        )
+    parts.append("</section>")
+    return parts
+
+
+def _details(page: Page, lines: Sequence[Line | None], found: Sequence[list[Passage]]) -> list[str]:
+    parts = ['<section id="numbers"><h2>Numbers</h2>', tables.certificate_table(page)]
+    for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
+        shown = " open" if len(page.subjects) == 1 else ""
+        parts.append(f"<details{shown}><summary>{esc(subject.name)}: limits, zones and legs</summary>")
+        parts.append(tables.limits_table(subject, line))
+        if line is not None:
+            parts.append(tables.zones_table(page, subject, line, found[i]))
+        parts.append(tables.legs_table(subject) + "</details>")
+    parts.append("</section>")
+    return parts
+
+
+def _end(page: Page) -> str:
+    notes = [(n, "") for n in page.notes] + [(n, s.name) for s in page.subjects for n in s.notes]
+    several = len(page.subjects) > 1
+    listed = "".join(
+        f"<li>{f'<b>{esc(who)}</b>: ' if who and several else ''}{esc(n)}</li>" for n, who in dict.fromkeys(notes)
+    )
+    unjudged = [(s.name, what) for s in page.subjects for what in s.verdict.not_judged]
+    missing = "".join(f"<li><b>{esc(who)}</b>: {esc(what)}</li>" for who, what in unjudged)
+    return (
+        f'<section id="sent"><h2>Upload</h2>{tables.upload_table(page)}</section>'
+        '<section id="notes"><h2>Notes, and what was not judged</h2>'
+        + (f"<h3>Not judged</h3><ul>{missing}</ul>" if missing else "")
+        + (f"<h3>Notes</h3><ul>{listed}</ul>" if listed else "")
+        + "<p>Wind, emergency landing sites and moving obstacles are not in the model. The terrain model has errors of "
+        "its own.</p></section>"
+        f'<section id="inputs"><h2>What went in</h2>{tables.inputs_table(page.inputs, page.facts)}</section>'
+        f"<footer>gcsplan {esc(__version__)}; numbers of room and clearance are rounded down</footer>"
+    )
+
+
+def _broken(subject: Subject, world: World) -> list[list[object]]:
+    """East, north, AMSL and kind of everything that is broken at a place."""
+    found: list[list[object]] = []
+    for f in subject.verdict.findings:
+        if math.isfinite(f.lat_deg + f.lon_deg + f.amsl_m):
+            e, n = (round(float(v), 1) for v in world.frame.to_plane(f.lat_deg, f.lon_deg))
+            found.append([e, n, round(f.amsl_m, 1), f.kind.replace("_", " ")])
+    return found
+
+
+def _line_data(index: int, subject: Subject, line: Line) -> dict[str, object]:
+    """One line for the page's script; decimetres (of a short one millimetres) are enough to look at."""
+    legs = subject.verdict.legs
+
+    decimals = 1 if line.length_m > 1000.0 else 3
+
+    def rounded(values: object) -> list[float | None]:
+        return [round(float(v), decimals) if math.isfinite(v) else None for v in np.asarray(values, float)]
+
+    return {
+        "index": index, "name": subject.name,
+        "s": rounded(line.run_m), "e": rounded(line.east_m), "n": rounded(line.north_m),
+        "z": rounded(line.amsl_m), "g": rounded(line.ground_m),
+        "o": rounded(line.top_m) if not np.array_equal(line.top_m, line.ground_m, equal_nan=True) else None,
+        "f": rounded(line.floor_m), "c": rounded(line.ceiling_m), "t": rounded(line.time_s), "leg": line.leg.tolist(),
+        "j": [round(float(j) / 1000.0, 1) for j in line.used_j],
+        "legs": [
+            {"seq": leg.seq, "kind": leg.kind, "column": leg.column, "climb": round(leg.climb_deg, 1)} for leg in legs
+        ],
+        "ends": np.flatnonzero(line.end).tolist(),
+        "battery": subject.vehicle.energy.battery_j and round(subject.vehicle.energy.battery_j / 1000.0, 1),
+    }  # fmt: skip

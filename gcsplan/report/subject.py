@@ -1,0 +1,140 @@
+"""What the page is about: one `Page`, a `Subject` for each vehicle; made from a plan or from checked files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from gcsplan.check.return_verdict import WayHome
+from gcsplan.check.verdict import Verdict
+from gcsplan.fleet.arrival import Slot
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.separation import Separation
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.world import World
+
+if TYPE_CHECKING:
+    from gcsplan.delivery import Delivery
+    from gcsplan.pipeline import Plan
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What is known of the best path: ``bound`` and ``cost`` in ``unit`` (m or J), and why the search stopped."""
+
+    objective: str
+    unit: str
+    cost: float
+    bound: float | None
+    gap_percent: float | None
+    stopped_by: str
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """One vehicle, or one checked file: its verdict, and what else is known of it.
+
+    ``motion`` and ``slot`` are its place in the fleet's time, None where it flies alone. ``home`` is the way home from
+    everywhere, where it was judged. ``upload`` holds the keys of ``upload.json``, None where nothing was sent.
+    """
+
+    name: str
+    verdict: Verdict
+    vehicle: Vehicle
+    certificate: Certificate | None = None
+    notes: tuple[str, ...] = ()
+    motion: TimedPath | None = None
+    slot: Slot | None = None
+    home: WayHome | None = None
+    upload: Mapping[str, object] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """Everything that one report shows. ``facts``: name and value of what was asked, in the order shown."""
+
+    title: str
+    world: World
+    subjects: tuple[Subject, ...]
+    inputs: Mapping[str, object]
+    facts: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
+    separation: Separation | None = None
+    order: tuple[str, ...] = ()
+
+    @property
+    def safe(self) -> bool | None:
+        """False where any subject breaks a limit, None where something could not be judged (or there is none)."""
+        verdicts = [s.verdict.safe for s in self.subjects]
+        return False if False in verdicts else None if None in verdicts or not verdicts else True
+
+
+class CheckedFile(Protocol):
+    """What a check of one file gives (`gcsplan.checking.Checked`)."""
+
+    @property
+    def file(self) -> object: ...
+    @property
+    def vehicle(self) -> Vehicle: ...
+    @property
+    def verdict(self) -> Verdict: ...
+    @property
+    def notes(self) -> tuple[str, ...]: ...
+
+
+def page_of_plan(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Mapping[str, WayHome] | None = None) -> Page:
+    """The page of a plan, with how its uploads ended, and the way home of each vehicle named in ``homes``."""
+    uploads = {d.vehicle: d.as_dict() for d in deliveries}
+    source, fleet = plan.source, plan.fleet
+    facts = [("planner", plan.planner), ("objective", plan.objective), ("seed", str(plan.seed)),
+             ("altitude frame", source.altitude_frame)]  # fmt: skip
+    several = fleet is not None and len(plan.vehicles) > 1
+    if fleet is not None and several and fleet.mode != "none":
+        apart = f", {fleet.interval_s:g} s apart" if fleet.mode == "sequence" else ""
+        facts += [("arrival", f"{fleet.mode}: {', '.join(fleet.order)}{apart}")]
+    subjects = []
+    for v in plan.vehicles:
+        certificate = Certificate(
+            v.problem.objective, "m" if v.problem.objective == "length" else "J",
+            v.cost, v.solution.lower_bound, v.gap_percent, v.solution.stopped_by,
+        )  # fmt: skip
+        slot = fleet.slot(v.name) if fleet is not None and several else None
+        notes = (*v.notes, *v.solution.notes, *v.verdict.notes, *(slot.notes if slot is not None else ()))
+        subjects.append(
+            Subject(
+                v.name, v.verdict, v.request.vehicle, certificate, tuple(dict.fromkeys(notes)),
+                fleet.motion(v.name) if fleet is not None and several else None, slot,
+                (homes or {}).get(v.name), uploads.get(v.name),
+            )
+        )  # fmt: skip
+    return Page(
+        source.name, plan.world, tuple(subjects), dict(source.inputs), tuple(facts), tuple(dict.fromkeys(plan.notes)),
+        fleet.separation if fleet is not None else None, fleet.order if fleet is not None else (),
+    )  # fmt: skip
+
+
+def page_of_check(
+    title: str,
+    world: World,
+    checked: Sequence[CheckedFile],
+    *,
+    inputs: Mapping[str, object],
+    notes: Sequence[str] = (),
+    homes: Sequence[WayHome | None] = (),
+) -> Page:
+    """The page of files that were checked; each is named by its file where one vehicle has several.
+
+    ``homes``: the way home of each of ``checked``, in the same order, where it was judged.
+    """
+    names = [c.vehicle.name for c in checked]
+    subjects = tuple(
+        Subject(
+            c.vehicle.name if names.count(c.vehicle.name) == 1 else str(c.file),
+            c.verdict, c.vehicle, None, tuple(dict.fromkeys((*c.notes, *c.verdict.notes))),
+            home=homes[i] if i < len(homes) else None,
+        )
+        for i, c in enumerate(checked)
+    )  # fmt: skip
+    facts = tuple((f"file of {s.name}", str(c.file)) for s, c in zip(subjects, checked, strict=True))
+    return Page(title, world, subjects, dict(inputs), facts, tuple(dict.fromkeys(notes)))

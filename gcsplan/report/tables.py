@@ -1,0 +1,246 @@
+"""The page's tables: legs, limits and how near each came to binding, zones, certificate, battery, upload."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from gcsplan.check.verdict import LegFigures
+from gcsplan.mavlink.autopilots import manner
+from gcsplan.report.markup import THIN, esc, least, minutes, num, place, table
+from gcsplan.report.plan_view import zone_heights
+from gcsplan.report.profile_view import passed
+from gcsplan.report.samples import Line, Passage
+from gcsplan.report.subject import Page, Subject
+
+CLOSE = 0.02
+"""A limit of whose value less than this part is left is called close."""
+
+
+def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
+    """The key figures, a row for each vehicle."""
+    rows, marks = [], []
+    for s, word in zip(page.subjects, verdicts, strict=True):
+        verdict, low, near = s.verdict, s.verdict.lowest, s.verdict.nearest
+        bound = s.certificate.gap_percent if s.certificate is not None else None
+        home = {True: "safe", False: "not safe", None: "not judged"}[s.home.safe] if s.home is not None else "–"
+        rows.append(
+            (
+                esc(s.name), word, num(verdict.length_m, 0, "m"), num(bound, 2, "%"),
+                least(low.min_agl_m if low else None, 1, "m"),
+                f"{least(near.zone_clearance_m, 1, 'm')} {esc(near.nearest_zone)}" if near else "–",
+                num(verdict.max_climb_deg, 1, "°"), num(verdict.energy_j / 1000.0, 0, "kJ"),
+                num(verdict.battery_used_percent, 1, "%"),
+                minutes(s.slot.arrive_s if s.slot is not None else verdict.arrive_s), home,
+            )
+        )  # fmt: skip
+        marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None else "")
+    head = ("vehicle|", "verdict|", "path", "gap", "lowest AGL", "nearest zone|", "steepest", "energy", "battery",
+            "arrives", "way home|")  # fmt: skip
+    return table("Key figures", head, rows, marks=marks)
+
+
+def legs_table(subject: Subject) -> str:
+    """Each flown stretch: where to, how high above what, how steep, how near to a zone, energy and time."""
+    bad = {f.seq for f in subject.verdict.findings}
+    battery = subject.vehicle.energy.battery_j
+    used, clock, rows, marks = 0.0, 0.0, [], []
+    for leg in subject.verdict.legs:
+        used += leg.energy_j * leg.times
+        clock += leg.time_s * leg.times
+        name = f"{leg.seq} {leg.kind}" + (f" ×{THIN}{leg.times}" if leg.times > 1 else "")
+        near = f"{least(leg.zone_clearance_m, 0, 'm')} {esc(leg.nearest_zone)}" if leg.nearest_zone else "–"
+        rows.append(
+            (
+                esc(name), num(leg.length_m, 0, "m"), num(leg.end[2], 1, "m"), least(leg.agl_end_m, 1, "m"),
+                "column" if leg.column else least(leg.min_agl_m, 1, "m"),
+                num(leg.max_agl_m, 1, "m"), num(leg.climb_deg, 1, "°"), near, num(leg.energy_j / 1000.0, 1, "kJ"),
+                num(100.0 * used / battery, 1, "%") if battery else "–", num(leg.time_s, 0, "s"), minutes(clock),
+            )
+        )  # fmt: skip
+        marks.append("bad" if leg.seq in bad else "")
+    head = ("to item|", "length", "AMSL there", "AGL there", "lowest AGL", "highest AGL", "climb", "nearest zone|",
+            "energy", "battery used", "time", "since take-off")  # fmt: skip
+    return table(f"Legs of {esc(subject.name)}, in the order flown", head, rows, marks=marks)
+
+
+def limits_table(subject: Subject, line: Line | None) -> str:
+    """Every limit, with the errors it is widened by, what was reached, and what was left."""
+    rows, marks = [], []
+    for name, asked, reached, left, unit, where, share in _limits(subject, line):
+        broken = left is not None and left < -1e-6
+        close = left is not None and not broken and share is not None and left <= share
+        word = "broken" if broken else "close" if close else "kept" if left is not None else "–"
+        rows.append((name, asked, reached, least(left, {"m": 2, "": 0}.get(unit, 1), unit), word, where))
+        marks.append("bad" if broken else "close" if close else "")
+    head = ("limit|", "asked", "reached", "left", "|", "where|")
+    return table(f"Limits of {esc(subject.name)}, and how near each came to binding", head, rows, marks=marks)
+
+
+Row = tuple[str, str, str, float | None, str, str, float | None]
+"""Limit, what is asked, what was reached, what is left, its unit, where, and what counts as close."""
+
+
+def _limits(subject: Subject, line: Line | None) -> list[Row]:
+    verdict, limits = subject.verdict, subject.vehicle.limits
+    error, track = limits.altitude_error_m, limits.track_error_m
+    flown = [leg for leg in verdict.legs if not leg.column]
+    rows: list[Row] = []
+    low = verdict.lowest
+    if low is not None:
+        asked = limits.min_agl_m + error
+        words = f"{num(limits.min_agl_m, 1)} + {num(error, 1)} error"
+        at = f"item {low.seq}, {place(*low.min_agl_at)}"
+        rows.append(("lowest above ground and what stands on it", words, least(low.min_agl_m, 2, "m"),
+                     low.min_agl_m - asked, "m", at, CLOSE * asked))  # fmt: skip
+    highs = [leg for leg in verdict.legs if not math.isnan(leg.max_agl_m)]
+    if limits.max_agl_m is not None and highs:
+        top = max(highs, key=lambda leg: leg.max_agl_m)
+        rows.append(("highest above ground", f"{num(limits.max_agl_m, 1)} − {num(error, 1)} error",
+                     num(top.max_agl_m, 2, "m"), limits.max_agl_m - error - top.max_agl_m, "m", f"item {top.seq}",
+                     CLOSE * limits.max_agl_m))  # fmt: skip
+    if limits.max_amsl_m is not None and verdict.legs:
+        peak = max(verdict.legs, key=lambda leg: max(leg.start[2], leg.end[2]))
+        z = max(peak.start[2], peak.end[2])
+        rows.append(("highest above sea level", f"{num(limits.max_amsl_m, 1)} − {num(error, 1)} error",
+                     num(z, 2, "m"), limits.max_amsl_m - error - z, "m", f"item {peak.seq}", 1.0))  # fmt: skip
+    near = verdict.nearest
+    if near is not None:
+        asked = limits.horizontal_clearance_m + track
+        rows.append(("horizontal distance from zones at the path's height",
+                     f"{num(limits.horizontal_clearance_m, 1)} + {num(track, 1)} error",
+                     least(near.zone_clearance_m, 2, "m"), near.zone_clearance_m - asked, "m",
+                     f"item {near.seq}, {esc(near.nearest_zone)}", max(CLOSE * asked, 1.0)))  # fmt: skip
+    if line is not None:
+        rows += _height_left(subject, line)
+    rows += _steepness(flown, limits.max_climb_deg, limits.max_descent_deg)
+    energy = subject.vehicle.energy
+    if energy.battery_j and verdict.battery_used_percent is not None:
+        may = 100.0 * (1.0 - energy.reserve)
+        rows.append(("battery", f"{num(may, 1)} ({num(100 * energy.reserve, 0)} kept)",
+                     num(verdict.battery_used_percent, 1, "%"), may - verdict.battery_used_percent, "%", "whole flight",
+                     5.0))  # fmt: skip
+    items, most = len(verdict.mission.wire_items()), manner(verdict.mission.autopilot).max_items
+    if most is not None:
+        rows.append(
+            ("mission items", num(most), num(items), float(most - items), "", str(verdict.mission.autopilot), 0.0)
+        )
+    return rows
+
+
+def _height_left(subject: Subject, line: Line) -> list[Row]:
+    """The least room above all that terrain asks for: min AGL, clearance and errors together, at the samples."""
+    legs = subject.verdict.legs
+    free = np.array([leg.column for leg in legs])[line.leg]
+    room = np.where(free | ~np.isfinite(line.floor_m), np.inf, line.amsl_m - line.floor_m)
+    at = int(room.argmin())
+    if not math.isfinite(room[at]):
+        return []
+    words = "the judgement is exact; this is drawn from samples, on the safe side, to some centimetres"
+    asked = f'<abbr title="{words}">{least(float(line.floor_m[at]), 1, "m AMSL")}</abbr>'
+    left = float(room[at])
+    return [("terrain with clearance and all errors, tightest sample", asked, num(float(line.amsl_m[at]), 1, "m AMSL"),
+             max(left, 0.0) if left > -0.5 and subject.verdict.safe is not False else left, "m",
+             f"item {legs[line.leg[at]].seq}, {num(line.run_m[at] / 1000, 2, 'km')} along", 1.0)]  # fmt: skip
+
+
+def _steepness(flown: Sequence[LegFigures], climb_deg: float, descent_deg: float) -> list[Row]:
+    rows: list[Row] = []
+    if not flown:
+        return rows
+    up, down = max(flown, key=lambda leg: leg.climb_deg), min(flown, key=lambda leg: leg.climb_deg)
+    for name, limit, sign, steep in (("climb", climb_deg, 1.0, up), ("descent", descent_deg, -1.0, down)):
+        if limit >= 90.0:
+            continue
+        angle = max(sign * steep.climb_deg, 0.0)
+        rows.append((f"steepest {name}", num(limit, 1, "°"), num(angle, 2, "°"), limit - angle, "°",
+                     f"item {steep.seq}", CLOSE * limit))  # fmt: skip
+    return rows
+
+
+def zones_table(page: Page, subject: Subject, line: Line, found: Sequence[Passage]) -> str:
+    """The zones on the way of one vehicle: those passed over, under or at their height."""
+    if not found:
+        return ""
+    rows = []
+    for p in found:
+        km = f"{num(line.run_m[p.first] / 1000, 2)} – {num(line.run_m[p.last] / 1000, 2, 'km')}"
+        rows.append((esc(p.zone.name), esc(zone_heights(p.zone)), km, passed(p)))
+    reach = subject.vehicle.limits.horizontal_clearance_m + subject.vehicle.limits.track_error_m
+    caption = f"Zones that {esc(subject.name)} passes within {num(reach, 0, 'm')} of their outline (heights at samples)"
+    return table(caption, ("zone|", "reaches|", "along the track", "how|"), rows)
+
+
+def certificate_table(page: Page) -> str:
+    """Length or energy, the bound that no path can beat, and the gap between the two."""
+    rows = []
+    for s in page.subjects:
+        c = s.certificate
+        if c is None:
+            continue
+        unit, share = ("m", 1.0) if c.unit == "m" else ("kJ", 1e-3)
+        rows.append(
+            (
+                esc(s.name), esc(c.objective), num(c.cost * share, 1, unit),
+                least(c.bound * share, 1, unit) if c.bound is not None else "none: this planner proves nothing",
+                num(c.gap_percent, 3, "%"), esc(c.stopped_by),
+            )
+        )  # fmt: skip
+    if not rows:
+        return ""
+    head = ("vehicle|", "objective|", "flown path", "no path is below", "gap at most", "search ended by|")
+    return table("Certificate: how far the path can be from the best there is", head, rows)
+
+
+def upload_table(page: Page) -> str:
+    """How each upload ended; empty where nothing was sent."""
+    rows, marks = [], []
+    for s in page.subjects:
+        u = s.upload
+        if u is None:
+            continue
+        where = esc(u.get("url", "")) + (" (simulated)" if u.get("simulated") else "")
+        seconds = u.get("seconds")
+        rows.append(
+            (
+                esc(s.name), where, esc(u.get("items", "–")), esc(u.get("outcome", "–")),
+                "read back the same" if u.get("verified") else "not verified",
+                num(float(seconds), 2, "s") if isinstance(seconds, int | float) else "–", esc(u.get("message", "")),
+            )
+        )  # fmt: skip
+        marks.append("" if u.get("verified") else "bad")
+    if not rows:
+        return '<p class="note">Nothing was sent to any vehicle when this report was written.</p>'
+    head = ("vehicle|", "link|", "items", "outcome|", "read back|", "took", "said|")
+    told = [(s.name, w) for s in page.subjects if s.upload is not None for w in _warnings(s.upload)]
+    listed = "".join(f"<li><b>{esc(who)}</b>: {esc(words)}</li>" for who, words in told)
+    return table("Upload", head, rows, marks=marks) + (f"<ul>{listed}</ul>" if listed else "")
+
+
+def _warnings(upload: Mapping[str, object]) -> Sequence[object]:
+    found = upload.get("warnings", ())
+    return found if isinstance(found, list | tuple) else ()
+
+
+def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]]) -> str:
+    """What went in: terrain model, its datum and resolution, hashes; and what was asked."""
+    names = {
+        "dem_sha256": "terrain model, SHA-256", "vertical_datum": "vertical datum", "resolution_m": "resolution",
+        "bare_dem": "terrain model", "zones_sha256": "zones, SHA-256",
+    }  # fmt: skip
+    rows = []
+    for key, value in inputs.items():
+        if value is None:
+            continue
+        words = esc(value)
+        if key == "bare_dem":
+            words = "bare: trees, masts and wires are not in it" if value else "obstacle heights were given"
+        elif key == "resolution_m" and isinstance(value, int | float):
+            words = num(float(value), 0 if value >= 10 else 3, "m")
+        elif key.endswith("sha256"):
+            words = f"<code>{words}</code>"
+        rows.append((esc(names.get(key, key.replace("_", " "))), words))
+    rows += [(esc(name), esc(value)) for name, value in facts]
+    return table("What went in", ("input|", "value|"), rows)
