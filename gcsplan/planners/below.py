@@ -201,7 +201,7 @@ class Below:
         if len(self.legs) > 1:
             return longest_m
         climbing = rise_bound(self.legs, [longest_m], [longest_m]) - longest_m
-        shorter = longest_m - 0.98 * climbing
+        shorter = max(longest_m - 0.98 * climbing, self.legs[0].length_m)
         return shorter if rise_bound(self.legs, [shorter], [longest_m]) >= longest_m else longest_m
 
     def _longest(self) -> float:

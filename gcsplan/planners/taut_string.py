@@ -20,6 +20,9 @@ from gcsplan.planners._taut import draw
 
 Floats = NDArray[np.float64]
 
+NO_LIMIT = 1e12
+"""A slope that stands for infinite ones, which would make nothing of a step at one place."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
@@ -89,7 +92,8 @@ def taut_string(
     at, z = _pull(s_m, low_m, high_m, start_m, end_m)
     s = s_m[at]
     run, rise = np.diff(s), np.diff(z)
-    over = np.maximum(rise - (climb_slope + 1e-9) * run, -rise - (descent_slope + 1e-9) * run)
+    steepest, deepest = (min(slope, NO_LIMIT) + 1e-9 for slope in (climb_slope, descent_slope))
+    over = np.maximum(rise - steepest * run, -rise - deepest * run)
     k = int(np.argmax(over))
     if over[k] > 0.0:
         return Blocked("climb" if rise[k] > 0 else "descent", float(s[k]), float(s[k + 1]), float(over[k]))
