@@ -1,0 +1,269 @@
+"""Flies tracks in simulated time: fixed steps, all vehicles of all runs at once.
+
+A lane is one vehicle in one run: lane ``r · vehicles + v``. Its state is how far along its track it is, how fast, and
+what speed is commanded of it. In one step it gains speed up to what the commanded speed, the piece, the wind and the
+braking distance to everything ahead allow; a step of uniform acceleration is exact, so the length of a step matters
+only where a limit begins within it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.sim.kinematics import AT_ONCE_M_S2
+from gcsplan.sim.trace import Trace
+from gcsplan.sim.track import PASSED, Track
+from gcsplan.sim.wind import Air, Weather
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.intp]
+
+STEP_S = 0.1
+SAMPLE_STEPS = 2
+SAMPLE_S = STEP_S * SAMPLE_STEPS
+"""The flown track is kept so often."""
+CRAWL_M_S = 0.05
+"""The slowest that a vehicle is in a corner: nothing stops but at a stop."""
+HEADWAY_M_S = 0.3
+"""Against a wind that is too strong it creeps on."""
+PATIENCE = 4.0
+"""A lane that takes so many times longer than in still air, and `SPARE_S`, is given up."""
+SPARE_S = 300.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Flown:
+    """What was flown. L lanes, sampled at ``times_s`` (J,), seconds since the fleet's common start.
+
+    ``along_m`` (J, L): how far along its track each lane was; ``offset_m`` (J, L, 3) how far off it, in east, north
+    and up, zero without weather. ``begin_s``, ``arrive_s``, ``end_s`` (L,): leaving the ground, reaching the goal,
+    being down (or at the last point); NaN where that never came. ``hold_s`` (L,): how long it stood in the air.
+    ``stops`` holds for each lane the (node, time reached, time left) of every stop.
+    """
+
+    tracks: tuple[Track, ...]
+    runs: int
+    times_s: Floats
+    along_m: Floats
+    offset_m: Floats | None
+    begin_s: Floats
+    arrive_s: Floats
+    end_s: Floats
+    hold_s: Floats
+    stops: tuple[tuple[tuple[int, float, float], ...], ...]
+
+    def track_of(self, lane: int) -> Track:
+        """The track of a lane."""
+        return self.tracks[lane % len(self.tracks)]
+
+    def points(self, lane: int) -> Floats:
+        """(J, 3) where a lane was at each sample."""
+        return self._places(lane, self.times_s, self.along_m[:, lane])
+
+    def trace(self, lane: int, *, leaves: bool = False) -> Trace:
+        """What a lane flew, from leaving the ground to its end; every node of its track is in it."""
+        track = self.track_of(lane)
+        s = np.concatenate([[0.0], np.cumsum(track.length_m)])
+        end_s = self.end_s[lane] if np.isfinite(self.end_s[lane]) else self.times_s[-1]
+        kept = (self.times_s > self.begin_s[lane]) & (self.times_s < end_s)
+        stops = [(at, float(s[node])) for node, reached, left in self.stops[lane] for at in (reached, left)]
+        stops = [(at, where) for at, where in stops if self.begin_s[lane] <= at <= end_s]
+        flown = self.along_m[:, lane]
+        passed = s[(track.hold_s == PASSED) & (s < flown[-1])]
+        times = np.concatenate([self.times_s[kept], [at for at, _ in stops], np.interp(passed, flown, self.times_s)])
+        along = np.concatenate([flown[kept], [where for _, where in stops], passed])
+        times, first = np.unique(times, return_index=True)
+        along = np.maximum.accumulate(along[first])
+        middle = 0.5 * (along[1:] + along[:-1])
+        piece = np.clip(np.searchsorted(s, middle, side="right") - 1, 0, len(track.column) - 1)
+        return Trace(
+            track.name, times, self._places(lane, times, along), track.column[piece], track.seq[piece],
+            float(self.arrive_s[lane]), 0.0, track.slack_m(SAMPLE_S), track.ends_in_air and not leaves, leaves,
+        )  # fmt: skip
+
+    def _places(self, lane: int, times: Floats, along: Floats) -> Floats:
+        track = self.track_of(lane)
+        s = np.concatenate([[0.0], np.cumsum(track.length_m)])
+        on_track = np.column_stack([np.interp(along, s, track.points[:, k]) for k in range(3)])
+        if self.offset_m is None:
+            return on_track
+        off = self.offset_m[:, lane]
+        return on_track + np.column_stack([np.interp(times, self.times_s, off[:, k]) for k in range(3)])
+
+
+class _Ways:
+    """All tracks' pieces in one row, and for each piece where its run ends."""
+
+    def __init__(self, tracks: Sequence[Track]) -> None:
+        length = [t.length_m for t in tracks]
+        along = [np.concatenate([[0.0], np.cumsum(one)]) for one in length]
+        braking = [t.braking() for t in tracks]
+        self.first: Integers = np.cumsum([0, *(len(one) for one in length[:-1])]).astype(np.intp)
+        self.begin, self.end = np.concatenate([a[:-1] for a in along]), np.concatenate([a[1:] for a in along])
+        self.square = np.concatenate([w[1:] for w in braking])
+        self.cap = np.concatenate([t.cap_m_s for t in tracks])
+        self.command = np.concatenate([t.command_m_s for t in tracks])
+        self.level = np.concatenate([t.level for t in tracks])
+        self.accel = np.concatenate([t.accel_m_s2 for t in tracks])
+        delta = np.concatenate([np.diff(t.points, axis=0)[:, :2] for t in tracks])
+        run = np.hypot(delta[:, 0], delta[:, 1])
+        self.course = delta / np.where(run > 0.0, run, 1.0)[:, None]
+        self.stop_node = np.concatenate([_next_stop(t) for t in tracks])
+        self.stop_at = np.concatenate([a[_next_stop(t)] for t, a in zip(tracks, along, strict=True)])
+        self.hold = np.concatenate([t.hold_s[_next_stop(t)] for t in tracks])
+        # A place just before the stop, so that what lies there is still this run's.
+        self.before_stop = np.nextafter(self.stop_at, -math.inf)
+        self.stops_after = self.end >= self.stop_at
+        self.last = np.concatenate([_next_stop(t) == len(t.points) - 1 for t in tracks])
+
+    def calm_s(self) -> float:
+        """About as long as the longest flight in still air takes, seconds; acceleration and corners not counted."""
+        slow = np.maximum(np.minimum(self.cap, self.command), CRAWL_M_S)
+        holds = np.where(self.stops_after & np.isfinite(self.hold), self.hold, 0.0)
+        return float(np.add.reduceat((self.end - self.begin) / slow + holds, self.first).max())
+
+
+def _next_stop(track: Track) -> Integers:
+    """(N - 1,) the node at which the vehicle next stops, for each piece; the last node is one."""
+    n = len(track.points)
+    stops = np.where(track.hold_s != PASSED, np.arange(n), n - 1)[1:]
+    return np.minimum.accumulate(stops[::-1])[::-1].astype(np.intp)
+
+
+def fly(
+    tracks: Sequence[Track], depart_s: Sequence[float], *, weather: Weather | None = None, runs: int = 1, seed: int = 1,
+    first_run: int = 0,
+) -> Flown:  # fmt: skip
+    """Fly every track, each released at its ``depart_s``, in ``runs`` runs of different weather.
+
+    In still air all runs are the same. Run number ``first_run`` + r has its own weather, whatever else is flown.
+    """
+    weather = weather or Weather()
+    ways = _Ways(tracks)
+    air = Air(weather, len(tracks), runs, seed, first_run)
+    lanes = _Lanes(tracks, ways, np.tile(np.asarray(depart_s, dtype=np.float64), runs), runs)
+    latest_s = max(depart_s) + PATIENCE * ways.calm_s() + SPARE_S
+    times, along, offset = [0.0], [lanes.s.copy()], [air.offset]
+    step = 0
+    while not lanes.done.all() and step * STEP_S < latest_s:
+        step += 1
+        lanes.advance(step * STEP_S, None if weather.calm else air.wind)
+        if step % SAMPLE_STEPS == 0:
+            times.append(step * STEP_S)
+            along.append(lanes.s.copy())
+            if not weather.calm:
+                air.step(SAMPLE_S)
+                offset.append(air.offset)
+    if step % SAMPLE_STEPS:
+        times.append(step * STEP_S)
+        along.append(lanes.s.copy())
+        offset.append(air.offset)
+    return Flown(
+        tuple(tracks), runs, np.array(times), np.array(along), None if weather.calm else np.array(offset),
+        lanes.begin, lanes.arrive, lanes.ended, lanes.stood, tuple(tuple(one) for one in lanes.stops),
+    )  # fmt: skip
+
+
+class _Lanes:
+    """The state of every lane: arrays (L,)."""
+
+    def __init__(self, tracks: Sequence[Track], ways: _Ways, depart_s: Floats, runs: int) -> None:
+        n = len(depart_s)
+        self._ways, self._tracks = ways, tracks
+        self._goal = np.tile([t.goal for t in tracks], runs)
+        self._slowing = np.tile([t.slowing_m_s2 for t in tracks], runs)
+        self._airspeed = np.tile([t.airspeed_m_s for t in tracks], runs)
+        self.piece = np.tile(ways.first, runs)
+        self.s, self.v = np.zeros(n), np.zeros(n)
+        self.command = ways.command[self.piece]
+        self.clock = np.zeros(n)  # each lane's own: after a stop within a step it is behind
+        self.wait = depart_s + np.tile([max(float(t.hold_s[0]), 0.0) for t in tracks], runs)
+        self.done = np.zeros(n, np.bool_)
+        self.begin, self.arrive, self.ended = self.wait.copy(), np.full(n, np.nan), np.full(n, np.nan)
+        self.stood = np.zeros(n)
+        self.stops: list[list[tuple[int, float, float]]] = [[(0, 0.0, float(w))] for w in self.wait]
+
+    def advance(self, to_s: float, wind: Floats | None) -> None:
+        """Bring every lane to ``to_s``."""
+        ways = self._ways
+        b = to_s - self.clock
+        waited = np.minimum(self.wait, b)
+        self.wait -= waited
+        b -= waited
+        b[self.done] = 0.0
+        k, v, s = self.piece, self.v, self.s
+        command = ways.command[k]
+        slower = np.maximum(command, self.command - self._slowing * b)
+        self.command = np.where((v > 0.0) & (command < self.command), slower, command)
+        accel = ways.accel[k]
+        over_ground = self.command if wind is None else np.minimum(self.command, self._headway(k, wind))
+        # What counts is what holds where the step ends: within a step it may come into a corner, or out of one.
+        there = self._piece_at(k, np.minimum(s + v * b, ways.before_stop[k]))
+        with np.errstate(divide="ignore"):
+            cap = np.minimum(ways.cap[there], over_ground / ways.level[there])
+            slow = v >= np.minimum(ways.cap[k], over_ground / ways.level[k])
+            # Out of a slow piece it gains speed from where that ends, not from where the step began.
+            after = np.where(slow & (there != k), b - (ways.begin[there] - s) / np.maximum(v, CRAWL_M_S), b)
+        half = 0.5 * accel * b
+        ahead = half**2 + ways.square[there] + 2.0 * accel * (ways.end[there] - s) - 2.0 * half * v
+        braked = np.where(accel < AT_ONCE_M_S2, np.sqrt(np.maximum(ahead, 0.0)) - half, np.inf)
+        braked = np.maximum(braked, np.where(ways.square[there] > 0.0, CRAWL_M_S, 0.0))
+        steady = np.maximum(cap, v - 2.0 * half)
+        faster = np.minimum(np.minimum(v + accel * np.clip(after, 0.0, b), steady), braked)
+        left = ways.stop_at[k] - s
+        # Faster: at full acceleration, then steady. Slower: evenly, as `braked` was worked out.
+        gone = np.where(faster > v, faster * b - (faster - v) ** 2 / (2.0 * accel), 0.5 * (v + faster) * b)
+        gone[b <= 0.0] = 0.0
+        stops = ((gone >= left) | (2.0 * left <= v * b)) & (b > 0.0)
+        self.s = np.where(stops, ways.stop_at[k], s + gone)
+        self.v = np.where(stops, 0.0, np.where(b > 0.0, faster, v))
+        self.clock[:] = to_s
+        for lane in np.flatnonzero(stops):
+            self._stop(int(lane), to_s - float(b[lane]), float(v[lane]), float(faster[lane]), float(left[lane]))
+        self.piece = np.where(stops | self.done, self.piece, self._piece_at(k, self.s))
+
+    def _piece_at(self, k: Integers, s: Floats) -> Integers:
+        """The pieces at ``s`` (L,), which lie on ``k`` or after it and before the next stop."""
+        ends, k = self._ways.end, k.copy()
+        behind = np.flatnonzero(s >= ends[k])
+        while len(behind):
+            behind = behind[~self._ways.stops_after[k[behind]]]
+            k[behind] += 1
+            behind = behind[s[behind] >= ends[k[behind]]]
+        return k
+
+    def _stop(self, lane: int, since_s: float, v: float, faster: float, left_m: float) -> None:
+        """A lane comes to its stop ``left_m`` further on, in a step that began at ``since_s`` with the speed ``v``."""
+        ways, k = self._ways, int(self.piece[lane])
+        accel, within_s = float(ways.accel[k]), float(self.clock[lane]) - since_s
+        if accel >= AT_ONCE_M_S2:
+            took = left_m / max(faster, CRAWL_M_S)
+        else:
+            took = 2.0 * left_m / v if v > 0.0 else math.sqrt(2.0 * left_m / accel)
+        at = since_s + min(took, within_s)
+        node, hold = int(ways.stop_node[k]), float(ways.hold[k])
+        if node == self._goal[lane]:
+            self.arrive[lane] = at
+        self.stops[lane].append((node, at, at + hold))
+        if ways.last[k] or math.isinf(hold):
+            self.ended[lane] = at
+            self.done[lane] = True
+            return
+        self.stood[lane] += hold
+        self.clock[lane] = at
+        self.wait[lane] = hold
+        first = int(ways.first[lane % len(self._tracks)])
+        self.piece[lane] = first + node
+
+    def _headway(self, k: Integers, wind: Floats) -> Floats:
+        """The most over ground along the course: what the airspeed leaves when the wind is held against."""
+        course = self._ways.course[k]
+        tail = (course * wind).sum(axis=1)
+        cross = course[:, 0] * wind[:, 1] - course[:, 1] * wind[:, 0]
+        through = np.sqrt(np.maximum(self._airspeed**2 - cross**2, 0.0))
+        return np.asarray(np.maximum(tail + through, HEADWAY_M_S))

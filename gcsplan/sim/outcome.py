@@ -1,0 +1,340 @@
+"""How a rehearsal ended: what every vehicle did in every run, and what of it was not as it should be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import CheckFailed
+from gcsplan.mavlink.mission import Mission
+from gcsplan.sim.trace import Judged, Meeting, Trace, examine, meetings
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.world import World
+
+SHOWN = 8
+"""So many violations are named in an error's message."""
+MEETING_STEP_S = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One vehicle's part: its mission with its verdict, and when it leaves and should arrive by plan.
+
+    ``depart_s``, ``arrive_s``: seconds since the fleet's common start, ``arrive_s`` None where nothing is planned.
+    ``airborne``: it begins at the top of its take-off (missions of papers); ``leaves``: it is gone when it arrives.
+    """
+
+    vehicle: Vehicle
+    mission: Mission
+    verdict: Verdict
+    depart_s: float = 0.0
+    arrive_s: float | None = None
+    rtl_rel_home_m: float | None = None
+    airborne: bool = False
+    leaves: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What a fleet is held to. ``order``: names in the order of arrival, empty where any will do. ``separation_m``
+    None: the least distance is told, and not judged. A landed vehicle is in the way for ``pad_clear_s``."""
+
+    order: tuple[str, ...] = ()
+    separation_m: float | None = None
+    pad_clear_s: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Breach:
+    """Something that went wrong: its worst instance in words, and in how many runs it happened."""
+
+    kind: str
+    vehicles: tuple[str, ...]
+    message: str
+    by: float
+    runs: int
+
+    def describe(self, of_runs: int) -> str:
+        """One line."""
+        return self.message if of_runs == 1 else f"{self.message} (in {self.runs} of {of_runs} runs)"
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "kind": self.kind, "vehicles": list(self.vehicles), "message": self.message, "by": _number(self.by),
+            "runs": self.runs,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Performance:
+    """One vehicle in all runs. ``arrive_s`` and ``end_s`` of each run (NaN: never); heights are the least of all."""
+
+    name: str
+    depart_s: float
+    planned_s: float | None
+    arrive_s: tuple[float, ...]
+    end_s: tuple[float, ...]
+    min_agl_m: float
+    min_agl_at: tuple[float, float]
+    battery_used_percent: float | None
+    not_flown: tuple[str, ...] = ()
+
+    @property
+    def errors_s(self) -> tuple[float, ...]:
+        """Arrival late (early: negative), of each run; infinite where it never arrived. Empty without a plan."""
+        if self.planned_s is None:
+            return ()
+        return tuple(math.inf if math.isnan(a) else a - self.planned_s for a in self.arrive_s)
+
+    @property
+    def p95_s(self) -> float | None:
+        """95 % of the runs are no farther from the plan."""
+        return percentile_95([abs(e) for e in self.errors_s])
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; a single run's arrival stands in ``arrive_s``, of several it is the median."""
+        errors = self.errors_s
+        worst = max(errors, key=abs, default=None)
+        return {
+            "name": self.name, "depart_s": self.depart_s, "planned_arrive_s": self.planned_s,
+            "arrive_s": _number(_median(self.arrive_s)), "error_s": _number(_median(errors)),
+            "p95_error_s": _number(self.p95_s), "worst_error_s": _number(worst),
+            "end_s": _number(_median(self.end_s)), "min_agl_m": _number(self.min_agl_m),
+            "min_agl_at": {"lat": _number(self.min_agl_at[0]), "lon": _number(self.min_agl_at[1])},
+            "battery_used_percent": self.battery_used_percent, "not_flown": list(self.not_flown),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """The whole. ``closest`` is the nearest that any two came in any run, None where no two flew at a time.
+
+    ``simulator``: who flew, ``gcsplan`` or ``sitl``. ``weather`` is what it was flown in, for people and JSON.
+    """
+
+    simulator: str
+    runs: int
+    seed: int
+    weather: dict[str, Any]
+    vehicles: tuple[Performance, ...]
+    terms: Terms
+    order_flown: tuple[str, ...]
+    order_kept_runs: int
+    separation_kept_runs: int
+    closest: Meeting | None
+    breaches: tuple[Breach, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def not_judged(self) -> tuple[str, ...]:
+        """What of the missions was not flown."""
+        return tuple(f"{v.name}: {what}" for v in self.vehicles for what in v.not_flown)
+
+    @property
+    def safe(self) -> bool | None:
+        """True, False, or None where nothing went wrong but something was not flown."""
+        if self.breaches:
+            return False
+        return None if self.not_judged else True
+
+    @property
+    def p95_s(self) -> float | None:
+        """95 % of all arrivals of all vehicles are no farther from the plan."""
+        return percentile_95([abs(e) for v in self.vehicles for e in v.errors_s])
+
+    def error(self, *, allow_unjudged: bool = False) -> CheckFailed | None:
+        """The error that this amounts to; None if all is well."""
+        if self.breaches:
+            lines = [b.describe(self.runs) for b in self.breaches[:SHOWN]]
+            rest = len(self.breaches) - SHOWN
+            lines += [f"and {rest} more"] if rest > 0 else []
+            return CheckFailed("the rehearsal found violations:\n  " + "\n  ".join(lines))
+        if self.not_judged and not allow_unjudged:
+            words = "not everything could be flown (--allow-unjudged takes it as it is):\n  "
+            return CheckFailed(words + "\n  ".join(self.not_judged), reason="not_judged")
+        return None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        closest = None
+        if self.closest is not None:
+            closest = {"vehicles": list(self.closest.names), "time_s": _number(self.closest.time_s)}
+        return {
+            "simulator": self.simulator, "runs": self.runs, "seed": self.seed, "weather": self.weather,
+            "safe": self.safe, "vehicles": [v.as_dict() for v in self.vehicles],
+            "fleet": {
+                "order": list(self.terms.order), "order_flown": list(self.order_flown),
+                "order_kept_runs": self.order_kept_runs if self.terms.order else None,
+                "separation_m": self.terms.separation_m,
+                "min_separation_m": None if self.closest is None else _number(self.closest.distance_m),
+                "closest": closest,
+                "separation_kept_runs": None if self.terms.separation_m is None else self.separation_kept_runs,
+                "p95_error_s": _number(self.p95_s),
+            },
+            "violations": [b.as_dict() for b in self.breaches], "not_judged": list(self.not_judged),
+            "notes": list(self.notes),
+        }  # fmt: skip
+
+    def rows(self) -> list[dict[str, str]]:
+        """A table row for each vehicle."""
+        return [_row(v, self.runs) for v in self.vehicles]
+
+
+def percentile_95(values: Sequence[float]) -> float | None:
+    """The smallest value that 95 % of ``values`` do not exceed; None of none."""
+    return sorted(values)[math.ceil(0.95 * len(values)) - 1] if values else None
+
+
+def _row(v: Performance, runs: int) -> dict[str, str]:
+    def seconds(value: float | None) -> str:
+        if value is None:
+            return "–"
+        return f"{value:.1f}" if math.isfinite(value) else "never"
+
+    row = {"vehicle": v.name, "leaves, s": seconds(v.depart_s), "planned, s": seconds(v.planned_s)}
+    arrived = _median(v.arrive_s)
+    row["arrives, s"] = seconds(math.inf if arrived is None or math.isnan(arrived) else arrived)
+    error = _median(v.errors_s)
+    row["error, s"] = "–" if error is None else f"{error:+.2f}" if math.isfinite(error) else "never"
+    if runs > 1:
+        row["95 % within, s"] = "–" if v.p95_s is None else f"{v.p95_s:.2f}"
+    row["down, s"] = seconds(_median(v.end_s))
+    row["lowest AGL, m"] = "–" if math.isnan(v.min_agl_m) else f"{v.min_agl_m:.1f}"
+    row["battery, %"] = "–" if v.battery_used_percent is None else f"{v.battery_used_percent:.0f}"
+    return row
+
+
+def _median(values: Sequence[float]) -> float | None:
+    if not values:
+        return None
+    ordered = sorted(math.inf if math.isnan(v) else v for v in values)
+    middle = len(ordered) // 2
+    return ordered[middle] if len(ordered) % 2 else 0.5 * (ordered[middle - 1] + ordered[middle])
+
+
+def _number(value: float | None) -> float | None:
+    """For JSON: no infinities, and no more digits than there is sense in."""
+    return None if value is None or not math.isfinite(value) else round(value, 7)
+
+
+@dataclass
+class Tally:
+    """Counts run after run what `Rehearsal` tells. ``energy_j`` of each vehicle's flight."""
+
+    parts: Sequence[Part]
+    world: World
+    terms: Terms
+    runs: int = 0
+    order_kept: int = 0
+    separation_kept: int = 0
+    closest: Meeting | None = None
+    order_flown: tuple[str, ...] = ()
+    notes: list[str] = field(default_factory=list)
+    _breaches: dict[tuple[object, ...], Breach] = field(default_factory=dict)
+    _seen: set[tuple[object, ...]] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self._arrive: list[list[float]] = [[] for _ in self.parts]
+        self._end: list[list[float]] = [[] for _ in self.parts]
+        self._lowest: list[Judged | None] = [None] * len(self.parts)
+
+    def add(self, traces: Sequence[Trace]) -> None:
+        """One run, the traces in the order of the parts."""
+        self.runs += 1
+        self._seen = set()
+        for i, (part, trace) in enumerate(zip(self.parts, traces, strict=True)):
+            arrived = math.isfinite(trace.arrive_s)
+            self._arrive[i].append(trace.arrive_s)
+            self._end[i].append(trace.end_s if arrived else math.nan)
+            if not arrived:
+                self.breach("arrival", (trace.name,), f"{trace.name} never arrived at its goal", math.inf)
+            judged = examine(trace, part.vehicle, self.world)
+            before = self._lowest[i]
+            if before is None or math.isnan(before.min_agl_m) or judged.min_agl_m < before.min_agl_m:
+                self._lowest[i] = judged
+            for f in judged.findings:
+                self.breach(f.kind, (trace.name,), f.message, f.by, f.zone)
+        self._order(traces)
+        self._separation(traces)
+
+    def breach(self, kind: str, vehicles: tuple[str, ...], message: str, by: float, more: object = None) -> None:
+        """Note a breach; of one kind the worst is kept, and each run counts once."""
+        key = (kind, vehicles, more)
+        was = self._breaches.get(key)
+        runs = (was.runs if was else 0) + (key not in self._seen)
+        self._seen.add(key)
+        new = Breach(kind, vehicles, message, by, runs)
+        if was is not None and was.by >= by:
+            new = Breach(kind, vehicles, was.message, was.by, runs)
+        self._breaches[key] = new
+
+    def _order(self, traces: Sequence[Trace]) -> None:
+        came = [t.name for t in sorted(traces, key=lambda t: math.inf if math.isnan(t.arrive_s) else t.arrive_s)]
+        if self.runs == 1:
+            self.order_flown = tuple(came)
+        wanted = list(self.terms.order)
+        if not wanted:
+            return
+        if came == wanted:
+            self.order_kept += 1
+            return
+        self.order_flown = tuple(came)
+        said = f"the order of arrival was {', '.join(came)}; planned was {', '.join(wanted)}"
+        self.breach("order", (), said, 1.0)
+
+    def _separation(self, traces: Sequence[Trace]) -> None:
+        needed = self.terms.separation_m
+        found = meetings(traces, needed or 0.0, MEETING_STEP_S, pad_clear_s=self.terms.pad_clear_s)
+        in_air = [m for m in found if m.kind == "air"]
+        if in_air and (self.closest is None or in_air[0].distance_m < self.closest.distance_m):
+            self.closest = in_air[0]
+        if needed is None:
+            return
+        close = [m for m in found if m.distance_m < needed - 1e-6]
+        for m in close:
+            self.breach("separation", m.names, m.describe(needed), needed - m.distance_m, m.kind)
+        self.separation_kept += not close
+
+    def result(
+        self, simulator: str, seed: int, weather: dict[str, Any], energy_j: Sequence[float],
+        not_flown: Sequence[tuple[str, ...]],
+    ) -> Rehearsal:  # fmt: skip
+        """What it all amounts to."""
+        performances = []
+        for i, part in enumerate(self.parts):
+            low = self._lowest[i]
+            energy = part.vehicle.energy
+            used = None if energy.battery_j is None else 100.0 * energy_j[i] / energy.battery_j
+            if used is not None and used > 100.0 * (1.0 - energy.reserve) + 1e-9:
+                stays = f"of which {100 * energy.reserve:g} % must stay"
+                said = f"{part.vehicle.name} used {used:.0f} % of its battery, {stays}"
+                self.breach("battery", (part.vehicle.name,), said, used - 100.0 * (1.0 - energy.reserve))
+            performances.append(
+                Performance(
+                    part.vehicle.name, part.depart_s, part.arrive_s, tuple(self._arrive[i]), tuple(self._end[i]),
+                    math.nan if low is None else low.min_agl_m, (math.nan, math.nan) if low is None else low.min_agl_at,
+                    used, not_flown[i],
+                )
+            )  # fmt: skip
+        breaches = sorted(self._breaches.values(), key=lambda b: (-b.runs, b.kind, b.vehicles))
+        return Rehearsal(
+            simulator, self.runs, seed, weather, tuple(performances), self.terms, self.order_flown, self.order_kept,
+            self.separation_kept, self.closest, tuple(breaches), tuple(dict.fromkeys(self.notes)),
+        )  # fmt: skip
+
+
+def energy_of(points: np.ndarray[Any, np.dtype[np.float64]], hold_s: float, vehicle: Vehicle) -> float:
+    """Joules for a flown line (M, 3) and standing in the air (krill paper, Table 1; wind costs nothing in it)."""
+    delta = np.diff(points, axis=0)
+    energy = vehicle.energy
+    return float(
+        energy.vertical_j_per_m * np.abs(delta[:, 2]).sum()
+        + energy.horizontal_j_per_m * np.hypot(delta[:, 0], delta[:, 1]).sum()
+        + energy.hover_w * hold_s
+    )

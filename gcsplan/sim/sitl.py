@@ -1,0 +1,342 @@
+"""The rehearsal with real autopilots: SITL instances take the missions, arm, start them, and are watched as they fly.
+
+Each vehicle flies in its own simulated time (``time_boot_ms``): a machine that is too slow for all of them at once
+changes nothing. Zero of that time is set so that the moment its MISSION_START was accepted is its departure offset
+(less `LIFT_S`); they need not be in step, for nothing passes between them. Arrivals are read off the positions.
+
+What answers must say that it is simulated (it has the parameter SIM_SPEEDUP) and must be on this machine, unless the
+user insists: this arms and starts vehicles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.errors import GcsplanError, LinkError, UsageError, VehicleRefused
+from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.frames import signing_key
+from gcsplan.mavlink.link import Channel, Job, Link, Steps, pump
+from gcsplan.mavlink.messages import Address
+from gcsplan.mavlink.session import Options, Order, upload_fleet
+from gcsplan.mavlink.steps import discover_steps, parameter_steps
+from gcsplan.mavlink.url import parse_url
+from gcsplan.mavlink.watch import VehicleState, Watch
+from gcsplan.sim.outcome import Part, Rehearsal, Tally, Terms, energy_of
+from gcsplan.sim.trace import Trace
+from gcsplan.vehicle import Autopilot
+from gcsplan.world.world import World
+
+__all__ = ["Seat", "rehearse_sitl", "require_here"]
+
+_GUIDED = 4  # ArduCopter's custom mode: it may be armed in it, and MISSION_START leads from it to AUTO
+_READY_S, _SILENT_S, _ARM_S, _ANSWER_S = 180.0, 30.0, 120.0, 3.0
+_RATE_US = 100_000.0
+_ARMED_MS = 3000
+"""It is armed so long before it is released: ArduCopter's motors do not turn for 2 s (ARMING_DELAY_SEC)."""
+_NEAR_M, _STILL_M_S = 3.0, 0.4
+"""The goal is reached where the vehicle is this near and this slow: it stops there."""
+_SLACK_M = 0.3
+"""What its position may be off, and where it may be between two messages."""
+LIFT_S = 1.6
+"""From MISSION_START to leaving the ground: measured on ArduCopter, whose motors spin up first."""
+_ODD_LIFT_S = 0.7
+_LATE = 1.5
+_SPARE_S = 300.0
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """Where the autopilot of one vehicle answers; ``ours``: it was started for this, and may be left in the air."""
+
+    name: str
+    url: str
+    ours: bool = False
+
+
+@dataclass(slots=True)
+class _Log:
+    """What one vehicle said on its way; ``released_ms`` of its boot time is its departure."""
+
+    released_ms: int = 0
+    boot_ms: list[int] = field(default_factory=list)
+    places: list[tuple[float, float, float]] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
+    items: list[int] = field(default_factory=list)
+    down: bool = False
+
+
+def require_here(urls: Sequence[str]) -> None:
+    """Raise UsageError for a link that leads off this machine."""
+    for url in urls:
+        end = parse_url(url)
+        if end.kind == "serial" or not (end.host.startswith("127.") or end.host in ("localhost", "::1")):
+            raise UsageError(
+                f"--sitl arms vehicles and starts their missions, and {url} is not an address of this machine alone: "
+                f"give 127.0.0.1, or --i-know if what answers there is a simulator as well"
+            )
+
+
+def rehearse_sitl(
+    parts: Sequence[Part],
+    world: World,
+    terms: Terms,
+    seats: Mapping[str, Seat],
+    *,
+    i_know: bool = False,
+    tell: Callable[[str, str], None] | None = None,
+) -> Rehearsal:
+    """Upload, arm, start, watch, judge: one run. ``seats`` by the vehicles' names; ``tell(vehicle, what)``.
+
+    Raises UsageError for a vehicle without a seat, an autopilot that is not ArduCopter, and (unless ``i_know``) a
+    link off this machine; VehicleRefused for what is no simulator, will not arm, or does not take its mission;
+    LinkError where nobody answers.
+    """
+    for part in parts:
+        if part.vehicle.name not in seats:
+            name = part.vehicle.name
+            raise UsageError(f"--sitl: {name} has no address; give {name}=tcp:127.0.0.1:5760")
+        if part.vehicle.autopilot is not Autopilot.ARDUCOPTER:
+            raise UsageError(f"--sitl flies ArduCopter; {part.vehicle.name} is {part.vehicle.autopilot}")
+    if not i_know:
+        require_here([seats[p.vehicle.name].url for p in parts])
+    said = tell or (lambda name, what: None)
+    with ExitStack() as stack:
+        urls = list(dict.fromkeys(seats[p.vehicle.name].url for p in parts))
+        links = {url: stack.enter_context(Link(url, key=signing_key())) for url in urls}
+        channels = [links[seats[p.vehicle.name].url].channel(p.vehicle.sysid) for p in parts]
+        states = _all([Job(c, _ready(c, p, said, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
+        for result in upload_fleet(
+            [
+                Order(
+                    c.link, p.mission, p.verdict,
+                    Options(unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True),
+                )
+                for c, p in zip(channels, parts, strict=True)
+            ]
+        ):  # fmt: skip
+            if isinstance(result, GcsplanError):
+                raise result
+            result.raise_for_outcome()
+        flights = [
+            Job(c, _fly(c, p, s, seats[p.vehicle.name], world, said))
+            for c, p, s in zip(channels, parts, states, strict=True)
+        ]
+        logs = _all(flights)
+    tally = Tally(parts, world, terms)
+    traces = [_trace(log, part, world) for log, part in zip(logs, parts, strict=True)]
+    tally.add(traces)
+    tally.notes.append(f"every vehicle was released {LIFT_S:g} s before its departure, for its motors to spin up")
+    tally.notes += [
+        f"{t.name} left the ground {t.begin_s - p.depart_s:+.1f} s from its departure"
+        for t, p in zip(traces, parts, strict=True)
+        if abs(t.begin_s - p.depart_s) > _ODD_LIFT_S
+    ]
+    energy = [energy_of(t.points, 0.0, p.vehicle) for t, p in zip(traces, parts, strict=True)]
+    return tally.result("sitl", 0, {}, energy, [()] * len(parts))
+
+
+def _all(jobs: list[Job[Any]]) -> list[Any]:
+    """Run all to their ends; raises the first error."""
+    pump(jobs)
+    for job in jobs:
+        if job.error is not None:
+            raise job.error
+    return [job.result for job in jobs]
+
+
+# -- one vehicle ----------------------------------------------------------------------------------------------------
+
+
+def _ready(channel: Channel, part: Part, tell: Callable[[str, str], None], *, i_know: bool) -> Steps[VehicleState]:
+    """Wait until it knows where it is, and make sure that it is a simulator and stands still."""
+    clock, name = channel.link.clock, part.vehicle.name
+    end = clock() + _READY_S
+    tell(name, "waits for its position")
+    while True:
+        watch = Watch(channel.sysid)
+        state = yield from discover_steps(channel, watch, timeout_s=20.0, listen_s=0.0, standby_s=60.0)
+        if state.located and state.home is not None:
+            break
+        if clock() > end:
+            raise VehicleRefused(f"{name}: it has no position after {_READY_S:g} s", where=channel.link.url)
+    values = yield from parameter_steps(channel, state, (("SIM_SPEEDUP",),), watch)
+    if not values and not i_know:
+        raise VehicleRefused(
+            f"{name}: what answers at {channel.link.url} has no parameter SIM_SPEEDUP, so it is no simulator: a "
+            f"rehearsal would arm it and start its mission. Nothing was sent to it (--i-know insists)"
+        )
+    if state.armed:
+        raise VehicleRefused(f"{name}: it is armed already: let it land, or start it anew", where=channel.link.url)
+    return state
+
+
+def _fly(
+    channel: Channel, part: Part, state: VehicleState, seat: Seat, world: World, tell: Callable[[str, str], None]
+) -> Steps[_Log]:
+    """Arm, start, and listen until it is down (or there, where it stays in the air)."""
+    to, name, log = state.address, part.vehicle.name, _Log()
+    pilot = _Pilot(channel, to, log)
+    for message, every_us in (
+        (dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, _RATE_US), (dialect.MAVLINK_MSG_ID_MISSION_CURRENT, _RATE_US)
+    ):  # fmt: skip
+        yield from pilot.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message, every_us)
+    tell(name, "arms")
+    yield from pilot.insist(dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, _GUIDED)
+    yield from pilot.insist(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+    armed_ms = pilot.boot_ms
+    while pilot.boot_ms < armed_ms + _ARMED_MS:
+        yield from pilot.listen(_ANSWER_S)
+    yield from pilot.insist(dialect.MAV_CMD_MISSION_START)
+    tell(name, "flies")
+    planned_s = part.verdict.time_s if part.arrive_s is None else part.arrive_s - part.depart_s + part.verdict.time_s
+    latest_ms = log.released_ms + 1000.0 * (_LATE * planned_s + _SPARE_S)
+    goal = _goal(part)
+    ground = world.ground_amsl(goal[0], goal[1])
+    landing = part.mission.first_seq + len(part.mission.items) - 1
+    last = part.mission.items[-1].command
+    item = 0
+    while True:
+        yield from pilot.listen(_ANSWER_S)
+        if item != pilot.item:
+            item = pilot.item
+            tell(name, f"flies item {item}")
+        if log.down or pilot.boot_ms > latest_ms:
+            return log
+        if not log.places:
+            continue
+        if last == m.LAND and item == landing and log.places[-1][2] <= ground + 0.3:
+            log.down = True  # SITL's ground is level at the height of home: it would sink on through a higher one
+            return log
+        if last not in (m.LAND, m.RTL) and _apart_m(log.places[-1], goal) <= _NEAR_M and log.speeds[-1] <= _STILL_M_S:
+            return log
+
+
+class _Pilot:
+    """Says commands to one vehicle and writes down what it says; generators of `link.Steps`."""
+
+    def __init__(self, channel: Channel, to: Address, log: _Log) -> None:
+        self._channel, self._to, self._log = channel, to, log
+        self._results: dict[int, int] = {}
+        self._texts: list[str] = []
+        self._heard_at = channel.link.clock()
+        self._was_armed = False
+        self.boot_ms, self.item = 0, 0
+
+    def listen(self, within_s: float) -> Steps[None]:
+        """Take in what comes; returns as soon as something came. Raises LinkError after a long silence."""
+        clock = self._channel.link.clock
+        if not self._channel.waits:
+            yield clock() + within_s
+        for heard in self._channel.take():
+            if heard.source == self._to:
+                self._heard_at = clock()
+                self._note(heard.message)
+        if clock() - self._heard_at > _SILENT_S:
+            raise LinkError(
+                f"system {self._to.sysid} has been silent for {_SILENT_S:g} s in the middle of the rehearsal",
+                where=self._channel.link.url,
+            )
+
+    def _note(self, message: Any) -> None:
+        kind, log = message.get_type(), self._log
+        if kind == "GLOBAL_POSITION_INT":
+            self.boot_ms = message.time_boot_ms
+            if log.released_ms:
+                log.boot_ms.append(message.time_boot_ms)
+                log.places.append((message.lat / 1e7, message.lon / 1e7, message.alt / 1e3))
+                log.speeds.append(math.hypot(message.vx, message.vy, message.vz) / 100.0)
+                log.items.append(self.item)
+        elif kind == "MISSION_CURRENT":
+            self.item = message.seq
+        elif kind == "HEARTBEAT":
+            armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+            log.down = log.down or (bool(log.released_ms) and self._was_armed and not armed)
+            self._was_armed = armed
+        elif kind == "COMMAND_ACK":
+            self._results[message.command] = message.result
+            started = message.command == dialect.MAV_CMD_MISSION_START
+            if started and message.result == dialect.MAV_RESULT_ACCEPTED and not log.released_ms:
+                log.released_ms = self.boot_ms  # as they come down the line, not as they are looked at
+        elif kind == "STATUSTEXT":
+            self._texts.append(str(message.text))
+
+    def command(self, command: int, *params: float) -> Steps[int | None]:
+        """Say a command once; its MAV_RESULT, None where no answer comes."""
+        clock = self._channel.link.clock
+        self._results.pop(command, None)
+        p = (*params, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)[:7]
+        self._channel.send(dialect.MAVLink_command_long_message(*self._to, command, 0, *p), self._to)
+        end = clock() + _ANSWER_S
+        while command not in self._results and clock() < end:
+            yield from self.listen(end - clock())
+        return self._results.get(command)
+
+    def insist(self, command: int, *params: float) -> Steps[None]:
+        """Say a command until it is accepted; an autopilot that has just got its position will not arm at once."""
+        clock = self._channel.link.clock
+        end = clock() + _ARM_S
+        while True:
+            result = yield from self.command(command, *params)
+            if result == dialect.MAV_RESULT_ACCEPTED:
+                return
+            if clock() > end:
+                said = " / ".join(self._texts[-3:])
+                raise VehicleRefused(
+                    f"system {self._to.sysid} does not take command {command} (result {result}); it says: "
+                    f"{said or 'nothing'}",
+                    where=self._channel.link.url,
+                )
+            again = clock() + 1.0
+            while clock() < again:
+                yield from self.listen(again - clock())
+
+
+# -- what was flown -------------------------------------------------------------------------------------------------
+
+
+def _goal(part: Part) -> tuple[float, float, float]:
+    """Where the path ends: latitude, longitude, amsl_m."""
+    legs = part.verdict.path_legs or part.verdict.legs
+    return legs[-1].end
+
+
+def _apart_m(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
+    north = (b[0] - a[0]) * 111_195.0
+    east = (b[1] - a[1]) * 111_195.0 * math.cos(math.radians(0.5 * (a[0] + b[0])))
+    return math.hypot(north, east, b[2] - a[2])
+
+
+def _trace(log: _Log, part: Part, world: World) -> Trace:
+    """The positions as a trace in the fleet's time, from leaving the ground to the end."""
+    name = part.vehicle.name
+    if len(log.places) < 2:
+        raise LinkError(f"{name}: no positions came after its mission was started")
+    released_s = part.depart_s - LIFT_S
+    times, first = np.unique((np.array(log.boot_ms) - log.released_ms) / 1000.0 + released_s, return_index=True)
+    places, items = np.array(log.places)[first], np.array(log.items)[first]
+    points = np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
+    goal = _goal(part)
+    aim = np.array([*world.frame.to_plane(goal[0], goal[1]), goal[2]])
+    apart = np.linalg.norm(points - aim, axis=1)
+    there = (apart <= _NEAR_M) & (np.array(log.speeds)[first] <= _STILL_M_S)
+    arrive_s = float(times[int(there.argmax())]) if there.any() else math.nan
+    if not there.any() and float(apart.min()) <= _NEAR_M:  # it went on at once
+        arrive_s = float(times[int(apart.argmin())])
+    up = int((points[:, 2] > points[0, 2] + 0.3).argmax())
+    begin = max(0, up - 1)
+    command = {part.mission.first_seq + i: item.command for i, item in enumerate(part.mission.items)}
+    moved = np.hypot(*np.diff(points[:, :2], axis=0).T) < np.abs(np.diff(points[:, 2])) + 0.05
+    vertical = np.array([command.get(int(i)) in (m.TAKEOFF, m.LAND, m.RTL) for i in items[:-1]])
+    before = items[:-1] < part.mission.first_seq  # not yet said: it is taking off
+    last = part.mission.items[-1].command
+    return Trace(
+        name, times[begin:], points[begin:], ((vertical & moved) | before)[begin:], items[:-1][begin:].astype(np.intp),
+        arrive_s, _SLACK_M, _SLACK_M, not log.down and last not in (m.LAND, m.RTL) and not part.leaves, part.leaves,
+    )  # fmt: skip

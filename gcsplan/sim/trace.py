@@ -1,0 +1,248 @@
+"""What was really flown, by a simulated vehicle or an autopilot, and how it is judged.
+
+A trace is where an aircraft *was*: corners, wind, noise and the autopilot's own errors are in it. So none of the
+limits' errors is added to it again (``track_error_m`` and ``altitude_error_m`` stand for just these), only what lies
+between two samples. Climb angles are not judged: they bound the mission's legs, which the check has judged, and a noisy
+trace has any angle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.check.verdict import Finding
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.airspace import Legs, Violation
+from gcsplan.world.world import World
+
+Floats = NDArray[np.float64]
+
+CHORD = 16
+"""Samples that are looked at as one straight leg, where they lie on one."""
+TRACK_M, HEIGHT_M = 0.25, 0.05
+"""How far they may lie off it; it widens the leg."""
+BLOCK = 16
+"""Intervals whose distance from another aircraft is bounded at once."""
+
+WORDS = {
+    "min_agl": "came too low above ground",
+    "max_agl": "came too high above ground",
+    "max_amsl": "came above max_amsl_m",
+    "terrain_clearance": "came too near to rising ground at its level",
+    "zone": "came into no-fly zone",
+    "coverage": "came over ground that the terrain model does not know",
+}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Trace:
+    """One aircraft's way through the air.
+
+    ``times_s`` (M,) rising, ``points`` (M, 3) east_m, north_m, amsl_m, from leaving the ground to the end. Its line is
+    within ``off_m`` of the straight ones between them; at every moment it is within ``slack_m`` of where an even motion
+    between them puts it. ``column`` and ``seq`` (M - 1,): whether a piece belongs to a take-off or landing,
+    and the wire item it was flown for. ``arrive_s``: the goal reached; NaN where it never was. ``stays``: it hangs in
+    the air at the end; ``leaves``: it is gone after the end.
+    """
+
+    name: str
+    times_s: Floats
+    points: Floats
+    column: NDArray[np.bool_]
+    seq: NDArray[np.intp]
+    arrive_s: float
+    off_m: float
+    slack_m: float
+    stays: bool = False
+    leaves: bool = False
+
+    @property
+    def begin_s(self) -> float:
+        """When it left the ground."""
+        return float(self.times_s[0])
+
+    @property
+    def end_s(self) -> float:
+        """When it was down, or at its last point."""
+        return float(self.times_s[-1])
+
+    def at(self, times_s: Floats) -> Floats:
+        """(K, 3) places at ``times_s`` (K,); before the first and after the last it stands there."""
+        return np.column_stack([np.interp(times_s, self.times_s, self.points[:, k]) for k in range(3)])
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """``min_agl_m``: least height above ground and what stands on it, columns aside; NaN where there is none."""
+
+    min_agl_m: float
+    min_agl_at: tuple[float, float]
+    findings: tuple[Finding, ...]
+
+
+def examine(trace: Trace, vehicle: Vehicle, world: World) -> Judged:
+    """Hold a trace against the limits by the exact check, between its samples too."""
+    legs, owner = _legs(trace)
+    limits = replace(vehicle.limits, max_climb_deg=90.0, max_descent_deg=90.0)
+    report = world.airspace.examine(legs, limits)
+    free = ~legs.column & ~np.isnan(report.min_agl_m)
+    agl, place = math.nan, (math.nan, math.nan)
+    if free.any():
+        height = np.where(free, report.min_agl_m - legs.altitude_error_m, np.inf)
+        low = int(height.argmin())
+        f = float(report.min_agl_at[low])
+        here = legs.start[low, :2] + f * (legs.end[low, :2] - legs.start[low, :2])
+        agl, place = float(height[low]), _degrees(world, here)
+    worst: dict[tuple[str, int], Violation] = {}
+    for v in report.violations:
+        if (v.kind, v.zone) not in worst or v.by > worst[v.kind, v.zone].by:
+            worst[v.kind, v.zone] = v
+    found = [_finding(v, trace, legs, int(owner[v.leg]), world) for v in worst.values()]
+    return Judged(agl, place, tuple(found))
+
+
+def _legs(trace: Trace) -> tuple[Legs, NDArray[np.intp]]:
+    """The trace as few straight legs, each widened by how far the samples lie off it, and each one's first sample."""
+    points = trace.points
+    firsts: list[NDArray[np.intp]] = []
+    lasts: list[NDArray[np.intp]] = []
+    edges = [0, *(np.flatnonzero(np.diff(trace.column)) + 1).tolist(), len(trace.column)]
+    for a, b in pairwise(edges):
+        starts = np.arange(a, b, CHORD, dtype=np.intp)
+        firsts.append(starts)
+        lasts.append(np.minimum(starts + CHORD, b).astype(np.intp))
+    first, last = np.concatenate(firsts), np.concatenate(lasts)
+    inner = np.minimum(first[:, None] + np.arange(1, CHORD), last[:, None])
+    track, height = _off(points[first], points[last], points[inner])
+    bent = (track > TRACK_M) | (height > HEIGHT_M)
+    each = np.concatenate([np.arange(a, b) for a, b in zip(first[bent], last[bent], strict=True)] or [first[:0]])
+    owner = np.concatenate([first[~bent], each]).astype(np.intp)
+    until = np.concatenate([last[~bent], each + 1]).astype(np.intp)
+    none = np.zeros(len(each))
+    return (
+        Legs(
+            points[owner], points[until], trace.column[owner],
+            np.concatenate([track[~bent], none]) + trace.off_m, np.concatenate([height[~bent], none]) + trace.off_m,
+        ),
+        owner,
+    )  # fmt: skip
+
+
+def _off(a: Floats, b: Floats, inner: Floats) -> tuple[Floats, Floats]:
+    """How far, across and in height, ``inner`` (N, K, 3) lie off the lines ``a``-``b`` (N, 3) at most."""
+    along = b - a
+    square = np.maximum((along**2).sum(axis=1), 1e-12)
+    f = np.clip(((inner - a[:, None]) * along[:, None]).sum(axis=2) / square[:, None], 0.0, 1.0)
+    apart = inner - (a[:, None] + f[..., None] * along[:, None])
+    return np.hypot(apart[..., 0], apart[..., 1]).max(axis=1), np.abs(apart[..., 2]).max(axis=1)
+
+
+def _finding(v: Violation, trace: Trace, legs: Legs, sample: int, world: World) -> Finding:
+    lat, lon = _degrees(world, np.array([v.east_m, v.north_m]))
+    name = world.airspace.zones[v.zone].name if v.zone >= 0 else ""
+    what = WORDS.get(v.kind, v.kind) + (f" “{name}” or its clearance" if name else "")
+    by = f" by {v.by:.2f} {v.unit}" if v.kind != "coverage" else ""
+    message = (
+        f"{trace.name} {what}{by} at {float(trace.times_s[sample]):.1f} s, item {int(trace.seq[sample])} "
+        f"({lat:.6f}, {lon:.6f}, {v.amsl_m:.1f} m AMSL)"
+    )
+    return Finding(int(trace.seq[sample]), v.kind, message, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name)
+
+
+def _degrees(world: World, place: Floats) -> tuple[float, float]:
+    lat, lon = (float(x) for x in world.frame.to_degrees(place[0], place[1]))
+    return lat, lon
+
+
+# -- each other ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """Two aircraft at their nearest: ``distance_m`` is less what may lie between samples. ``kind``: ``air``, or
+    ``landing`` where the first comes down beside the second, which stands on the ground."""
+
+    names: tuple[str, str]
+    distance_m: float
+    time_s: float
+    kind: str = "air"
+
+    def describe(self, needed_m: float) -> str:
+        """One sentence."""
+        a, b = self.names
+        near = f"{self.distance_m:.1f} m, asked were {needed_m:g} m, at {self.time_s:.1f} s"
+        if self.kind == "air":
+            return f"{a} and {b} came as near as {near}"
+        return f"{a} landed beside {b}, which stood there: {near}"
+
+
+def meetings(
+    traces: Sequence[Trace], needed_m: float, step_s: float, *, pad_clear_s: float = math.inf
+) -> list[Meeting]:
+    """The least distance of each pair nearer than ``needed_m`` while both are in the air, and of the nearest pair.
+
+    Sampled every ``step_s``, and less what may lie between the samples: never optimistic. The nearest stands first.
+    Then those that land within ``needed_m`` of one that has landed up to ``pad_clear_s`` before.
+    """
+    found: list[Meeting] = []
+    if len(traces) > 1:
+        first = math.floor(min(t.begin_s for t in traces) / step_s)
+        last = math.ceil(max(t.end_s for t in traces) / step_s) + 1
+        times = step_s * np.arange(first, last + 1, dtype=np.float64)
+        places = np.stack([t.at(times) for t in traces])
+        found = _in_the_air(traces, times, places, needed_m)
+    landed = sorted((t for t in traces if not t.stays and not t.leaves), key=lambda t: t.end_s)
+    for n, late in enumerate(landed):
+        for early in landed[:n]:
+            apart_m = float(np.hypot(*(late.points[-1] - early.points[-1])[:2]))
+            if apart_m < needed_m and late.end_s < early.end_s + pad_clear_s:
+                found.append(Meeting((late.name, early.name), apart_m, late.end_s, "landing"))
+    return found
+
+
+def _in_the_air(traces: Sequence[Trace], times: Floats, places: Floats, needed_m: float) -> list[Meeting]:
+    flying = np.array([(times[1:] >= t.begin_s) & ((times[:-1] <= t.end_s) | t.stays) for t in traces])
+    speed = np.linalg.norm(np.diff(places, axis=1), axis=2)
+    n = len(times) - 1
+    blocks = np.arange(0, n, BLOCK)
+    reach = np.array([np.add.reduceat(one, blocks) for one in speed])  # no farther than this within a block
+    i, j = np.triu_indices(len(traces), 1)
+    bound = np.full((len(i), len(blocks)), np.inf)
+    for m, (a, b) in enumerate(zip(i.tolist(), j.tolist(), strict=True)):
+        both = np.logical_or.reduceat(flying[a] & flying[b], blocks)
+        apart = np.linalg.norm(places[a, blocks] - places[b, blocks], axis=1)
+        bound[m] = np.where(both, apart - reach[a] - reach[b], np.inf)
+    found: list[Meeting] = []
+    best = math.inf
+    for m in np.argsort(bound.min(axis=1)).tolist():
+        if bound[m].min() > max(best, needed_m):
+            break
+        a, b = int(i[m]), int(j[m])
+        rows = (blocks[bound[m] <= max(best, needed_m)][:, None] + np.arange(BLOCK)).ravel()
+        rows = rows[rows < n]
+        rows = rows[flying[a, rows] & flying[b, rows]]
+        if not len(rows):
+            continue
+        distance, at = _nearest(places[a] - places[b], rows)
+        low = int(distance.argmin())
+        least = max(0.0, float(distance[low]) - 2.0 * (traces[a].slack_m + traces[b].slack_m))
+        when = float(times[rows[low]] + at[low] * (times[1] - times[0]))
+        if least < needed_m or least < best:
+            found.append(Meeting((traces[a].name, traces[b].name), least, when))
+        best = min(best, least)
+    found.sort(key=lambda meeting: meeting.distance_m)
+    return [f for k, f in enumerate(found) if k == 0 or f.distance_m < needed_m]
+
+
+def _nearest(apart: Floats, rows: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Least length of the vectors between ``apart[r]`` and ``apart[r + 1]``, straight, and where in [0, 1]."""
+    p, d = apart[rows], apart[rows + 1] - apart[rows]
+    square = np.maximum((d * d).sum(axis=1), 1e-18)
+    f = np.clip(-(p * d).sum(axis=1) / square, 0.0, 1.0)
+    return np.linalg.norm(p + f[:, None] * d, axis=1), f

@@ -1,0 +1,327 @@
+"""The way of one simulated vehicle: its stored mission as a line in space, with what limits its speed on each piece.
+
+The items are read as the check reads them (`check.flight.follow`); how long they take is worked out here and in
+`mission_flight`, and nowhere else: nothing of it is shared with what planned the times.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.check.arcs import bend
+from gcsplan.check.flight import follow
+from gcsplan.check.stretch import Flight, Stretch
+from gcsplan.errors import InputError
+from gcsplan.mavlink.mission import Mission
+from gcsplan.sim.kinematics import Kinematics
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.world import World
+
+Floats = NDArray[np.float64]
+
+SAG_M = 0.02
+"""How far the chords of a rounded corner may lie from its arc."""
+TERRAIN_PART_M = 10.0
+"""Longest piece of a leg that follows the ground."""
+FAST_M_S = 60.0
+"""A corner that allows more, and is cut by next to nothing, is none."""
+SAME_M = 0.01
+"""Places nearer than this are one place."""
+PASSED = -1.0
+"""In `Track.hold_s`: a node that is passed without a stop."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Track:
+    """N nodes and the N - 1 straight pieces between them.
+
+    ``points`` (N, 3): east_m, north_m, amsl_m. ``hold_s`` (N,): how long the vehicle stands at a node, `PASSED` where
+    it does not stop; infinite for good. Of the pieces (N - 1,): ``cap_m_s`` the most that climb, descent and corners
+    allow along it; ``command_m_s`` the speed over ground that is commanded; ``level`` the horizontal part of a metre;
+    ``accel_m_s2``; ``column`` (take-off or landing); ``seq`` the wire item. ``goal`` is the node where the path ends.
+    ``bend_m_s2``: the most that its velocity changes.
+    """
+
+    name: str
+    points: Floats
+    hold_s: Floats
+    cap_m_s: Floats
+    command_m_s: Floats
+    level: Floats
+    accel_m_s2: Floats
+    column: NDArray[np.bool_]
+    seq: NDArray[np.intp]
+    goal: int
+    ends_in_air: bool
+    slowing_m_s2: float
+    airspeed_m_s: float
+    bend_m_s2: float
+    not_flown: tuple[str, ...]
+
+    @property
+    def length_m(self) -> Floats:
+        """(N - 1,) of each piece, in space."""
+        return np.asarray(np.linalg.norm(np.diff(self.points, axis=0), axis=1))
+
+    def slack_m(self, sample_s: float) -> float:
+        """How far the motion may stray from the straight line between two of its points ``sample_s`` apart."""
+        fastest = float(np.minimum(self.cap_m_s, self.command_m_s / np.maximum(self.level, 0.05)).max())
+        bend = self.bend_m_s2 * sample_s**2 / 8.0
+        return min(bend, 0.5 * fastest * sample_s)
+
+    def braking(self) -> Floats:
+        """(N,) the largest v² at each node from which every later cap and stop can still be met.
+
+        A lower speed that is commanded on the way is not looked ahead to: it is heard of when it is commanded.
+        """
+        heard = self.command_m_s.copy()
+        for i in range(1, len(heard)):
+            if self.hold_s[i] == PASSED:
+                heard[i] = max(heard[i], heard[i - 1])
+        with np.errstate(divide="ignore"):
+            square = np.minimum(np.minimum(self.cap_m_s, heard / self.level), 1e6) ** 2
+        gain = 2.0 * self.accel_m_s2 * self.length_m
+        w = np.zeros(len(self.points))
+        for i in range(len(w) - 2, 0, -1):
+            w[i] = 0.0 if self.hold_s[i] != PASSED else min(square[i - 1], square[i], w[i + 1] + gain[i])
+        return w
+
+
+class _Line:
+    """Nodes and pieces, one after the other. ``leg_m_s``: what the leg that is being laid allows for its length."""
+
+    def __init__(self, start: Floats) -> None:
+        self.leg_m_s = math.inf
+        self.points = [start]
+        self.hold_s = [0.0]
+        self.pieces: list[tuple[float, float, float, float, bool, int]] = []
+
+    def add(
+        self, to: Floats, stretch: Stretch, kinematics: Kinematics, *, corner_m_s: float = math.inf, cap_m_s: float = 0
+    ) -> None:
+        """A piece to ``to``; ``cap_m_s`` > 0 in a column."""
+        delta = to - self.points[-1]
+        length = float(np.linalg.norm(delta))
+        if length <= 1e-9:
+            return
+        level, rise = float(math.hypot(delta[0], delta[1])) / length, float(delta[2]) / length
+        climb, descent = stretch.rates_m_s or (kinematics.climb_m_s, kinematics.descent_m_s)
+        vertical = climb if rise > 0 else descent
+        if not cap_m_s:
+            rate = vertical / abs(rise) if abs(rise) > 1e-9 else math.inf
+            cap_m_s = min(rate, self.leg_m_s, corner_m_s / level if level else math.inf)
+        if rise != 0.0 and math.isinf(vertical):  # the ideal vehicle: its speed is one in space
+            level = 1.0
+        accel = kinematics.vertical_accel_m_s2 if stretch.column else kinematics.accel_m_s2
+        self.pieces.append((cap_m_s, stretch.speed_m_s, level, accel, stretch.column, stretch.seq))
+        self.points.append(to)
+        self.hold_s.append(PASSED)
+
+    def stop(self, hold_s: float) -> None:
+        """Stand at the last node, ``hold_s`` longer if it stands there already."""
+        self.hold_s[-1] = max(self.hold_s[-1], 0.0) + hold_s
+
+
+def make_track(
+    mission: Mission,
+    vehicle: Vehicle,
+    world: World,
+    kinematics: Kinematics,
+    *,
+    rtl_rel_home_m: float | None = None,
+    airborne: bool = False,
+) -> Track:
+    """The way that ``mission`` (as stored on board) asks of ``vehicle``.
+
+    ``airborne``: it begins at the top of its take-off.
+
+    What of it is not understood, or cannot be simulated, is named in ``not_flown``. Raises ValueError where the
+    mission does not fly at all.
+    """
+    flight = follow(mission, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    if not flight.stretches:
+        raise ValueError(f"{vehicle.name}: the mission flies nowhere")
+    wing = vehicle.turn_radius_m > 0.0
+    if wing:
+        bend(flight, mission, vehicle, world.frame)
+    places = np.array([(s.start, s.end) for s in flight.stretches])
+    ends = np.empty_like(places)
+    ends[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
+    ends[..., 2] = places[..., 2]
+    if airborne:
+        first = next((k for k, s in enumerate(flight.stretches) if not s.column), 0)
+        flight.stretches, ends = flight.stretches[first:], ends[first:]
+    # A leg begins where the last one ended: what lies between was not understood, and is said in `not_flown`.
+    line, goal, i = _Line(ends[0, 0]), 0, 0
+    stretches = flight.stretches
+    while i < len(stretches):
+        s = stretches[i]
+        if s.column and not (wing and _slants(ends[i])):
+            _column(line, ends[i], s, kinematics)
+            line.stop(s.hold_s)
+        elif _stands(s, ends[i]):
+            line.stop(s.hold_s)
+        else:
+            last = _end_of_flight(stretches, i) if wing else _end_of_run(stretches, ends, i)
+            _run(line, stretches[i : last + 1], ends[i : last + 1], kinematics, world)
+            line.stop(stretches[last].hold_s)
+            i = last
+        if stretches[i].on_path:
+            goal = len(line.points) - 1
+        if math.isinf(line.hold_s[-1]):
+            break
+        i += 1
+    if not line.pieces:
+        raise ValueError(f"{vehicle.name}: the mission flies nowhere")
+    return _track(vehicle, line, goal, flight, kinematics, stretches[min(i, len(stretches) - 1)])
+
+
+def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics: Kinematics, last: Stretch) -> Track:
+    name, turns = vehicle.name, []
+    if vehicle.turn_radius_m > 0.0 and vehicle.autopilot is not Autopilot.ARDUPLANE:
+        turns.append(f"its turns of {vehicle.turn_radius_m:g} m are flown as corners")
+    cap, command, level, accel, column, seq = zip(*line.pieces, strict=True)
+    points = np.array(line.points)
+    if not np.isfinite(points).all():
+        raise InputError(f"{name}: the mission follows terrain that the terrain model does not know")
+    return Track(
+        name, points, np.array(line.hold_s), np.array(cap), np.array(command), np.array(level),
+        np.array(accel), np.array(column, dtype=np.bool_), np.array(seq, dtype=np.intp), goal,
+        not (last.column and last.end[2] < last.start[2]), kinematics.slowing_m_s2, kinematics.airspeed_m_s,
+        math.hypot(max(kinematics.accel_m_s2, kinematics.vertical_accel_m_s2), kinematics.corner_accel_m_s2),
+        (*flight.not_judged, *_left_out(flight), *turns),
+    )  # fmt: skip
+
+
+def _left_out(flight: Flight) -> list[str]:
+    """What is flown more simply than by an autopilot."""
+    circles = sorted({s.seq for s in flight.stretches if s.kind == "loiter" and s.reach_m > 0.0})
+    again = sorted({s.seq for s in flight.stretches if s.times > 1})
+    return [
+        *(f"item {seq}: its circle is not flown, the simulated vehicle waits at the middle" for seq in circles),
+        *(f"item {seq}: a jump flies it again and again, the simulated vehicle once" for seq in again),
+    ]
+
+
+def _stands(s: Stretch, ends: Floats) -> bool:
+    return bool(np.linalg.norm(ends[1] - ends[0]) <= SAME_M)
+
+
+def _end_of_run(stretches: Sequence[Stretch], ends: Floats, first: int) -> int:
+    """Index of the stretch at whose end the vehicle stops: way points without a wait are passed.
+
+    It stops before a landing or a return and where the frame changes between terrain and another
+    (mode_auto.cpp, `set_next_wp`).
+    """
+    i = first
+    while i + 1 < len(stretches):
+        here, after = stretches[i], stretches[i + 1]
+        if here.hold_s > 0.0 or after.column or after.kind != here.kind or after.terrain != here.terrain:
+            break
+        if _stands(after, ends[i + 1]) and after.hold_s > 0.0:
+            break
+        i += 1
+    return i
+
+
+def _end_of_flight(stretches: Sequence[Stretch], first: int) -> int:
+    """Index of the last stretch of one kind that a fixed wing flies; to stop there takes it no time."""
+    i = first
+    while i + 1 < len(stretches) and stretches[i + 1].kind == stretches[first].kind:
+        i += 1
+    return i
+
+
+def _slants(ends: Floats) -> bool:
+    return bool(np.hypot(*(ends[1] - ends[0])[:2]) > SAME_M)
+
+
+def _column(line: _Line, ends: Floats, s: Stretch, kinematics: Kinematics) -> None:
+    """Straight up, or straight down and slowly at the end."""
+    start, end = line.points[-1], ends[1]
+    climb, descent = s.rates_m_s or (kinematics.climb_m_s, kinematics.descent_m_s)
+    if end[2] >= start[2]:
+        line.add(end, s, kinematics, cap_m_s=climb)
+        return
+    low = end[2] + kinematics.land_below_m
+    if start[2] > low > end[2]:
+        line.add(np.array([*end[:2], low]), s, kinematics, cap_m_s=descent)
+    line.add(end, s, kinematics, cap_m_s=min(kinematics.land_m_s, descent))
+
+
+def _run(line: _Line, stretches: Sequence[Stretch], ends: Floats, kinematics: Kinematics, world: World) -> None:
+    """Legs that are flown without a stop, their corners rounded."""
+    terrain = stretches[0].terrain
+    legs = [i for i, s in enumerate(stretches) if not _stands(s, ends[i])]
+    if not legs:
+        return
+    corners = np.array([line.points[-1], *(ends[i, 1] for i in legs)])
+    if terrain:  # heights above ground are what changes evenly along the leg
+        corners[:, 2] -= world.airspace.surface.ground_at(corners[:, 0], corners[:, 1])
+    arcs = [_arc(corners[k : k + 3], kinematics) for k in range(len(legs) - 1)]
+    sharp_end = corners[-1][None, :], math.inf
+    for k, i in enumerate(legs):  # the second half of the corner behind, the straight, the first half of the one ahead
+        way: list[tuple[Floats, float]] = []
+        if k > 0:
+            nodes, corner_m_s = arcs[k - 1]
+            way += [(node, corner_m_s) for node in nodes[len(nodes) // 2 + 1 :]]
+        nodes, corner_m_s = arcs[k] if k < len(arcs) else sharp_end
+        way.append((nodes[0], math.inf))
+        way += [(node, corner_m_s) for node in nodes[1 : len(nodes) // 2 + 1]]
+        line.leg_m_s = kinematics.leg_m_s(float(np.linalg.norm(ends[i, 1] - ends[i, 0])))
+        for to, corner_m_s in way:
+            if terrain:
+                _over_ground(line, to, stretches[i], kinematics, corner_m_s, world)
+            else:
+                line.add(to, stretches[i], kinematics, corner_m_s=corner_m_s)
+
+
+def _over_ground(line: _Line, to: Floats, s: Stretch, kinematics: Kinematics, corner_m_s: float, world: World) -> None:
+    """A piece whose height is given above ground, in parts that follow it."""
+    surface = world.airspace.surface
+    here = line.points[-1]
+    agl = here[2] - float(surface.ground_at(here[0], here[1]))
+    parts = max(1, math.ceil(float(math.hypot(*(to[:2] - here[:2]))) / TERRAIN_PART_M))
+    for f in np.arange(1, parts + 1) / parts:
+        east, north = here[:2] + f * (to[:2] - here[:2])
+        z = float(surface.ground_at(east, north)) + agl + f * (to[2] - agl)
+        line.add(np.array([east, north, z]), s, kinematics, corner_m_s=corner_m_s)
+
+
+def _arc(corner: Floats, kinematics: Kinematics) -> tuple[Floats, float]:
+    """The nodes of a rounded corner, an odd number of them, and the speed that it allows.
+
+    ``corner`` (3, 3): the way point between its neighbours. One node, the way point, where there is no turn.
+    """
+    before, here, after = corner
+    into, out = here - before, after - here
+    run_in, run_out = math.hypot(into[0], into[1]), math.hypot(out[0], out[1])
+    sharp = here[None, :]
+    if min(run_in, run_out) <= SAME_M:
+        return sharp, math.inf
+    cross, dot = into[0] * out[1] - into[1] * out[0], into[0] * out[0] + into[1] * out[1]
+    turn = min(abs(math.atan2(cross, dot)), math.pi - 1e-3)
+    radius = kinematics.corner_radius_m(turn, min(run_in, run_out))
+    corner_m_s = kinematics.corner_m_s(radius)
+    straight = radius * (1.0 / math.cos(0.5 * turn) - 1.0) <= 0.5 * SAG_M and corner_m_s > FAST_M_S
+    if straight or radius <= 0.0:
+        return sharp, math.inf
+    tangent = radius * math.tan(0.5 * turn)
+    begin, end = here - into * (tangent / run_in), here + out * (tangent / run_out)
+    side = math.copysign(1.0, cross)
+    normal = side * np.array([-into[1], into[0]]) / run_in
+    centre = begin[:2] + radius * normal
+    parts = 2 * max(1, math.ceil(0.5 * turn / math.sqrt(8.0 * SAG_M / radius)))
+    u = np.arange(parts + 1) / parts
+    angle = side * turn * u
+    spoke = begin[:2] - centre
+    turned = np.column_stack(
+        [spoke[0] * np.cos(angle) - spoke[1] * np.sin(angle), spoke[0] * np.sin(angle) + spoke[1] * np.cos(angle)]
+    )
+    height = np.interp(u, [0.0, 0.5, 1.0], [begin[2], here[2], end[2]])  # a change of pitch is not rounded
+    return np.column_stack([centre + turned, height]), corner_m_s

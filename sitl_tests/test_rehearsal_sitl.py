@@ -1,0 +1,87 @@
+"""A rehearsal with real ArduCopters: they arm, fly their missions, and arrive when the plan says.
+
+Wants the path of an arducopter binary: each instance has to stand where its mission starts.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from gcsplan.errors import LinkError, UsageError
+from gcsplan.mission_file import load_mission
+from gcsplan.pipeline import Plan, plan
+from gcsplan.rehearsing import rehearse, rehearse_in_sitl
+from sitl_tests import sitl
+
+binary = pytest.mark.skipif(
+    not os.path.isfile(sitl.wanted()),
+    reason=f"no autopilot: set {sitl.VARIABLE} to the path of an arducopter binary (an instance for each vehicle)",
+)
+
+FLEET = """
+version: 1
+name: Two up the valley
+terrain: {dem: "sample:jacksboro", vertical_datum: EGM96}
+limits: {min_agl_m: 60, horizontal_clearance_m: 30, track_error_m: 3, altitude_error_m: 5, max_climb_deg: 15}
+vehicles:
+  - name: uav1
+    sysid: 1
+    autopilot: arducopter
+    speed_m_s: [3, 9]
+    start: [36.6175, -84.3892]
+    goal: [36.6300, -84.3800]
+  - name: uav2
+    sysid: 2
+    autopilot: arducopter
+    speed_m_s: [3, 9]
+    start: [36.6195, -84.3925]
+    goal: [36.6300, -84.3830]
+arrival: {mode: sequence, order: [uav2, uav1], interval_s: 10, separation_m: 30}
+planner: {name: optimal, objective: length, seed: 1}
+altitude_frame: relative
+"""
+
+WITHIN_S = 2.0
+"""How far an arrival may be from the plan."""
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+    file = tmp_path_factory.mktemp("rehearsal") / "fleet.yaml"
+    file.write_text(FLEET, encoding="utf-8")
+    return plan(load_mission(file))
+
+
+@binary
+def test_two_real_arducopters_arrive_as_planned_and_as_the_built_in_simulator_says(planned: Plan) -> None:
+    said: list[tuple[str, str]] = []
+    result = rehearse_in_sitl(
+        planned, binary=Path(sitl.wanted()), speedup=10.0, tell=lambda name, what: said.append((name, what))
+    )
+    assert result.simulator == "sitl"
+    assert result.breaches == ()
+    assert result.order_flown == ("uav2", "uav1")
+    errors = [v.errors_s[0] for v in result.vehicles]
+    assert errors == pytest.approx([0.0, 0.0], abs=WITHIN_S), f"arrival errors {errors}"
+    ours = rehearse(planned)
+    assert [v.arrive_s[0] for v in result.vehicles] == pytest.approx(
+        [v.arrive_s[0] for v in ours.vehicles], abs=WITHIN_S
+    )
+    assert all(v.min_agl_m >= 60.0 for v in result.vehicles)
+    assert result.closest is not None
+    assert ours.closest is not None
+    assert result.closest.distance_m == pytest.approx(ours.closest.distance_m, abs=25.0)
+    assert {name for name, what in said if what == "flies"} == {"uav1", "uav2"}
+
+
+def test_addresses_off_this_machine_are_refused_before_anything_is_opened(planned: Plan) -> None:
+    with pytest.raises(UsageError, match="--i-know"):
+        rehearse_in_sitl(planned, addresses={"uav1": "tcp:192.0.2.1:5760", "uav2": "tcp:127.0.0.1:5760"})
+
+
+def test_a_program_that_is_no_autopilot_is_named(planned: Plan) -> None:
+    with pytest.raises(LinkError, match="ended at once with code"):
+        rehearse_in_sitl(planned, binary=Path("/bin/false"))
