@@ -22,36 +22,42 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.checking import Checked, split_name
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
+from gcsplan.fencing import not_fenced, upload_fences
 from gcsplan.mavlink.autopilots import manner
+from gcsplan.mavlink.fence import Fence
 from gcsplan.mavlink.files import read_mission_file, write_plan, write_waypoints
 from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, Mission
 from gcsplan.mavlink.url import parse_url
 from gcsplan.mission_file import MissionFile
-from gcsplan.pipeline import Plan, world_of
+from gcsplan.pipeline import Plan
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.withdrawal import withdrawn
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
     from gcsplan.mavlink import session
     from gcsplan.mavlink.link import Link
+    from gcsplan.mavlink.machine import Progress
     from gcsplan.mavlink.results import UploadResult
 
 SIM, LINK = "sim", "link"
 LISTEN_S = 1.5
 """How long to listen for a second source of a system id's heartbeats, which come once a second."""
 KINDS = {"mission": MISSION, "fence": FENCE, "rally": RALLY}
-ProgressCall = Callable[[str, int, int], None]
+ProgressCall = Callable[[str, "Progress"], None]
+"""Called with a vehicle's name and where its upload is; at the end the phase is the outcome in a word."""
 Simulator = Callable[[Sequence[Mission]], AbstractContextManager[str]]
 """Starts a vehicle for each mission; the context is the URL where all of them answer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What the user allows."""
+    """What the user allows. ``atomic``: if one upload fails, the missions that others took are cleared again."""
 
     allow_armed: bool = False
     ignore_position: bool = False
     unchecked: bool = False
+    atomic: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +72,7 @@ class Job:
     world: World | None = None
     rtl_rel_home_m: float | None = None
     terrain_error_m: float = 0.0
+    fence: Fence | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +150,6 @@ def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[Job]:
 
 def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) -> list[Job]:
     """The uploads of checked files; ``word`` as of ``--upload``. Raises UsageError for two files of one vehicle."""
-    world = world_of(source)
     seen: dict[str, Path] = {}
     for c in checked:
         if seen.setdefault(c.vehicle.name, c.file) is not c.file:
@@ -154,8 +160,8 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
         raise UsageError(f"--to {word} says nothing of {', '.join(missing)}")
     return [
         Job(
-            c.vehicle.name, to[c.vehicle.name], c.mission, c.verdict, c.vehicle, world, c.request.rtl_rel_home_m,
-            source.terrain_error_m,
+            c.vehicle.name, to[c.vehicle.name], c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m,
+            c.terrain_error_m,
         )
         for c in checked
     ]  # fmt: skip
@@ -217,14 +223,69 @@ def deliver(
                 links[url] = stack.enter_context(_open(url))
             except LinkError as error:  # the other vehicles' links may be well
                 failed[url] = error
-        open_jobs = [job for job in jobs if job.url in links]
-        orders = [_order(job, links[job.url], options, progress) for job in open_jobs]
-        ended: dict[int, UploadResult | GcsplanError] = {
-            id(job): result for job, result in zip(open_jobs, session.upload_fleet(orders), strict=True)
+        if failed and options.atomic:  # known before anything was sent: nobody's old mission need be lost
+            where = ", ".join(failed)
+            held = LinkError(f"nothing was sent, all or nothing: the link {where} did not open")
+            return [_delivery(job, failed.get(job.url) or held) for job in jobs]
+        fenced = _fenced(jobs, links, options)
+        barred = not_fenced(fenced)
+        if barred and options.atomic:
+            held = LinkError("nothing was sent but fences, all or nothing: another vehicle's fence is not on board")
+            return [_delivery(job, barred.get(job.name) or held) for job in jobs]
+        orders = {
+            job.name: _order(job, links[job.url], options, progress)
+            for job in jobs
+            if job.url in links and job.name not in barred
         }
-        for job in jobs:
-            ended.setdefault(id(job), failed.get(job.url) or LinkError("the link did not open"))
-        return [_delivery(job, ended[id(job)]) for job in jobs]
+        results = session.upload_fleet(list(orders.values()), ended=_teller(progress))
+        ended = dict(zip(orders, results, strict=True))
+        done = [
+            _with_fence(
+                _delivery(
+                    job,
+                    ended.get(job.name) or barred.get(job.name) or failed.get(job.url)
+                    or LinkError("the link did not open"),
+                ),
+                fenced.get(job.name),
+            )
+            for job in jobs
+        ]  # fmt: skip
+        return withdrawn(done, orders, ended) if options.atomic else done
+
+
+def _fenced(jobs: Sequence[Job], links: Mapping[str, Link], options: Options) -> dict[str, UploadResult | GcsplanError]:
+    if not any(job.fence is not None for job in jobs):
+        return {}
+    from gcsplan.mavlink import session
+
+    return upload_fences(jobs, links, session.Options(allow_armed=options.allow_armed, listen_s=LISTEN_S))
+
+
+def _with_fence(delivery: Delivery, fence: UploadResult | GcsplanError | None) -> Delivery:
+    if fence is None or isinstance(fence, GcsplanError):
+        return delivery
+    told = {"outcome": fence.outcome, "verified": fence.verified, "items": fence.items, "seconds": fence.seconds}
+    words = f"a fence of {fence.items} item(s) is on board too, read back and compared"
+    return replace(
+        delivery,
+        warnings=tuple(dict.fromkeys((words, *delivery.warnings, *fence.warnings))),
+        details=dict(delivery.details or {}) | {"fence": told},
+    )
+
+
+def _teller(progress: ProgressCall | None) -> session.EndCall | None:
+    if progress is None:
+        return None
+    from gcsplan.mavlink.machine import Progress
+
+    def tell(order: session.Order, ended: UploadResult | GcsplanError) -> None:
+        count = len(order.mission.wire_items())
+        refused = isinstance(ended, VehicleRefused)
+        word = ("refused" if refused else "unknown") if isinstance(ended, GcsplanError) else ended.outcome
+        verified = not isinstance(ended, GcsplanError) and ended.verified
+        progress(order.mission.name, Progress("verified" if verified else f"{word}!", count if verified else 0, count))
+
+    return tell
 
 
 def _order(job: Job, link: Link, options: Options, progress: ProgressCall | None) -> session.Order:
@@ -244,8 +305,7 @@ def _order(job: Job, link: Link, options: Options, progress: ProgressCall | None
         simulated=job.url == SIM,
         listen_s=0.0 if job.url == SIM else LISTEN_S,
     )
-    told = None if progress is None else lambda name, p: progress(name, p.done, p.total)
-    return session.Order(link, job.mission, job.verdict, settings, _judge_again(job), told)
+    return session.Order(link, job.mission, job.verdict, settings, _judge_again(job), progress)
 
 
 def _judge_again(job: Job) -> session.Judge | None:

@@ -431,6 +431,26 @@ def test_the_plan_is_what_qgroundcontrol_and_mavsdk_ask_for() -> None:
     assert {i["type"] for i in mission["items"]} == {"SimpleItem"}
 
 
+@pytest.mark.parametrize(
+    ("key", "room", "said"),
+    [
+        ("geoFence", {"circles": [{"inclusion": 1, "circle": {}}]}, "circles\\[0\\].*inclusion"),
+        ("geoFence", {"circles": [{"inclusion": True, "circle": {"center": [1, 2], "radius": -1}}]}, "radius"),
+        ("geoFence", {"circles": [{"inclusion": True, "circle": {"center": [1, None], "radius": 1}}]}, "center"),
+        ("geoFence", {"polygons": [{"inclusion": False, "polygon": [[1, 2], [3, 4]]}]}, "3 corners"),
+        ("geoFence", {"polygons": {}}, "must be a list"),
+        ("rallyPoints", {"points": [[1, 2]]}, "points\\[0\\]"),
+        ("rallyPoints", {"points": [[1, 2, None]]}, "altitude above home"),
+        ("rallyPoints", {"points": [[91, 2, 3]]}, "within"),
+    ],
+)
+def test_a_broken_fence_or_rally_point_is_named_with_its_key(key: str, room: Any, said: str) -> None:
+    plan = json.loads(write_plan(short_mission()))
+    plan[key] = room
+    with pytest.raises(InputError, match=said):
+        parse_plan(json.dumps(plan), autopilot=COPTER, where="x.plan")
+
+
 def test_kind_and_speeds_of_the_vehicle_stand_in_the_plan() -> None:
     limits = Limits(min_agl_m=30)
     vehicle = Vehicle("a", 1, PX4, limits, speed_max_m_s=22.5, turn_radius_m=80)
@@ -456,9 +476,11 @@ def test_fence_and_rally_points_are_written_from_their_wire_items() -> None:
         {"circle": {"center": [5, 6], "radius": 40.5}, "inclusion": False, "version": 1}
     ]
     assert plan["rallyPoints"]["points"] == [[7, 8, 90.5]]
-    notes = parse_plan(json.dumps(plan), autopilot=COPTER, where="").notes
-    assert len(notes) == 2
-    assert all("not read" in n for n in notes)
+    read = parse_plan(json.dumps(plan), autopilot=COPTER, where="")
+    assert len(read.notes) == 2
+    assert all("is not sent with it" in n for n in read.notes)
+    assert read.fence == (fence[3], *fence[:3], *fence[4:])  # circles come first in a plan
+    assert [(r.x, r.y, r.z) for r in read.rally] == [(7 * 10**7, 8 * 10**7, 90.5)]
     for broken in (fence[:2], [vertex(5100, 0, 1, 1)], [vertex(5001, math.nan, 1, 1)]):
         with pytest.raises(InputError, match="whole polygons and circles"):
             write_plan(short_mission(), fence=broken)
@@ -502,6 +524,30 @@ def test_a_survey_is_read_as_the_items_that_it_holds() -> None:
     plan["mission"]["items"][2] = {"type": "ComplexItem", "complexItemType": "fwLandingPattern", "landCoordinate": []}
     with pytest.raises(InputError, match=r"f: mission.items\[2\]: a complex item \(fwLandingPattern\)"):
         read_plan(json.dumps(plan), autopilot=PX4, where="f")
+
+
+@pytest.mark.parametrize(("kind", "land"), [("fwLandingPattern", 21), ("vtolLandingPattern", 85)])
+@pytest.mark.parametrize("circle", [True, False])
+def test_a_landing_pattern_is_read_as_the_items_that_are_sent_for_it(kind: str, land: int, circle: bool) -> None:
+    pattern = {
+        "type": "ComplexItem", "complexItemType": kind, "version": 2, "altitudesAreRelative": True,
+        "landCoordinate": [36.6, -84.3, 0], "landingApproachCoordinate": [36.61, -84.31, 40], "loiterRadius": 75,
+        "loiterClockwise": False, "useLoiterToAlt": circle, "stopTakingPhotos": True, "stopVideoPhotos": False,
+    }  # fmt: skip
+    plan = json.loads(write_plan(short_mission(PLANE)))
+    before = len(plan["mission"]["items"])
+    plan["mission"]["items"].append(pattern)
+    read = parse_plan(json.dumps(plan), autopilot=PLANE, where="x.plan")
+    start, trigger, photos, approach, down = read.mission.items[before:]
+    assert (start.command, trigger.command, photos.command, down.command) == (189, 206, 2001, land)
+    assert approach.command == (31 if circle else 16)
+    assert approach.params[1] == (-75.0 if circle else 0.0)
+    assert (approach.lat_deg, approach.z, approach.frame) == (36.61, 40.0, RELATIVE)
+    assert (down.lat_deg, down.z, down.frame) == (36.6, 0.0, RELATIVE)
+    assert any(kind in n and "stands for" in n for n in read.notes)
+    del pattern["landCoordinate"]
+    with pytest.raises(InputError, match="without its single items"):
+        parse_plan(json.dumps(plan), autopilot=PLANE, where="x.plan")
 
 
 def test_a_place_that_is_not_given_is_here_for_ardupilot_and_refused_for_px4() -> None:

@@ -124,8 +124,6 @@ def test_rtl_at_an_unknown_altitude_is_not_judged() -> None:
 @pytest.mark.parametrize(
     "item",
     [
-        at(m.SPLINE_WAYPOINT, 0.02, 0, 80),
-        MissionItem(m.DO_JUMP, 2, (1, 3, 0, 0)),
         MissionItem(m.DO_SET_HOME, 0, (0, 0, 0, 0), 366000000, -843000000, 10),
         at(31000, 0.02, 0, 80),
     ],
@@ -301,6 +299,56 @@ def test_a_circles_radius_holds_for_the_next_one_without() -> None:
 
     assert fly(TAKEOFF, circle(0)).stretches[-1].reach_m == 10
     assert fly(TAKEOFF, circle(80), circle(0)).stretches[-1].reach_m == 80
+
+
+def test_an_arduplanes_endless_loiter_takes_the_items_radius_and_a_timed_one_its_own() -> None:
+    place = m.degrees_e7(36.61), m.degrees_e7(-84.3)
+    wide = MissionItem(m.LOITER_UNLIM, m.RELATIVE, (0, 0, -200, 0), *place, 65)
+    timed = MissionItem(m.LOITER_TIME, m.RELATIVE, (30, 0, 200, 0), *place, 65)
+    assert 200 < fly(VTOL_TAKEOFF, wide, autopilot=Autopilot.ARDUPLANE).stretches[-1].reach_m < 250
+    assert 60 < fly(VTOL_TAKEOFF, timed, autopilot=Autopilot.ARDUPLANE).stretches[-1].reach_m < 75
+
+
+def test_a_loiter_to_an_altitude_circles_through_the_whole_band_on_arduplane_and_climbs_on_copter() -> None:
+    place = m.degrees_e7(36.61), m.degrees_e7(-84.3)
+    up = MissionItem(31, m.RELATIVE, (0, 100, 0, 0), *place, 165)
+    circle = fly(VTOL_TAKEOFF, up, autopilot=Autopilot.ARDUPLANE).stretches[-1]
+    assert circle.reach_m > 100
+    assert (circle.start[2] - circle.band_m, circle.start[2] + circle.band_m) == (GROUND_M + 65, GROUND_M + 165)
+    copter = fly(TAKEOFF, up)
+    assert copter.not_judged == []
+    assert copter.stretches[-1].end[2] == GROUND_M + 165
+    px4 = fly(TAKEOFF, up, autopilot=Autopilot.PX4)
+    assert [s.end[2] for s in px4.instead] == [GROUND_M + 65, GROUND_M + 165]
+
+
+def test_rates_of_climb_and_descent_hold_from_there_on() -> None:
+    rates = [MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (kind, value, -1, 0)) for kind, value in ((2, 5), (3, 4))]
+    flight = fly(TAKEOFF, *rates, at(m.WAYPOINT, 0.01, 0, 80))
+    assert [s.rates_m_s for s in flight.stretches] == [(2.5, 1.5), (5, 4)]
+
+
+def test_a_spline_is_flown_as_a_curve_and_judged_from_a_standstill_too() -> None:
+    spline, after = at(m.SPLINE_WAYPOINT, 0.01, 0.01, 80), at(m.WAYPOINT, 0.0, 0.02, 80)
+    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 80), spline, after)
+    assert flight.not_judged == []
+    curve = [s for s in flight.stretches if s.seq == 3]
+    assert curve[0].start == flight.stretches[1].end
+    assert curve[-1].end[:2] == (spline.lat_deg, spline.lon_deg)
+    assert max(s.end[0] for s in curve) > 36.6105  # it leaves northward
+    assert max(s.end[0] for s in flight.instead) < 36.612
+    assert all(0 < s.reach_m == s.band_m < 0.3 for s in curve)
+
+
+@pytest.mark.parametrize("autopilot", [Autopilot.PX4, Autopilot.ARDUPLANE])
+def test_a_spline_of_anything_but_arducopter_is_not_judged(autopilot: Autopilot) -> None:
+    up = VTOL_TAKEOFF if autopilot is Autopilot.ARDUPLANE else TAKEOFF
+    flight = fly(up, at(m.WAYPOINT, 0.01, 0, 80), at(m.SPLINE_WAYPOINT, 0.01, 0.01, 80), autopilot=autopilot)
+    assert any("command 82" in what for what in flight.not_judged)
+
+
+def test_a_take_off_written_elsewhere_is_remarked_on_copter() -> None:
+    assert any("takes off where it stands" in n for n in fly(at(m.TAKEOFF, 0.01, 0, 65)).notes)
 
 
 def test_px4_takes_no_turns() -> None:

@@ -40,7 +40,7 @@ HIGH_ENOUGH = [[0.0, 0, 366], [3000, 0, 366], [6000, 1000, 366]]
 def test_a_mission_above_every_limit_is_safe_and_its_figures_add_up() -> None:
     verdict = verdict_of(world(), HIGH_ENOUGH)
     assert verdict.safe is True
-    assert verdict.length_m == pytest.approx(3000 + math.hypot(3000, 1000), rel=1e-6)
+    assert verdict.length_m == pytest.approx(3000 + math.hypot(3000, 1000), rel=1e-5)
     assert verdict.lowest is not None
     assert verdict.lowest.min_agl_m == pytest.approx(66.0, abs=0.01)
     up_and_down = 120 * (66 + 66)
@@ -164,12 +164,22 @@ def test_an_empty_mission_is_not_judged() -> None:
     assert judge(replace(mission, items=()), craft, world()).safe is None
 
 
-def test_a_jump_makes_the_verdict_not_judged() -> None:
-    mission, craft = mission_over(world(), HIGH_ENOUGH)
-    jump = MissionItem(m.DO_JUMP, m.NO_POSITION, (2, 2, 0, 0))
-    verdict = judge(replace(mission, items=(*mission.items[:3], jump, *mission.items[3:])), craft, world())
-    assert verdict.safe is None
-    assert any("177" in what for what in verdict.not_judged)
+def test_a_jump_back_is_judged_and_each_of_its_rounds_counts() -> None:
+    mission, craft = mission_over(world(), [[0.0, 0, 366], [900, 0, 366], [900, 800, 366], [1800, 800, 366]])
+    once = judge(mission, craft, world())
+
+    def with_jump(rounds: int) -> Verdict:
+        jump = MissionItem(m.DO_JUMP, m.NO_POSITION, (3, rounds, 0, 0))
+        items = (*mission.items[:4], jump, *mission.items[4:])
+        return judge(replace(mission, items=items), craft, world())
+
+    for rounds in (0, 1, 2, 30):
+        verdict = with_jump(rounds)
+        assert verdict.safe is True, verdict.describe()
+        assert verdict.length_m == pytest.approx(once.length_m + rounds * 1600.0, rel=1e-5)
+        assert verdict.time_s == pytest.approx(once.time_s + rounds * 1600.0 / 15.0, rel=1e-5)
+        assert verdict.energy_j == pytest.approx(once.energy_j + rounds * 1600.0 * 100.0, rel=1e-5)
+    assert max(leg.times for leg in with_jump(30).legs) > 20  # rounds alike are judged once
 
 
 @pytest.mark.parametrize("autopilot", list(Autopilot))

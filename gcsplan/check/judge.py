@@ -12,7 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gcsplan.check.arcs import bend
+from gcsplan.check.climb_out import slant_findings
 from gcsplan.check.flight import follow
+from gcsplan.check.misses import nearest_misses
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.mavlink.autopilots import manner
@@ -37,7 +40,7 @@ HIGHEST_M = 20_000.0
 
 
 @dataclass(frozen=True, slots=True)
-class _Plane:
+class PlaneLegs:
     """The legs of all stretches in the plane; ``owner`` (N,) is the stretch of each leg."""
 
     legs: Legs
@@ -51,16 +54,15 @@ def judge(
     *,
     rtl_rel_home_m: float | None = None,
     terrain_error_m: float = TERRAIN_ERROR_M,
+    misses: bool = False,
 ) -> Verdict:
-    """Judge ``mission`` for ``vehicle`` in ``world``; never raises for a mission that is merely unsafe."""
+    """Judge ``mission`` for ``vehicle`` in ``world``; never raises for a mission that is merely unsafe.
+
+    ``misses``: look too how near it comes to each limit (half as much work again).
+    """
     table = manner(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
     flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
-    if vehicle.turn_radius_m > 0.0:  # the straight legs are judged below; a pass would claim what nobody looked at
-        flight.not_judged.append(
-            f"the arcs of {vehicle.turn_radius_m:g} m that {vehicle.name} flies at its corners are not judged: "
-            f"autopilots begin a turn, and change altitude in it, by parameters that the mission does not hold"
-        )
     findings: list[Finding] = []
     count = len(mission.wire_items())
     if table.max_items is not None and count > table.max_items:
@@ -76,12 +78,16 @@ def judge(
     far = [_too_far(s) for s in (*flight.stretches, *flight.instead) if _is_too_far(s, world)]
     if far:  # the plane does not reach there, and neither does any terrain model that could be loaded
         return Verdict(mission, (), tuple(findings + far), tuple(flight.not_judged), tuple(flight.notes))
-    plane = _legs(flight.stretches, vehicle.limits, world, terrain_error_m)
+    if vehicle.turn_radius_m > 0.0:
+        bend(flight, stored, vehicle, world.frame)
+        findings += slant_findings(flight.stretches, vehicle, world)
+    plane = legs_in_plane(flight.stretches, vehicle.limits, world, terrain_error_m)
     report = world.airspace.examine(plane.legs, vehicle.limits)
     figures = _figures(flight, plane, report, vehicle, world)
     findings += _findings(flight.stretches, plane, report, world)
+    near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
     if flight.instead:  # what may be flown in place of a stretch must be legal; its figures are not the mission's
-        plane = _legs(flight.instead, vehicle.limits, world, terrain_error_m)
+        plane = legs_in_plane(flight.instead, vehicle.limits, world, terrain_error_m)
         report = world.airspace.examine(plane.legs, vehicle.limits)
         known = {(f.seq, f.kind, f.zone) for f in findings}
         more = _findings(flight.instead, plane, report, world)
@@ -90,7 +96,7 @@ def judge(
         flight.notes.append(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged with {terrain_error_m:g} m of error"
         )
-    verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
+    verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near)
     return _with_battery(verdict, vehicle)
 
 
@@ -115,7 +121,8 @@ def _too_far(s: Stretch) -> Finding:
     return Finding(s.seq, "coverage", message, lat, lon, amsl, math.nan, math.nan, math.nan, "m")
 
 
-def _legs(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> _Plane:
+def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> PlaneLegs:
+    """The stretches as straight legs of the plane, with all that widens them; terrain-frame ones in many pieces."""
     places = np.array([(s.start, s.end) for s in stretches])
     plane = np.empty_like(places)
     plane[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
@@ -132,7 +139,7 @@ def _legs(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_er
     owners = np.array(owner, dtype=np.intp)
     column = np.array([s.column for s in stretches])[owners]
     legs = Legs(np.concatenate(starts), np.concatenate(ends), column, np.array(track), np.array(height))
-    return _Plane(legs, owners)
+    return PlaneLegs(legs, owners)
 
 
 def _follow_ground(ends: Floats, world: World) -> tuple[Floats, Floats]:
@@ -176,7 +183,7 @@ def _follow_ground(ends: Floats, world: World) -> tuple[Floats, Floats]:
 
 
 def _figures(
-    flight: Flight, plane: _Plane, report: LegReport, vehicle: Vehicle, world: World
+    flight: Flight, plane: PlaneLegs, report: LegReport, vehicle: Vehicle, world: World
 ) -> tuple[LegFigures, ...]:
     energy = vehicle.energy
     ground_end = world.airspace.surface.ground_at(plane.legs.end[:, 0], plane.legs.end[:, 1])
@@ -211,11 +218,20 @@ def _figures(
                 nearest_zone=world.airspace.zones[zone].name if zone >= 0 else "",
                 energy_j=energy.vertical_j_per_m * float(np.abs(rise).sum())
                 + energy.horizontal_j_per_m * horizontal_m + energy.hover_w * hold_s,
-                time_s=sum(vehicle.leg_time_s(h, r, s.speed_m_s) for h, r in zip(run, rise, strict=True)) + hold_s,
+                time_s=_time_s(vehicle, s, run, rise) + hold_s,
                 hold_s=s.hold_s,
+                times=s.times,
+                jumped_from=s.jumped_from,
             )
         )  # fmt: skip
     return tuple(figures)
+
+
+def _time_s(vehicle: Vehicle, s: Stretch, run_m: Floats, rise_m: Floats) -> float:
+    climb_m_s, descent_m_s = s.rates_m_s or (vehicle.climb_m_s, vehicle.descent_m_s)
+    if (climb_m_s, descent_m_s) != (vehicle.climb_m_s, vehicle.descent_m_s):
+        vehicle = replace(vehicle, climb_m_s=climb_m_s, descent_m_s=descent_m_s)
+    return math.fsum(vehicle.leg_time_s(h, r, s.speed_m_s) for h, r in zip(run_m, rise_m, strict=True))
 
 
 WORDS = {
@@ -230,7 +246,7 @@ WORDS = {
 }
 
 
-def _findings(stretches: Sequence[Stretch], plane: _Plane, report: LegReport, world: World) -> list[Finding]:
+def _findings(stretches: Sequence[Stretch], plane: PlaneLegs, report: LegReport, world: World) -> list[Finding]:
     """The worst violation of each kind and zone on each stretch, in the order flown."""
     worst: dict[tuple[int, str, int], Violation] = {}
     for v in report.violations:
@@ -245,7 +261,8 @@ def _findings(stretches: Sequence[Stretch], plane: _Plane, report: LegReport, wo
         what = WORDS[kind] + (f" “{name}” or its clearance" if name else "")
         numbers = f": {v.value:.2f} {v.unit}, limit {v.limit:.2f} {v.unit}" if kind not in ("coverage", "zone") else ""
         by = f" (by {v.by:.2f} {v.unit})" if kind != "coverage" else ""
-        message = f"item {s.seq} ({s.kind}): {what}{numbers}{by} at {lat:.6f}, {lon:.6f}, {v.amsl_m:.1f} m AMSL"
+        way = s.kind if s.jumped_from is None else f"{s.kind}, after the jump at item {s.jumped_from}"
+        message = f"item {s.seq} ({way}): {what}{numbers}{by} at {lat:.6f}, {lon:.6f}, {v.amsl_m:.1f} m AMSL"
         found.append(Finding(s.seq, kind, message, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name))
     return found
 

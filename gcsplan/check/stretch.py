@@ -17,6 +17,8 @@ class Stretch:
     ``column``: vertical take-off or landing. ``terrain``: altitude is interpolated above ground between the ends.
     ``band_m`` widens the altitude error (altitude is known only within a band), ``reach_m`` the track error (a
     loiter's circle). ``on_path``: counts for the path's length, from the top of the take-off to the approach.
+    ``rates_m_s``: of climb and descent, None the vehicle's own. ``times``: how often it is flown, by a jump that leads
+    back. ``jumped_from``: the jump that led to it, where it is the first after one.
     """
 
     seq: int
@@ -30,6 +32,9 @@ class Stretch:
     reach_m: float = 0.0
     hold_s: float = 0.0
     on_path: bool = False
+    rates_m_s: tuple[float, float] | None = None
+    times: int = 1
+    jumped_from: int | None = None
 
 
 @dataclass(slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.mavlink.mission import Mission
 
@@ -32,6 +33,8 @@ class LegFigures:
 
     ``min_agl_m`` counts above ground and what stands on it, on the line itself; ``agl_end_m`` above bare ground.
     ``energy_j`` holds the hold's cost too; ``hold_s`` may be infinite (a loiter without end costs nothing here).
+    Figures are those of one time; ``times``: how often it is flown, where a jump leads back. ``jumped_from``: the jump
+    that leads to it.
     """
 
     seq: int
@@ -52,11 +55,16 @@ class LegFigures:
     energy_j: float
     time_s: float
     hold_s: float
+    times: int = 1
+    jumped_from: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """``mission`` is the one that was judged, as sent; the judgement is of what the autopilot stores of it."""
+    """``mission`` is the one that was judged, as sent; the judgement is of what the autopilot stores of it.
+
+    ``misses``: how near it comes to each limit, where that was asked.
+    """
 
     mission: Mission
     legs: tuple[LegFigures, ...]
@@ -64,6 +72,7 @@ class Verdict:
     not_judged: tuple[str, ...]
     notes: tuple[str, ...] = ()
     battery_used_percent: float | None = None
+    misses: tuple[Miss, ...] = ()
 
     @property
     def safe(self) -> bool | None:
@@ -80,28 +89,28 @@ class Verdict:
     @property
     def length_m(self) -> float:
         """Length of the path in space."""
-        return math.fsum(leg.length_m for leg in self.path_legs)
+        return math.fsum(leg.length_m * leg.times for leg in self.path_legs)
 
     @property
     def path_energy_j(self) -> float:
         """Energy of the path alone, comparable with a planner's bound."""
-        return math.fsum(leg.energy_j for leg in self.path_legs)
+        return math.fsum(leg.energy_j * leg.times for leg in self.path_legs)
 
     @property
     def energy_j(self) -> float:
         """Energy of the whole flight: columns, holds and the return included."""
-        return math.fsum(leg.energy_j for leg in self.legs)
+        return math.fsum(leg.energy_j * leg.times for leg in self.legs)
 
     @property
     def time_s(self) -> float:
         """Duration of the whole flight; a loiter without end counts nothing."""
-        return math.fsum(leg.time_s for leg in self.legs)
+        return math.fsum(leg.time_s * leg.times for leg in self.legs)
 
     @property
     def arrive_s(self) -> float:
         """From leaving the ground to the end of the path (the goal at approach altitude)."""
         last = max((i for i, leg in enumerate(self.legs) if leg.on_path), default=-1)
-        return math.fsum(leg.time_s for leg in self.legs[: last + 1])
+        return math.fsum(leg.time_s * leg.times for leg in self.legs[: last + 1])
 
     @property
     def lowest(self) -> LegFigures | None:

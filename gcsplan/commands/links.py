@@ -11,6 +11,9 @@ from gcsplan.commands.ending import emit, talking
 from gcsplan.commands.options import (
     LINKS,
     ArmedOption,
+    AtomicOption,
+    FenceInfiniteOption,
+    FenceOption,
     FilesArgument,
     JsonOption,
     PlaceOption,
@@ -41,6 +44,9 @@ def upload(
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
+    atomic: AtomicOption = False,
+    fence: FenceOption = False,
+    fence_infinite: FenceInfiniteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Check mission files, upload them, read them back, and compare.
@@ -48,13 +54,17 @@ def upload(
     A file goes out only with a passing verdict in --mission's world, or with --unchecked. The file's name (uav1.plan)
     or NAME= says which vehicle of the mission it is for.
     """
-    from gcsplan import checking, delivery, pipeline
-    from gcsplan.console import delivery_table, say_notes, transfer_progress, verdict_table
+    from gcsplan import checking, delivery, fencing, pipeline
+    from gcsplan.console import delivery_table, say_notes, say_notes_of, transfer_progress, verdict_table
     from gcsplan.sim.loopback import loopback_fleet
 
     if (mission is None) == (not unchecked):
         raise UsageError("give either --mission FILE, in whose world the files are checked, or --unchecked")
-    options = delivery.Options(allow_armed=allow_armed, ignore_position=ignore_position, unchecked=unchecked)
+    if unchecked and (fence or fence_infinite):
+        raise UsageError("--fence is made of the zones of a mission file: give --mission FILE instead of --unchecked")
+    options = delivery.Options(
+        allow_armed=allow_armed, ignore_position=ignore_position, unchecked=unchecked, atomic=atomic
+    )
     if mission is not None:
         if sysid is not None:
             raise UsageError(
@@ -70,6 +80,9 @@ def upload(
         verdicts = {c.vehicle.name: c.verdict for c in checked}
         pipeline.require_passing(verdicts, allow_unjudged=allow_unjudged)
         jobs = delivery.jobs_of_files(source, checked, to)
+        if fence or fence_infinite:
+            jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
+            say_notes_of(fence_notes)
     else:
         if len(files) > 1:
             raise UsageError("--unchecked takes one FILE, for the vehicle --sysid; send the others one by one")

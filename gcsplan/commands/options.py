@@ -28,6 +28,15 @@ FilesArgument = Annotated[
 ]
 TypeOption = Annotated[str, typer.Option("--type", metavar="KIND", help="mission, fence or rally.")]
 ArmedOption = Annotated[bool, typer.Option("--allow-armed", help="Send to an armed vehicle.")]
+AtomicOption = Annotated[
+    bool, typer.Option("--atomic", help="All or nothing: if one upload fails, clear what the other vehicles took.")
+]
+FenceOption = Annotated[
+    bool, typer.Option("--fence", help="Send the zones as a fence first. Zones with a floor or a ceiling stay out.")
+]
+FenceInfiniteOption = Annotated[
+    bool, typer.Option("--fence-infinite", help="As --fence, with zones that have a height as if they had none.")
+]
 PlaceOption = Annotated[bool, typer.Option("--ignore-position", help="Send wherever the vehicle stands.")]
 
 UncheckedSysidOption = Annotated[

@@ -25,7 +25,18 @@ ORDER: dict[str, tuple[str, ...]] = {
 CLOCKS = frozenset({"planning_s", "first_path_s", "upload"})
 """Clock readings: different each time, so they stand in ``--json`` and upload.json only."""
 
-DECIMALS = (("_m_s", 3), ("_m", 3), ("_j", 1), ("_s", 3), ("_deg", 3), ("_percent", 3), ("lat", 7), ("lon", 7))
+DECIMALS = (
+    ("lat_deg", 7),
+    ("lon_deg", 7),
+    ("_m_s", 3),
+    ("_m", 3),
+    ("_j", 1),
+    ("_s", 3),
+    ("_deg", 3),
+    ("_percent", 3),
+    ("lat", 7),
+    ("lon", 7),
+)
 OTHER_DECIMALS = 6
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gcsplan.mavlink import mission as m
 from gcsplan.mavlink.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.wings import Wing, build_wing
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
@@ -46,13 +47,19 @@ MARGINS = Margins()
 class Order:
     """What the mission around a path is to be; ``speed_m_s`` None is the fastest cruise.
 
-    ``spaced`` drops way points nearer to their neighbours than two acceptance radii.
+    ``spaced`` drops way points nearer to their neighbours than two acceptance radii. ``hold_s``: so many seconds the
+    vehicle waits in the air above its start (the gate) before it sets out; only multicopters can (`Vehicle.can_hold`).
+    ``gate_utc``: instead, it waits until that hour, minute and second of the day, UTC; only ArduCopter can.
+    ``wing``: the ends of a fixed wing's mission, None for all that stands in the air.
     """
 
     end: End = "land"
     altitude_frame: AltitudeFrame = "relative"
     speed_m_s: float | None = None
     spaced: bool = True
+    hold_s: int = 0
+    gate_utc: tuple[int, int, int] | None = None
+    wing: Wing | None = None
 
 
 def acceptance_radius_m(vehicle: Vehicle) -> float:
@@ -67,6 +74,8 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
 
     The path begins above home at take-off altitude and ends above the goal. The result is not yet judged.
     """
+    if order.wing is not None:
+        return build_wing(path, world, vehicle, home_deg, order)
     datum = world.ground_amsl(*(m.degrees_e7(x) / 1e7 for x in home_deg))
     home = Home.at(*home_deg, round(datum, 2))
     points = _spaced(path.points, 2.0 * acceptance_radius_m(vehicle) if order.spaced else 0.0)
@@ -101,6 +110,8 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
         item(m.VTOL_TAKEOFF if plane else m.TAKEOFF, 0, m.RELATIVE, top_cm),
         MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (speed_kind, speed, -1.0, 0.0)),
     ]
+    if order.hold_s > 0 or order.gate_utc is not None:  # before the speed, which is exact from a standstill
+        items.insert(1, _gate(order, vehicle))
     last = len(points) - 1
     items += [item(m.WAYPOINT, i, frame, int(cm[i]), radius_m=radius) for i in range(1, last)]
     if order.end == "loiter":
@@ -112,6 +123,15 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
     elif order.end == "rtl":
         items.append(MissionItem(m.RTL, m.NO_POSITION))
     return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)
+
+
+def _gate(order: Order, vehicle: Vehicle) -> MissionItem:
+    if not vehicle.can_hold or (order.gate_utc is not None and vehicle.autopilot is not Autopilot.ARDUCOPTER):
+        raise ValueError(f"{vehicle.name} cannot wait so in the air: {vehicle.autopilot} goes on at once")
+    if order.gate_utc is None:
+        return MissionItem(m.DELAY, m.NO_POSITION, (float(order.hold_s), -1.0, -1.0, -1.0))
+    hour, minute, second = order.gate_utc
+    return MissionItem(m.DELAY, m.NO_POSITION, (-1.0, float(hour), float(minute), float(second)))
 
 
 def split_legs(points: NDArray[np.float64], world: World) -> NDArray[np.float64]:

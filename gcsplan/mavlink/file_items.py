@@ -43,10 +43,15 @@ HAS_PLACE = frozenset({16, 17, 18, 19, 21, 22, 31, 36, 80, 82, 84, 85, 94, 179, 
 
 @dataclass(frozen=True, slots=True)
 class MissionFileRead:
-    """A mission from a file, and what its reader should know of it (``notes``, sentences for people)."""
+    """A mission from a file, and what its reader should know of it (``notes``, sentences for people).
+
+    ``fence`` and ``rally`` are the wire items of the file's other two lists, where it has them.
+    """
 
     mission: Mission
     notes: tuple[str, ...] = ()
+    fence: tuple[MissionItem, ...] = ()
+    rally: tuple[MissionItem, ...] = ()
 
 
 def in_degrees(command: int, frame: int) -> bool:

@@ -26,12 +26,17 @@ __all__ = [
 
 
 def read_mission_file(
-    path: str | PathLike[str], *, autopilot: Autopilot | None, home_hint: Home | None = None
+    path: str | PathLike[str],
+    *,
+    autopilot: Autopilot | None,
+    home_hint: Home | None = None,
+    otherwise: Autopilot | None = None,
 ) -> MissionFileRead:
     """Read a `.waypoints` or `.plan` file; its content decides which it is. The mission is named after the file.
 
-    ``autopilot`` None takes a `.plan`'s own; a `.waypoints` file names none, so there it must be given. ``home_hint``
-    is the home of a file that has none. Raises InputError for everything that is wrong, with line or key.
+    ``autopilot`` None takes a `.plan`'s own; a `.waypoints` file names none, so there it must be given, or
+    ``otherwise`` be there for it, and the notes say so. ``home_hint`` is the home of a file that has none. Raises
+    InputError for everything that is wrong, with line or key.
     """
     file = Path(path)
     where = str(path)
@@ -40,9 +45,13 @@ def read_mission_file(
     if start.startswith("{"):
         read = parse_plan(text, autopilot=autopilot, where=where, home_hint=home_hint)
     elif start.startswith("QGC") or file.suffix.lower() in (".waypoints", ".txt"):
-        if autopilot is None:
+        taken = autopilot or otherwise
+        if taken is None:
             raise InputError("a .waypoints file does not name its autopilot; say which it is", where=where)
-        read = parse_waypoints(text, autopilot=autopilot, where=where, home_hint=home_hint)
+        read = parse_waypoints(text, autopilot=taken, where=where, home_hint=home_hint)
+        if autopilot is None:
+            words = f"a .waypoints file does not name its autopilot: it is taken to be for {taken} (--autopilot)"
+            read = replace(read, notes=(*read.notes, words))
     else:
         raise InputError(
             "neither a .waypoints file (first line 'QGC WPL 110') nor a .plan file (a JSON object)", where=where

@@ -29,7 +29,7 @@ Steps = Generator[float, None, T]
 GCS = Address(255, 190)
 """System and component id that ground stations use (MAV_COMP_ID_MISSIONPLANNER)."""
 
-_MOST_PEERS = 64
+_MOST_PEERS = 260  # a system id each, and some strangers
 _MOST_WAITING = 4096
 _FORGET_S = 10.0
 _IDLE_S = 0.1  # a machine hears of prompt answers, and progress is shown, at least so often

@@ -36,6 +36,13 @@ GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
 }  # fmt: skip
 """What is read of each autopilot. Names in one group are one parameter in different versions."""
 
+FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
+    Autopilot.ARDUCOPTER: (("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ACTION",)),
+    Autopilot.ARDUPLANE: (("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ACTION",)),
+    Autopilot.PX4: (("GF_ACTION",),),
+}
+"""What is read when a fence is sent."""
+
 _RETURN_ALTITUDE = {"RTL_ALT": 0.01, "RTL_ALT_M": 1.0, "ALT_HOLD_RTL": 0.01, "RTL_ALTITUDE": 1.0, "RTL_RETURN_ALT": 1.0}
 _FAILSAFES = {
     "FS_THR_ENABLE": "loss of radio control", "THR_FAILSAFE": "loss of radio control",
@@ -43,7 +50,7 @@ _FAILSAFES = {
     "FS_GCS_ENABL": "loss of the ground station", "NAV_DLL_ACT": "loss of the ground station",
     "BATT_FS_LOW_ACT": "a low battery", "COM_LOW_BAT_ACT": "a low battery",
 }  # fmt: skip
-_ALTITUDE_FENCE, _CIRCLE_FENCE = 1, 2  # bits of FENCE_TYPE
+_ALTITUDE_FENCE, _CIRCLE_FENCE, _POLYGON_FENCE = 1, 2, 4  # bits of FENCE_TYPE; the circle is that around home
 _SAME_M = 0.5
 
 
@@ -90,6 +97,21 @@ def judge_parameters(
     off = [f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0]
     if off:
         found.append("no failsafe action on board for " + ", ".join(off))
+    return found
+
+
+def judge_fence_parameters(values: Values) -> list[str]:
+    """Whether a fence that is sent will be enforced, in words; nothing is changed on board."""
+    if not values:
+        return ["no parameters could be read: whether the fence is enforced is not known"]
+    found = []
+    if values.get("FENCE_ENABLE") == 0:
+        found.append("FENCE_ENABLE is 0 on board: the fence is kept and not enforced until it is enabled")
+    kinds = values.get("FENCE_TYPE")
+    if kinds is not None and not int(kinds) & _POLYGON_FENCE:
+        found.append(f"FENCE_TYPE is {kinds:g} on board: polygons and circles (4) are not among the fences in force")
+    if values.get("FENCE_ACTION") == 0 or values.get("GF_ACTION") == 0:
+        found.append("the fence's action on board is none: a breach is only reported")
     return found
 
 

@@ -1,8 +1,8 @@
 """`.plan` files (QGroundControl's JSON), written so that QGroundControl, MAVSDK and Mission Planner take them.
 
 For PX4 this is the file to load: it keeps home apart from the items and has a word (null) for NaN. Survey and corridor
-items are read as the simple items that QGroundControl stored inside them; other complex items hold no items and are
-refused. ``doJumpId`` counts from 1 for every autopilot; a DO_JUMP names one.
+items are read as the simple items that QGroundControl stored inside them, landing patterns as those that it makes of
+them; other complex items are refused. ``doJumpId`` counts from 1 for every autopilot; a DO_JUMP names one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from gcsplan.mavlink.file_items import (
     RawItem,
     check_writable,
     degrees_e7_of,
-    float32_text,
     in_degrees,
     jumps_from_file,
     jumps_to_file,
@@ -39,6 +38,8 @@ from gcsplan.mavlink.mission import (
     Mission,
     MissionItem,
 )
+from gcsplan.mavlink.plan_fence import fence_items, fence_json, json_float, json_number, rally_items, rally_json
+from gcsplan.mavlink.plan_landing import LANDINGS, landing_entries
 from gcsplan.vehicle import Autopilot, Vehicle
 
 ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT
@@ -46,7 +47,6 @@ FIXED_WING, QUADROTOR = 1, 2  # MAV_TYPE
 ROTARY_WINGS = frozenset({2, 3, 4, 13, 14, 15, 29, 35})  # MAV_TYPE: quad-, hexa-, octorotor, helicopter, …
 WINGED = frozenset({1, 19, 20, 21, 22, 23, 24, 25})  # fixed wing, and VTOLs, which ArduPlane flies
 ALTITUDE_MODE = {RELATIVE: 1, GLOBAL: 2, TERRAIN: 4}  # QGroundControl's AltMode; 0 is "mixed"
-POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT = 5001, 5002, 5003, 5004
 MAX_PROBLEMS = 20
 
 
@@ -70,19 +70,19 @@ def write_plan(
     home = mission.home
     plan = {
         "fileType": "Plan",
-        "geoFence": _fence(fence),
+        "geoFence": fence_json(fence),
         "groundStation": "gcsplan",
         "mission": {
-            "cruiseSpeed": _number(speed_m_s) if speed_m_s else 15,
+            "cruiseSpeed": json_number(speed_m_s) if speed_m_s else 15,
             "firmwareType": ARDUPILOT if mission.autopilot.is_ardupilot else PX4,
             "globalPlanAltitudeMode": modes.pop() if len(modes) == 1 else 0,
-            "hoverSpeed": _number(speed_m_s) if speed_m_s else 5,
+            "hoverSpeed": json_number(speed_m_s) if speed_m_s else 5,
             "items": [_item(item, number) for number, item in enumerate(items, start=1)],
             "plannedHomePosition": [home.lat_e7 / 1e7, home.lon_e7 / 1e7, float(home.amsl_m)],
             "vehicleType": FIXED_WING if winged else QUADROTOR,
             "version": 2,
         },
-        "rallyPoints": {"points": [[r.lat_deg, r.lon_deg, _number(r.z)] for r in rally], "version": 2},
+        "rallyPoints": rally_json(rally),
         "version": 1,
     }
     return json.dumps(plan, indent=2, allow_nan=False) + "\n"
@@ -90,13 +90,6 @@ def write_plan(
 
 def _frame(item: MissionItem) -> int:
     return FRAME_SYNONYMS.get(item.frame, item.frame)
-
-
-def _number(value: float) -> float | int | None:
-    if math.isnan(value):
-        return None
-    text = float32_text(value)
-    return int(text) if text.lstrip("-").isdigit() and text != "-0" else float(text)
 
 
 def _speed_m_s(mission: Mission, vehicle: Vehicle | None) -> float | None:
@@ -112,34 +105,15 @@ def _item(item: MissionItem, number: int) -> dict[str, Any]:
     out: dict[str, Any] = {}
     if item.command in HAS_PLACE and placed:
         out["AMSLAltAboveTerrain"] = None
-        out["Altitude"] = _number(item.z)
+        out["Altitude"] = json_number(item.z)
         out["AltitudeMode"] = ALTITUDE_MODE[_frame(item)]
     out["autoContinue"] = bool(item.autocontinue)
     out["command"] = item.command
     out["doJumpId"] = number
     out["frame"] = _frame(item)
-    out["params"] = [*map(_number, item.params), x, y, _number(item.z)]
+    out["params"] = [*map(json_number, item.params), x, y, json_number(item.z)]
     out["type"] = "SimpleItem"
     return out
-
-
-def _fence(fence: Sequence[MissionItem]) -> dict[str, Any]:
-    circles, polygons = [], []
-    rest = list(fence)
-    while rest:
-        first = rest[0]
-        if first.command in (CIRCLE_IN, CIRCLE_OUT):
-            shape = {"center": [first.lat_deg, first.lon_deg], "radius": _number(first.params[0])}
-            circles.append({"circle": shape, "inclusion": first.command == CIRCLE_IN, "version": 1})
-            rest = rest[1:]
-            continue
-        count = whole(first.params[0], 3, len(rest))
-        if first.command not in (POLYGON_IN, POLYGON_OUT) or count is None:
-            raise InputError(f"a fence is made of whole polygons and circles, given command {first.command}")
-        corners = [[v.lat_deg, v.lon_deg] for v in rest[:count]]
-        polygons.append({"inclusion": first.command == POLYGON_IN, "polygon": corners, "version": 1})
-        rest = rest[count:]
-    return {"circles": circles, "polygons": polygons, "version": 2}
 
 
 def read_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint: Home | None = None) -> Mission:
@@ -176,11 +150,12 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     for index, entry in enumerate(mission["items"]):
         found.add(entry, f"mission.items[{index}]")
     items = found.finish()
-    for key, shapes in (("geoFence", ("circles", "polygons")), ("rallyPoints", ("points",))):
-        room = plan.get(key)
-        if isinstance(room, dict) and any(room.get(shape) for shape in shapes):
-            notes.append(f"the file's {key} is not part of the mission and was not read")
-    return MissionFileRead(Mission(pilot, home, items), tuple(notes))
+    fence = fence_items(plan.get("geoFence"), f"{where}: geoFence", notes)
+    rally = rally_items(plan.get("rallyPoints"), f"{where}: rallyPoints")
+    for key, own in (("geoFence", fence), ("rallyPoints", rally)):
+        if own:
+            notes.append(f"the file's {key} ({len(own)} items) is no part of the mission and is not sent with it")
+    return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally)
 
 
 def _json(text: str, where: str) -> Any:
@@ -203,18 +178,6 @@ def _json(text: str, where: str) -> Any:
         raise
     except ValueError:  # an integer of thousands of digits
         raise InputError("not JSON that a mission can have: a number is too long", where=where) from None
-
-
-def _float(value: object) -> float | None:
-    """A JSON number as float, NaN for null, None for anything else."""
-    if value is None:
-        return math.nan
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
 
 
 def _autopilot(mission: dict[str, Any], given: Autopilot | None, where: str, notes: list[str]) -> Autopilot:
@@ -248,7 +211,7 @@ def _autopilot(mission: dict[str, Any], given: Autopilot | None, where: str, not
 
 
 def _home(value: object, hint: Home | None, place: str, notes: list[str]) -> Home:
-    numbers = [_float(v) for v in value] if isinstance(value, list) and len(value) == 3 else None
+    numbers = [json_float(v) for v in value] if isinstance(value, list) and len(value) == 3 else None
     good = numbers is not None and all(n is not None and math.isfinite(n) for n in numbers)
     if value is None or (numbers is not None and any(n is not None and math.isnan(n) for n in numbers)):
         if hint is None:
@@ -310,12 +273,16 @@ class _Items:
         style = entry.get("TransectStyleComplexItem")
         inner = style.get("Items") if isinstance(style, dict) else None
         name = str(entry.get("complexItemType"))[:40]
+        where = f"{key}.TransectStyleComplexItem.Items"
+        if name in LANDINGS:
+            inner, where = landing_entries(entry), key
         if not isinstance(inner, list) or not inner:
             self._bad(key, f"a complex item ({name}) without its single items cannot be read; make it of way points")
             return
-        self.notes.append(f"{key} is a {name}: it was read as the {len(inner)} items that it holds")
+        how = "stands for" if where == key else "holds"
+        self.notes.append(f"{key} is a {name}: it was read as the {len(inner)} items that it {how}")
         for index, part in enumerate(inner):
-            place = f"{key}.TransectStyleComplexItem.Items[{index}]"
+            place = f"{where}[{index}]"
             if not isinstance(part, dict) or part.get("type") != "SimpleItem":
                 self._bad(place, "must be a SimpleItem")
             else:
@@ -327,8 +294,8 @@ class _Items:
             self._bad(key, f"a mission of more than {MAX_ITEMS} items is not read")
             self._raise()
         given = entry.get("params")
-        params = [_float(p) for p in given] if isinstance(given, list) and len(given) == 7 else []
-        command, frame = _float(entry.get("command")), _float(entry.get("frame"))
+        params = [json_float(p) for p in given] if isinstance(given, list) and len(given) == 7 else []
+        command, frame = json_float(entry.get("command")), json_float(entry.get("frame"))
         goes_on = entry.get("autoContinue")
         if len(params) != 7 or None in params:
             self._bad(f"{key}.params", "must be seven numbers (null where none is given)")
@@ -349,7 +316,7 @@ class _Items:
             self._raise()
 
     def _number(self, jump_id: object) -> None:
-        number = whole(_float(jump_id) or math.nan, 1, 2**31) if jump_id is not None else None
+        number = whole(json_float(jump_id) or math.nan, 1, 2**31) if jump_id is not None else None
         if number is None:
             return
         if number in self.index_of:

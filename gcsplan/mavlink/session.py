@@ -35,11 +35,14 @@ from gcsplan.vehicle import Autopilot
 
 __all__ = [
     "Checked",
+    "EndCall",
     "Judge",
+    "ListOrder",
     "Options",
     "Order",
     "ProgressCall",
     "UploadResult",
+    "clear_fleet",
     "clear_mission",
     "discover",
     "download_items",
@@ -47,6 +50,7 @@ __all__ = [
     "require_verdict",
     "upload_fleet",
     "upload_items",
+    "upload_lists",
     "upload_mission",
     "verify_mission",
 ]
@@ -80,6 +84,9 @@ class Order:
     progress: ProgressCall | None = None
 
 
+EndCall = Callable[[Order, UploadResult | GcsplanError], None]
+
+
 def discover(
     link: Link, sysid: int, timeout_s: float = 10.0, *, listen_s: float = 1.5, standby_s: float = 0.0
 ) -> VehicleState:
@@ -111,33 +118,91 @@ def upload_mission(
     return result
 
 
-def upload_fleet(orders: Sequence[Order]) -> list[UploadResult | GcsplanError]:
+def upload_fleet(orders: Sequence[Order], *, ended: EndCall | None = None) -> list[UploadResult | GcsplanError]:
     """Several uploads at once, on one link or several; results in the order given, an error in place of a result.
 
-    Raises CheckFailed, and sends nothing to anybody, unless every mission has its passing verdict; InputError where
-    two missions are meant for one vehicle.
+    ``ended(order, outcome)`` is called as each of them ends. Raises CheckFailed, and sends nothing to anybody, unless
+    every mission has its passing verdict; InputError where two missions are meant for one vehicle.
     """
     for order in orders:
         require_verdict(order.mission, order.verdict, unchecked=order.options.unchecked)
     seats = [(id(order.link), order.mission.sysid) for order in orders]
     if len(set(seats)) < len(seats):
         raise InputError("two missions of one fleet are meant for the same system id on the same link")
+
+    def starting(order: Order) -> Callable[[Channel], Steps[UploadResult]]:
+        task = Task.of(order.mission, order.options, order.judge, order.progress)
+        return lambda channel: _telling(uploading(channel, task), order, ended)
+
+    return _together([(order.link, order.mission.sysid, starting(order)) for order in orders])
+
+
+@dataclass(frozen=True)
+class ListOrder:
+    """A fence or rally points for one vehicle of a fleet."""
+
+    link: Link
+    sysid: int
+    items: tuple[MissionItem, ...]
+    autopilot: Autopilot
+    name: str = ""
+    options: Options = field(default_factory=Options)
+
+
+def upload_lists(orders: Sequence[ListOrder], mission_type: int) -> list[UploadResult | GcsplanError]:
+    """Fences (1) or rally points (2) of several vehicles at once, each proved; results as of `upload_fleet`."""
+    _require_list(mission_type)
+
+    def starting(order: ListOrder) -> Callable[[Channel], Steps[UploadResult]]:
+        task = Task(order.name, order.sysid, order.autopilot, order.items, mission_type, order.options)
+        return lambda channel: uploading(channel, task)
+
+    return _together([(order.link, order.sysid, starting(order)) for order in orders])
+
+
+def clear_fleet(orders: Sequence[Order]) -> list[UploadResult | GcsplanError]:
+    """Clear the mission on every vehicle of ``orders``, all at once, and read back that it is gone.
+
+    Results in the order given, an error in place of a result: a vehicle that is armed, or gone, keeps what it has.
+    """
+
+    def starting(order: Order) -> Callable[[Channel], Steps[UploadResult]]:
+        return lambda channel: clearing(channel, order.mission.name, (MISSION,), order.options)
+
+    return _together([(order.link, order.mission.sysid, starting(order)) for order in orders])
+
+
+def _together(
+    starts: Sequence[tuple[Link, int, Callable[[Channel], Steps[UploadResult]]]],
+) -> list[UploadResult | GcsplanError]:
     jobs: list[Job[UploadResult]] = []
     try:
-        for order in orders:
-            channel = order.link.channel(order.mission.sysid)
-            task = Task.of(order.mission, order.options, order.judge, order.progress)
-            jobs.append(Job(channel, uploading(channel, task)))
+        for link, sysid, steps in starts:
+            channel = link.channel(sysid)
+            jobs.append(Job(channel, steps(channel)))
         pump(jobs)
     finally:
         for job in jobs:
             job.channel.link.drop(job.channel)
-    ended: list[UploadResult | GcsplanError] = []
+    outcomes: list[UploadResult | GcsplanError] = []
     for job in jobs:
         outcome = job.error or job.result
         assert outcome is not None
-        ended.append(outcome)
-    return ended
+        outcomes.append(outcome)
+    return outcomes
+
+
+def _telling(steps: Steps[UploadResult], order: Order, ended: EndCall | None) -> Steps[UploadResult]:
+    """``steps``, and how they ended told to the caller at once: the others of the fleet may take much longer."""
+    try:
+        result = yield from steps
+    except GcsplanError as error:
+        if ended:
+            ended(order, error)
+        raise
+    if ended:
+        ended(order, result)
+    return result
 
 
 def require_verdict(mission: Mission, verdict: Checked | None, *, unchecked: bool = False) -> None:
@@ -166,10 +231,14 @@ def upload_items(
     name: str = "",
 ) -> UploadResult:
     """Upload a fence (1) or rally points (2), and prove it. Raises as `upload_mission` does, but for the verdict."""
-    if mission_type not in (FENCE, RALLY):
-        raise InputError(f"fence (1) or rally points (2) are wanted, given mission type {mission_type}")
+    _require_list(mission_type)
     task = Task(name, sysid, autopilot, tuple(items), mission_type, options or Options())
     return _run(link, sysid, lambda channel: uploading(channel, task))
+
+
+def _require_list(mission_type: int) -> None:
+    if mission_type not in (FENCE, RALLY):
+        raise InputError(f"fence (1) or rally points (2) are wanted, given mission type {mission_type}")
 
 
 def download_items(

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from gcsplan.errors import LinkError, VehicleRefused
 from gcsplan.mavlink.compare import compare, faults
 from gcsplan.mavlink.link import Channel, Steps, drive
-from gcsplan.mavlink.mission import MISSION, RELATIVE, Home, Mission, MissionItem
-from gcsplan.mavlink.parameters import GROUPS, judge_parameters
+from gcsplan.mavlink.mission import FENCE, MISSION, RELATIVE, Home, Mission, MissionItem
+from gcsplan.mavlink.parameters import FENCE_GROUPS, GROUPS, judge_fence_parameters, judge_parameters
 from gcsplan.mavlink.preflight import NEAR_GROUND_M, NEAR_START_M, distance_m, preflight
 from gcsplan.mavlink.results import UploadResult, outcome_word
 from gcsplan.mavlink.steps import discover_steps, parameter_steps
@@ -96,6 +96,9 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
         warnings += judge_parameters(
             values, mission, rtl_rel_home_m=options.rtl_rel_home_m, expected=options.expected_parameters
         )
+    if task.mission_type == FENCE and options.read_parameters:
+        values = yield from parameter_steps(channel, state, FENCE_GROUPS[task.autopilot], watch)
+        warnings += judge_fence_parameters(values)
     said_before = watch.said
     machine = VerifiedUpload(
         task.items,

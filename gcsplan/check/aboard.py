@@ -1,0 +1,125 @@
+"""What is known on board while a mission is followed, and how an item's place and altitude are read there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from gcsplan.check.pace import Pace
+from gcsplan.check.spline import Vector
+from gcsplan.check.stretch import Flight, Place, Stretch, StretchKind
+from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.vehicle import Autopilot, Vehicle
+
+
+class Aboard:
+    """Where the aircraft is, how fast, what it has flown; and what an item's numbers mean there."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        vehicle: Vehicle,
+        ground_amsl: Callable[[float, float], float],
+        rtl_rel_home_m: float | None,
+    ) -> None:
+        self.flight = Flight()
+        self.autopilot = mission.autopilot
+        self.vehicle = vehicle
+        self.ground = ground_amsl
+        self.rtl_rel_home_m = rtl_rel_home_m
+        self.pace = Pace.of(vehicle)
+        self.circle_m = 0.0
+        self.items, self.first_seq = mission.items, mission.first_seq
+        self.direction: Vector | None = None
+        self.jumped_from: int | None = None
+        lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
+        ground = ground_amsl(lat, lon)
+        if math.isnan(ground):
+            self.flight.not_judged.append(f"the ground at home ({lat:.7f}, {lon:.7f}) is unknown")
+            ground = mission.home.amsl_m
+        elif abs(ground - mission.home.amsl_m) > max(1.0, vehicle.limits.altitude_error_m):
+            self.flight.notes.append(
+                f"home is given as {mission.home.amsl_m:.1f} m AMSL and the terrain model says {ground:.1f} m there: "
+                f"the terrain model was taken"
+            )
+        self.home: Place = (lat, lon, ground)
+        self.at: Place = self.home
+        self.airborne = False
+        self.known = True
+        self.landed = False
+
+    def note(self, words: str) -> None:
+        """Say ``words`` once: a round may be flown more than once."""
+        if words not in self.flight.notes:
+            self.flight.notes.append(words)
+
+    def instead(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
+        """A stretch that some versions fly in place of another one."""
+        self.flight.instead.append(self.stretch(seq, kind, start, end, more))
+
+    def add(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
+        """The next stretch; ``more`` are `Stretch`'s own fields."""
+        self.flight.stretches.append(self.stretch(seq, kind, start, end, more))
+
+    def stretch(self, seq: int, kind: StretchKind, start: Place, end: Place, more: dict[str, object]) -> Stretch:
+        """One stretch at the pace that holds now."""
+        given: dict[str, object] = {"rates_m_s": self.pace.rates_m_s, "jumped_from": self.jumped_from} | more
+        return Stretch(seq, kind, start, end, self.pace.speed_m_s, **given)  # type: ignore[arg-type]
+
+    def has_place(self, item: MissionItem) -> bool:
+        """Whether the item says where; latitude = longitude = 0 is 'here'."""
+        return item.frame != m.NO_POSITION and not (item.x == 0 and item.y == 0)
+
+    def off_africa(self, item: MissionItem) -> bool:
+        """A way point at latitude = longitude = 0, for an autopilot to which that is a place like any other."""
+        moves = (m.WAYPOINT, m.LOITER_UNLIM, m.LOITER_TIME, m.LAND, m.VTOL_LAND)
+        return item.command in moves and item.x == 0 and item.y == 0
+
+    def target(self, item: MissionItem) -> Place | None:
+        """Where the item leads; None where that is not known."""
+        lat, lon = (item.lat_deg, item.lon_deg) if self.has_place(item) else self.at[:2]
+        if not self.has_place(item) and not self.known:
+            return None
+        amsl = self.altitude(item, (lat, lon, self.at[2]))
+        return None if amsl is None else (lat, lon, amsl)
+
+    def altitude(self, item: MissionItem, here: Place) -> float | None:
+        """The item's altitude AMSL at ``here``, in its frame; None where the ground or the frame is not known."""
+        frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
+        if not math.isfinite(item.z):
+            return None
+        keeps = self.autopilot is Autopilot.ARDUCOPTER and item.command != m.TAKEOFF
+        keeps = keeps or (self.autopilot is Autopilot.ARDUPLANE and not self.has_place(item))
+        if item.z == 0.0 and keeps:
+            if not self.known:
+                return None
+            if frame != m.TERRAIN or self.autopilot is Autopilot.ARDUPLANE:
+                return self.at[2]
+            kept = self.ground(*here[:2]) + self.at[2] - self.ground(*self.at[:2])
+            return None if math.isnan(kept) else kept
+        if frame == m.GLOBAL:
+            return item.z
+        if frame == m.RELATIVE:
+            return self.home[2] + item.z
+        if frame == m.TERRAIN:
+            ground = self.ground(here[0], here[1])
+            return None if math.isnan(ground) else ground + item.z
+        return None
+
+    def hold(self, item: MissionItem) -> float:
+        """Seconds for which a way point holds."""
+        if self.autopilot is Autopilot.ARDUPLANE or not math.isfinite(item.params[0]):
+            return 0.0
+        return max(0.0, item.params[0])
+
+    def loiter_s(self, item: MissionItem) -> float:
+        """Seconds of a loiter in one place."""
+        if item.command != m.LOITER_TIME:
+            return math.inf
+        return max(0.0, item.params[0]) if math.isfinite(item.params[0]) else math.inf
+
+    def turns_s(self, item: MissionItem, reach_m: float) -> float:
+        """Seconds of an item's turns with a radius."""
+        turns = item.params[0] if math.isfinite(item.params[0]) and item.params[0] > 0 else 1.0
+        return turns * 2.0 * math.pi * reach_m / self.pace.speed_m_s

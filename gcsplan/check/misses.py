@@ -1,0 +1,141 @@
+"""How near a mission comes to each limit that it keeps: where there is least room, and how much."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.check.stretch import Stretch
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.airspace import Floats, LegReport, Legs, Violation
+from gcsplan.world.world import World
+from gcsplan.world.zones import Circle
+
+MOST_ZONES = 3
+"""So many zones are named, the nearest first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Miss:
+    """The least room that is left to one limit (for zones: to one zone), errors and clearances taken off.
+
+    ``value``: heights with the errors taken off, as a finding gives them; angles and distances to zones on the line
+    itself. ``room`` is negative where the limit is broken. The place is where it is least.
+    """
+
+    kind: str
+    room: float
+    value: float
+    limit: float
+    unit: str
+    seq: int
+    lat_deg: float
+    lon_deg: float
+    amsl_m: float
+    zone: str = ""
+
+    def describe(self) -> str:
+        """One line."""
+        what = f"{WORDS[self.kind]}{f' {self.zone}' if self.zone else ''}"
+        left = (
+            f"{self.room:.1f} {self.unit} to spare" if self.room >= 0.0 else f"broken by {-self.room:.1f} {self.unit}"
+        )
+        return (
+            f"{what}: {self.value:.1f} {self.unit} of {self.limit:g}, {left}, item {self.seq} "
+            f"({self.lat_deg:.6f}, {self.lon_deg:.6f}, {self.amsl_m:.0f} m AMSL)"
+        )
+
+
+WORDS = {
+    "min_agl": "lowest above ground", "max_agl": "highest above ground", "max_amsl": "highest altitude",
+    "terrain_clearance": "lowest above ground within the clearance", "zone": "nearest to zone",
+    "climb": "steepest climb", "descent": "steepest descent",
+}  # fmt: skip
+LIFT_M = 50_000.0
+"""An altitude error that breaks every limit of height everywhere, and so tells how much room there is to each."""
+
+
+def nearest_misses(
+    stretches: Sequence[Stretch], legs: Legs, owner: NDArray[np.intp], report: LegReport, vehicle: Vehicle, world: World
+) -> tuple[Miss, ...]:
+    """A `Miss` for each limit that the vehicle has, and for the zones that it comes nearest to.
+
+    ``owner`` (N,): the stretch of each leg. Heights are those of the exact check, what lies beside the track within
+    its error included.
+    """
+    limits = vehicle.limits
+    run = np.hypot(*(legs.end - legs.start)[:, :2].T)
+    found = _heights(stretches, legs, owner, vehicle, world)
+
+    def least(kind: str, room: Floats, value: Floats, limit: float, unit: str, at: Floats, zone: str = "") -> None:
+        leg = int(room.argmin())
+        east, north, amsl = legs.start[leg] + float(at[leg]) * (legs.end[leg] - legs.start[leg])
+        lat, lon = (float(x) for x in world.frame.to_degrees(east, north))
+        seq = stretches[int(owner[leg])].seq
+        found.append(Miss(kind, float(room[leg]), float(value[leg]), limit, unit, seq, lat, lon, float(amsl), zone))
+
+    slanted = ~legs.column & (run > 0.0)
+    for kind, sign, limit in (("climb", 1.0, limits.max_climb_deg), ("descent", -1.0, limits.max_descent_deg)):
+        angle = np.where(slanted, sign * report.climb_deg, -1.0)
+        if limit < 90.0 and angle.max() > 0.0:
+            least(kind, limit - angle, angle, limit, "°", np.full(len(run), 0.5))
+    near = report.zone_clearance_m / world.airspace.scale
+    reach = limits.horizontal_clearance_m
+    met = [k for k in dict.fromkeys(report.nearest_zone.tolist()) if k >= 0]
+    for k in sorted(met, key=lambda k: float(near[report.nearest_zone == k].min()))[:MOST_ZONES]:
+        distance = np.where(report.nearest_zone == k, near, np.inf)
+        room, at = distance - legs.track_error_m - reach, np.zeros(len(run))
+        for v in report.violations:  # inside, the clearance is 0 however deep
+            if v.kind == "zone" and v.zone == k:
+                room[v.leg], distance[v.leg] = -v.by, v.value
+        leg = int(room.argmin())
+        at[leg] = _nearest_part(legs.start[leg], legs.end[leg], world, k)
+        least("zone", room, distance, reach, "m", at, world.airspace.zones[k].name)
+    return tuple(found)
+
+
+def _heights(
+    stretches: Sequence[Stretch], legs: Legs, owner: NDArray[np.intp], vehicle: Vehicle, world: World
+) -> list[Miss]:
+    limits = vehicle.limits
+    lifted = replace(legs, altitude_error_m=legs.altitude_error_m + LIFT_M)
+    worst: dict[str, Violation] = {}
+    for v in world.airspace.examine(lifted, limits).violations:
+        if v.kind in WORDS and v.kind not in ("zone", "climb", "descent"):
+            worst[v.kind] = max(worst.get(v.kind, v), v, key=lambda w: w.by)
+    asked = {"min_agl": limits.min_agl_m, "max_agl": limits.max_agl_m or 0.0, "max_amsl": limits.max_amsl_m or 0.0}
+    found = []
+    for kind in WORDS:
+        if (found_one := worst.get(kind)) is None or abs(found_one.by) > 1.5 * LIFT_M:
+            continue
+        room, limit = LIFT_M - found_one.by, asked.get(kind, 0.0)
+        value = limit - room if kind in ("max_agl", "max_amsl") else limit + room
+        lat, lon = (float(x) for x in world.frame.to_degrees(found_one.east_m, found_one.north_m))
+        seq = stretches[int(owner[found_one.leg])].seq
+        found.append(Miss(kind, room, value, limit, "m", seq, lat, lon, found_one.amsl_m))
+    return found
+
+
+def _nearest_part(start: Floats, end: Floats, world: World, zone: int) -> float:
+    """Which part of a leg is nearest to a zone's outline, seen from above."""
+    shape = world.airspace.zones[zone].shape
+    way = (end - start)[:2]
+    square = float(way @ way)
+    if square == 0.0:
+        return 0.0
+    if isinstance(shape, Circle):
+        return min(max(float((np.array([shape.east_m, shape.north_m]) - start[:2]) @ way) / square, 0.0), 1.0)
+    t = np.linspace(0.0, 1.0, 101)
+    points = start[:2] + t[:, None] * way
+    a, b = shape.vertices, np.roll(shape.vertices, -1, axis=0)
+    best, part = math.inf, 0.0
+    for p, f in zip(points, t.tolist(), strict=True):
+        along = np.clip(((p - a) * (b - a)).sum(1) / np.maximum(((b - a) ** 2).sum(1), 1e-12), 0.0, 1.0)
+        off = float(np.hypot(*(p - a - along[:, None] * (b - a)).T).min())
+        if off < best:
+            best, part = off, f
+    return part

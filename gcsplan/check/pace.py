@@ -1,0 +1,47 @@
+"""How fast it is flown: cruise, climb and descent, as a mission's speed changes set them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from gcsplan.mavlink.mission import MissionItem
+from gcsplan.vehicle import Autopilot, Vehicle
+
+AIRSPEED, GROUND_SPEED, CLIMB, DESCENT = 0.0, 1.0, 2.0, 3.0  # SPEED_TYPE
+DEFAULT = -2.0
+"""What puts a speed back to its default; -1 leaves it as it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Cruise speed over ground, and rates of climb and descent, m/s."""
+
+    speed_m_s: float
+    rates_m_s: tuple[float, float]
+
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> Pace:
+        """What a mission begins with: the vehicle's own."""
+        return cls(vehicle.speed_max_m_s, (vehicle.climb_m_s, vehicle.descent_m_s))
+
+    def changed(self, item: MissionItem, vehicle: Vehicle) -> tuple[Pace, str]:
+        """The pace after a DO_CHANGE_SPEED, and what is to be said of it (mostly nothing).
+
+        On ArduPlane a ground speed is a lower bound, not a target (commands_logic.cpp, `do_change_speed`).
+        """
+        kind, value = item.params[0], item.params[1]
+        plane = vehicle.autopilot is Autopilot.ARDUPLANE
+        cruise = (AIRSPEED,) if plane else (AIRSPEED, GROUND_SPEED)
+        if vehicle.autopilot is Autopilot.PX4 and kind in (CLIMB, DESCENT):
+            return self, "a rate of climb or descent for PX4 is not counted in the time"
+        if kind in cruise and value == DEFAULT:
+            return replace(self, speed_m_s=vehicle.speed_max_m_s), ""
+        if not 0.0 < value < math.inf:
+            return self, ""
+        if kind in cruise:
+            return replace(self, speed_m_s=value), ""
+        if kind in (CLIMB, DESCENT) and not plane:
+            up, down = self.rates_m_s
+            return replace(self, rates_m_s=(value, down) if kind == CLIMB else (up, value)), ""
+        return self, ""

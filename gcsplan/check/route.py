@@ -1,0 +1,136 @@
+"""In which order the items of a mission are flown: jumps with their counts, as the autopilots count them.
+
+- A jump's count belongs to the jump and is never given back: reached again after it is used up, it is passed
+  (ArduPilot's `AP_Mission::get_next_cmd`, PX4's `getNonJumpItem`). 0 never jumps; −1 is without end on ArduPilot, and
+  65,535 rounds on PX4, which keeps 16 bits.
+- ArduPilot counts `MOST_JUMPS` jumps of one mission and takes the rest for used up. Jump tags are ArduPilot's alone.
+- A round that begins as the one before it began is flown as that one was: it is followed once, and counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import replace
+from typing import Protocol
+
+from gcsplan.check.stretch import Flight
+from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.mission import Mission, MissionItem
+
+JUMP_TAG, DO_JUMP_TAG = 600, 601
+MOST_JUMPS = 15  # AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS on small boards, 100 on large ones; the rest count as used up
+MOST_STEPS = 100_000
+"""Items flown one after the other, rounds that repeat others aside, before a mission is given up as endless."""
+
+
+class Pilot(Protocol):
+    """Who flies the items; see `flight`."""
+
+    flight: Flight
+    jumped_from: int | None
+
+    def fly(self, seq: int, item: MissionItem) -> None:
+        """Fly one item."""
+        ...
+
+    @property
+    def over(self) -> bool:
+        """True once the aircraft is down and stays there."""
+        ...
+
+    @property
+    def state(self) -> Hashable:
+        """All that the rest of the flight depends on, but the counts of the jumps."""
+        ...
+
+
+class _Jump:
+    """One jump: its target's index (None: nowhere), rounds (None: without end), and what became of it so far."""
+
+    __slots__ = ("done", "rounds", "target", "was")
+
+    def __init__(self, target: int | None, rounds: int | None) -> None:
+        self.target, self.rounds, self.done = target, rounds, 0
+        self.was: tuple[Hashable, int, int] | None = None
+
+
+def fly_in_order(mission: Mission, pilot: Pilot) -> bool:
+    """Have ``pilot`` fly the items of ``mission`` (as stored) in their order; False where that never ends."""
+    jumps = _jumps(mission)
+    flight, first, items = pilot.flight, mission.first_seq, mission.items
+    if mission.autopilot.is_ardupilot and len(jumps) > MOST_JUMPS:
+        flight.not_judged.append(
+            f"the mission has {len(jumps)} jumps, and ArduPilot counts {MOST_JUMPS} on small boards and passes the rest"
+        )
+    index = steps = 0
+    while index < len(items):
+        steps += 1
+        if steps > MOST_STEPS:
+            flight.not_judged.append(f"the jumps lead through more than {MOST_STEPS} items: the rest is not judged")
+            return False
+        seq, jump = first + index, jumps.get(index)
+        if jump is None or pilot.over:
+            pilot.fly(seq, items[index])
+            index += 1
+            continue
+        if jump.target is None:
+            flight.not_judged.append(f"item {seq} jumps to an item that the mission has not")
+            return False
+        if jump.rounds is not None and jump.done >= jump.rounds:
+            index += 1
+            continue
+        others = tuple(j.done for j in jumps.values() if j is not jump)
+        begins = (pilot.state, others)
+        if jump.was is not None and jump.was[0] == begins:
+            if jump.rounds is None:
+                _without_end(flight, seq, first + jump.target, first + len(items) - 1, jump.was)
+                return False
+            _again(flight, jump, jump.was)
+            index += 1
+            continue
+        jump.was = (begins, len(flight.stretches), len(flight.instead))
+        jump.done += 1
+        pilot.jumped_from = seq
+        index = jump.target
+    return True
+
+
+def _jumps(mission: Mission) -> dict[int, _Jump]:
+    first, items = mission.first_seq, mission.items
+    tags: dict[float, int] = {}
+    if mission.autopilot.is_ardupilot:
+        for index, item in enumerate(items):
+            if item.command == JUMP_TAG:
+                tags.setdefault(item.params[0], index)
+    jumps: dict[int, _Jump] = {}
+    for index, item in enumerate(items):
+        tagged = item.command == DO_JUMP_TAG and mission.autopilot.is_ardupilot
+        if item.command != m.DO_JUMP and not tagged:
+            continue
+        where, count = item.params[0], item.params[1]
+        numbered = int(where) - first if first <= where < first + len(items) else None
+        target = tags.get(where) if tagged else numbered
+        endless = mission.autopilot.is_ardupilot and count == -1.0
+        jumps[index] = _Jump(target, None if endless else max(0, int(count)) if count == count else 0)
+    return jumps
+
+
+def _again(flight: Flight, jump: _Jump, was: tuple[Hashable, int, int]) -> None:
+    """The rounds that are left, all like the last one."""
+    assert jump.rounds is not None
+    times = 1 + jump.rounds - jump.done
+    _, since, instead = was
+    flight.stretches[since:] = [replace(s, times=s.times * times) for s in flight.stretches[since:]]
+    flight.instead[instead:] = [replace(s, times=s.times * times) for s in flight.instead[instead:]]
+    jump.done = jump.rounds
+
+
+def _without_end(flight: Flight, seq: int, target: int, last: int, was: tuple[Hashable, int, int]) -> None:
+    if len(flight.stretches) == was[1]:
+        flight.not_judged.append(f"item {seq} jumps to item {target} for ever and nothing is flown between them")
+        return
+    never = "" if seq == last else f"; the items after it, {seq + 1} to {last}, are never flown"
+    flight.notes.append(
+        f"item {seq} jumps back to item {target} without end: its round is judged and counted once, what ends it (a "
+        f"pilot, a failsafe) is not judged{never}"
+    )

@@ -1,0 +1,55 @@
+"""The altitude profile of a mission as a few lines of text, for a terminal, a log or a review."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gcsplan.check.verdict import Verdict
+from gcsplan.world.world import World
+
+GROUND, TRACK, BOTH, UNKNOWN = "█", "•", "▒", "?"
+
+
+def profile_lines(verdict: Verdict, world: World, *, columns: int = 72, rows: int = 10) -> list[str]:
+    """``rows`` lines with the altitude AMSL in front, and one below with the way flown; none where nothing is flown.
+
+    In each column ground is filled up to its highest sample, the track is drawn where it runs, and ``▒`` marks where
+    both fall into one cell. Columns of take-off and landing are left out: they have no width.
+    """
+    legs = [leg for leg in verdict.legs if not leg.column and leg.horizontal_m > 0.0]
+    total_m = math.fsum(leg.horizontal_m for leg in legs)
+    if not legs or total_m <= 0.0:
+        return []
+    ends = np.cumsum([0.0, *(leg.horizontal_m for leg in legs)])
+    at = np.linspace(0.0, total_m, 8 * columns)
+    which = np.clip(np.searchsorted(ends, at, side="right") - 1, 0, len(legs) - 1)
+    starts = np.array([leg.start for leg in legs])[which]
+    stops = np.array([leg.end for leg in legs])[which]
+    part = ((at - ends[which]) / np.maximum(ends[which + 1] - ends[which], 1e-9)).clip(0.0, 1.0)[:, None]
+    places = starts + part * (stops - starts)
+    plane = world.frame.to_plane(places[:, 0], places[:, 1])
+    ground = world.airspace.surface.ground_at(plane[..., 0], plane[..., 1]).reshape(columns, 8)
+    track = places[:, 2].reshape(columns, 8)
+    both = np.concatenate([ground[np.isfinite(ground)], track.ravel()])
+    low, high = float(both.min()), float(both.max())
+    span = max(high - low, 10.0)
+    low, high = low - span / rows, high + 0.02 * span  # the lowest ground fills a row of its own
+    step = (high - low) / rows
+    top = np.array([np.nan if np.isnan(g).all() else np.nanmax(g) for g in ground])
+    lines = []
+    for row in range(rows):
+        above, below = high - row * step, high - (row + 1) * step
+        cells = []
+        for column in range(columns):
+            fill = top[column] > 0.5 * (above + below)  # NaN is not
+            here = bool(((track[column] >= below) & (track[column] <= above)).any())
+            unknown = row == rows - 1 and math.isnan(top[column])
+            if here:
+                cells.append(BOTH if fill else TRACK)
+            else:
+                cells.append(GROUND if fill else UNKNOWN if unknown else " ")
+        lines.append(f"{0.5 * (above + below):7.0f} {''.join(cells)}".rstrip())
+    lines.append(f"{'m AMSL':>7} 0{f'{total_m / 1000.0:.2f} km':>{columns - 1}}")
+    return lines

@@ -1,0 +1,78 @@
+"""Fences made of zones, on peers that others wrote: MAVSDK as a vehicle and as a reader of plans, a real ArduCopter."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gcsplan.mavlink.compare import compare, faults
+from gcsplan.mavlink.fence import Fence, areas_of, fence_of
+from gcsplan.mavlink.files import write_plan
+from gcsplan.mavlink.link import Link
+from gcsplan.mavlink.mission import FENCE, Mission
+from gcsplan.mavlink.session import Options, clear_mission, download_items, upload_items
+from gcsplan.sim.server import SimServer
+from gcsplan.vehicle import Autopilot
+from gcsplan.world.frame import Frame
+from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from sitl_tests import sitl
+from sitl_tests.missions import a_mission, a_vehicle
+from sitl_tests.peers import MavsdkVehicle, item_of, mavsdk_station
+
+COPTER, PX4 = Autopilot.ARDUCOPTER, Autopilot.PX4
+FRAME = Frame(36.6, -84.38)
+ZONES = (
+    Zone("yard", Circle(900.0, 400.0, 120.5)),
+    Zone("field", Polygon(np.array([[-900.0, -900], [-500, -950], [-300, -500], [-700, -300], [-1000, -600]]))),
+    Zone("mast", Circle(0.0, 1500.0, 60.0), None, Level(100.0, "agl")),
+    Zone("pond", Circle(-1500.0, 0.0, 80.0)),
+)
+QUICK = Options(unchecked=True, listen_s=0.5)
+
+
+def a_fence(autopilot: Autopilot) -> Fence:
+    fence = fence_of(ZONES, FRAME, autopilot)
+    assert fence.left_out == ("mast",)
+    assert len(fence.items) == 1 + 5 + 1
+    return fence
+
+
+@pytest.mark.parametrize("autopilot", [COPTER, PX4])
+def test_a_fence_arrives_at_a_mavsdk_vehicle_and_reads_back(autopilot: Autopilot) -> None:
+    fence = a_fence(autopilot)
+    with MavsdkVehicle(sysid=4) as vehicle, Link(vehicle.url) as link:
+        result = upload_items(link, 4, fence.items, autopilot, FENCE, options=QUICK)
+        assert result.verified, result.differences
+        read = download_items(link, 4, FENCE, options=QUICK)
+    assert faults(compare(fence.items, read, autopilot, FENCE)) == ()
+    assert len(areas_of(read, FRAME)) == 3
+
+
+def test_mavsdk_imports_the_fence_of_a_plan(tmp_path: Path) -> None:
+    fence = a_fence(PX4)
+    mission: Mission = a_mission(PX4, 8)
+    file = tmp_path / "uav1.plan"
+    file.write_text(write_plan(mission, fence=fence.items))
+    with SimServer([a_vehicle(PX4)], "udpin:127.0.0.1:0") as server:
+        ((_, fences, _),) = mavsdk_station(server.url_for_gcs, [["import_plan", str(file)]])
+    items = [item_of(row) for row in fences]
+    numbers = [(i.command, i.params, i.x, i.y) for i in items]
+    assert sorted(numbers) == sorted((i.command, i.params, i.x, i.y) for i in fence.items)
+    assert len(areas_of(items, FRAME)) == 3
+
+
+@pytest.mark.skipif(not sitl.wanted(), reason=sitl.WHY_SKIPPED)
+def test_a_real_arducopter_keeps_a_fence(tmp_path: Path) -> None:
+    fence = a_fence(COPTER)
+    with sitl.running(sitl.wanted(), tmp_path) as link:
+        sitl.ready(link, 1)
+        result = upload_items(link, 1, fence.items, COPTER, FENCE, options=QUICK)
+        assert result.verified, (result.reason, result.differences)
+        read = download_items(link, 1, FENCE, options=QUICK)
+        assert faults(compare(fence.items, read, COPTER, FENCE)) == ()
+        most = [Zone(f"c{i}", Circle(200.0 * i, 3000.0, 40.0)) for i in range(42)]
+        full = upload_items(link, 1, fence_of(most, FRAME, COPTER).items, COPTER, FENCE, options=QUICK)
+        assert full.verified, (full.reason, full.differences)
+        assert clear_mission(link, 1, FENCE, options=QUICK).verified

@@ -1,0 +1,86 @@
+"""Splines and jumps: a real ArduCopter flies the curve, and the items in the order, that the check judges."""
+
+from __future__ import annotations
+
+import os
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gcsplan.check.judge import judge
+from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.sim import sitl as flown
+from gcsplan.sim.outcome import Part, Terms
+from gcsplan.sim.sitl_instances import sitl_instances
+from gcsplan.sim.trace import Trace
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.limits import Limits
+from sitl_tests import sitl
+from tests.worlds import world
+
+TRACK_ERROR_M = 3.0
+
+
+@pytest.mark.skipif(
+    not os.path.isfile(sitl.wanted()), reason=f"no autopilot: set {sitl.VARIABLE} to the path of an arducopter binary"
+)
+def test_a_real_arducopter_flies_splines_and_jumps_as_they_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    where = world(half_m=1500.0)
+    craft = Vehicle(
+        "uav1", 1, Autopilot.ARDUCOPTER, Limits(10.0, track_error_m=TRACK_ERROR_M, altitude_error_m=5.0),
+        speed_max_m_s=8.0,
+    )  # fmt: skip
+
+    def at(command: int, east: float, north: float, z: float, hold: float = 0.0) -> MissionItem:
+        lat, lon = where.frame.to_degrees(east, north)
+        return MissionItem(command, m.RELATIVE, (hold, 0, 0, 0), m.degrees_e7(lat), m.degrees_e7(lon), z)
+
+    items = (
+        at(m.TAKEOFF, 0, 0, 40), at(m.WAYPOINT, 0, 120, 40), at(m.SPLINE_WAYPOINT, 120, 180, 50),
+        at(m.SPLINE_WAYPOINT, 240, 60, 40), at(m.WAYPOINT, 120, 0, 45), at(m.WAYPOINT, 60, -60, 45),
+        at(m.SPLINE_WAYPOINT, 120, -120, 45, 2.0), at(m.WAYPOINT, 0, -120, 45),
+        MissionItem(m.DO_JUMP, m.NO_POSITION, (6, 1, 0, 0)), at(m.LAND, 0, -120, 0),
+    )  # fmt: skip
+    home_amsl_m = where.ground_amsl(36.6, -84.3)
+    mission = Mission(Autopilot.ARDUCOPTER, m.Home.at(36.6, -84.3, home_amsl_m), items, "uav1")
+    verdict = judge(mission, craft, where)
+    assert verdict.safe is True, verdict.describe()
+    traces: list[Trace] = []
+    traced = flown._trace
+
+    def keeping(*arguments: Any) -> Trace:
+        traces.append(traced(*arguments))
+        return traces[-1]
+
+    monkeypatch.setattr(flown, "_trace", keeping)
+    part = Part(craft, mission, verdict)
+    with sitl_instances(Path(sitl.wanted()), [part], speedup=10.0) as seats:
+        flown.rehearse_sitl([part], where, Terms(), seats)
+    (trace,) = traces
+    judged = [seq for seq, _ in groupby(leg.seq for leg in verdict.legs)]
+    order = [int(seq) for seq, _ in groupby(trace.seq.tolist())]
+    assert order == judged == [1, 2, 3, 4, 5, 6, 7, 8, 6, 7, 8, 10]
+    for seq in range(2, 9):
+        legs = [leg for leg in verdict.legs if leg.seq == seq]
+        start = _plane(where, [leg.start for leg in legs])
+        way = _plane(where, [leg.end for leg in legs]) - start
+        points = trace.points[1:][trace.seq == seq]
+        along = ((points[:, None] - start) * way).sum(-1) / np.maximum((way**2).sum(-1), 1e-9)
+        off = np.linalg.norm(points[:, None] - start - along.clip(0, 1)[..., None] * way, axis=-1).min(axis=1)
+        assert off.max() < TRACK_ERROR_M, (seq, off.max())
+    straight = _plane(where, [verdict.mission.items[1], verdict.mission.items[2]])
+    curve = trace.points[1:][trace.seq == 3][:, :2] - straight[0, :2]
+    side = straight[1, :2] - straight[0, :2]
+    bulge = np.abs(curve[:, 0] * side[1] - curve[:, 1] * side[0]) / np.hypot(*side)
+    assert bulge.max() > 5 * TRACK_ERROR_M  # a straight leg would not have held it
+
+
+def _plane(where: Any, places: list[Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """(N, 3) metres of places (latitude, longitude, AMSL) or of items."""
+    rows = [(p.lat_deg, p.lon_deg, p.z) if isinstance(p, MissionItem) else p for p in places]
+    plane = where.frame.to_plane([r[0] for r in rows], [r[1] for r in rows])
+    return np.column_stack([plane, [r[2] for r in rows]])

@@ -1,0 +1,369 @@
+"""Zones as fences and back, fences held against their missions, and sent over bad links to both kinds of autopilot."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gcsplan import cli, delivery, fencing
+from gcsplan.check.judge import judge
+from gcsplan.errors import CheckFailed, InputError
+from gcsplan.mavlink import mission as m
+from gcsplan.mavlink import session
+from gcsplan.mavlink.autopilots import stored
+from gcsplan.mavlink.build import Order, build_mission
+from gcsplan.mavlink.compare import compare, faults
+from gcsplan.mavlink.fence import areas_of, fence_of
+from gcsplan.mavlink.files import read_mission_file, write_plan
+from gcsplan.mavlink.link import Link
+from gcsplan.mavlink.messages import Address
+from gcsplan.mavlink.mission import FENCE, Mission, MissionItem
+from gcsplan.mavlink.transfer import VerifiedUpload
+from gcsplan.sim.loopback import loopback_fleet
+from gcsplan.sim.misbehaviour import Misbehaviour
+from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.frame import Frame
+from gcsplan.world.path import Path as FlightPath
+from gcsplan.world.world import World
+from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests import lossy
+from tests.lossy import Weather
+from tests.worlds import vehicle, world
+
+FRAME = Frame(36.6, -84.3)
+COPTER = Autopilot.ARDUCOPTER
+
+
+def square(east: float, north: float, half_m: float, name: str = "square", **levels: Level) -> Zone:
+    ring = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half_m + [east, north]
+    return Zone(name, Polygon(ring.astype(float)), **levels)
+
+
+metres = st.floats(-20_000, 20_000)
+
+
+@st.composite
+def zones(draw: st.DrawFn) -> Zone:
+    east, north, size = draw(metres), draw(metres), draw(st.floats(5.0, 3000.0))
+    if draw(st.booleans()):
+        return Zone("z", Circle(east, north, size))
+    turns = sorted(draw(st.lists(st.floats(0.0, 6.28), min_size=3, max_size=12, unique_by=lambda a: round(a, 1))))
+    radii = draw(st.lists(st.floats(0.5 * size, size), min_size=len(turns), max_size=len(turns)))
+    ring = np.array([[east + r * math.cos(a), north + r * math.sin(a)] for a, r in zip(turns, radii, strict=True)])
+    polygon = shapely.Polygon(ring)
+    if len(turns) < 3 or not polygon.is_valid or polygon.area < 20.0 or not polygon.exterior.is_ccw:
+        return Zone("z", Circle(east, north, size))
+    return Zone("z", Polygon(ring))
+
+
+def outline(shape: Circle | Polygon) -> shapely.Polygon:
+    if isinstance(shape, Polygon):
+        return shapely.Polygon(shape.vertices)
+    return shapely.Point(shape.east_m, shape.north_m).buffer(shape.radius_m, 256)
+
+
+@settings(deadline=None, max_examples=80)
+@given(zones(), st.sampled_from(list(Autopilot)))
+def test_a_zone_comes_back_from_its_items_as_they_are_stored(zone: Zone, autopilot: Autopilot) -> None:
+    fence = fence_of([zone], FRAME, autopilot)
+    kept = [stored(item, autopilot) for item in fence.items]
+    (area,) = areas_of(kept, FRAME)
+    assert area.inclusion is False
+    assert all(item.frame == m.GLOBAL and math.isfinite(item.params[0]) for item in fence.items)
+    if isinstance(zone.shape, Circle):
+        assert isinstance(area.zone.shape, Circle)
+        assert -1e-3 <= area.zone.shape.radius_m - zone.shape.radius_m <= 0.011
+        off = math.hypot(area.zone.shape.east_m - zone.shape.east_m, area.zone.shape.north_m - zone.shape.north_m)
+        assert off < 0.01
+    else:
+        assert outline(area.zone.shape).hausdorff_distance(outline(zone.shape)) < 0.12
+    # Made again of what came back, it is the same to the bit.
+    assert fence_of([area.zone], FRAME, autopilot).items == fence.items
+
+
+def test_corners_that_only_follow_a_straight_edge_are_left_out() -> None:
+    side = np.linspace(-500, 500, 21)[:-1]
+    ring = np.concatenate(
+        [
+            np.c_[side, side * 0 - 500],
+            np.c_[side * 0 + 500, side],
+            np.c_[-side, side * 0 + 500],
+            np.c_[side * 0 - 500, -side],
+        ]
+    )
+    fence = fence_of([Zone("z", Polygon(ring))], FRAME, COPTER)
+    assert len(fence.items) == 4
+    (area,) = areas_of(fence.items, FRAME)
+    assert outline(area.zone.shape).symmetric_difference(outline(Polygon(ring))).area < 30.0
+
+
+def test_zones_with_a_floor_or_a_ceiling_are_left_out_and_named_or_taken_to_the_sky() -> None:
+    mast = Zone("mast", Circle(0, 0, 60), None, Level(100, "agl"))
+    shelf = square(3000, 0, 200, "shelf", floor=Level(900, "amsl"))
+    yard = Zone("yard", Circle(1000, 0, 50))
+    fence = fence_of([mast, shelf, yard], FRAME, COPTER)
+    assert [z.name for z in fence.zones] == ["yard"]
+    assert fence.left_out == ("mast", "shelf")
+    assert any("mast" in words and "shelf" in words and "left out" in words for words in fence.told)
+    whole = fence_of([mast, shelf, yard], FRAME, COPTER, infinite=True)
+    assert len(whole.items) == 1 + 4 + 1
+    assert whole.left_out == ()
+    assert any("to the sky" in words for words in whole.told)
+
+
+def circles(count: int) -> list[Zone]:
+    return [Zone(f"c{i}", Circle(100.0 * i, 0, 40)) for i in range(count)]
+
+
+def test_more_circles_than_arducopter_keeps_are_refused_and_circles_in_circles_are_joined() -> None:
+    assert len(fence_of(circles(42), FRAME, COPTER).items) == 42
+    with pytest.raises(InputError, match=r"43 circle.*42 circles"):
+        fence_of(circles(43), FRAME, COPTER)
+    assert len(fence_of(circles(43), FRAME, Autopilot.PX4).items) == 43
+    with pytest.raises(InputError, match="keeps 64"):
+        fence_of(circles(65), FRAME, Autopilot.PX4)
+    inside = [Zone("big", Circle(0, 0, 9000)), *circles(60), Zone("big too", Circle(0, 0, 9000))]
+    fence = fence_of(inside, FRAME, COPTER)
+    assert [z.name for z in fence.zones] == ["big"]
+    assert "inside another circle" in fence.told[0]
+    ring = np.array([[1000 * math.cos(a), 1000 * math.sin(a)] for a in np.linspace(0, 2 * math.pi, 71)[:-1]])
+    with pytest.raises(InputError, match="70 corners"):
+        fence_of([Zone("round", Polygon(ring))], FRAME, COPTER)
+
+
+@pytest.mark.parametrize(
+    ("items", "said"),
+    [
+        ([MissionItem(5004, 0, (math.nan, 0, 0, 0), 1, 1)], "radius"),
+        ([MissionItem(5002, 0, (3, 0, 0, 0), 1, 1)] * 2, "not whole"),
+        ([MissionItem(5002, 0, (2, 0, 0, 0), 1, 1)] * 2, "not whole"),
+        ([MissionItem(16, 0)], "command 16"),
+    ],
+)
+def test_what_is_no_fence_is_refused(items: list[MissionItem], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        areas_of(items, FRAME)
+
+
+# -- held against the mission ---------------------------------------------------------------------------------------
+
+OVER = [[0.0, 0, 420], [3000, 0, 420], [6000, 1000, 420]]
+
+
+def mission_in(where: World, craft: Vehicle) -> Mission:
+    return build_mission(FlightPath(np.array(OVER)), where, craft, (36.6, -84.3), Order())
+
+
+def test_a_fence_that_the_mission_flies_over_is_refused_by_name() -> None:
+    mast = Zone("mast", Circle(1500, 10, 60), None, Level(50, "agl"))
+    where, craft = world(zones=[mast, Zone("yard", Circle(1500, 300, 100))]), vehicle(horizontal_clearance_m=30)
+    mission = mission_in(where, craft)
+    fence = fencing.fence_for(mission, craft, where)
+    assert [z.name for z in fence.zones] == ["yard"]
+    with pytest.raises(CheckFailed, match=r"mast(.|\n)*fence-infinite") as refused:
+        fencing.fence_for(mission, craft, where, infinite=True)
+    assert refused.value.reason == "fence"
+    assert "yard" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("east", "north"), [(0.0, 90.0), (6000.0, 900.0)])
+def test_start_and_goal_keep_their_clearance_from_the_fence_too(east: float, north: float) -> None:
+    low = Zone("low", Circle(east, north, 80), None, Level(1, "agl"))
+    where, craft = world(zones=[low]), vehicle(horizontal_clearance_m=30)
+    with pytest.raises(CheckFailed, match="low"):
+        fencing.fence_for(mission_in(where, craft), craft, where, infinite=True)
+
+
+def test_a_mission_that_touches_its_clearance_does_not_fail_for_the_rounding_of_the_fence() -> None:
+    zone = Zone("near", Circle(1500, 133.025, 100.0))
+    where, craft = world(zones=[zone]), vehicle(horizontal_clearance_m=30)
+    assert len(fencing.fence_for(mission_in(where, craft), craft, where).items) == 1
+
+
+def test_inclusion_areas_must_hold_the_whole_flight() -> None:
+    where, craft = world(), vehicle()
+    mission = mission_in(where, craft)
+    ring = np.array([[-100.0, -100], [6100, -100], [6100, 1100], [-100, 1100]])
+
+    def found(shape: Circle | Polygon) -> list[str]:
+        (item_zone,) = fence_of([Zone("z", shape)], FRAME, Autopilot.PX4).zones
+        items = [replace(i, command=i.command - 1) for i in fence_of([item_zone], FRAME, Autopilot.PX4).items]
+        return [f.message for f in fencing.breaches(areas_of(items, FRAME), mission, craft, where)]
+
+    assert found(Polygon(ring)) == []
+    assert found(Circle(3000, 0, 4000)) == []
+    assert any("item" in w and "leaves" in w for w in found(Polygon(ring * [0.9, 1])))
+    assert found(Circle(3000, 0, 3001)) != []  # three metres of track error
+    notch = np.array([[-100.0, -100], [1400, -100], [1500, 50], [1600, -100], [6100, -100], [6100, 1100], [-100, 1100]])
+    assert found(Polygon(notch)) != []
+
+
+def test_a_plan_files_own_fence_is_read_and_judged(tmp_path: Path) -> None:
+    where, craft = world(), vehicle()
+    mission = mission_in(where, craft)
+    for north, safe in ((300.0, True), (50.0, False)):
+        fence = fence_of([Zone("z", Circle(1500, north, 100))], FRAME, COPTER)
+        file = tmp_path / "uav1.plan"
+        file.write_text(write_plan(mission, fence=fence.items))
+        read = read_mission_file(file, autopilot=COPTER)
+        assert read.fence == fence.items
+        verdict, told = fencing.own_fence(read.fence, judge(mission, craft, where), craft, where)
+        assert "1 area(s) to stay out of" in told[0]
+        assert verdict.safe is safe
+
+
+# -- to vehicles ----------------------------------------------------------------------------------------------------
+
+MIXED = [Zone("a", Circle(500, 500, 120.5)), square(3000, -900, 200), Zone("b", Circle(-700, 0, 80))]
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_a_fence_is_uploaded_read_back_and_compared(autopilot: Autopilot) -> None:
+    fence = fence_of(MIXED, FRAME, autopilot)
+    craft = LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0)
+    with SimServer([craft], "udpin:127.0.0.1:0") as server, Link(server.url_for_gcs) as link:
+        options = session.Options(listen_s=0.1, discover_s=5.0)
+        result = session.upload_items(link, 1, fence.items, autopilot, FENCE, options=options, name="uav1")
+        assert result.outcome == "accepted"
+        assert result.verified, result.differences
+        enforced = autopilot is Autopilot.PX4
+        assert enforced or any("FENCE_ENABLE is 0" in w for w in result.warnings)
+        read = session.download_items(link, 1, FENCE, options=options)
+    assert faults(compare(fence.items, read, autopilot, FENCE)) == ()
+    back = areas_of(read, FRAME)
+    assert len(back) == len(MIXED)
+    for area, zone in zip(back, fence.zones, strict=True):
+        assert outline(area.zone.shape).hausdorff_distance(outline(zone.shape)) < 0.12
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_over_bad_links_a_fence_that_is_called_verified_is_on_board(autopilot: Autopilot) -> None:
+    """Where a link is so bad that nothing can be known, nothing is claimed."""
+    items = fence_of(MIXED, FRAME, autopilot).items
+    sure = 0
+    for seed in range(60):
+        weather = Weather(loss=0.03 * (seed % 8), duplicate=0.1, held_up=0.1)
+        board = LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0)
+        machine = VerifiedUpload(items, autopilot, us=Address(255, 190), vehicle=Address(1, 1), mission_type=FENCE)
+        lossy.run(machine, board, weather, seed, lambda machine=machine: machine.result is not None)  # type: ignore[misc]
+        assert machine.result is not None
+        if machine.result.verified:
+            sure += 1
+            assert faults(compare(items, board.items(FENCE), autopilot, FENCE)) == (), seed
+    assert sure >= 50
+
+
+def job_of(name: str, sysid: int, url: str, mission: Mission, craft: Vehicle, where: World) -> delivery.Job:
+    craft = replace(craft, name=name, sysid=sysid)
+    mission = replace(mission, name=name, sysid=sysid)
+    return delivery.Job(name, url, mission, judge(mission, craft, where), craft, where)
+
+
+def test_fences_go_before_the_missions_and_a_vehicle_that_is_not_there_stops_nobody_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)
+    where, craft = world(zones=MIXED), vehicle()
+    mission = mission_in(where, craft)
+    boards = [
+        LoopbackVehicle(1, COPTER, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0),
+        LoopbackVehicle(2, COPTER, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0, misbehave=Misbehaviour(no_space=True)),
+    ]
+    with SimServer(boards, "udpin:127.0.0.1:0") as server:
+        plain = [job_of(f"uav{n}", n, server.url_for_gcs, mission, craft, where) for n in (1, 2)]
+        jobs, notes = fencing.with_fences(plain)
+        assert notes == []
+        first, second = delivery.deliver(jobs, delivery.Options())
+    assert first.verified
+    assert first.as_dict()["fence"]["verified"] is True
+    assert any("FENCE_ENABLE is 0" in w for w in first.warnings)
+    assert len(boards[0].items(FENCE)) == 6
+    assert second.verified is False
+    assert "fence is not on board" in second.message
+    assert second.code in (5, 6)
+    assert boards[1].items(FENCE) == ()
+    assert boards[1].items() == ()
+
+
+def test_vehicles_without_zones_keep_their_fence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)
+    where, craft = world(), vehicle()
+    jobs, notes = fencing.with_fences([job_of("uav1", 1, delivery.SIM, mission_in(where, craft), craft, where)])
+    assert "left as it is" in notes[0][1]
+    (done,) = delivery.deliver(jobs, delivery.Options(), simulator=loopback_fleet)
+    assert done.verified
+    assert "fence" not in done.as_dict()
+
+
+def test_a_simulated_upload_sends_the_fence_too() -> None:
+    where, craft = world(zones=MIXED), vehicle()
+    jobs, _ = fencing.with_fences([job_of("uav1", 1, delivery.SIM, mission_in(where, craft), craft, where)])
+    (done,) = delivery.deliver(jobs, delivery.Options(), simulator=loopback_fleet)
+    assert done.verified
+    assert done.as_dict()["fence"]["items"] == 6
+
+
+# -- on the command line --------------------------------------------------------------------------------------------
+
+MISSION = """
+version: 1
+terrain: {dem: "sample:jacksboro"}
+limits: {min_agl_m: 60, horizontal_clearance_m: 30, track_error_m: 3, altitude_error_m: 5}
+no_fly:
+  - {name: mast, center: [36.598, -84.367], radius_m: 150}
+  - {name: shed, center: [36.5975, -84.373], radius_m: 60, ceiling_agl_m: 40}
+vehicles:
+  - {name: uav1, sysid: 1, autopilot: arducopter, start: [36.600, -84.380], goal: [36.596, -84.355], max_climb_deg: 15}
+"""
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)
+    (tmp_path / "m.yaml").write_text(MISSION)
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["gcsplan", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        out, err = capfd.readouterr()
+        assert isinstance(ended.value.code, int)
+        return ended.value.code, out, err
+
+    return call
+
+
+def test_plan_and_upload_send_the_fence_where_that_is_asked_for(run: Any) -> None:
+    code, _, err = run("plan", "m.yaml", "-o", "out", "--upload", "sim", "--fence")
+    assert code == 0, err
+    assert "'shed' is left out" in err
+    assert "a fence of 1 item(s) is on board too" in err
+    board = LoopbackVehicle(1, COPTER, lat_deg=36.6, lon_deg=-84.38, amsl_m=471.0)
+    with SimServer([board], "udpin:127.0.0.1:0") as server:
+        to = ("--to", server.url_for_gcs)
+        code, out, _ = run("upload", "out/uav1.plan", *to, "--mission", "m.yaml", "--fence", "--json")
+        assert code == 0
+        assert json.loads(out)["vehicles"][0]["fence"]["verified"] is True
+        (circle,) = board.items(FENCE)
+        assert circle.params[0] == 150.0
+        # Over the shed it flies legally, and a fence without a height would turn it round.
+        code, _, err = run("upload", "out/uav1.plan", *to, "--mission", "m.yaml", "--fence-infinite")
+        assert code == 4
+        assert "shed" in err
+        assert board.items(FENCE) == (circle,)
+        assert run("upload", "out/uav1.plan", *to, "--unchecked", "--fence")[0] == 2
+        assert run("clear", *to, "--type", "fence")[0] == 0
+    assert board.items(FENCE) == ()
