@@ -163,17 +163,18 @@ class Below:
 
     def _tighten_length(self) -> None:
         self.try_below(self.top_m, fine=True)
-        low, high = self.bound, self.cost
-        for k in range(CLOSER):
-            # No path is shorter than `low`; is any shorter than `middle`?
-            middle = high if k == 0 else 0.5 * (low + high)
-            found = self._bound_shorter(middle)
-            if found < middle:
-                high = middle
-            low = max(low, min(found, middle))
-            self._raise_bound(low)
-            if self._done() or high - low < 2e-5 * low or not self._in_time():
-                break
+        for closely in (False, True):
+            low, high = self.bound, self.cost
+            for k in range(CLOSER):
+                if self._done() or high - low < 2e-5 * low or not self._in_time():
+                    break
+                # No path is shorter than `low`; is any shorter than `middle`?
+                middle = high if k == 0 else 0.5 * (low + high)
+                found = self._bound_shorter(middle, closely)
+                if found < middle:
+                    high = middle
+                low = max(low, min(found, middle))
+                self._raise_bound(low)
 
         for part in LAPS:
             if not self._done() and self._climbs() and self._in_time():
@@ -184,17 +185,18 @@ class Below:
         limits = self.problem.limits
         return math.isfinite(limits.max_climb_slope) or math.isfinite(limits.max_descent_slope)
 
-    def _bound_shorter(self, longest_m: float) -> float:
+    def _bound_shorter(self, longest_m: float, closely: bool) -> float:
         """A bound of all paths shorter than ``longest_m``: their tracks on the fine lattice, then what they climb."""
-        spare = self._longest_track(longest_m) - sum(leg.length_m for leg in self.legs)
+        most_m = self._longest_track(longest_m)
+        spare = most_m - sum(leg.length_m for leg in self.legs)
         tracks = []
         for leg in self.legs:
             limit = leg.length_m + spare
             wanted = leg.corridor(limit)
             tracks.append(leg.bound(self.top_m, wanted, limit, True))
         # Each leg's limit is what the others leave, which is less now that they are known better.
-        spare = max(longest_m - sum(tracks), 0.0)
-        return rise_bound(self.legs, tracks, [track + spare for track in tracks])
+        spare = max(most_m - sum(tracks), 0.0)
+        return rise_bound(self.legs, tracks, [track + spare for track in tracks], closely=closely)
 
     def _longest_track(self, longest_m: float) -> float:
         """No track of a path shorter than ``longest_m`` is longer than this, for it must climb as well."""

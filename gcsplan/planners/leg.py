@@ -29,6 +29,8 @@ COARSE_M = 100.0
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 """Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
 
+FEWER = 0.6
+"""Cells are looked up anew for tracks that are longer than the shortest by that part of what was asked before."""
 RAISED, WORTHWHILE = 4, 0.05
 """Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
 
@@ -47,6 +49,17 @@ class End:
         return self.east_m, self.north_m
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Cells:
+    """Of each cell the lowest floor and how long ways there and on are at least; all cells that tracks no longer than
+    ``limit_m`` may meet."""
+
+    limit_m: float
+    low_m: Floats
+    away_m: Floats
+    left_m: Floats
+
+
 class Leg:
     """One leg of a problem, from stop to stop, under caps of at most ``top_m``."""
 
@@ -61,7 +74,7 @@ class Leg:
         self._twin: Plane | None = None
         self._guide: Guide
         self._ahead: Guide | None = None
-        self._seen: tuple[Floats, Floats, Floats] | None = None
+        self._seen: dict[bool, Cells] = {}
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
         wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
         self.parts = max(1, round(cell_m / wanted_m))
@@ -94,7 +107,8 @@ class Leg:
 
         Widens the lattice until that way lies within it.
         """
-        self._ahead = self._seen = None
+        self._ahead = None
+        self._seen.clear()
         for detour in DETOURS:
             if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                 continue
@@ -183,22 +197,42 @@ class Leg:
         out[mesh.row : mesh.row + rows, mesh.col : mesh.col + cols] = near.reshape(rows, cols)
         return out
 
-    def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats]:
-        """Of the cells that tracks shorter than ``limit_m`` may meet (and more): lowest floor, ways there and on."""
+    def cells(self, limit_m: float, *, closely: bool = False) -> tuple[Floats, Floats, Floats]:
+        """Of the cells that tracks shorter than ``limit_m`` may meet (and more): lowest floor, ways there and on.
+
+        ``closely``: the ways of each cell alone, where else whole pieces are as near as their entrances.
+        """
         if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that the flood did not
             return np.full(1, -math.inf), np.zeros(1), np.zeros(1)  # of nothing it is known that it is high
-        if self._seen is None:
-            # A piece is as near as its entrance, and no cell of it nearer than straight ahead.
-            mesh = self._guide.mesh
-            both = mesh.piece.reshape(-1, 2)
-            ways = []
-            for guide, end in ((self._from_start(), self.start), (self._guide, self.goal)):
-                entered = np.append(guide.entered, np.inf)[both].min(axis=1)
-                ways.append(np.maximum(entered, mesh.straight_to(end.place)))
-            self._seen = mesh.lowest(), ways[0], ways[1]
-        low, away, left = self._seen
-        near = away + left <= limit_m
-        return low[near], away[near], left[near]
+        seen = self._seen.get(closely)
+        again = seen is None or limit_m > seen.limit_m
+        if seen is not None and closely:  # fewer cells lie on shorter tracks
+            again = again or limit_m - self.length_m < FEWER * (seen.limit_m - self.length_m)
+        if seen is None or again:
+            seen = self._seen[closely] = self._cells_alone(limit_m) if closely else self._cells_of_pieces()
+        near = seen.away_m + seen.left_m <= limit_m
+        return seen.low_m[near], seen.away_m[near], seen.left_m[near]
+
+    def _cells_of_pieces(self) -> Cells:
+        mesh = self._guide.mesh
+        both = mesh.piece.reshape(-1, 2)
+        ways = []
+        for guide, end in ((self._from_start(), self.start), (self._guide, self.goal)):
+            entered = np.append(guide.entered, np.inf)[both].min(axis=1)
+            ways.append(np.maximum(entered, mesh.straight_to(end.place)))
+        return Cells(math.inf, mesh.lowest(), *ways)
+
+    def _cells_alone(self, limit_m: float) -> Cells:
+        mesh = self.plane.mesh(self.top_m, True, 1, self.corridor(limit_m), single=True)
+        a, b = self.start.place, self.goal.place
+        try:
+            _, left = mesh.flood(b, a, limit_m, math.inf, self._from_start())
+            _, away = mesh.flood(a, b, limit_m, math.inf, left)
+        except Exhausted:
+            return self._cells_of_pieces()
+        both = mesh.piece.reshape(-1, 2)
+        ways = [np.append(guide.entered, np.inf)[both].min(axis=1) for guide in (away, left)]
+        return Cells(limit_m, mesh.lowest(), *ways)
 
     def _from_start(self) -> Guide:
         """Distances from the start over the coarse mesh, as far as the flood from the goal has seen."""
