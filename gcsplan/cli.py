@@ -8,7 +8,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from gcsplan.commands import check, fly, links, plan
+from gcsplan.commands import check, energy, fly, links, plan, rehearse
 from gcsplan.commands.bench import bench_app
 from gcsplan.commands.ending import Interrupted, explained, fail, put, speak_plainly
 from gcsplan.errors import GcsplanError, InputError
@@ -25,12 +25,14 @@ app = typer.Typer(
 )
 app.add_typer(bench_app, name="bench")
 app.command(short_help="Plan a mission file; upload and verify if asked.")(plan.plan)
+app.command(short_help="Plan, fly it all in a simulator, judge.")(rehearse.rehearse)
 app.command(short_help="Does a file fly safely in a mission's world?")(check.check)
 app.command(short_help="Check files, upload them, read them back, compare.")(links.upload)
 app.command(short_help="Is exactly this file on board?")(links.verify)
 app.command()(links.download)
 app.command(short_help="Remove the mission, fence or rally points.")(links.clear)
 app.command(short_help="Loopback vehicles that take missions.")(fly.sim)
+app.command("fit-energy", short_help="The energy model out of flight logs.")(energy.fit_energy)
 app.command()(plan.planners)
 
 

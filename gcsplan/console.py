@@ -14,9 +14,12 @@ from rich.table import Table
 from gcsplan.native import notice
 
 if TYPE_CHECKING:
+    from gcsplan.check.return_verdict import WayHome
     from gcsplan.check.verdict import Verdict
     from gcsplan.delivery import Delivery
-    from gcsplan.pipeline import Plan, VehiclePlan
+    from gcsplan.gate import GateTime
+    from gcsplan.mavlink.machine import Progress as Transfer
+    from gcsplan.pipeline import FleetPlan, Plan, VehiclePlan
     from gcsplan.planners.problem import Progress
 
 PLAIN_WIDTH = 130  # of a log file or a pipe, where nobody says how wide it is
@@ -62,7 +65,7 @@ def verdict_word(safe: bool | None) -> str:
 
 def plan_table(plan: Plan) -> None:
     """A column for each vehicle of a plan, and the limit beside what was reached; for large fleets a row for each."""
-    rows = [_plan_row(v) for v in plan.vehicles]
+    rows = [_plan_row(v, plan.fleet) for v in plan.vehicles]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
     table = _table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
     for row in rows:
@@ -73,10 +76,33 @@ def plan_table(plan: Plan) -> None:
         each = next((n for n in (4, 3, 2) if all(_width(t) <= console.width for t in _columns(title, rows, n))), 1)
         for table in _columns(title, rows, each):
             _print(table)
+    _say_fleet(plan)
     say_notes(plan.notes)
     say_notes_of([(v.name, n) for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)])
+    if plan.fleet is not None:
+        notes = [(slot.name, note) for slot in plan.fleet.slots for note in slot.notes]
+        say_notes_of([(name, note.removeprefix(f"{name} ")) for name, note in notes])
     if plan.source.inputs.get("bare_dem"):
         console.print("[yellow]bare DEM: trees, masts and wires are not in it[/]")
+
+
+def _say_fleet(plan: Plan) -> None:
+    """How the fleet arrives, and how near two of it come to each other."""
+    fleet, arrival = plan.fleet, plan.source.arrival
+    if fleet is None or len(fleet.slots) < 2:
+        return
+    how = f"{fleet.interval_s:g} s apart" if fleet.mode == "sequence" else ""
+    if fleet.mode != "none":
+        say(f"arrival: {fleet.mode}{f', {how}' if how else ''}; order {', '.join(fleet.order)}")
+    closest = fleet.closest
+    if fleet.separation is None:
+        return
+    asked = f" of {arrival.separation_m:g}" if arrival is not None else ""
+    if closest is None:
+        say("separation: no two vehicles are in the air at the same time")
+    else:
+        a, b = closest.vehicles
+        say(f"separation: {closest.distance_m:.1f} m{asked} m, {a} and {b} at T+{closest.time_s:.1f} s")
 
 
 def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[Table]:
@@ -91,8 +117,10 @@ def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[T
     return tables
 
 
-def _plan_row(v: VehiclePlan) -> dict[str, str]:
+def _plan_row(v: VehiclePlan, fleet: FleetPlan | None) -> dict[str, str]:
     verdict = v.verdict
+    slot = None if fleet is None else fleet.slot(v.name)
+    held = f" + {slot.hold_s:.0f} at the gate" if slot and slot.hold_s > 0 else ""
     lowest, nearest = verdict.lowest, verdict.nearest
     limits = v.request.vehicle.limits
     climb = f" of {limits.max_climb_deg:g}" if limits.max_climb_deg < 90 else ""
@@ -106,7 +134,9 @@ def _plan_row(v: VehiclePlan) -> dict[str, str]:
         "lowest AGL, m": f"{number(lowest.min_agl_m, 1)} of {limits.min_agl_m:g}" if lowest else "–",
         "nearest zone, m": f"{number(nearest.zone_clearance_m, 1)} {escape(nearest.nearest_zone)}" if nearest else "–",
         "steepest, °": f"{number(verdict.max_climb_deg, 1)}{climb}",
-        "time to goal, s": number(verdict.arrive_s),
+        "speed, m/s": number(v.speed_m_s, 2),
+        "departs, s": number(slot.depart_s if slot else 0.0, 1) + held,
+        "arrives, s": number(slot.arrive_s if slot else verdict.arrive_s, 1),
         "verdict": verdict_word(verdict.safe),
     }
 
@@ -145,7 +175,9 @@ def delivery_table(deliveries: Sequence[Delivery], title: str = "upload") -> Non
                ("read back", False), ("s", True), ("retries", True)]  # fmt: skip
     table = _table(f"[bold]{title}[/]", columns)
     for d in deliveries:
-        told = {"accepted": "[green]accepted[/]"}.get(d.outcome, f"[bold red]{d.outcome}[/]")
+        told = {"accepted": "[green]accepted[/]", "withdrawn": "[yellow]withdrawn[/]"}.get(
+            d.outcome, f"[bold red]{d.outcome}[/]"
+        )
         verified = "[green]verified[/]" if d.verified else "[bold red]not verified[/]"
         link = escape(d.url) + (" [bold yellow]simulated[/]" if d.simulated else "")
         outcome = [told] if sent else []  # a comparison sends nothing
@@ -155,6 +187,36 @@ def delivery_table(deliveries: Sequence[Delivery], title: str = "upload") -> Non
     for d in deliveries:
         if d.message:
             console.print(f"{d.vehicle}: {d.message}", style="red", markup=False)
+
+
+def release_table(plan: Plan, deliveries: Sequence[Delivery], gate: GateTime | None = None) -> None:
+    """When to start each vehicle of a fleet, for whoever does it: we never arm or start one."""
+    if plan.fleet is None or len(plan.fleet.slots) < 2:
+        return
+    ready = {d.vehicle for d in deliveries if d.verified}
+    columns = [("vehicle", False), ("release, T+ s", True), ("at the goal, T+ s", True), ("", False)]
+    table = _table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
+    for slot in sorted(plan.fleet.slots, key=lambda s: s.depart_s):
+        state = "" if slot.name in ready else "[bold red]not ready[/]"
+        table.add_row(escape(slot.name), number(slot.depart_s, 1), number(slot.arrive_s, 1), state)
+    _print(table)
+    if gate is not None:
+        say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")
+
+
+def homes_table(homes: Mapping[str, WayHome]) -> None:
+    """One row for each vehicle whose way home was judged."""
+    if not homes:
+        return
+    columns = [("vehicle", False), ("return at, m above home", True), ("lowest safe from everywhere", True),
+               ("not safe from, m", True), ("rally points", True), ("way home", False)]  # fmt: skip
+    table = _table("[bold]way home[/]  the autopilot's own return, from every point of the mission", columns)
+    for name, home in homes.items():
+        at = f"{home.rtl_rel_home_m:g} {escape(home.parameter)}" + (" (default)" if home.assumed else "")
+        rally = str(len(home.rally)) if home.rally else "–"
+        lowest = number(home.lowest_rel_home_m, 1)
+        table.add_row(escape(name), at, lowest, number(home.unsafe_m), rally, verdict_word(home.safe))
+    _print(table)
 
 
 def say_notes(notes: Sequence[str]) -> None:
@@ -172,18 +234,30 @@ def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
 
 
 @contextmanager
-def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, int, int], None]]:
-    """Bars for transfers, on a terminal only: call the result with (name, done, total)."""
+def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer], None]]:
+    """A live table of transfers, on a terminal only: call the result with (name, progress)."""
     if not console.is_terminal:
-        yield lambda name, done, total: None
+        yield lambda name, told: None
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    columns = (
+        TextColumn("{task.description}"), TextColumn("{task.fields[phase]}"), BarColumn(), MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )  # fmt: skip
     with Bars(*columns, console=console, transient=True) as bars:
-        tasks = {name: bars.add_task(name, total=None) for name in names}
-        yield lambda name, done, total: bars.update(tasks[name], completed=done, total=total)
+        tasks = {name: bars.add_task(escape(name), total=None, phase="looking for it") for name in names}
+
+        def update(name: str, told: Transfer) -> None:
+            ended = {"verified": "[green]verified[/]"}.get(told.phase)
+            if told.phase.endswith("!"):
+                ended = f"[bold red]{told.phase.removesuffix('!')}[/]"
+            bars.update(tasks[name], completed=told.done, total=told.total, phase=ended or told.phase)
+            if ended:
+                bars.stop_task(tasks[name])
+
+        yield update
 
 
 @contextmanager

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from gcsplan import __version__
+from gcsplan.check.return_verdict import WayHome
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.delivery import Delivery
 from gcsplan.export.geojson import write_geojson
@@ -18,24 +20,64 @@ from gcsplan.export.kml import write_kml
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import ItemRow, Track
 from gcsplan.export.summary import write_summary
+from gcsplan.fleet.motion import TimedPath
 from gcsplan.mavlink.compare import command_name
 from gcsplan.mavlink.files import write_plan, write_waypoints
-from gcsplan.pipeline import Plan, VehiclePlan
+from gcsplan.mavlink.mission import MissionItem
+from gcsplan.pipeline import FleetPlan, Plan, VehiclePlan
+
+Homes = Mapping[str, WayHome]
 
 
-def outputs_of(plan: Plan) -> dict[str, str]:
-    """File name to text, of all that INTERFACE's ``plan -o DIR`` names but the report and the upload."""
+def outputs_of(
+    plan: Plan, homes: Homes = MappingProxyType({}), fences: Mapping[str, Sequence[MissionItem]] = MappingProxyType({})
+) -> dict[str, str]:
+    """File name to text, of all that INTERFACE's ``plan -o DIR`` names but the report and the upload.
+
+    ``homes``: vehicle to its way home, where that was judged; it stands in the summary then. ``fences``: vehicle to
+    the items of its fence, for the `.plan`.
+    """
     tracks = [_track(v) for v in plan.vehicles]
     frame, zones = plan.world.frame, plan.world.airspace.zones
     files = {}
     for v in plan.vehicles:
         files[f"{v.name}.waypoints"] = write_waypoints(v.mission)
-        files[f"{v.name}.plan"] = write_plan(v.mission, vehicle=v.request.vehicle)
+        files[f"{v.name}.plan"] = write_plan(v.mission, vehicle=v.request.vehicle, fence=fences.get(v.name, ()))
     files["mission.kml"] = write_kml(plan.source.name, tracks, zones, frame)
     files["mission.geojson"] = write_geojson(plan.source.name, tracks, zones, frame)
-    files["profile.csv"] = write_profile([row for v in plan.vehicles for row in item_rows(v.name, v.verdict)])
-    files["summary.json"] = write_summary(summary_of(plan))
+    motions = {m.name: m for m in plan.fleet.motions} if plan.fleet is not None else {}
+    files["profile.csv"] = write_profile(
+        [row for v in plan.vehicles for row in item_rows(v.name, v.verdict, motions.get(v.name))]
+    )
+    files["summary.json"] = write_summary(summary_of(plan, homes=homes))
     return files
+
+
+def homes_of(plan: Plan) -> dict[str, WayHome]:
+    """The way home of every vehicle, from everywhere on its mission: about a second for 20 km."""
+    from gcsplan.check.way_home import way_home
+
+    return {
+        v.name: way_home(
+            v.verdict, v.request.vehicle, plan.world,
+            rtl_rel_home_m=v.request.rtl_rel_home_m, terrain_error_m=plan.source.terrain_error_m,
+        )
+        for v in plan.vehicles
+    }  # fmt: skip
+
+
+def report_of(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Homes = MappingProxyType({})) -> str:
+    """``report.html``: one page that needs no network."""
+    from gcsplan.report.page import render
+
+    return render(plan, deliveries, homes)
+
+
+def figures_of(plan: Plan) -> dict[str, bytes]:
+    """File name to PNG of each figure alone: map, profiles, and a fleet's time and separation."""
+    from gcsplan.report import picture
+
+    return picture.figures(plan)
 
 
 def picture_of(plan: Plan) -> bytes:
@@ -47,15 +89,14 @@ def picture_of(plan: Plan) -> bytes:
     return buffer.getvalue()
 
 
-def upload_text(plan: Plan, deliveries: Sequence[Delivery]) -> str:
+def upload_text(plan: Plan, deliveries: Sequence[Delivery], homes: Homes = MappingProxyType({})) -> str:
     """``upload.json``: the summary with the clock readings and each vehicle's upload."""
-    return write_summary(summary_of(plan, deliveries), clocks=True)
+    return write_summary(summary_of(plan, deliveries, homes), clocks=True)
 
 
-def summary_of(plan: Plan, deliveries: Sequence[Delivery] = ()) -> dict[str, Any]:
+def summary_of(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Homes = MappingProxyType({})) -> dict[str, Any]:
     """The summary of INTERFACE.md as plain values, clock readings included."""
     uploads = {d.vehicle: d for d in deliveries}
-    arrival = plan.source.arrival
     return {
         "name": plan.source.name,
         "gcsplan": __version__,
@@ -63,18 +104,32 @@ def summary_of(plan: Plan, deliveries: Sequence[Delivery] = ()) -> dict[str, Any
         "objective": plan.objective,
         "seed": plan.seed,
         "inputs": dict(plan.source.inputs),
-        "vehicles": [_vehicle(v, uploads.get(v.name)) for v in plan.vehicles],
-        "fleet": {
-            "mode": arrival.mode if arrival else "none",
-            "order": list(arrival.order) if arrival else [],
-            "min_separation_m": None,
-            "closest": None,
-        },
+        "vehicles": [
+            _vehicle(v, plan.fleet, uploads.get(v.name))
+            | ({"way_home": homes[v.name].as_dict()} if v.name in homes else {})
+            for v in plan.vehicles
+        ],
+        "fleet": _fleet(plan),
         "notes": list(dict.fromkeys(plan.notes)),
     }
 
 
-def _vehicle(v: VehiclePlan, delivery: Delivery | None) -> dict[str, Any]:
+def _fleet(plan: Plan) -> dict[str, Any]:
+    fleet, arrival = plan.fleet, plan.source.arrival
+    several = fleet is not None and len(fleet.slots) > 1
+    closest = fleet.closest if fleet is not None else None
+    return {
+        "mode": fleet.mode if fleet is not None else "none",
+        "order": list(fleet.order) if fleet is not None and several else [],
+        "min_separation_m": closest.distance_m if closest else None,
+        "closest": {"vehicles": list(closest.vehicles), "time_s": closest.time_s} if closest else None,
+        "interval_s": fleet.interval_s if fleet is not None and fleet.mode == "sequence" else None,
+        "separation_m": arrival.separation_m if arrival is not None and several else None,
+    }
+
+
+def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, delivery: Delivery | None) -> dict[str, Any]:
+    slot = None if fleet is None else fleet.slot(v.name)
     verdict = v.verdict
     lowest, nearest = verdict.lowest, verdict.nearest
     length = v.problem.objective == "length"
@@ -95,14 +150,15 @@ def _vehicle(v: VehiclePlan, delivery: Delivery | None) -> dict[str, Any]:
         "nearest_zone": nearest.nearest_zone if nearest else None,
         "max_climb_deg": verdict.max_climb_deg,
         "speed_m_s": v.speed_m_s,
-        "depart_s": 0.0,
-        "arrive_s": verdict.arrive_s,
+        "depart_s": slot.depart_s if slot else 0.0,
+        "arrive_s": slot.arrive_s if slot else verdict.arrive_s,
         "planning_s": v.solution.planning_s,
         "first_path_s": v.solution.first_path_s,
         "stopped_by": v.solution.stopped_by,
         "safe": verdict.safe,
         "not_judged": list(verdict.not_judged),
-        "notes": list(dict.fromkeys((*v.notes, *v.solution.notes, *verdict.notes))),
+        "hold_s": slot.hold_s if slot else 0.0,
+        "notes": list(dict.fromkeys((*v.notes, *v.solution.notes, *verdict.notes, *(slot.notes if slot else ())))),
         "upload": delivery.as_dict() if delivery else None,
     } | _of_search(v)
 
@@ -135,8 +191,14 @@ def verdict_of(name: str, verdict: Verdict) -> dict[str, Any]:
     }
 
 
-def item_rows(vehicle: str, verdict: Verdict) -> list[ItemRow]:
-    """A row for each wire item; the figures of all stretches that are flown for it."""
+def item_rows(vehicle: str, verdict: Verdict, motion: TimedPath | None = None) -> list[ItemRow]:
+    """A row for each wire item; the figures of all stretches that are flown for it.
+
+    Times count from the fleet's common start, by ``motion``; without one from leaving the ground, by the verdict.
+    """
+    until: dict[int, float] = {}
+    if motion is not None and motion.pieces is not None:
+        until = dict(zip(motion.pieces.tolist(), motion.times_s[1:].tolist(), strict=True))  # the last one of each
     flown: dict[int, list[LegFigures]] = {}
     for leg in verdict.legs:
         flown.setdefault(leg.seq, []).append(leg)
@@ -152,7 +214,8 @@ def item_rows(vehicle: str, verdict: Verdict) -> list[ItemRow]:
             continue
         energy_j = math.fsum(leg.energy_j for leg in legs)
         spent_j += energy_j
-        clock_s += math.fsum(leg.time_s for leg in legs)
+        # A hold at the gate has no piece of its own: its seconds stand with the take-off.
+        clock_s = until.get(seq, clock_s) if until else clock_s + math.fsum(leg.time_s for leg in legs)
         low = [leg.min_agl_m for leg in legs if not leg.column and not math.isnan(leg.min_agl_m)]
         steep = max((leg.climb_deg for leg in legs), key=abs)
         lat, lon, amsl = legs[-1].end

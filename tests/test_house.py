@@ -20,13 +20,14 @@ WORLD = {"errors", "native", "world"}
 VEHICLE = WORLD | {"vehicle"}
 ABOVE = VEHICLE | {"swarm", "planners", "fleet", "mavlink", "check"}
 OUTWARD = ABOVE | {"export", "report"}
-EVERYTHING = OUTWARD | {"mission_file", "pipeline", "sim", "bench", "console"}
+EVERYTHING = OUTWARD | {"mission_file", "pipeline", "sim", "rehearsing", "bench", "console", "logs"}
 
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "native": set(),
     "world": {"errors", "native"},
     "vehicle": WORLD,
+    "logs": {"errors"},
     "swarm": {"errors"},
     "planners": VEHICLE | {"swarm"},
     "fleet": VEHICLE,
@@ -39,12 +40,27 @@ MAY_IMPORT: dict[str, set[str]] = {
     "pipeline": OUTWARD | {"mission_file"},
     "sim": VEHICLE | {"mavlink", "check"},
     "bench": OUTWARD | {"mission_file", "pipeline", "sim"},
+    "rehearsing": OUTWARD | {"mission_file", "pipeline", "sim"},
+    "scripting": OUTWARD | {"mission_file", "pipeline", "sim", "rehearsing"},
     "console": EVERYTHING,
     "cli": EVERYTHING,
 }
 
 # Modules beside the rooms that belong to one: the way of the data.
-STEPS = {"outputs", "delivery", "checking"}
+STEPS = {
+    "outputs",
+    "delivery",
+    "withdrawal",
+    "checking",
+    "fencing",
+    "planning",
+    "fleeting",
+    "detours",
+    "gate",
+    "wings",
+    "wing_ends",
+    "slants",
+}
 # Likewise of the command line: a folder of its commands.
 COMMAND_LINE = {"commands"}
 

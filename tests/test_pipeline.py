@@ -41,7 +41,10 @@ def test_the_example_of_the_contract_plans_as_printed() -> None:
         assert v.verdict.length_m > 17_000
     summary = summary_of(done)
     assert summary["fleet"]["order"] == ["uav1", "uav2"]
-    assert any("separation" in note for note in done.notes)
+    first, second = (v["arrive_s"] for v in summary["vehicles"])
+    assert second - first == pytest.approx(9.0, abs=1e-3)
+    assert summary["fleet"]["min_separation_m"] >= 30
+    assert summary["fleet"]["closest"]["vehicles"] == ["uav1", "uav2"]
 
 
 @pytest.mark.parametrize("autopilot", list(Autopilot))

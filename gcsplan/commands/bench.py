@@ -37,15 +37,28 @@ def bench_check(
     _tell(result, bench.report, as_json)
 
 
-@bench_app.command("upload", short_help="Upload beside MAVSDK's.")
+@bench_app.command("upload", short_help="Upload beside MAVSDK's; a fleet beside its slowest.")
 def bench_upload(
-    items: Annotated[int, typer.Option(metavar="N", help="Items of the mission.")] = 600,
+    items: Annotated[
+        int | None, typer.Option(metavar="N", help="Items of each mission [default: 600; of a fleet 50]")
+    ] = None,
     runs: Annotated[int, typer.Option(metavar="N", help="Runs of each, in turn.")] = 15,
+    fleet: Annotated[
+        int | None, typer.Option(metavar="N", help="Instead: N vehicles at once, beside the slowest of them alone.")
+    ] = None,
+    drop: Annotated[float, typer.Option(metavar="P", help="With --fleet: part of the packets that is lost.")] = 0.05,
     as_json: JsonOption = False,
 ) -> None:
     """Upload to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
+    if fleet is not None:
+        from gcsplan.bench import upload_fleet
+
+        measured = upload_fleet.run(fleet=fleet, items=50 if items is None else items, drop=drop)
+        _tell(measured, upload_fleet.report, as_json)
+        return
     from gcsplan.bench import upload as bench
 
+    items = 600 if items is None else items
     result = bench.run(items=items, runs=runs)
     _tell(result, bench.report, as_json)
 

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import os
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gcsplan.commands.ending import emit, talking
-from gcsplan.commands.options import LINKS, ArmedOption, JsonOption, MissionArgument, PlaceOption, UnjudgedOption
+from gcsplan.commands.options import (
+    LINKS,
+    ArmedOption,
+    AtomicOption,
+    JsonOption,
+    MissionArgument,
+    PlaceOption,
+    UnjudgedOption,
+)
 from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
@@ -38,12 +47,38 @@ def plan(
             f"vehicles). May be repeated. URLs: {LINKS}",
         ),
     ] = None,
+    gate_utc: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="The common start as a time of day, UTC (18:30:00): every vehicle waits in the air for its own "
+            "second. ArduCopter alone; needs --allow-unjudged, for nobody knows how long it will wait.",
+        ),
+    ] = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Also write report.html: map, profiles, way home, fleet; one page.")
+    ] = False,
+    way_home: Annotated[
+        bool, typer.Option("--way-home", help="Judge the return home from everywhere (--report does so too).")
+    ] = False,
+    fence: Annotated[
+        bool,
+        typer.Option("--fence", help="Zones without floor and ceiling as a fence: in the .plan, and sent first."),
+    ] = False,
+    fence_infinite: Annotated[
+        bool, typer.Option("--fence-infinite", help="As --fence, with zones that have a height as if they had none.")
+    ] = False,
     png: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="Also draw map and profiles to this picture.")
+        Path | None,
+        typer.Option(
+            metavar="FILE.png|DIR",
+            help="Also draw map and profiles to this picture; into a directory: each figure as a picture of its own.",
+        ),
     ] = None,
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
+    atomic: AtomicOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a mission file, write its outputs, and upload and verify them if asked.
@@ -51,12 +86,23 @@ def plan(
     Without --upload nothing is ever sent. The outputs are written whole or not at all; where no safe mission
     exists, earlier outputs are moved to DIR/previous, so that no old mission is flown by mistake.
     """
-    from gcsplan import delivery, outputs, pipeline
-    from gcsplan.console import delivery_table, plan_table, planning_status, say, transfer_progress
+    from gcsplan import delivery, fencing, outputs, pipeline
+    from gcsplan.console import (
+        delivery_table,
+        homes_table,
+        plan_table,
+        planning_status,
+        release_table,
+        say,
+        say_notes_of,
+        transfer_progress,
+    )
     from gcsplan.export.outdir import add_output, retire_outputs, write_outputs, write_whole
+    from gcsplan.gate import GateTime
     from gcsplan.planners import table
 
     directory = Path(mission.stem) if out is None else out
+    gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     if planner is not None:
         try:
             table.get(planner)
@@ -64,18 +110,35 @@ def plan(
             raise UsageError(f"--planner: {error}") from None
     if objective not in (None, "length", "energy"):
         raise UsageError(f"--objective {objective}: length or energy is wanted")
-    if png is not None and (png.suffix.lower() != ".png" or not (png.parent.is_dir() or png.parent == directory)):
-        raise UsageError(f"--png {png}: a name that ends in .png, in a directory that is there, is wanted")
+    each = png is not None and (png.is_dir() or png == directory)
+    named = png is not None and png.suffix.lower() == ".png" and (png.parent.is_dir() or png.parent == directory)
+    if png is not None and not (each or named):
+        raise UsageError(f"--png {png}: a directory, or a name that ends in .png in one that is there, is wanted")
     try:
         source = pipeline.load_mission(mission)
         targets = delivery.targets(upload or [], [r.vehicle for r in source.vehicles])
         with planning_status() as tell:
             told = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
             planned = pipeline.plan(
-                source, planner=planner, objective=objective, seed=seed, options=told, progress=tell
+                source,
+                planner=planner,
+                objective=objective,
+                seed=seed,
+                options=told,
+                progress=tell,
+                gate_utc=None if gate is None else gate.start,
             )
         pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
-        files = outputs.outputs_of(planned)
+        homes = outputs.homes_of(planned) if report or way_home else {}
+        names = [v.name for v in planned.vehicles]
+        jobs = delivery.jobs_of(planned, targets or dict.fromkeys(names, ""))
+        fence_notes: list[tuple[str, str]] = []
+        if fence or fence_infinite:  # one that the mission would breach is found before anything is written
+            jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
+        fences = {job.name: job.fence.items for job in jobs if job.fence is not None}
+        files = outputs.outputs_of(planned, homes, fences)
+        if report:
+            files["report.html"] = outputs.report_of(planned, (), homes)
     except UsageError:
         raise  # a slip on the command line says nothing against an earlier mission
     except (InputError, NoMission, CheckFailed):
@@ -83,32 +146,42 @@ def plan(
         if moved:
             say(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
         raise
-    picture = None if png is None else outputs.picture_of(planned)
+    pictures: dict[Path, bytes] = {}
+    if png is not None and each:
+        pictures = {png / name: content for name, content in outputs.figures_of(planned).items()}
+    elif png is not None:
+        pictures = {png: outputs.picture_of(planned)}
     in_the_way = write_outputs(directory, files)
-    if png is not None and picture is not None:
-        write_whole(png, picture)
+    for file, content in pictures.items():
+        write_whole(file, content)
     if in_the_way:
         say(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
     if not as_json:
         plan_table(planned)
+        homes_table(homes)
+        say_notes_of(fence_notes)
         say(f"written to {directory}{os.sep}: {', '.join(files)}")
     deliveries: list[Delivery] = []
     if targets:
         from gcsplan.sim.loopback import loopback_fleet
 
-        jobs = delivery.jobs_of(planned, targets)
-        options = delivery.Options(allow_armed=allow_armed, ignore_position=ignore_position)
+        if gate is not None:
+            gate.require_ahead(datetime.now(UTC))  # planning took its time
+        options = delivery.Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic)
         names = [job.name for job in jobs]
         with talking(names), transfer_progress(names) as moved_on:
             deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
         if not as_json:
             delivery_table(deliveries)
+            release_table(planned, deliveries, gate)
         try:
-            add_output(directory, "upload.json", outputs.upload_text(planned, deliveries))
+            add_output(directory, "upload.json", outputs.upload_text(planned, deliveries, homes))
+            if report:
+                add_output(directory, "report.html", outputs.report_of(planned, deliveries, homes))
         except InputError as error:  # what became of the upload matters more
-            say(f"note: upload.json is not written: {error}")
+            say(f"note: what became of the upload is not written: {error}")
     if as_json:
-        emit(outputs.summary_of(planned, deliveries), delivery.failure(deliveries))
+        emit(outputs.summary_of(planned, deliveries, homes), delivery.failure(deliveries))
     raise typer.Exit(delivery.exit_code(deliveries))
 
 

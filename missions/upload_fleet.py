@@ -1,0 +1,43 @@
+#!/usr/bin/env python3
+"""Plan a fleet, rehearse it, upload it to all vehicles at once, and say when to start each of them.
+
+    python missions/upload_fleet.py missions/fleet-4.yaml sim
+
+WHERE is as of `gcsplan plan --upload`: a URL for all vehicles, `link` (the mission file's links), `sim`, or NAME=URL.
+Nothing goes out unless the rehearsal went well; if one vehicle does not take its mission, no vehicle keeps one.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from gcsplan import load_mission, plan, rehearse, upload
+from gcsplan.errors import GcsplanError
+
+
+def main(mission_file: str, where: str) -> int:
+    """Exit code: 0 if every mission is on board and verified."""
+    try:
+        planned = plan(load_mission(mission_file))
+        rehearsed = rehearse(planned)
+        if (error := rehearsed.error()) is not None:
+            raise error
+        deliveries = upload(planned, to=where, atomic=True)
+    except GcsplanError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+    for delivery in deliveries:
+        said = "verified" if delivery.verified else f"{delivery.outcome}: {delivery.message}"
+        print(f"{delivery.vehicle}: {delivery.items} items, {said}")
+    if not all(delivery.verified for delivery in deliveries):
+        return max(delivery.code for delivery in deliveries)
+    assert planned.fleet is not None
+    for slot in planned.fleet.slots:
+        print(f"{slot.name}: start at T+{slot.depart_s:.1f} s, at its goal at T+{slot.arrive_s:.1f} s")
+    return 0
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,210 @@
+"""Fleets of loopback vehicles on one lossy port: everybody verified, the bad ones named, all or nothing on request."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from gcsplan import console, delivery
+from gcsplan.bench import upload_fleet as upload_fleet_bench
+from gcsplan.delivery import Delivery, Job
+from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, VehicleRefused
+from gcsplan.mavlink import session
+from gcsplan.mavlink.autopilots import altitude_of_cm
+from gcsplan.mavlink.compare import compare, faults
+from gcsplan.mavlink.link import Link
+from gcsplan.mavlink.machine import Progress
+from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.session import Options, Order, upload_fleet
+from gcsplan.mavlink.transfer import Timers
+from gcsplan.sim.misbehaviour import Misbehaviour
+from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.vehicle import Autopilot
+
+COPTER = Autopilot.ARDUCOPTER
+HOME = Home.at(36.6, -84.38, 371.0)
+QUICK = Timers(response_s=0.3, item_s=0.05, silence_s=1.5, retries=4)
+OPTIONS = Options(unchecked=True, listen_s=0.0, standby_s=0.0, discover_s=2.0, read_parameters=False, timers=QUICK)
+FLEET = range(1, 21)
+
+
+def mission(sysid: int, count: int = 50) -> Mission:
+    z = altitude_of_cm(6500, COPTER)
+    items = tuple(
+        MissionItem(16, 3, (0.0, 0.0, 0.0, 0.0), 366_000_000 + 1000 * n, -843_800_000 + 700 * n + sysid, z + n)
+        for n in range(count - 1)  # item 0 is home
+    )
+    return Mission(COPTER, HOME, items, f"uav{sysid}", sysid)
+
+
+@contextmanager
+def fleet(numbers: range, trouble: Mapping[int, Mapping[str, Any]], drop: float) -> Iterator[SimServer]:
+    """A vehicle for each of ``numbers`` on one port, each losing packets by its own seed."""
+    boards = [
+        LoopbackVehicle(
+            n, COPTER, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.0,
+            misbehave=Misbehaviour(drop=drop, seed=n, **trouble.get(n, {})),
+        )
+        for n in numbers
+    ]  # fmt: skip
+    with SimServer(boards, "udpin:127.0.0.1:0", speedup=10.0) as server:
+        yield server
+    assert server.mishandled == 0
+
+
+def test_twenty_vehicles_with_fifty_items_are_all_verified_over_a_link_that_loses_a_twentieth() -> None:
+    sent = [mission(n) for n in FLEET]
+    ended: list[str] = []
+    with fleet(FLEET, {}, drop=0.05) as server, Link(server.url_for_gcs) as link:
+        orders = [Order(link, each, options=OPTIONS) for each in sent]
+        results = upload_fleet(orders, ended=lambda order, outcome: ended.append(order.mission.name))
+        for board, each, result in zip(server.vehicles, sent, results, strict=True):
+            assert not isinstance(result, GcsplanError), result
+            assert result.verified, result.reason
+            assert (result.sysid, result.items) == (board.sysid, 50)
+            assert not faults(compare(each.wire_items(), board.items(), COPTER))
+    assert sum(r.retries for r in results if not isinstance(r, GcsplanError)) > 0  # the link did lose something
+    assert sorted(ended) == sorted(each.name for each in sent)
+
+
+def test_a_dead_a_refusing_and_a_corrupting_vehicle_are_named_and_the_other_seventeen_verified() -> None:
+    trouble: dict[int, dict[str, Any]] = {
+        4: {"silent_after": 0},
+        9: {"refuse": 7, "refuse_code": 5},
+        13: {"corrupt": 5},
+    }
+    with fleet(FLEET, trouble, drop=0.05) as server, Link(server.url_for_gcs) as link:
+        results = upload_fleet([Order(link, mission(n), options=OPTIONS) for n in FLEET])
+    by_number = dict(zip(FLEET, results, strict=True))
+    errors = {
+        n: r if isinstance(r, GcsplanError) else r.error()
+        for n, r in by_number.items() if isinstance(r, GcsplanError) or not r.verified
+    }  # fmt: skip
+    assert {n: type(e) for n, e in errors.items()} == {4: LinkError, 9: VehicleRefused, 13: ReadBackDiffers}
+    assert "4" in str(errors[4])
+    assert "item 7" in str(errors[9])
+    assert "item 5" in str(errors[13])
+    assert "uav9" in str(errors[9])
+    assert "uav13" in str(errors[13])
+
+
+# -- all or nothing -----------------------------------------------------------------------------------------------
+
+
+def delivered(
+    trouble: Mapping[int, Mapping[str, Any]], monkeypatch: pytest.MonkeyPatch, *, atomic: bool = True, count: int = 4
+) -> tuple[dict[str, Delivery], dict[str, int], list[tuple[str, Progress]]]:
+    """What became of a small fleet: deliveries, items on board without home, and what was told on the way."""
+    monkeypatch.setattr(delivery, "LISTEN_S", 0.0)
+    order = delivery._order
+    monkeypatch.setattr(
+        delivery, "_order", lambda *a: replace(o := order(*a), options=replace(o.options, timers=QUICK))
+    )
+    told: list[tuple[str, Progress]] = []
+    with fleet(range(1, count + 1), trouble, drop=0.0) as server:
+        jobs = [Job(f"uav{n}", server.url_for_gcs, mission(n, 12)) for n in range(1, count + 1)]
+        options = delivery.Options(unchecked=True, atomic=atomic)
+        done = delivery.deliver(jobs, options, lambda name, progress: told.append((name, progress)))
+        boards = {f"uav{v.sysid}": len(v.items()[1:]) for v in server.vehicles}
+    return {d.vehicle: d for d in done}, boards, told
+
+
+def test_one_failure_leaves_the_others_results_standing(monkeypatch: pytest.MonkeyPatch) -> None:
+    done, boards, told = delivered({2: {"refuse": 3}, 3: {"corrupt": 4}}, monkeypatch, atomic=False)
+    assert [d.verified for d in done.values()] == [True, False, False, True]
+    assert delivery.exit_code(list(done.values())) == 7
+    assert boards["uav1"] == boards["uav4"] == 11
+    last = {name: progress.phase for name, progress in told}
+    assert last == {"uav1": "verified", "uav2": "refused!", "uav3": "accepted!", "uav4": "verified"}
+
+
+def test_all_or_nothing_takes_back_what_the_others_took_and_reads_that_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    done, boards, _ = delivered({2: {"refuse": 3}}, monkeypatch)
+    assert {n: d.outcome for n, d in done.items()} == {
+        "uav1": "withdrawn", "uav2": "refused", "uav3": "withdrawn", "uav4": "withdrawn",
+    }  # fmt: skip
+    assert not any(d.verified for d in done.values())
+    assert all(boards[n] == 0 for n in ("uav1", "uav3", "uav4"))
+    assert delivery.exit_code(list(done.values())) == 5
+    assert "uav2" in done["uav1"].message
+    assert "item 3" in done["uav2"].message
+
+
+def test_all_or_nothing_changes_nothing_where_all_went_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    done, boards, _ = delivered({}, monkeypatch)
+    assert all(d.verified and d.outcome == "accepted" for d in done.values())
+    assert set(boards.values()) == {11}
+    assert delivery.exit_code(list(done.values())) == 0
+
+
+def test_what_read_back_wrong_is_cleared_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    done, boards, _ = delivered({3: {"corrupt": 4}}, monkeypatch)
+    assert done["uav3"].outcome == "withdrawn"
+    assert done["uav3"].code == 7
+    assert set(boards.values()) == {0}
+    assert delivery.exit_code(list(done.values())) == 7
+
+
+def test_a_vehicle_that_keeps_its_mission_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    clear = session.clear_fleet
+
+    def armed_in_between(orders: list[Order]) -> Any:
+        results = clear(orders[1:])
+        return [VehicleRefused("not cleared: the vehicle is armed"), *results]
+
+    monkeypatch.setattr(session, "clear_fleet", armed_in_between)
+    done, boards, _ = delivered({4: {"refuse": 3}}, monkeypatch)
+    assert done["uav1"].outcome == "accepted"
+    assert done["uav1"].code == LinkError.exit_code
+    assert "still holds" in done["uav1"].message
+    assert boards["uav1"] == 11
+    assert boards["uav2"] == boards["uav3"] == 0
+    assert delivery.exit_code(list(done.values())) == 6
+
+
+def test_all_or_nothing_sends_nothing_where_a_link_does_not_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    with fleet(range(1, 2), {}, drop=0.0) as server:
+        jobs = [Job("uav1", server.url_for_gcs, mission(1, 12)), Job("uav2", "tcp:127.0.0.1:1", mission(2, 12))]
+        done = delivery.deliver(jobs, delivery.Options(unchecked=True, atomic=True))
+        assert server.vehicles[0].items()[1:] == ()
+    assert [d.code for d in done] == [6, 6]
+    assert "nothing was sent" in done[0].message
+
+
+# -- what is seen of it -------------------------------------------------------------------------------------------
+
+
+def test_the_live_table_is_for_terminals_and_shows_where_each_vehicle_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = io.StringIO()
+    monkeypatch.setattr(console, "console", Console(file=screen, force_terminal=True, width=100, color_system=None))
+    with console.transfer_progress(["uav1", "[/]odd"]) as tell:
+        tell("uav1", Progress("upload", 3, 12))
+        tell("uav1", Progress("verified", 12, 12))
+        tell("[/]odd", Progress("refused!", 0, 12))
+    shown = screen.getvalue()
+    assert all(word in shown for word in ("uav1", "[/]odd", "verified", "refused", "12/12"))
+    plain = io.StringIO()
+    monkeypatch.setattr(console, "console", Console(file=plain, width=100))
+    with console.transfer_progress(["uav1"]) as tell:
+        tell("uav1", Progress("upload", 3, 12))
+    assert plain.getvalue() == ""
+
+
+def test_the_measurement_of_a_fleet_wants_a_fleet() -> None:
+    with pytest.raises(InputError, match="2 to 254 vehicles"):
+        upload_fleet_bench.run(fleet=1)
+    told = upload_fleet_bench.report(
+        {
+            "vehicles": 20, "items": 50, "drop": 0.05, "autopilot": "px4", "together_s": 9.0, "slowest_alone_s": 8.0,
+            "slowest_sysid": 7, "ratio": 1.125, "retries": 3,
+        }
+    )  # fmt: skip
+    assert "1.125" in told
+    assert "5 %" in told
