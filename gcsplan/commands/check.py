@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcsplan.commands.ending import emit
+from gcsplan.commands.ending import complain, emit, printable
 from gcsplan.commands.options import JsonOption, UnjudgedOption
 from gcsplan.errors import InputError, UsageError
 
@@ -104,6 +104,8 @@ def check(
         verdicts = [outputs.verdict_of(str(c.file), c.verdict) | checking.more_of(c) for c in batch.checked]
         document = {"name": batch.name, "inputs": dict(batch.inputs), "notes": list(batch.notes), "verdicts": verdicts}
         emit(document, failed)
+        for _, error in batch.unreadable:
+            complain(error)
     elif quiet:
         _say_findings(batch, allow_unjudged)
     else:
@@ -189,7 +191,7 @@ def _say_all(batch: Batch) -> None:
         if c.way_home is not None:
             console.print(c.way_home.describe(), style="red" if c.way_home.safe is False else None, markup=False)
     for _, error in batch.unreadable:
-        console.print(str(error), style="red", markup=False)
+        complain(error)
 
 
 def _say_findings(batch: Batch, allow_unjudged: bool) -> None:
@@ -198,10 +200,10 @@ def _say_findings(batch: Batch, allow_unjudged: bool) -> None:
 
     for c in batch.checked:
         for line in finding_lines(c, allow_unjudged=allow_unjudged):
-            say(line)
+            say(printable(line))
     for argument, error in batch.unreadable:
         for problem in error.problems:
-            say(f"{problem}" if problem.where.startswith(argument) else f"{argument}: {problem}")
+            say(printable(f"{problem}" if problem.where.startswith(argument) else f"{argument}: {problem}"))
 
 
 def _report(batch: Batch, file: Path) -> None:

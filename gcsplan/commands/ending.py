@@ -77,15 +77,23 @@ def explained(error: Exception) -> GcsplanError:
     return GcsplanError(f"internal error, a bug in gcsplan: {type(error).__name__}: {error} (--debug shows where)")
 
 
+def printable(text: str) -> str:
+    """Text for a terminal: names of files and values come from anywhere, and none of them may speak to it."""
+    return "".join(c if c.isprintable() or c in "\n\u2009" else "\ufffd" for c in text)
+
+
+def complain(error: GcsplanError) -> None:
+    """One message on standard error."""
+    with suppress(OSError):  # there is nobody left to tell
+        print(f"gcsplan: {printable(str(error))}", file=sys.stderr)
+
+
 def fail(error: GcsplanError, as_json: bool, debug: bool) -> NoReturn:
     """One message on standard error, one JSON document if asked, and the exit code."""
     code = error.exit_code
     if debug:
         traceback.print_exc()
-    with suppress(OSError):  # there is nobody left to tell
-        # Names of files and values come from anywhere: none of them may speak to the terminal.
-        words = "".join(c if c.isprintable() or c in "\n\u2009" else "\ufffd" for c in str(error))
-        print(f"gcsplan: {words}", file=sys.stderr)
+    complain(error)
     if as_json:
         document = {"code": code, "reason": error.reason, "message": error.message, "where": error.where}
         if isinstance(error, InputError):
