@@ -32,7 +32,7 @@ def circling_m(v: VehiclePlan) -> float:
     """How far from its last point a vehicle may be that circles there for good; 0 for any other."""
     wing = v.order.wing
     if wing is None or v.request.end not in ("loiter", "rtl"):
-        return 0.0
+        return 0.0  # a climb in circles is in the motion
     highest = max(leg.end[2] for leg in v.verdict.legs)
     radius = wing.circle_m if v.request.end == "loiter" else PLANE_LOITER_RADIUS_M
     return max(radius, math.ceil(v.request.vehicle.turn_radius_m)) * circle_growth(highest)

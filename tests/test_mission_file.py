@@ -181,7 +181,7 @@ def test_min_agl_must_be_said_somewhere() -> None:
         ({"approach_agl_m": 64.9}, "approach_agl_m", "at least 65 m AGL"),
         ({"approach_agl_m": 120, "max_agl_m": 120}, "approach_agl_m", "at most 115 m AGL"),
         ({"via": [[36.58, -84.3, 20]]}, "via[0]", "at least 65 m AGL"),
-        ({"turn_radius_m": 80}, "turn_radius_m", "not yet planned"),
+        ({"turn_radius_m": 80}, "turn_radius_m", "a multicopter has no turn radius"),
         ({"end": "rtl"}, "rtl_rel_home_m", "is missing"),
         ({"min_agl_m": 70, "limits": {"min_agl_m": 70}}, "min_agl_m", "keep one"),
         ({"name": "uav 1"}, "name", "letters, digits"),

@@ -80,7 +80,7 @@ def judge(
         return Verdict(mission, (), tuple(findings + far), tuple(flight.not_judged), tuple(flight.notes))
     if vehicle.turn_radius_m > 0.0:
         bend(flight, stored, vehicle, world.frame)
-        findings += slant_findings(flight.stretches, vehicle, world)
+        findings += slant_findings([*flight.stretches, *flight.instead], vehicle, world)
     plane = legs_in_plane(flight.stretches, vehicle.limits, world, terrain_error_m)
     report = world.airspace.examine(plane.legs, vehicle.limits)
     figures = _figures(flight, plane, report, vehicle, world)

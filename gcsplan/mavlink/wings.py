@@ -51,7 +51,8 @@ class Wing:
 
     ``top``: where the climb-out ends, straight ahead of home. ``touch``: where the glide from the last way point ends,
     on the ground; None without a landing. ``circle_m``: radius of a circle at the goal. ``up``: the circle, around this
-    place and to this altitude, in which it climbs behind ``top``, and ``up_m`` its radius; None: it climbs straight.
+    place and to this altitude, in which it climbs behind ``top``, and ``up_m`` its radius (negative: anticlockwise);
+    None: it climbs straight.
     """
 
     top: Point

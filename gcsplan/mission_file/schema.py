@@ -177,6 +177,7 @@ class VehicleKeys(LimitKeys):
     accel_m_s2: Accel = 1.5
     corner_accel_m_s2: Accel = 2.5
     vertical_accel_m_s2: Accel = 1.0
+    leg_jerk_m_s3: Accel = 1.0
     turn_radius_m: Length = 0.0
     energy: EnergyKeys = EnergyKeys()
     link: Text | None = None

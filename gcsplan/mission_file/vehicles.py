@@ -28,7 +28,9 @@ GRAVITY_M_S2 = 9.80665
 
 SEPARATION_M = 30.0
 
-MOTION = ("climb_m_s", "descent_m_s", "land_m_s", "accel_m_s2", "corner_accel_m_s2", "vertical_accel_m_s2")
+MOTION = (
+    "climb_m_s", "descent_m_s", "land_m_s", "accel_m_s2", "corner_accel_m_s2", "vertical_accel_m_s2", "leg_jerk_m_s3",
+)  # fmt: skip
 """What bounds a vehicle's motion besides its cruise speed. In local metres (the papers' worlds) what is not given does
 not bound it: speed is instant, and counts in space."""
 
@@ -128,7 +130,7 @@ def _wing_motion(keys: VehicleKeys, limits: Limits) -> dict[str, float]:
         "descent_m_s": fast * limits.max_descent_slope,
     }
     own = {key: getattr(keys, key) for key in rates if key in keys.model_fields_set}
-    return {key: math.inf for key in MOTION if key.endswith("_m_s2")} | {"land_m_s": math.inf} | rates | own
+    return {key: math.inf for key in MOTION if key.endswith(("_m_s2", "_m_s3"))} | {"land_m_s": math.inf} | rates | own
 
 
 def _motion(keys: VehicleKeys, notes: list[str], *, local: bool) -> dict[str, float]:

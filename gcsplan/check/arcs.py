@@ -1,0 +1,351 @@
+"""Corners as a fixed wing flies them: arcs that touch both legs, laid over the straight stretches of a flight.
+
+What is assumed of ArduPlane (commands_logic.cpp, `verify_nav_wp`; AP_L1_Control.cpp; altitude.cpp):
+
+- A way point counts as reached at its own acceptance radius (param2), else at `turn_distance`: the smaller of
+  WP_RADIUS and the L1 distance, times turn/90°. There the turn begins, on an arc of ``turn_radius_m``.
+- Where that is not the tangent length of the corner, the arc is moved along the leg before it by the difference, and
+  the leg behind it aside by its sine: both are widened by that.
+- Altitude runs evenly along what is flown, from the middle of one arc to that of the next. ArduPlane reckons along
+  the straight line between way points instead, and from where a turn begins it is after the altitude of the way point:
+  what lies between all of these is judged besides (``Flight.instead``).
+- Behind a circle a leg may begin anywhere on it.
+
+Corners whose arcs do not fit between their way points are named as not judged, and left sharp.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.check.stretch import Flight, Place, Stretch
+from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.frame import Frame
+
+__all__ = ["SAG_M", "UNFITTING", "bend", "tangent_m"]
+
+Floats = NDArray[np.float64]
+
+SAG_M = 0.2
+"""How far an arc may lie outside its chords, which are widened by that."""
+
+FIT_M = 0.25
+"""By so much arcs of neighbours may overlap: what the wire's rounding makes of arcs that just touch."""
+
+UNFITTING = "what is flown there is not judged"
+
+LEAST_TURN = math.radians(0.02)
+ABOUT = math.radians(170.0)
+"""A corner that turns by less is none; one that turns by more is a turn about, whose way point lies far off."""
+
+WP_RADIUS_M, L1_S = 90.0, 4.06
+"""ArduPlane's WP_RADIUS and, for each m/s, its L1 distance (0.3183 · damping 0.75 · NAVL1_PERIOD 17), defaults."""
+
+MOST_BANK_DEG = 45.0
+"""ArduPlane's ROLL_LIMIT_DEG, default."""
+
+SETTLES_S = 15.0
+"""Seconds on a straight leg after which the L1 controller is back on it (NAVL1_PERIOD 17, NAVL1_DAMPING 0.75)."""
+
+SAME_M = 0.02
+GRAVITY_M_S2 = 9.80665
+
+
+def tangent_m(radius_m: float, turn_rad: float) -> float:
+    """How far before its corner an arc begins."""
+    return radius_m * math.tan(0.5 * abs(turn_rad))
+
+
+def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame) -> None:
+    """Lay arcs of the vehicle's turn radius over the corners of ``flight``, in place.
+
+    ``mission`` is the one that is followed, as stored. Every stretch is replaced by the chords of half the arc
+    behind it, what is left of it, and the chords of half the arc ahead, under its own number.
+    """
+    radius = vehicle.turn_radius_m
+    if mission.autopilot is not Autopilot.ARDUPLANE:
+        flight.not_judged.append(
+            f"the arcs of {radius:g} m that {vehicle.name} flies at its corners are not judged: {mission.autopilot} "
+            f"begins a turn by parameters that the mission does not hold"
+        )
+        return
+    fastest = max((s.speed_m_s for s in flight.stretches), default=0.0)
+    bank_deg = math.degrees(math.atan(fastest**2 / (GRAVITY_M_S2 * radius)))
+    if bank_deg > MOST_BANK_DEG:
+        flight.not_judged.append(
+            f"turns of {radius:g} m at {fastest:g} m/s need a bank of {bank_deg:.0f}°, and ArduPlane's ROLL_LIMIT_DEG "
+            f"is {MOST_BANK_DEG:g}°: the arcs that it flies are wider, and not judged"
+        )
+    bent, other = [], list(flight.instead)
+    new: list[Stretch] = []
+    for first, last in _runs(flight.stretches):
+        run = flight.stretches[first:last]
+        if not _moves(run[0]):
+            bent += run
+            continue
+        before = flight.stretches[first - 1] if first else None
+        behind = before.reach_m if before is not None and not _moves(before) else 0.0
+        legs = _Run(run, mission, vehicle, frame, flight, behind)
+        bent += [piece for k in range(len(run)) for piece in legs.flown(k)]
+        for k, s in enumerate(run):
+            banded = [i for i in other if _same_way(i, s)]
+            for i in banded:
+                other.remove(i)
+            new += legs.banded(k, banded[0]) if banded else legs.instead(k)
+    flight.stretches[:] = bent
+    flight.instead[:] = other + new
+    note = (
+        f"turns are judged as arcs of {radius:g} m that begin at the acceptance radius of their way point; that the "
+        f"aircraft follows them within track_error_m {vehicle.limits.track_error_m:g} is assumed (NAVL1_PERIOD, wind; "
+        f"a bank of {bank_deg:.0f}° at {fastest:g} m/s)"
+    )
+    if note not in flight.notes:
+        flight.notes.append(note)
+
+
+@dataclass(frozen=True, slots=True)
+class _Corner:
+    """``turn`` radians, left positive; 0 where it is left sharp.
+
+    ``tangent`` metres, its arc's; ``off_m``: how far that may lie elsewhere; ``begins_m``: where the turn begins.
+    """
+
+    turn: float = 0.0
+    tangent: float = 0.0
+    off_m: float = 0.0
+    begins_m: float = 0.0
+
+
+class _Run:
+    """Straight stretches flown one after the other without a stop, in the plane."""
+
+    def __init__(
+        self, run: Sequence[Stretch], mission: Mission, vehicle: Vehicle, frame: Frame, flight: Flight, behind_m: float
+    ) -> None:
+        self.run, self.frame, self.radius = run, frame, vehicle.turn_radius_m
+        places = np.array([run[0].start, *(s.end for s in run)])
+        self.points = np.column_stack([frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
+        way = np.diff(self.points[:, :2], axis=0)
+        self.long_m = np.hypot(*way.T)
+        self.heading = np.arctan2(way[:, 1], way[:, 0])
+        self.behind_m = behind_m
+        self.corners = self._corners(mission, flight)
+        half = np.array([0.5 * self.radius * abs(c.turn) for c in self.corners])
+        tangent = np.array([c.tangent for c in self.corners])
+        self.straight_m = self.long_m - tangent[:-1] - tangent[1:]
+        self.flown_m = half[:-1] + np.abs(self.straight_m) + half[1:]
+        self.half_m = half
+
+    def _corners(self, mission: Mission, flight: Flight) -> list[_Corner]:
+        turns = (np.diff(self.heading) + math.pi) % (2.0 * math.pi) - math.pi
+        found = [_Corner()]
+        for k, turn in enumerate(turns.tolist()):
+            s, after = self.run[k], self.run[k + 1]
+            if abs(turn) < LEAST_TURN:
+                found.append(_Corner())
+                continue
+            if s.terrain or after.terrain or abs(turn) > ABOUT:
+                why = "in the terrain frame" if abs(turn) <= ABOUT else f"that turns by {math.degrees(abs(turn)):.0f}°"
+                flight.not_judged.append(f"item {s.seq}: what a fixed wing flies at a corner {why} is not judged")
+                found.append(_Corner())
+                continue
+            tangent = tangent_m(self.radius, turn)
+            begins = self._begins_m(mission, s, abs(turn), flight)
+            off_m = abs(begins - tangent) * math.sin(min(abs(turn), 0.5 * math.pi))
+            found.append(_Corner(turn, tangent, off_m, begins))
+        found.append(_Corner())
+        for k, s in enumerate(self.run):
+            a, b = found[k], found[k + 1]
+            if max(a.tangent + b.tangent, b.begins_m) <= self.long_m[k] + FIT_M:
+                continue
+            seqs = ", ".join(dict.fromkeys(str(x.seq) for x in self.run[max(k - 1, 0) : k + 1]))
+            takes = (
+                f"arcs of {self.radius:g} m take {a.tangent + b.tangent:.0f} m"
+                if a.tangent + b.tangent > self.long_m[k] + FIT_M
+                else f"the turn begins {b.begins_m:.0f} m before the end"
+            )
+            flight.not_judged.append(
+                f"item {seqs}: {takes} of the leg to item {s.seq}, which is {self.long_m[k]:.0f} m long: {UNFITTING}"
+            )
+            # Left sharp, so that what is judged of the rest makes sense.
+            found[k], found[k + 1] = _Corner(off_m=a.off_m), _Corner(off_m=b.off_m)
+        for k, s in enumerate(self.run[:-1]):  # what a leg is too short to settle on stays for the next turn
+            if self.long_m[k] - found[k].tangent - found[k + 1].tangent < SETTLES_S * s.speed_m_s:
+                found[k + 1] = replace(found[k + 1], off_m=found[k + 1].off_m + found[k].off_m)
+        return found
+
+    def _begins_m(self, mission: Mission, s: Stretch, turn: float, flight: Flight) -> float:
+        """How far before the end of ``s`` the turn behind it begins."""
+        item = _item(mission, s.seq)
+        if item is None or item.command != m.WAYPOINT:
+            return 0.0  # a take-off ends where its height is reached, not before
+        if math.isfinite(item.params[1]) and item.params[1] > 0.0:
+            return item.params[1]
+        words = (
+            f"item {s.seq} gives no acceptance radius: its turn is judged as begun by WP_RADIUS {WP_RADIUS_M:g} m and "
+            f"NAVL1_PERIOD 17, the defaults"
+        )
+        if words not in flight.notes:
+            flight.notes.append(words)
+        return min(WP_RADIUS_M, L1_S * s.speed_m_s) * min(1.0, turn / (0.5 * math.pi))
+
+    def _widen_m(self, k: int) -> float:
+        """What a leg is widened by: how late or early the turn before it began, the circle that it leaves."""
+        c = self.corners[k]
+        return c.off_m + (self.behind_m if k == 0 else 0.0)
+
+    def _track(self, k: int) -> list[tuple[Floats, float, float]]:
+        """Leg ``k`` as flown: (east and north, metres flown, how far the piece to there may lie elsewhere)."""
+        a, b, heading = self.corners[k], self.corners[k + 1], float(self.heading[k])
+        along = np.array([math.cos(heading), math.sin(heading)])
+        leaves = self.points[k, :2] + a.tangent * along
+        reaches = self.points[k + 1, :2] - b.tangent * along
+        # The arc that ends here, backwards: on the opposite heading it turns to the other side.
+        behind, sag = self._half_arc(leaves, heading + math.pi, -a.turn)
+        n = len(behind) - 1
+        off = a.off_m + sag
+        track = [(p, self.half_m[k] * (n - i) / max(n, 1), off) for i, p in reversed(list(enumerate(behind)))]
+        done = float(self.half_m[k]) + abs(float(self.straight_m[k]))
+        track.append((reaches, done, self._widen_m(k)))
+        ahead, sag = self._half_arc(reaches, heading, b.turn)
+        n = len(ahead) - 1
+        off = b.off_m + sag + (self.behind_m if k == 0 else 0.0)
+        track += [(p, done + self.half_m[k + 1] * i / n, off) for i, p in enumerate(ahead) if i]
+        return track
+
+    def _half_arc(self, start: Floats, heading: float, turn: float) -> tuple[list[Floats], float]:
+        """The ends of the chords of the first half of an arc, and how far it lies outside them."""
+        if not turn:
+            return [start], 0.0
+        n = self._parts(turn)
+        points = [start + _chord(self.radius, heading, 0.5 * turn * i / n) for i in range(n + 1)]
+        return points, self.radius * (1.0 - math.cos(0.25 * abs(turn) / n))
+
+    def _parts(self, turn: float) -> int:
+        step = 2.0 * math.acos(max(1.0 - SAG_M / self.radius, 0.0))
+        return max(1, math.ceil(0.5 * abs(turn) / step))
+
+    def flown(self, k: int) -> Iterator[Stretch]:
+        """Leg ``k``, altitude even along what is flown."""
+        z0, z1 = self.points[k, 2], self.points[k + 1, 2]
+        whole = max(float(self.flown_m[k]), 1e-9)
+        track = [(p, z0 + (z1 - z0) * s / whole, off) for p, s, off in self._track(k)]
+        yield from self._pieces(k, track)
+
+    def _pieces(self, k: int, track: list[tuple[Floats, float, float]]) -> Iterator[Stretch]:
+        s = self.run[k]
+        if s.terrain:
+            yield replace(s, reach_m=s.reach_m + self._widen_m(k))
+            return
+        kept = [track[0]]
+        for one in track[1:]:
+            if math.dist(one[0], kept[-1][0]) > SAME_M:
+                kept.append(one)
+        if len(kept) == 1:
+            kept.append(track[-1])
+        places = [self._place(p, z) for p, z, _ in kept]
+        if not self.corners[k].turn:
+            places[0] = s.start  # the very same numbers as before
+        if not self.corners[k + 1].turn:
+            places[-1] = s.end
+        for i, (a, b) in enumerate(pairwise(places)):
+            last = i == len(places) - 2
+            yield replace(
+                s, start=a, end=b, reach_m=s.reach_m + kept[i + 1][2], hold_s=s.hold_s if last else 0.0,
+                jumped_from=s.jumped_from if i == 0 else None,
+            )  # fmt: skip
+
+    def _place(self, p: Floats, z: float) -> Place:
+        lat, lon = (float(x) for x in self.frame.to_degrees(p[0], p[1]))
+        return lat, lon, float(z)
+
+    def banded(self, k: int, band: Stretch) -> Iterator[Stretch]:
+        """Leg ``k`` flown anywhere between the altitudes of its ends: its whole band, level."""
+        z0, z1 = self.points[k, 2], self.points[k + 1, 2]
+        if band.terrain:
+            yield band
+            return
+        track = [(p, 0.5 * (z0 + z1), off) for p, _, off in self._track(k)]
+        for piece in self._pieces(k, track):
+            level = 0.5 * (z0 + z1)
+            yield replace(
+                piece, start=(*piece.start[:2], level), end=(*piece.end[:2], level), band_m=0.5 * abs(z1 - z0)
+            )
+
+    def instead(self, k: int) -> Iterator[Stretch]:
+        """What ArduPlane's own reckoning of altitude makes of leg ``k``: along the line between the way points."""
+        s = self.run[k]
+        a, b = self.corners[k], self.corners[k + 1]
+        z0, z1 = self.points[k, 2], self.points[k + 1, 2]
+        if s.terrain or z0 == z1 or not (a.turn or b.turn):
+            return
+        slope = (z1 - z0) / max(float(self.long_m[k]), 1e-9)
+        whole = max(float(self.flown_m[k]), 1e-9)
+        leaves, reaches = z0 + slope * a.tangent, z1 - slope * b.tangent
+        first, last = self.half_m[k] / whole, 1.0 - self.half_m[k + 1] / whole
+        # Over half an arc: all between the way point's altitude and both ways to reckon that of its other end.
+        for corner, at, other, even in (
+            (a, z0, leaves, z0 + (z1 - z0) * first), (b, z1, reaches, z0 + (z1 - z0) * last),
+        ):  # fmt: skip
+            if not corner.turn:
+                continue
+            low, high = min(at, other, even), max(at, other, even)
+            track = self._track(k)
+            half = self._parts(corner.turn)
+            part = track[: half + 1] if corner is a else track[-half - 1 :]
+            for p, q in pairwise(part):
+                if math.dist(p[0], q[0]) > SAME_M:
+                    level = 0.5 * (low + high)
+                    yield replace(
+                        s, start=self._place(p[0], level), end=self._place(q[0], level), band_m=0.5 * (high - low),
+                        reach_m=s.reach_m + q[2], hold_s=0.0,
+                    )  # fmt: skip
+        if self.straight_m[k] > SAME_M:
+            along = np.array([math.cos(self.heading[k]), math.sin(self.heading[k])])
+            start = self._place(self.points[k, :2] + a.tangent * along, leaves)
+            end = self._place(self.points[k + 1, :2] - b.tangent * along, reaches)
+            yield replace(s, start=start, end=end, reach_m=s.reach_m + self._widen_m(k), hold_s=0.0)
+
+
+def _chord(radius: float, heading: float, turn: float) -> Floats:
+    """From the start of an arc to where it has turned by ``turn``."""
+    length, course = 2.0 * radius * math.sin(0.5 * abs(turn)), heading + 0.5 * turn
+    return np.array([length * math.cos(course), length * math.sin(course)])
+
+
+def _moves(s: Stretch) -> bool:
+    """A stretch along which the aircraft gets on, and at whose ends it turns by arcs."""
+    north = (s.end[0] - s.start[0]) * 111_195.0
+    east = (s.end[1] - s.start[1]) * 111_195.0 * math.cos(math.radians(s.start[0]))
+    circles = s.reach_m > 0.0  # a climb in circles, which turns as it is
+    return s.kind in ("takeoff", "cruise", "land") and not circles and math.hypot(north, east) > SAME_M
+
+
+def _runs(stretches: Sequence[Stretch]) -> Iterator[tuple[int, int]]:
+    """Index ranges of stretches that are flown through, and of those between."""
+    first = 0
+    for i in range(1, len(stretches) + 1):
+        if i < len(stretches):
+            here, after = stretches[i - 1], stretches[i]
+            joined = here.end == after.start and here.hold_s == 0.0
+            if _moves(here) and _moves(after) and joined:
+                continue
+        yield first, i
+        first = i
+
+
+def _same_way(band: Stretch, s: Stretch) -> bool:
+    return band.seq == s.seq and band.kind == s.kind and band.start[:2] == s.start[:2] and band.end[:2] == s.end[:2]
+
+
+def _item(mission: Mission, seq: int) -> MissionItem | None:
+    index = seq - mission.first_seq
+    return mission.items[index] if 0 <= index < len(mission.items) else None

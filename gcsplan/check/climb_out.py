@@ -1,0 +1,269 @@
+"""A fixed wing leaving the ground and coming back to it: straight and slanting, where a multicopter has its columns.
+
+What ArduPlane does (commands_logic.cpp, `do_takeoff`, `verify_takeoff`; AP_Landing): it holds the course on which it
+was launched until it is as high as the item says, climbing with at least the pitch of param1 (4° where that is 0), and
+then makes straight for the next item. The mission holds no heading, so the place of the item is read as it is drawn on
+maps: where the climb-out leads to; without one it leads towards the next item. A NAV_LAND glides straight from the way
+point before it to its place and altitude.
+
+Both are exempt from min AGL, climb angle and terrain clearance, as columns are; never from zones, their clearance and
+ceilings. What they must keep is `room_m` over bare ground: the altitude error, and near the ends, where the aircraft
+has just left the ground, half of what it has risen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.check.aboard import Aboard
+from gcsplan.check.returning import circle_growth, flat_m
+from gcsplan.check.spline import towards
+from gcsplan.check.stretch import Place, Stretch
+from gcsplan.check.verdict import Finding
+from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.mission import MissionItem
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.airspace import Airspace, Legs
+from gcsplan.world.limits import Limits
+from gcsplan.world.surface import Surface
+from gcsplan.world.world import World
+
+Floats = NDArray[np.float64]
+
+LEAST_PITCH_DEG = 4.0
+"""ArduPlane's where the item gives none."""
+
+NEAR_M = 1.0
+"""An item this near to home does not say where a climb-out leads."""
+
+SAME_M = 0.02
+
+SPARED = 0.5
+"""The part of its height that the aircraft needs below itself while it is lower than the altitude error allows."""
+
+
+CHORD_M = 2.0
+"""How far the chords of a circle that is climbed in may lie inside it."""
+
+BOUND_M = 0.05
+"""The exact check bounds the ground beside a line, and so calls it a few centimetres too high at times; where the
+aircraft stands on it, that is no violation."""
+
+
+def is_wing(vehicle: Vehicle) -> bool:
+    """A vehicle that cannot stand in the air."""
+    return vehicle.turn_radius_m > 0.0
+
+
+def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | None) -> None:
+    """NAV_TAKEOFF: straight ahead until the altitude of the item is reached; ``after``: the next item flown to."""
+    lat, lon, ground = pilot.home
+    top = pilot.altitude(item, (lat, lon, ground))
+    ahead = _place(pilot, item)
+    if ahead is None and after is not None:
+        ahead = _place(pilot, after)
+        pilot.note(f"item {seq} gives no place: the take-off is judged as launched towards the item after it")
+    pilot.airborne = True
+    frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
+    if ahead is None or top is None or top <= ground or frame == m.TERRAIN:
+        pilot.flight.not_judged.append(
+            f"item {seq}: a take-off of a fixed wing is judged where it has an altitude above home, and itself or the "
+            f"item after it a place to climb towards"
+        )
+        pilot.known = False
+        return
+    pitch = item.params[0] if item.params[0] > 0.0 else LEAST_PITCH_DEG
+    climb_deg = min(pitch, pilot.vehicle.limits.max_climb_deg)
+    run_m = (top - ground) / math.tan(math.radians(climb_deg))
+    part = run_m / flat_m((lat, lon, 0.0), ahead)
+    end = (lat + part * (ahead[0] - lat), lon + part * (ahead[1] - lon), top)
+    pilot.note(
+        f"item {seq}: the take-off is judged as a straight climb at {climb_deg:g}° on a heading of "
+        f"{_bearing(pilot.home, ahead):.0f}° over {run_m:.0f} m: launch it that way; ArduPlane holds the heading that "
+        f"it is launched on, and turns when it is high enough"
+    )
+    pilot.add(seq, "takeoff", pilot.home, end, column=True)
+    pilot.at, pilot.direction = end, towards(pilot.home, end)
+
+
+def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bool:
+    """LOITER_TO_ALT right behind a climb-out that ends on its circle: the take-off goes on in circles; False if not.
+
+    The aircraft may be anywhere within the circle, on whose edge it was, as low as the climb-out left it.
+    """
+    before = pilot.flight.stretches[-1] if pilot.flight.stretches else None
+    target = pilot.target(item) if pilot.has_place(item) else None
+    if before is None or target is None or not slants([before]) or before.kind != "takeoff":
+        return False
+    reach_m = radius_m * circle_growth(target[2])
+    if target[2] <= pilot.at[2] or flat_m(pilot.at, target) > reach_m:
+        return False
+    low = (*target[:2], pilot.at[2])
+    turns = -1.0 if item.params[1] < 0.0 else 1.0
+    for a, b in pairwise(_helix(pilot.at, target, radius_m, turns, pilot.vehicle.limits.max_climb_slope)):
+        pilot.add(seq, "takeoff", a, b, column=True, reach_m=reach_m - radius_m + CHORD_M)
+    pilot.add(seq, "takeoff", target, target, reach_m=reach_m)
+    pilot.instead(seq, "takeoff", low, target, column=True, reach_m=reach_m)
+    pilot.note(f"item {seq}: the take-off goes on in circles, judged as {reach_m:.0f} m wide all the way up")
+    pilot.at, pilot.direction = target, None
+    return True
+
+
+def _helix(begin: Place, top: Place, radius_m: float, turns: float, slope: float) -> list[Place]:
+    """From ``begin`` up to the altitude of ``top`` on a circle around it; ``turns`` 1: clockwise."""
+    scale = (111_195.0, 111_195.0 * math.cos(math.radians(top[0])))
+    north, east = (begin[0] - top[0]) * scale[0], (begin[1] - top[1]) * scale[1]
+    angle = math.atan2(north, east)
+    whole = (top[2] - begin[2]) / slope / radius_m
+    parts = max(1, math.ceil(whole / (2.0 * math.acos(max(0.0, 1.0 - CHORD_M / radius_m)))))
+    places = [begin]
+    for i in range(1, parts + 1):
+        now, z = angle - turns * whole * i / parts, begin[2] + (top[2] - begin[2]) * i / parts
+        flat = radius_m * math.sin(now) / scale[0], radius_m * math.cos(now) / scale[1]
+        places.append((top[0] + flat[0], top[1] + flat[1], z))
+    return places
+
+
+def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
+    """NAV_LAND: straight down from where it is to the place of the item."""
+    target = pilot.target(item) if pilot.has_place(item) else None
+    pilot.landed = True
+    if target is None:
+        pilot.flight.not_judged.append(f"item {seq}: a landing of a fixed wing without a place is not judged")
+        return
+    ground = pilot.ground(*target[:2])
+    off_m = target[2] - ground
+    if not abs(off_m) <= max(1.0, pilot.vehicle.limits.altitude_error_m):
+        words = (
+            "is unknown" if math.isnan(ground) else f"lies {abs(off_m):.1f} m {'below' if off_m > 0 else 'above'} it"
+        )
+        pilot.flight.not_judged.append(
+            f"item {seq}: the glide leads to the item's altitude, and the ground there {words}: it is not judged"
+        )
+        return
+    end = (*target[:2], ground)
+    pilot.note(f"item {seq}: the landing is judged as a straight glide from the way point before it; it is not flared")
+    pilot.add(seq, "land", pilot.at, end, column=True)
+    pilot.at = end
+
+
+def slants(stretches: Sequence[Stretch]) -> list[Stretch]:
+    """Those stretches that leave the ground, or come down to it, on a slant; their ends on the ground are ends."""
+    return [s for s in stretches if s.column and s.kind in ("takeoff", "land") and flat_m(s.start, s.end) > SAME_M]
+
+
+def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World) -> list[Finding]:
+    """Where a climb-out or a glide comes too near to the ground, or is too steep."""
+    found = []
+    for s in stretches:
+        if s.column and s.kind == "takeoff" and s.reach_m > 0.0 and flat_m(s.start, s.end) <= SAME_M:
+            east, north, amsl = (float(x) for x in _one(s.start, world))
+            by = circle_missing_m(np.array([east, north, amsl]), s.reach_m, vehicle.limits, world.airspace)
+            if by > BOUND_M:
+                found.append(_low(s, east, north, amsl, by, world))
+    home = {"takeoff": 0, "land": -1}
+    for kind in ("takeoff", "land"):
+        mine = [s for s in slants(stretches) if s.kind == kind]
+        if not mine:
+            continue
+        touch = mine[home[kind]]
+        point = touch.start if kind == "takeoff" else touch.end
+        for s in mine:
+            worst = slant_room(_in_plane(s, world), _one(point, world), s.reach_m, vehicle.limits, world.airspace)
+            if worst is not None:
+                found.append(_low(s, *worst, world))
+            steep = math.degrees(math.atan2(s.start[2] - s.end[2], max(flat_m(s.start, s.end), 1e-9)))
+            limit = vehicle.limits.max_descent_deg
+            if kind == "land" and steep > limit * 1.01 + 0.01:
+                words = f"item {s.seq} (land): glides down too steeply: {steep:.2f}°, limit {limit:g}°"
+                found.append(Finding(s.seq, "descent", words, *s.start, steep, limit, steep - limit, "deg"))
+    return found
+
+
+def slant_room(
+    line: Floats, touch: Floats, reach_m: float, limits: Limits, air: Airspace
+) -> tuple[float, float, float, float] | None:
+    """The worst place where ``line`` (2, 3), rising from ``touch`` (3,) or falling to it, is too near to bare ground.
+
+    (east, north, amsl, metres missing), or None where it has its room all along. The room that is wanted rises evenly
+    from 0 at ``touch`` to the altitude error, so both parts of the line are straight lines below it.
+    """
+    a, b = (line[0], line[1]) if line[0, 2] <= line[1, 2] else (line[1], line[0])
+    rise = float(b[2] - a[2])
+    if rise <= 0.0:
+        return None
+    error = limits.altitude_error_m
+    begun = float(a[2] - touch[2])
+
+    def room(z: float) -> float:
+        return min(error, SPARED * max(z - float(touch[2]), 0.0))
+
+    split = min(max((error / SPARED - begun) / rise, 0.0), 1.0)
+    middle = a + split * (b - a)
+    starts, ends, track, height = [], [], [], []
+    for p, q in ((a, middle), (middle, b)):
+        if float(np.linalg.norm(q - p)) <= 1e-6:
+            continue
+        starts.append(p - [0.0, 0.0, room(p[2])])
+        ends.append(q - [0.0, 0.0, room(q[2])])
+        low = p[2] - touch[2] < error / SPARED - 1e-9
+        track.append(reach_m if low else limits.track_error_m + reach_m)  # on the strip it is where the strip is
+        height.append(0.0)
+    plain = Limits(min_agl_m=0.0)
+    legs = Legs(np.array(starts), np.array(ends), np.zeros(len(starts), bool), np.array(track), np.array(height))
+    bad = [v for v in bare(air).examine(legs, plain).violations if v.kind in ("min_agl", "coverage") and v.by > BOUND_M]
+    if not bad:
+        return None
+    worst = max(bad, key=lambda v: v.by)
+    return worst.east_m, worst.north_m, worst.amsl_m, worst.by
+
+
+def circle_missing_m(low: Floats, reach_m: float, limits: Limits, air: Airspace) -> float:
+    """By how much a circle around ``low`` (3,) is too near to bare ground; inf where that is unknown."""
+    plain = Limits(
+        min_agl_m=0.0, track_error_m=limits.track_error_m + reach_m, altitude_error_m=limits.altitude_error_m
+    )
+    return float(bare(air).floor_amsl(low[0], low[1], plain)) - float(low[2])
+
+
+def bare(air: Airspace) -> Airspace:
+    """The airspace over bare ground: what stands beside the strip is not on it."""
+    surface = air.surface
+    if surface.top_m is surface.ground_m:
+        return air
+    return Airspace(Surface(surface.ground_m, surface.ground_m, surface.grid), (), scale=air.scale)
+
+
+def _low(s: Stretch, east: float, north: float, amsl: float, by: float, world: World) -> Finding:
+    lat, lon = (float(x) for x in world.frame.to_degrees(east, north))
+    way = "climb-out" if s.kind == "takeoff" else "glide"
+    message = (
+        f"item {s.seq} ({s.kind}): the {way} comes too near to the ground, by {by:.2f} m, at {lat:.6f}, {lon:.6f}, "
+        f"{amsl:.1f} m AMSL"
+    )
+    return Finding(s.seq, "min_agl", message, lat, lon, amsl, -by, 0.0, by, "m")
+
+
+def _place(pilot: Aboard, item: MissionItem) -> Place | None:
+    if not pilot.has_place(item):
+        return None
+    place = (item.lat_deg, item.lon_deg, 0.0)
+    return place if flat_m(pilot.home, place) > NEAR_M else None
+
+
+def _bearing(a: Place, b: Place) -> float:
+    east = (b[1] - a[1]) * math.cos(math.radians(a[0]))
+    return math.degrees(math.atan2(east, b[0] - a[0])) % 360.0
+
+
+def _one(p: Place, world: World) -> Floats:
+    return np.array([*world.frame.to_plane(p[0], p[1]), p[2]])
+
+
+def _in_plane(s: Stretch, world: World) -> Floats:
+    return np.array([_one(s.start, world), _one(s.end, world)])

@@ -1,0 +1,33 @@
+"""Every mission of the gallery is planned, judged, written and read again; the papers' have a test of their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gcsplan import load_mission, plan
+from gcsplan.mavlink.compare import compare, faults
+from gcsplan.mavlink.files import read_mission_file
+from gcsplan.outputs import outputs_of
+
+MISSIONS = Path(__file__).parent.parent / "missions"
+SLOW = {"fleet-100"}
+
+
+@pytest.mark.parametrize(
+    "file",
+    [pytest.param(f, id=f.stem, marks=[pytest.mark.slow] if f.stem in SLOW else []) for f in MISSIONS.glob("*.yaml")],
+)
+def test_a_mission_of_the_gallery_is_safe_and_its_files_are_what_was_judged(file: Path, tmp_path: Path) -> None:
+    planned = plan(load_mission(file))
+    files = outputs_of(planned)
+    assert {v.verdict.safe for v in planned.vehicles} == {True}
+    if planned.fleet is not None and planned.fleet.separation is not None:
+        assert planned.fleet.separation.safe
+    for vehicle in planned.vehicles[:4]:
+        written = tmp_path / f"{vehicle.name}.plan"
+        written.write_text(files[written.name], encoding="utf-8")
+        read = read_mission_file(written, autopilot=None)
+        sent, stored = vehicle.mission.wire_items(), read.mission.wire_items()
+        assert not faults(compare(sent, stored, vehicle.mission.autopilot))
