@@ -123,3 +123,13 @@ class ReadBackDiffers(GcsplanError, RuntimeError):
 
     exit_code = 7
     default_reason = "differs"
+
+
+def unknown_name(sentence: str, name: str, known: Iterable[str]) -> InputError:
+    """What to raise where ``name`` is none of the ``known``: the sentence that says so, the nearest one, and all."""
+    from difflib import get_close_matches
+
+    names = list(known)
+    near = get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f" Did you mean {near[0]!r}?" if near else ""
+    return InputError(f"{sentence}.{hint} Known: {', '.join(names) or 'none'}")

@@ -97,7 +97,11 @@ def test_the_best_cost_never_rises_and_the_budget_is_exact() -> None:
     found = search(problem, settings(evaluations=333, population=50, points=3))
     assert found.result.evaluations == 333
     assert found.result.stopped_by == "evaluations"
-    assert (np.diff(found.result.history.cost) <= 0.0).all()
+    history = found.result.history
+    assert (history.cost[0], history.evaluations[0]) == (np.inf, 0)  # as no colony has been yet
+    assert (history.cost[1:] <= history.cost[:-1]).all()
+    assert len(history.by_iteration()) == found.result.iterations + 1 == 8
+    np.testing.assert_array_equal(history.by_iteration(), history.cost)
     assert list(found.result.history.evaluations[-2:]) == [300, 333]
     again = search(problem, settings(evaluations=333, population=50, points=3))
     assert again.curve.tobytes() == found.curve.tobytes()
@@ -112,5 +116,5 @@ def test_no_ant_through_a_closed_wall_is_a_refusal() -> None:
 
 
 def test_unknown_parameters_are_refused() -> None:
-    with pytest.raises(InputError, match="aco has no parameter 'gamma'; it has: alpha, beta"):
+    with pytest.raises(InputError, match=r"aco has no parameter 'gamma'.* Known: alpha, beta"):
         get("aco").plan(mission(parameters={"gamma": 1}))

@@ -135,7 +135,7 @@ def test_via_points_are_stops_of_every_path_and_points_are_shared_by_length() ->
 
 
 def test_an_unknown_encoding_is_refused_by_name() -> None:
-    with pytest.raises(InputError, match="no encoding 'spiral'; known: box"):
+    with pytest.raises(InputError, match=r"no encoding 'spiral'\. Known: box"):
         get_encoding("spiral")
 
 
@@ -183,6 +183,28 @@ def test_a_curve_is_scipys_clamped_cubic(free: int) -> None:
     line = curve((free,), (50,))
     np.testing.assert_allclose(line.samples(controls), wanted, atol=1e-12)
     np.testing.assert_allclose(line.basis.sum(axis=0), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("points", "legs"), [((1,), (9,)), ((1, 1), (3, 2)), ((2, 1, 5), (8, 3, 20)), ((30,), (186,)), ((9, 4), (1, 1))]
+)
+def test_what_kernels_have_of_a_basis_is_the_whole_of_it(points: tuple[int, ...], legs: tuple[int, ...]) -> None:
+    line = curve(points, legs)
+    whole = np.zeros_like(line.basis)
+    seen = np.zeros(line.basis.shape[1], int)
+    for begin, end, first in line.spans:
+        seen[begin:end] += 1
+        for k, row in enumerate(line.bands[:, begin:end]):
+            if first + k < len(whole):
+                whole[first + k, begin:end] = row
+            else:
+                assert not row.any()
+    np.testing.assert_array_equal(whole, line.basis)
+    assert (seen == 1).all()
+    controls = np.random.default_rng(1).random((5, len(whole), 3))
+    np.testing.assert_allclose(line.samples(controls), np.einsum("cs,ncd->nsd", line.basis, controls), atol=1e-12)
+    np.testing.assert_array_equal(line.samples(controls)[:, line.stops[0]], controls[:, 0])
+    np.testing.assert_array_equal(line.samples(controls)[:, line.stops[-1]], controls[:, -1])
 
 
 @given(seed=st.integers(0, 2**31), part=st.floats(1e-4, 0.3))

@@ -20,6 +20,7 @@ from gcsplan.errors import (
     ReadBackDiffers,
     UsageError,
     VehicleRefused,
+    unknown_name,
 )
 
 TREE: list[tuple[type[GcsplanError], type[Exception], int, str]] = [
@@ -107,3 +108,11 @@ def test_errors_survive_the_way_between_processes() -> None:
         assert str(copy) == str(error)
         assert (copy.reason, copy.where, copy.exit_code) == (error.reason, error.where, error.exit_code)
         assert getattr(copy, "problems", None) == getattr(error, "problems", None)
+
+
+def test_an_unknown_name_is_told_the_nearest_and_all() -> None:
+    error = unknown_name("there is no planner 'krll'", "krll", ["optimal", "krill"])
+    assert type(error) is InputError
+    assert str(error) == "there is no planner 'krll'. Did you mean 'krill'? Known: optimal, krill"
+    assert str(unknown_name("there is no x 'q'", "q", ["optimal"])) == "there is no x 'q'. Known: optimal"
+    assert str(unknown_name("it has no y 'q'", "q", [])) == "it has no y 'q'. Known: none"

@@ -15,6 +15,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle as CirclePatch
 from matplotlib.patches import Polygon as PolygonPatch
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from gcsplan.bench.papers_runs import Record
@@ -30,6 +31,8 @@ COST_UNITS = {
     "krill": "m", "ssgwo": "weighted sum (eq. 33)", "msfoa": "weighted m, all vehicles together", "abo": "m",
     "ib-abc": "parts of the straight line's, all vehicles",
 }  # fmt: skip
+WIDE = 4.0
+"""Costs that differ by more than so many times are shown on a logarithmic scale."""
 CELLS = 400
 STEPS = 200
 _LINES = ("-", "--", "-.", ":")
@@ -51,18 +54,18 @@ def draw_map(summary: dict[str, Any]) -> bytes:
     paths = [np.array(p) for run in shown.values() if run is not None for p in run["paths"]]
     ends = np.array([[p.start, p.goal] for p in ready.problems]).reshape(-1, 3)
     _ground(plan, ready, np.concatenate([ends, *paths])[:, :2])
-    for (name, run), colour in zip(shown.items(), COLOURS, strict=False):
+    for rank, ((name, run), colour) in enumerate(zip(shown.items(), COLOURS, strict=False)):
         if run is None:
             plan.plot([], [], color=colour, label=f"{name}: refused")
             continue
         words = f"{name}: {run['length_m']:,.1f} m" + ("" if legal(run) else ", breaks limits")
         for k, path in enumerate(map(np.array, run["paths"])):
             plan.plot(path[:, 0], path[:, 1], color=colour, lw=1.5, ls="-" if legal(run) else ":",
-                      label=None if k else words)  # fmt: skip
+                      zorder=2.9 - 0.1 * rank, label=None if k else words)  # fmt: skip
     for k, points in enumerate(summary["best_path"] or []):
         path = np.array(points)
         label = f"planner optimal: {summary['optimum_m']:,.1f} m"
-        plan.plot(path[:, 0], path[:, 1], color="black", lw=1.2, ls="--", label=None if k else label)
+        plan.plot(path[:, 0], path[:, 1], color="black", lw=1.2, ls="--", zorder=3.0, label=None if k else label)
     for k, problem in enumerate(ready.problems):
         both = np.array([problem.start, problem.goal])
         label = f"straight: {summary['straight_m']:,.1f} m"
@@ -138,7 +141,7 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
     axes = figure.subplots(1, 2, sharey=True)
     lowest, least, most = math.inf, math.inf, -math.inf
     for ax, along in zip(axes, ("iterations", "evaluations"), strict=True):
-        for (name, records), colour in zip(summary["records"].items(), COLOURS, strict=False):
+        for rank, ((name, records), colour) in enumerate(zip(summary["records"].items(), COLOURS, strict=False)):
             found = [r["history"] for r in records if r["status"] == "found"]
             if not found:
                 continue
@@ -148,7 +151,7 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
             shown = np.isfinite(high)
             if not shown.any():
                 continue
-            ax.plot(grid[shown], middle[shown], color=colour, lw=1.5, label=name)
+            ax.plot(grid[shown], middle[shown], color=colour, lw=1.5, zorder=2.9 - 0.1 * rank, label=name)
             ax.fill_between(grid[shown], low[shown], high[shown], color=colour, alpha=0.15, lw=0)
             lowest = min(lowest, float(low[shown].min()))
             # The first batches' costs are of no interest: the scale begins where a quarter of the way is gone.
@@ -158,9 +161,14 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
         ax.set(xlabel=along + (of if len(summary["set"].problems) > 1 else ""))
         ax.grid(alpha=0.3, which="both")
     if lowest > 0.0 and math.isfinite(most):
-        axes[0].set_yscale("log")
+        if most > WIDE * least:
+            axes[0].set_yscale("log")
+            axes[0].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes[0].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axes[0].yaxis.set_minor_formatter(NullFormatter())
         axes[0].set_ylim(0.97 * least, 1.1 * most)
-    axes[0].set_ylabel(f"best cost so far,\n{COST_UNITS[summary['paper']]}")
+    unit = COST_UNITS[summary["paper"]]
+    axes[0].set_ylabel(f"best cost so far,{chr(10) if len(unit) > 12 else ' '}{unit}")
     axes[1].legend(fontsize=8)
     runs = max(len(records) for records in summary["records"].values())
     figure.suptitle(

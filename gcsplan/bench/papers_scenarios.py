@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
@@ -16,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from gcsplan.bench.papers_printed import PRINTED, Least
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, unknown_name
 from gcsplan.mavlink.build import Margins
 from gcsplan.mission_file import MissionFile
 from gcsplan.planners.problem import Problem
@@ -144,9 +143,7 @@ def _known(what: str, names: Sequence[str] | None, known: Mapping[str, object]) 
         return list(known)
     for name in names:
         if name not in known:
-            near = get_close_matches(name, known, n=1, cutoff=0.5)
-            hint = f" Did you mean {near[0]!r}?" if near else ""
-            raise InputError(f"there is no {what} {name!r} here.{hint} Known: {', '.join(known)}")
+            raise unknown_name(f"there is no {what} {name!r} here", name, known)
     if not names:
         raise InputError(f"no {what} is given; known: {', '.join(known)}")
     return list(dict.fromkeys(names))

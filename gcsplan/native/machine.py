@@ -9,7 +9,7 @@ from typing import Any
 import llvmlite  # type: ignore[import-untyped]
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
-_CALLED = ("hypot", "sqrt", "floor", "ceil", "sin", "cos", "memset", "memcpy")
+_CALLED = ("hypot", "sqrt", "floor", "ceil", "sin", "cos", "asin", "atan2", "fmod", "memset", "memcpy")
 """What machine code may call; everything else is in it."""
 
 _engines: list[Any] = []  # machine code lives as long as its engine

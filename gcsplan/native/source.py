@@ -3,6 +3,7 @@
 # mypy: disable-error-code="no-untyped-call,no-untyped-def,untyped-decorator"
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from types import FunctionType
 from typing import Any, cast
@@ -13,6 +14,7 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.core.cpu import CPUTargetOptions
 from numba.core.errors import TypingError
+from numba.core.options import TargetOptions
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
@@ -30,6 +32,18 @@ INSIDE = options(
     nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True, _nrt=False
 )
 """Options of kernels and of what they call: dividing by zero gives inf or NaN, and nothing is allocated."""
+
+
+# Arguments are never two views of one array, and sums may be made in any order: that order, and what stands in one
+# vector, are then a part of the intermediate form, the same for everybody.
+CPUTargetOptions.noalias = TargetOptions.Mapping("noalias")
+VECTORS = options(fastmath={"reassoc", "nsz"}, noalias=True)
+"""Further options of kernels that are cut to vectors before they are shipped."""
+
+_ANY_ORDER = re.compile(
+    r"(?m)^(\s+(?:%\S+ = )?(?:tail )?(?:f(?:add|sub|mul|div|rem|neg|cmp|ptrunc|pext)|phi|select|call)) "
+    r"(?:(?:reassoc|nsz) )+"
+)
 
 
 def _slot(builder, block, position):
@@ -98,11 +112,16 @@ def result_of(typingctx, value):
     return types.int64(value), lower
 
 
-def bitcode(kernels: Mapping[str, tuple[Any, tuple[Form, ...]]]) -> bytes:
-    """One module with a function of each name, that takes addresses and lengths for arrays."""
+def bitcode(kernels: Mapping[str, tuple[Any, tuple[Form, ...]]], *, vectors: bool = False) -> bytes:
+    """One module with a function of each name, that takes addresses and lengths for arrays.
+
+    ``vectors``: the kernels were made with `VECTORS`; from here on the order of every sum stands fast.
+    """
     whole = None
     for name, (function, forms) in kernels.items():
         text = _compiled(name, function, forms)
+        if vectors:
+            text = _ANY_ORDER.sub(r"\1 ", text)
         module = llvm.parse_assembly(text)
         if whole is None:
             whole = module
@@ -117,7 +136,10 @@ def bitcode(kernels: Mapping[str, tuple[Any, tuple[Form, ...]]]) -> bytes:
 
 
 def bitcode_of_plain(
-    kernels: Mapping[str, tuple[Callable[..., Any], tuple[Form, ...]]], others: Mapping[int, Callable[..., Any]]
+    kernels: Mapping[str, tuple[Callable[..., Any], tuple[Form, ...]]],
+    others: Mapping[int, Callable[..., Any]],
+    *,
+    vectors: bool = False,
 ) -> bytes:
     """The same of plain functions. ``others``: by the identity of whatever modules know under a name, the plain
     function that stands behind it and that kernels call; kernels included.
@@ -129,14 +151,15 @@ def bitcode_of_plain(
         plain = cast(FunctionType, function)
         scope = scopes.setdefault(id(plain.__globals__), dict(plain.__globals__))
         twin = FunctionType(plain.__code__, scope, plain.__name__, plain.__defaults__, plain.__closure__)
-        return njit(**INSIDE)(twin)
+        return njit(**INSIDE, **(VECTORS if vectors else {}))(twin)
 
     twins = {id(function): compiled(function) for function in {id(f): f for f in others.values()}.values()}
     for scope in scopes.values():
         for name, value in scope.items():
             if id(value) in others:
                 scope[name] = twins[id(others[id(value)])]
-    return bitcode({name: (twins[id(function)], forms) for name, (function, forms) in kernels.items()})
+    mine = {name: (twins[id(function)], forms) for name, (function, forms) in kernels.items()}
+    return bitcode(mine, vectors=vectors)
 
 
 def _compiled(name: str, function: Any, forms: tuple[Form, ...]) -> str:

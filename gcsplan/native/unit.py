@@ -29,13 +29,22 @@ class Unit(Kernels):
     """Kernels of some modules of a package that are compiled together.
 
     ``modules``: all of them that hold a marked function or a constant that one uses, names within ``package``;
-    ``more``: further files that they depend on, beside them.
+    ``more``: further files that they depend on, beside them. ``vectors``: loops over arrays are cut to vectors before
+    they are shipped, sums in an order that is then fixed; no argument of a function may be a view of another's array.
     """
 
     def __init__(
-        self, name: str, folder: Path, package: str, modules: tuple[str, ...], more: tuple[str, ...] = ()
+        self,
+        name: str,
+        folder: Path,
+        package: str,
+        modules: tuple[str, ...],
+        more: tuple[str, ...] = (),
+        *,
+        vectors: bool = False,
     ) -> None:
         super().__init__(name, folder, (*(f"{m}.py" for m in modules), *more), package, {})
+        self.vectors = vectors
         self._modules = tuple(f"{package}.{m}" for m in modules)
         self._plain: dict[int, Callable[..., Any]] = {}
         self._kernels: dict[str, Callable[..., Any]] = {}
@@ -76,4 +85,4 @@ class Unit(Kernels):
         self.digest()
         source = importlib.import_module("gcsplan.native.source")
         kernels = {name: (function, read_forms(self.forms[name])) for name, function in self._kernels.items()}
-        return bytes(source.bitcode_of_plain(kernels, self._plain))
+        return bytes(source.bitcode_of_plain(kernels, self._plain, vectors=self.vectors))

@@ -49,7 +49,7 @@ TAN_PITCH_MAX = math.tan(PITCH_MAX)
 TAN_TURN_MAX = math.tan(math.radians(45.0))  # D: MSFOA, whose φ_max follows from a load that it does not give
 D_HIDE = 20.0  # D: IB-ABC's d_safe
 
-UNEVEN = 2.0
+UNEVEN = 1.5
 """Legs of more than so many times the mean are divided, where they are longer than `SPACING`."""
 
 
@@ -360,7 +360,7 @@ def measure(
         many = count
         if long > 0.0:
             step_m = max(numbers[s.SPACING], UNEVEN * to[LENGTH] / len(leg))
-            many = divide(leg, step_m, all_x, all_y, all_z, weight)
+            many = divide(leg, step_m, all_x, all_y, all_z, weight, row)
         off = place(floors, floor_map, numbers, all_x[:many], all_y[:many], column, row)
         if grounded and shared:
             lookup_both(floors, heights, column, row, off, floor[:many], ground[:many])

@@ -123,12 +123,18 @@ def weigh(leg: Floats, weight: Floats) -> None:
 
 
 @device
-def divide(leg: Floats, step_m: float, x: Floats, y: Floats, z: Floats, weight: Floats) -> int:
-    """Add points, after the samples themselves, on every leg longer than ``step_m``; how many there are then."""
-    count = len(leg) + 1
+def divide(leg: Floats, step_m: float, x: Floats, y: Floats, z: Floats, weight: Floats, long: Floats) -> int:
+    """Add points, after the samples themselves, on every leg longer than ``step_m``; how many there are then.
+
+    ``long`` is scratch: the long legs' indices, found without a jump for each leg.
+    """
+    found = 0
     for i in range(len(leg)):
-        if leg[i] <= step_m:
-            continue
+        long[found] = i
+        found += 1 if leg[i] > step_m else 0
+    count = len(leg) + 1
+    for k in range(found):
+        i = int(long[k])
         parts = int(leg[i] / step_m) + 1
         share = 1.0 / parts
         part = leg[i] * share

@@ -12,17 +12,15 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from gcsplan.planners._turn_kernels import CHORD_M, fill_outline, part_neighbours, tangents
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST_DEG = 100.0
 """Largest turn at one way point."""
-
-CHORD_M = 0.05
-"""Most that an arc lies outside the chords that stand for it."""
 
 ROUNDS = 12
 """Times that discs are laid anew through their contacts, or pushed apart, before the belt is drawn for good."""
@@ -161,11 +159,11 @@ def outline(belt: Belt) -> Outline:
     points, true_m, widen = np.empty((size, 2)), np.empty(size), np.zeros(size)
     arcs, corners = np.empty((size, 3), np.int64), np.empty((size, 2))
     disc, pin_at = np.empty(size, np.int64), np.full(len(belt.sense), -1, np.int64)
-    n, turns = _outline(
+    n = fill_outline(
         belt.ends, belt.radius_m, belt.centre, belt.sense, belt.pin, belt.heading, belt.turn, step, most,
         points, true_m, widen, arcs, corners, disc, pin_at,
     )  # fmt: skip
-    points = points[:n].copy()
+    points, turns = points[:n].copy(), int(disc[-1])
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     touched = pin_at >= 0
     return Outline(
@@ -195,14 +193,15 @@ def _without(belt: Belt, gone: NDArray[np.bool_]) -> Belt:
 def _drawn(belt: Belt, *, parted: bool = False) -> Belt:
     count = len(belt.sense)
     heading, turn, centre = np.empty(count + 1), np.empty(count), belt.centre.copy()
-    gap = _tangents(belt.ends, belt.radius_m, centre, belt.sense, heading, turn)
-    if parted and gap > 0.0:
+    gap = np.empty(1)
+    tangents(belt.ends, belt.radius_m, centre, belt.sense, heading, turn, gap)
+    if parted and gap[0] > 0.0:
         for _ in range(4 * ROUNDS):
-            _part(belt.ends, belt.radius_m, centre, belt.sense, belt.pinned)
-            gap = _tangents(belt.ends, belt.radius_m, centre, belt.sense, heading, turn)
-            if gap == 0.0:
+            part_neighbours(belt.ends, belt.radius_m, centre, belt.sense, belt.pinned)
+            tangents(belt.ends, belt.radius_m, centre, belt.sense, heading, turn, gap)
+            if gap[0] == 0.0:
                 break
-    return replace(belt, centre=centre, heading=heading, turn=turn, gap_m=gap)
+    return replace(belt, centre=centre, heading=heading, turn=turn, gap_m=float(gap[0]))
 
 
 def _pins_laid(belt: Belt) -> Belt:
@@ -215,133 +214,3 @@ def _pins_laid(belt: Belt) -> Belt:
     normal = np.stack([-np.sin(middle), np.cos(middle)], axis=-1)
     centre = np.where(belt.pinned[:, None], belt.pin + belt.radius_m * sense[:, None] * normal, belt.centre)
     return _drawn(replace(belt, centre=centre, sense=sense))
-
-
-@njit(cache=True)
-def _tangents(ends: Floats, radius: float, centre: Floats, sense: Floats, heading: Floats, turn: Floats) -> float:
-    """Headings of the legs and turns between them, in place; how much too close neighbours are."""
-    n = len(sense)
-    gap = 0.0
-    for k in range(n + 1):
-        if k == 0:
-            ax, ay, sa = ends[0, 0], ends[0, 1], 0.0
-        else:
-            ax, ay, sa = centre[k - 1, 0], centre[k - 1, 1], sense[k - 1]
-        if k == n:
-            bx, by, sb = ends[1, 0], ends[1, 1], 0.0
-        else:
-            bx, by, sb = centre[k, 0], centre[k, 1], sense[k]
-        dx, dy = bx - ax, by - ay
-        d = math.hypot(dx, dy)
-        across = (sb - sa) * radius
-        if abs(across) > d:
-            gap += abs(across) - d
-            across = math.copysign(d, across)
-        heading[k] = math.atan2(dy, dx) - (math.asin(across / d) if d > 0.0 else 0.0)
-    for k in range(n):
-        t = sense[k] * (heading[k + 1] - heading[k])
-        # Between a quarter of a circle the wrong way (the disc is not touched) and three the right way.
-        turn[k] = (t + 0.5 * math.pi) % (2.0 * math.pi) - 0.5 * math.pi
-    return gap
-
-
-@njit(cache=True)
-def _part(ends: Floats, radius: float, centre: Floats, sense: Floats, fixed: NDArray[np.bool_]) -> None:
-    """Push neighbours apart that are too close for a tangent, in place."""
-    n = len(sense)
-    for k in range(n + 1):
-        first, last = k == 0, k == n
-        if first and last:
-            continue
-        need = radius if first or last else abs(sense[k] - sense[k - 1]) * radius
-        need *= 1.0 + 1e-6
-        a = ends[0] if first else centre[k - 1]
-        b = ends[1] if last else centre[k]
-        dx, dy = b[0] - a[0], b[1] - a[1]
-        d = math.hypot(dx, dy)
-        if d >= need:
-            continue
-        if d < 1e-6:
-            dx, dy, d = 1.0, 0.0, 1.0
-        by = need - d
-        hold_a, hold_b = first or fixed[k - 1], last or fixed[k]
-        if not hold_a:
-            part = by if hold_b else 0.5 * by
-            centre[k - 1, 0] -= part * dx / d
-            centre[k - 1, 1] -= part * dy / d
-        if not hold_b:
-            part = by if hold_a else 0.5 * by
-            centre[k, 0] += part * dx / d
-            centre[k, 1] += part * dy / d
-
-
-@njit(cache=True)
-def _outline(
-    ends: Floats, radius: float, centre: Floats, sense: Floats, pin: Floats, heading: Floats, turn: Floats,
-    step: float, most: float, points: Floats, true_m: Floats, widen: Floats, arcs: Ints, corners: Floats,
-    disc: Ints, pin_at: Ints,
-) -> tuple[int, int]:  # fmt: skip
-    """Fills the arrays of `Outline` (widen[i] belongs to the chord that ends in point i); points, turns."""
-    points[0] = ends[0]
-    true_m[0] = 0.0
-    n, turns = 1, 0
-    for k in range(len(sense)):
-        whole = turn[k]
-        if whole <= 0.0:
-            continue
-        # From the centre, the arc begins at this angle and runs by ``sense``.
-        begin = heading[k] - sense[k] * 0.5 * math.pi
-        x = centre[k, 0] + radius * math.cos(begin)
-        y = centre[k, 1] + radius * math.sin(begin)
-        way = math.hypot(x - points[n - 1, 0], y - points[n - 1, 1])
-        if way > 1e-6:
-            points[n, 0], points[n, 1] = x, y
-            true_m[n] = true_m[n - 1] + way
-            n += 1
-        cut = -1.0
-        if pin[k, 0] == pin[k, 0]:
-            t = sense[k] * (math.atan2(pin[k, 1] - centre[k, 1], pin[k, 0] - centre[k, 0]) - begin)
-            cut = (t + 0.5 * math.pi) % (2.0 * math.pi) - 0.5 * math.pi
-            cut = min(max(cut, 0.0), whole)
-        for part in range(2):
-            if part == 0:
-                t0, t1 = 0.0, whole if cut < 0.0 else cut
-            elif cut < 0.0:
-                break
-            else:
-                t0, t1 = cut, whole
-                pin_at[k] = n - 1
-            if t1 - t0 <= 1e-12:
-                continue
-            pieces = max(1, math.ceil((t1 - t0) / most))
-            for piece in range(pieces):
-                u0 = t0 + (t1 - t0) * piece / pieces
-                u1 = t0 + (t1 - t0) * (piece + 1) / pieces
-                half = 0.5 * (u1 - u0)
-                chords = max(1, math.ceil(half / step))
-                arcs[turns, 0] = n - 1
-                arcs[turns, 1] = n - 1 + chords
-                arcs[turns, 2] = n - 1 + 2 * chords
-                for c in range(1, 2 * chords + 1):
-                    at = begin + sense[k] * (u0 + half * c / chords)
-                    points[n, 0] = centre[k, 0] + radius * math.cos(at)
-                    points[n, 1] = centre[k, 1] + radius * math.sin(at)
-                    true_m[n] = true_m[n - 1] + radius * half / chords
-                    widen[n] = CHORD_M
-                    n += 1
-                at = begin + sense[k] * (u0 + half)
-                out = radius / math.cos(half)
-                corners[turns, 0] = centre[k, 0] + out * math.cos(at)
-                corners[turns, 1] = centre[k, 1] + out * math.sin(at)
-                disc[turns] = k
-                turns += 1
-        if cut >= 0.0:
-            points[pin_at[k]] = pin[k]
-    way = math.hypot(ends[1, 0] - points[n - 1, 0], ends[1, 1] - points[n - 1, 1])
-    if way > 1e-6:
-        points[n] = ends[1]
-        true_m[n] = true_m[n - 1] + way
-        n += 1
-    else:
-        points[n - 1] = ends[1]
-    return n, turns

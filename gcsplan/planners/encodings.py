@@ -24,8 +24,8 @@ LATERAL = 0.5
 OFFSET = 0.25
 """The same for `offsets`."""
 
-Decode = Callable[[Scene, Floats, Floats, Floats], Floats]
-"""(scene, from (3,), to (3,), u (n, K, variables)) to points (n, K, 3)."""
+Decode = Callable[[Scene, Floats, Floats, Floats, Floats], None]
+"""(scene, from (3,), to (3,), u (n, K, variables)) to points, into the last argument (n, K, 3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +39,15 @@ class Encoding:
     decode: Decode
 
 
-def _box(scene: Scene, a: Floats, b: Floats, u: Floats) -> Floats:
-    return np.asarray(scene.low + u * (scene.high - scene.low))
+def _box(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    np.multiply(u, scene.high - scene.low, out=out)
+    out += scene.low
 
 
-def _polar(scene: Scene, a: Floats, b: Floats, u: Floats) -> Floats:
+def _polar(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
     # E: MSFOA's eq. 31 has d = 1 … 3D, its eq. 32 k = 2 … D + 1. S > 1 lies on the circle.
     pairs = u.reshape(*u.shape[:2], 3, 2)
-    return _box(scene, a, b, np.minimum(np.hypot(pairs[..., 0], pairs[..., 1]), 1.0))
+    _box(scene, a, b, np.minimum(np.hypot(pairs[..., 0], pairs[..., 1]), 1.0), out)
 
 
 def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -57,37 +58,38 @@ def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     return ahead, np.array([-ahead[1], ahead[0]])
 
 
-def _flat(scene: Scene, a: Floats, b: Floats, along: Floats, aside: Floats) -> Floats:
-    """(n, K, 2) points by their parts along the track and aside, within the map."""
+def _flat(scene: Scene, a: Floats, b: Floats, along: Floats, aside: Floats, out: Floats) -> None:
+    """Points by their parts along the track and aside, within the map, into ``out`` (n, K, 2 or more)."""
     ahead, left = _frame(a, b)
-    flat = a[:2] + along[..., None] * ahead + aside[..., None] * left
-    return np.asarray(np.clip(flat, scene.low[:2], scene.high[:2]))
+    for i in range(2):
+        np.clip(a[i] + along * ahead[i] + aside * left[i], scene.low[i], scene.high[i], out=out[..., i])
+
+
+def _altitude(scene: Scene, u: Floats, out: Floats) -> None:
+    """Altitudes anywhere in the volume, into ``out`` (n, K, 3)."""
+    out[..., 2] = scene.low[2] + u * (scene.high[2] - scene.low[2])
 
 
 def _stations(count: int) -> Floats:
     return np.arange(1, count + 1) / (count + 1.0)
 
 
-def _sections(scene: Scene, a: Floats, b: Floats, u: Floats) -> Floats:
-    along = np.broadcast_to(_stations(u.shape[1]), u.shape[:2])
-    flat = _flat(scene, a, b, along, 2.0 * LATERAL * (u[..., 0] - 0.5))
-    low, high = scene.room(flat)
-    return np.concatenate([flat, (low + u[..., 1] * (high - low))[..., None]], axis=-1)
+def _sections(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    _flat(scene, a, b, _stations(u.shape[1]), 2.0 * LATERAL * (u[..., 0] - 0.5), out)
+    low, high = scene.room(out)
+    out[..., 2] = low + u[..., 1] * (high - low)
 
 
-def _offsets(scene: Scene, a: Floats, b: Floats, u: Floats) -> Floats:
-    along = np.broadcast_to(_stations(u.shape[1]), u.shape[:2])
-    flat = _flat(scene, a, b, along, 2.0 * OFFSET * (u[..., 0] - 0.5))
-    z = scene.low[2] + u[..., 1] * (scene.high[2] - scene.low[2])
-    return np.concatenate([flat, z[..., None]], axis=-1)
+def _offsets(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    _flat(scene, a, b, _stations(u.shape[1]), 2.0 * OFFSET * (u[..., 0] - 0.5), out)
+    _altitude(scene, u[..., 1], out)
 
 
-def _bspline(scene: Scene, a: Floats, b: Floats, u: Floats) -> Floats:
+def _bspline(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
     count = u.shape[1]
     along = _stations(count) + 2.0 * (u[..., 0] - 0.5) / (count + 1.0)
-    flat = _flat(scene, a, b, along, 2.0 * LATERAL * (u[..., 1] - 0.5))
-    z = scene.low[2] + u[..., 2] * (scene.high[2] - scene.low[2])
-    return np.concatenate([flat, z[..., None]], axis=-1)
+    _flat(scene, a, b, along, 2.0 * LATERAL * (u[..., 1] - 0.5), out)
+    _altitude(scene, u[..., 2], out)
 
 
 ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
@@ -142,7 +144,7 @@ class Code:
         for i, count in enumerate(self.points):
             out[:, row] = stops[i]
             part = u[:, at : at + v * count].reshape(n, count, v)
-            out[:, row + 1 : row + 1 + count] = self.encoding.decode(self.scene, stops[i], stops[i + 1], part)
+            self.encoding.decode(self.scene, stops[i], stops[i + 1], part, out[:, row + 1 : row + 1 + count])
             at, row = at + v * count, row + count + 1
         out[:, row] = stops[-1]
         return out

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from gcsplan.planners._turn_kernels import pinched, shut
 from gcsplan.planners.belts import Belt, Outline, inserted, moved, outline, tight, without
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.track import Obstruction, Track
@@ -49,9 +49,6 @@ KICKS = 60
 
 GAIN, PROBE = 1e-4, 0.01
 """Polishing: least gain worth a try, as a part of the whole; how far a disc is moved to see if it can be, in radii."""
-
-FORGIVEN_M, END_M = 25.0, 60.0
-"""Bounds so near to start and goal are not read (see `track`) unless they are broken by more."""
 
 
 @dataclass(eq=False, slots=True)
@@ -262,59 +259,16 @@ def _kicks(here: Tried, rng: np.random.Generator) -> Iterator[Belt]:
 
 def _broken(problem: Problem, track: Track) -> tuple[float, float]:
     tube, limits = track.tube, problem.limits
-    total, worst, by = _pinched(
+    out = np.empty(3)
+    pinched(
         tube.s_m, tube.floor_m, tube.ceiling_m, problem.start[2], problem.goal[2],
-        limits.max_climb_slope, limits.max_descent_slope,
+        limits.max_climb_slope, limits.max_descent_slope, out,
     )  # fmt: skip
+    total, worst, by = out.tolist()
     for b in tube.bands:
-        length, middle = _shut(tube.s_m, tube.floor_m, tube.ceiling_m, b.s_m, b.bottom_m, b.top_m)
+        shut(tube.s_m, tube.floor_m, tube.ceiling_m, b.s_m, b.bottom_m, b.top_m, out)
+        length, middle = float(out[0]), float(out[1])
         total += ZONE_M * length
         if length > by:
             worst, by = middle, length
     return total, worst
-
-
-@njit(cache=True)
-def _pinched(
-    s: Floats, floor: Floats, ceiling: Floats, z0: float, z1: float, up: float, down: float
-) -> tuple[float, float, float]:
-    """Metres of floor over ceiling, summed along; the worst place, and how much there. Ends are judged by others."""
-    total, worst, most = 0.0, 0.0, 0.0
-    length = s[-1]
-    for k in range(len(floor)):
-        a, b = s[k], s[k + 1]
-        middle = 0.5 * (a + b)
-        part = 0.0
-        for e in range(2):
-            at = a if e == 0 else b
-            high = ceiling[k, e]
-            if np.isfinite(up):
-                high = min(high, z0 + up * at)
-            if np.isfinite(down):
-                high = min(high, z1 + down * (length - at))
-            gap = min(floor[k, e] - high, 1e3)
-            if (at < END_M or at > length - END_M) and gap < FORGIVEN_M:
-                continue
-            part = max(part, gap)
-        if part > 0.0:
-            total += part * (b - a)
-            if part > most:
-                worst, most = middle, part
-    return total, worst, most
-
-
-@njit(cache=True)
-def _shut(s: Floats, floor: Floats, ceiling: Floats, at: Floats, bottom: Floats, top: Floats) -> tuple[float, float]:
-    """Metres of a band that can be passed neither below nor above, and their middle."""
-    length, first, last = 0.0, at[-1], at[0]
-    for i in range(len(floor)):
-        for j in range(len(bottom)):
-            a, b = max(s[i], at[j]), min(s[i + 1], at[j + 1])
-            if b <= a:
-                continue
-            low = min(floor[i, 0], floor[i, 1])
-            high = max(ceiling[i, 0], ceiling[i, 1])
-            if max(bottom[j, 0], bottom[j, 1]) < low and min(top[j, 0], top[j, 1]) > high:
-                length += b - a
-                first, last = min(first, a), max(last, b)
-    return length, 0.5 * (first + last)

@@ -193,7 +193,8 @@ APART_M = 30.0
 class Cost:
     """A batch objective over the unit box: (n, dim) to (n,).
 
-    ``earlier`` vehicles count in every objective; ``speed_m_s`` is this one's.
+    ``earlier`` vehicles count in every objective; ``speed_m_s`` is this one's. A path costs the same, to the bit,
+    alone and in any population. For one thread at a time: it works in scratch of its own.
     """
 
     def __init__(

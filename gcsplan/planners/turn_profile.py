@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from gcsplan.planners.belts import CHORD_M, Outline
+from gcsplan.planners._turn_kernels import CHORD_M, level, straighten
+from gcsplan.planners.belts import Outline
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.taut_string import Profile
 from gcsplan.planners.track import Flown, Obstruction, Track, fly
@@ -206,114 +206,14 @@ def _way_points(line: Outline, nodes: Floats) -> Floats:
 
 def _straightened(tube: Tube, halves: Floats) -> Tube:
     """The tube with one piece for each half arc (``halves`` (H, 2), in order, ends among its breakpoints)."""
-    s, floor, ceiling = _lines(tube.s_m, tube.floor_m, tube.ceiling_m, halves)
+    s, floor, ceiling = np.empty_like(tube.s_m), np.empty_like(tube.floor_m), np.empty_like(tube.ceiling_m)
+    n = straighten(tube.s_m, tube.floor_m, tube.ceiling_m, halves, s, floor, ceiling, np.empty(5))
+    s, floor, ceiling = s[: n + 1], floor[:n], ceiling[:n]
     bands = []
     for b in tube.bands:
-        at, bottom, top = _levels(b.s_m, b.bottom_m, b.top_m, halves)
+        most = len(b.bottom_m) + 2 * len(halves) + 2
+        at, bottom, top = np.empty(most + 1), np.empty((most, 2)), np.empty((most, 2))
+        n = level(b.s_m, b.bottom_m, b.top_m, halves, at, bottom, top)
+        at, bottom, top = at[: n + 1].copy(), bottom[:n].copy(), top[:n].copy()
         bands.append(Band(b.zone, float(at[0]), float(at[-1]), at, bottom, top))
     return Tube(s, floor, ceiling, tuple(bands))
-
-
-@njit(cache=True)
-def _lines(s: Floats, floor: Floats, ceiling: Floats, halves: Floats) -> tuple[Floats, Floats, Floats]:
-    """A tube with floor and ceiling over each half arc replaced by the lines that leave the most room between."""
-    n = len(floor)
-    at, low, high = np.empty(n + 1), np.empty((n, 2)), np.empty((n, 2))
-    at[0] = s[0]
-    out, i, h = 0, 0, 0
-    while i < n:
-        while h < len(halves) and halves[h, 1] < s[i] + 1e-6:
-            h += 1
-        if h == len(halves) or s[i] < halves[h, 0] - 1e-6:
-            low[out], high[out], at[out + 1] = floor[i], ceiling[i], s[i + 1]
-            out, i = out + 1, i + 1
-            continue
-        j = i
-        while j < n and s[j] < halves[h, 1] - 1e-6:
-            j += 1
-        a, b = s[i], s[j]
-        slopes = np.zeros(5)
-        slopes[1] = (floor[j - 1, 1] - floor[i, 0]) / (b - a)
-        slopes[2] = (ceiling[j - 1, 1] - ceiling[i, 0]) / (b - a)
-        # Along the highest floor, the steepest lines that still lie over all that comes before, and after.
-        peak, peak_at = -np.inf, a
-        for k in range(i, j):
-            for e in range(2):
-                if floor[k, e] > peak:
-                    peak, peak_at = floor[k, e], s[k + e]
-        if peak_at > a:
-            slopes[3] = (peak - floor[i, 0]) / (peak_at - a)
-        if peak_at < b:
-            slopes[4] = (floor[j - 1, 1] - peak) / (b - peak_at)
-        best = -np.inf
-        for m in slopes:
-            if not np.isfinite(m):
-                continue
-            under = -np.inf
-            for k in range(i, j):
-                for e in range(2):
-                    under = max(under, floor[k, e] - m * (s[k + e] - a))
-            for w in (m, slopes[2], 0.0):
-                if not np.isfinite(w):
-                    continue
-                over = np.inf
-                for k in range(i, j):
-                    for e in range(2):
-                        over = min(over, ceiling[k, e] - w * (s[k + e] - a))
-                tight = min(over - under, over + w * (b - a) - under - m * (b - a))
-                # Room that is there counts little, room that is missing all.
-                score = (1e6 * tight if tight < 0.0 else 0.0) - (2.0 * under + m * (b - a))
-                if over < np.inf:
-                    score += 2.0 * over + w * (b - a)
-                if score > best or best == -np.inf:
-                    best = score
-                    low[out, 0], low[out, 1] = under, under + m * (b - a)
-                    high[out, 0], high[out, 1] = over, over + w * (b - a)
-        at[out + 1] = b
-        out, i = out + 1, j
-    return at[: out + 1].copy(), low[:out].copy(), high[:out].copy()
-
-
-@njit(cache=True)
-def _levels(s: Floats, bottom: Floats, top: Floats, halves: Floats) -> tuple[Floats, Floats, Floats]:
-    """A band that reaches over whole half arcs, each on one lowest bottom and one highest top."""
-    n, first, last = len(bottom), s[0], s[-1]
-    for h in range(len(halves)):
-        if halves[h, 0] < last - 1e-6 and halves[h, 1] > first + 1e-6:
-            first, last = min(first, halves[h, 0]), max(last, halves[h, 1])
-    most = n + 2 * len(halves) + 2
-    at, under, over = np.empty(most + 1), np.empty((most, 2)), np.empty((most, 2))
-    at[0] = first
-    out, h, here = 0, 0, first
-    while here < last - 1e-6:
-        while h < len(halves) and halves[h, 1] < here + 1e-6:
-            h += 1
-        inside = h < len(halves) and halves[h, 0] < here + 1e-6
-        there = halves[h, 1] if inside else (halves[h, 0] if h < len(halves) else last)
-        there = min(there, last)
-        if inside:
-            lowest, highest = np.inf, -np.inf
-            for k in range(n):
-                if s[k] < there - 1e-9 and s[k + 1] > here + 1e-9:
-                    lowest = min(lowest, min(bottom[k, 0], bottom[k, 1]))
-                    highest = max(highest, max(top[k, 0], top[k, 1]))
-            under[out, :], over[out, :] = lowest, highest
-        else:
-            k = 0
-            while k < n - 1 and s[k + 1] < here + 1e-9:
-                k += 1
-            there = min(there, s[k + 1])
-            under[out, :], over[out, :] = bottom[k], top[k]
-            width = s[k + 1] - s[k]
-            if width > 0.0:
-                u, v = (here - s[k]) / width, (there - s[k]) / width
-                for e in range(2):
-                    w = u if e == 0 else v
-                    if bottom[k, 0] != bottom[k, 1] and np.isfinite(bottom[k, 0] + bottom[k, 1]):
-                        under[out, e] = bottom[k, 0] + w * (bottom[k, 1] - bottom[k, 0])
-                    if top[k, 0] != top[k, 1] and np.isfinite(top[k, 0] + top[k, 1]):
-                        over[out, e] = top[k, 0] + w * (top[k, 1] - top[k, 0])
-        out += 1
-        at[out] = there
-        here = there
-    return at[: out + 1].copy(), under[:out].copy(), over[:out].copy()

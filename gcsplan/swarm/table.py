@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, cast
 
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
     from gcsplan.swarm.box import Steps
@@ -56,10 +55,7 @@ class Entry:
         given = dict(parameters or {})
         for name, value in given.items():
             if name not in self.defaults:
-                near = get_close_matches(name, self.defaults, n=1, cutoff=0.5)
-                hint = f" Did you mean {near[0]!r}?" if near else ""
-                known = ", ".join(self.defaults) or "none"
-                raise InputError(f"{self.name} has no parameter {name!r}.{hint} It has: {known}")
+                raise unknown_name(f"{self.name} has no parameter {name!r}", name, self.defaults)
             usual = self.defaults[name]
             if not _fits(value, usual):
                 raise InputError(f"{self.name}: {name} must be {_kind(usual)}, given {value!r}")
@@ -307,7 +303,5 @@ def get(name: str) -> Entry:
     """The optimiser called ``name``. Raises InputError that names the nearest known one."""
     entry = TABLE.get(name)
     if entry is None:
-        near = get_close_matches(name, TABLE, n=1, cutoff=0.5)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise InputError(f"there is no optimiser {name!r}.{hint} Known: {', '.join(TABLE)}")
+        raise unknown_name(f"there is no optimiser {name!r}", name, TABLE)
     return entry
