@@ -1,0 +1,199 @@
+"""The battery along a mission: what each leg takes, and whether what is left brings the vehicle home.
+
+The model is R1/R2 (`gcsplan.vehicle.Energy`): a return costs R1 for its climb and its descent and R2 for the straight
+way. Along a straight leg the energy spent is linear, and that of the return is convex: the distance to home is, and
+so is the climb to the level of the return. So their sum is above a limit on at most the two ends of a leg, and where
+it crosses is found by halving, not by sampling.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby, repeat
+from typing import Any
+
+from gcsplan.check.stretch import Place
+from gcsplan.check.verdict import LegFigures, Verdict
+from gcsplan.vehicle import Vehicle
+
+HALVINGS = 50
+MOST_ROUNDS = 1000
+EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
+
+
+@dataclass(frozen=True, slots=True)
+class LegBattery:
+    """One leg: its energy, what is spent at its end, a return from there; percent of the battery (or None)."""
+
+    seq: int
+    kind: str
+    energy_j: float
+    spent_j: float
+    return_j: float
+    used_percent: float | None
+    with_return_percent: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryHome:
+    """Whether the battery reaches for the return, from everywhere.
+
+    ``usable_j``: the battery less its reserve. ``most_j``: the most that spent and return come to, anywhere, at
+    ``most_at`` (``most_m`` along the mission). ``point_of_no_return``: the first place beyond which the return is not
+    within it (None: there is none); ``no_return_m`` how far along; ``short``: (from_m, to_m) of all such parts.
+    """
+
+    usable_j: float
+    battery_j: float
+    most_j: float
+    most_at: Place
+    most_m: float
+    point_of_no_return: Place | None
+    no_return_m: float | None
+    no_return_seq: int | None
+    short: tuple[tuple[float, float], ...]
+    legs: tuple[LegBattery, ...]
+
+    @property
+    def most_percent(self) -> float:
+        """The most that is used with the return, percent of the whole battery."""
+        return 100.0 * self.most_j / self.battery_j
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "usable_j": self.usable_j,
+            "most_j": self.most_j,
+            "most_percent": self.most_percent,
+            "most_at": list(self.most_at),
+            "most_m": self.most_m,
+            "point_of_no_return": None if self.point_of_no_return is None else list(self.point_of_no_return),
+            "no_return_m": self.no_return_m,
+            "no_return_seq": self.no_return_seq,
+            "short": [list(part) for part in self.short],
+        }
+
+    def describe(self) -> str:
+        """One line."""
+        usable = 100.0 * self.usable_j / self.battery_j
+        if self.point_of_no_return is None or self.no_return_m is None:
+            return (
+                f"enough from everywhere: at most {self.most_percent:.0f} % is used with the return "
+                f"({usable:.0f} % may be), at km {self.most_m / 1e3:.2f}"
+            )
+        return (
+            f"point of no return at km {self.no_return_m / 1e3:.2f} (item {self.no_return_seq}, "
+            f"{self.point_of_no_return[0]:.6f}, {self.point_of_no_return[1]:.6f}): beyond it up to "
+            f"{self.most_percent:.0f} % would be used with the return, and {usable:.0f} % may be"
+        )
+
+
+def battery_home(
+    verdict: Verdict, vehicle: Vehicle, home: Place, level_amsl_m: float, *, climbs_first: bool
+) -> BatteryHome | None:
+    """Spent so far plus the return, from everywhere on a flight; None where the capacity is not given.
+
+    ``climbs_first``: a return never descends below where it begins before it is home; a plane's does.
+    """
+    energy = vehicle.energy
+    if energy.battery_j is None or not verdict.legs:
+        return None
+    usable = (1.0 - energy.reserve) * energy.battery_j
+
+    def back_j(at: Place) -> float:
+        level = max(level_amsl_m, at[2]) if climbs_first else level_amsl_m
+        vertical = abs(level - at[2]) + max(level - home[2], 0.0)
+        return energy.vertical_j_per_m * vertical + energy.horizontal_j_per_m * _away_m(at, home)
+
+    spent = along = most = 0.0
+    most_at, most_m = verdict.legs[0].start, 0.0
+    rows: list[LegBattery] = []
+    short: list[tuple[float, float]] = []
+    first: tuple[Place, float, int] | None = None
+    for leg in flown(verdict.legs):
+        if leg.kind == "rtl":
+            break
+        hold_j = energy.hover_w * (leg.hold_s if math.isfinite(leg.hold_s) else 0.0)
+        way_j = leg.energy_j - hold_j
+
+        def used(part: float, leg: LegFigures = leg, way_j: float = way_j, spent: float = spent) -> float:
+            return spent + part * way_j + back_j(_between(leg, part))
+
+        ends = [(0.0, used(0.0)), (1.0, used(1.0) + hold_j)]
+        for part, j in ends:
+            if j > most:
+                most, most_at, most_m = j, _between(leg, part), along + part * leg.horizontal_m
+        for a, b in _above(used, usable, ends[1][1] > usable):
+            if first is None:
+                first = (_between(leg, a), along + a * leg.horizontal_m, leg.seq)
+            low, high = along + a * leg.horizontal_m, along + b * leg.horizontal_m
+            if short and low <= short[-1][1] + 1e-6:
+                short[-1] = (short[-1][0], max(short[-1][1], high))
+            else:
+                short.append((low, high))
+        spent += leg.energy_j
+        along += leg.horizontal_m
+        back = back_j(leg.end)
+        rows.append(
+            LegBattery(
+                leg.seq, leg.kind, leg.energy_j, spent, back, 100.0 * spent / energy.battery_j,
+                100.0 * (spent + back) / energy.battery_j,
+            )
+        )  # fmt: skip
+    place, at_m, seq = first if first else (None, None, None)
+    return BatteryHome(usable, energy.battery_j, most, most_at, most_m, place, at_m, seq, tuple(short), tuple(rows))
+
+
+def flown(legs: Sequence[LegFigures]) -> Iterator[LegFigures]:
+    """The legs as often as they are flown: a run of neighbours that are flown n times is flown n times as a whole."""
+    for times, run in groupby(legs, key=lambda leg: leg.times):
+        yield from (leg for legs_of_run in repeat(list(run), min(times, MOST_ROUNDS)) for leg in legs_of_run)
+
+
+def _between(leg: LegFigures, part: float) -> Place:
+    a, b = leg.start, leg.end
+    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
+
+
+def _above(used: Callable[[float], float], usable: float, at_end: bool) -> list[tuple[float, float]]:
+    """Parts of a leg on which the convex ``used`` is above ``usable``; ``at_end``: above after the hold there."""
+    before, after = used(0.0) > usable, used(1.0) > usable
+    if not before and not after:
+        return [(1.0, 1.0)] if at_end else []
+    low = _least(used)
+    if used(low) > usable:
+        return [(0.0, 1.0)]
+    out = []
+    if before:
+        out.append((0.0, _crossing(used, usable, 0.0, low)))
+    if after or at_end:
+        out.append((_crossing(used, usable, 1.0, low) if after else 1.0, 1.0))
+    return out
+
+
+def _least(used: Callable[[float], float]) -> float:
+    """Where a convex function on [0, 1] is least, by thirds."""
+    a, b = 0.0, 1.0
+    for _ in range(HALVINGS):
+        c, d = a + (b - a) / 3.0, b - (b - a) / 3.0
+        a, b = (a, d) if used(c) <= used(d) else (c, b)
+    return 0.5 * (a + b)
+
+
+def _crossing(used: Callable[[float], float], usable: float, above: float, below: float) -> float:
+    """Where it crosses ``usable`` between a place above it and one below, on the safe side: still above."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (above + below)
+        above, below = (middle, below) if used(middle) > usable else (above, middle)
+    return above
+
+
+def _away_m(a: Place, b: Place) -> float:
+    """Horizontal metres between places on the ellipsoid, by its radii half way: good to a millionth over 100 km."""
+    lat = math.radians(0.5 * (a[0] + b[0]))
+    w = 1.0 - ECCENTRICITY_2 * math.sin(lat) ** 2
+    north = EQUATOR_M * (1.0 - ECCENTRICITY_2) / w**1.5 * math.radians(b[0] - a[0])
+    east = EQUATOR_M / math.sqrt(w) * math.cos(lat) * math.radians((b[1] - a[1] + 180.0) % 360.0 - 180.0)
+    return math.hypot(north, east)

@@ -1,0 +1,126 @@
+"""What stands in the way of returns, as walls in height, and the levels at which they are passed.
+
+A return at the level ``h`` is somewhere between a lowest and a highest altitude: *highest* is the greater of the level
+and of where it begins, *lowest* depends on how the autopilot gets to its level. Ground is a wall without a bottom, a
+ceiling one without a top, a zone has either or neither. A wall is hit where the highest is above its bottom and the
+lowest below its top. Raising the level never gets a return below a wall again, so the lowest level that passes all is
+found by going up from wall top to wall top.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+
+TOUCH_M = 1e-6
+GROUND, MAX_AMSL, MAX_AGL = -1, -2, -3
+"""What a wall is, where it is no zone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """R walls in the way of N returns, altitudes AMSL.
+
+    ``high`` (N,): the highest that each return begins. By wall (R,): the return, bottom and top; the lowest altitude of
+    the return there is ``max(base, min(h, limit))``; ``what``: `GROUND`, `MAX_AMSL`, `MAX_AGL` or a zone's index.
+    """
+
+    high: Floats
+    back: Ints
+    bottom: Floats
+    top: Floats
+    base: Floats
+    limit: Floats
+    what: Ints
+
+    def __len__(self) -> int:
+        return len(self.high)
+
+    def hit(self, level: Floats | float) -> Bools:
+        """(R,) walls that are hit at a level, or at one for each return (N,)."""
+        h = np.broadcast_to(np.asarray(level, float), self.high.shape)[self.back]
+        lowest = np.maximum(self.base, np.minimum(h, self.limit))
+        return np.asarray((np.maximum(self.high[self.back], h) > self.bottom + TOUCH_M) & (lowest < self.top - TOUCH_M))
+
+    def passes(self, level: Floats | float) -> Bools:
+        """(N,) returns that hit nothing."""
+        ok = np.ones(len(self), np.bool_)
+        ok[self.back[self.hit(level)]] = False
+        return ok
+
+    def lowest(self, start: float) -> Floats:
+        """(N,) the lowest level from ``start`` up that passes; inf where none does."""
+        level = np.full(len(self), start)
+        for _ in range(len(self.back) + 1):
+            hit = np.flatnonzero(self.hit(level))
+            if not len(hit):
+                break
+            np.maximum.at(level, self.back[hit], self._over(hit))
+            done = np.isinf(level)
+            if done[self.back[hit]].all():
+                break
+        return level
+
+    def together(self, start: float, returns: Bools | None = None) -> float:
+        """The lowest level from ``start`` up that suits all of ``returns`` (all of them by default); inf if none."""
+        mine = np.ones(len(self), np.bool_) if returns is None else returns
+        level = start
+        for _ in range(len(self.back) + 1):
+            hit = np.flatnonzero(self.hit(level) & mine[self.back])
+            if not len(hit):
+                break
+            level = max(level, float(self._over(hit).max()))
+            if level == np.inf:
+                break
+        return level
+
+    def highest(self, level: float) -> float:
+        """How far ``level``, which passes everywhere, may be raised; inf where nothing bounds it."""
+        h = np.minimum(level, self.limit)
+        under = np.maximum(self.base, h) < self.top - TOUCH_M
+        return float(self.bottom[under].min(initial=np.inf))
+
+    def worst(self, which: int, level: float) -> int | None:
+        """The wall that return ``which`` hits highest up, zones before ground; None where it hits none."""
+        rows = np.flatnonzero((self.back == which) & self.hit(level))
+        if not len(rows):
+            return None
+        return int(rows[np.lexsort((self.top[rows], self.what[rows] >= 0, np.isinf(self._over(rows))))[-1]])
+
+    def _over(self, rows: Ints) -> Floats:
+        """The level that gets over each of the walls."""
+        return np.where(self.top[rows] <= self.limit[rows], self.top[rows], np.inf)
+
+    def take(self, returns: Bools) -> Walls:
+        """Those of some returns."""
+        number = np.cumsum(returns) - 1
+        rows = returns[self.back]
+        return Walls(
+            self.high[returns], number[self.back[rows]], self.bottom[rows], self.top[rows], self.base[rows],
+            self.limit[rows], self.what[rows],
+        )  # fmt: skip
+
+    @classmethod
+    def join(cls, parts: Sequence[Walls]) -> Walls:
+        """Those of all parts, one after the other."""
+        offset = np.cumsum([0, *(len(p) for p in parts)])
+        back = np.concatenate([p.back + o for p, o in zip(parts, offset[:-1], strict=True)])
+        names = ("bottom", "top", "base", "limit", "what")
+        return cls(
+            np.concatenate([p.high for p in parts]),
+            back,
+            *(np.concatenate([getattr(p, name) for p in parts]) for name in names),
+        )
+
+    def ordered(self, order: Ints) -> Walls:
+        """The returns in another order."""
+        place = np.empty(len(order), np.intp)
+        place[order] = np.arange(len(order))
+        return Walls(self.high[order], place[self.back], self.bottom, self.top, self.base, self.limit, self.what)

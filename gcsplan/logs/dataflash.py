@@ -1,0 +1,118 @@
+"""ArduPilot's onboard logs (.bin), read with pymavlink's DFReader.
+
+BAT: Volt, Curr of each battery instance (AP_BattMonitor; CURR before 4.0). POS: the estimator's place; GPS where there
+is none. TimeUS in microseconds since boot.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+from gcsplan.errors import InputError
+from gcsplan.logs.flight_log import FlightLog
+
+HEAD = b"\xa3\x95"
+FIX_3D = 3
+
+
+def read_dataflash(file: Path) -> FlightLog:
+    """The flight in a .bin; InputError where it is none, is cut short at the front, or holds no battery."""
+    with file.open("rb") as opened:
+        if opened.read(2) != HEAD:
+            raise InputError("is no ArduPilot log: it does not begin with A3 95", where=str(file))
+    from pymavlink import DFReader
+
+    places: list[tuple[float, float, float, float]] = []
+    gps: list[tuple[float, float, float, float]] = []
+    batteries: dict[int, list[tuple[float, float]]] = {}
+    old: list[tuple[float, float]] = []
+    log = None
+    with _overheard() as said:
+        try:
+            log = DFReader.DFReader_binary(str(file))
+            while (m := log.recv_match(type=["BAT", "CURR", "POS", "GPS"])) is not None:
+                _take(m, places, gps, batteries, old)
+        except Exception as error:  # the reader knows no error of its own for a damaged file
+            raise InputError(
+                f"could not be read by pymavlink ({type(error).__name__}: {error}): it is damaged or not whole; "
+                f"download it again",
+                where=str(file),
+            ) from None
+        finally:
+            if log is not None:
+                log.close()
+    notes = []
+    if said():
+        notes.append(f"{file.name} is damaged in places, which were passed over")
+    if not places and gps:
+        places = gps
+        notes.append(f"{file.name}: no POS messages, so the GPS's own places were taken")
+    if not batteries and old:
+        batteries = {0: old}
+    _require(file, places, batteries)
+    return FlightLog.of(str(file), places, together(batteries), tuple(notes))
+
+
+@contextmanager
+def _overheard() -> Iterator[Callable[[], bool]]:
+    """Keeps what pymavlink says of damage, from Python and from C, from between our lines; whether it spoke."""
+    words = io.StringIO()
+    length = 0
+    with tempfile.TemporaryFile() as kept, redirect_stderr(words), redirect_stdout(words):
+        before = os.dup(2)
+        os.dup2(kept.fileno(), 2)
+        try:
+            yield lambda: bool(length or words.getvalue().strip())
+        finally:
+            os.dup2(before, 2)
+            os.close(before)
+            length = kept.seek(0, os.SEEK_END)
+
+
+def _take(
+    m: Any, places: list[Any], gps: list[Any], batteries: dict[int, list[tuple[float, float]]], old: list[Any]
+) -> None:
+    kind, time_s = m.get_type(), float(getattr(m, "TimeUS", math.nan)) * 1e-6
+    if not math.isfinite(time_s):
+        return
+    if kind == "POS":
+        places.append((time_s, float(m.Lat), float(m.Lng), float(m.Alt)))
+    elif kind == "GPS" and getattr(m, "I", 0) == 0 and getattr(m, "Status", FIX_3D) >= FIX_3D:
+        gps.append((time_s, float(m.Lat), float(m.Lng), float(m.Alt)))
+    elif kind == "BAT":
+        which = int(getattr(m, "Inst", getattr(m, "Instance", 0)))
+        batteries.setdefault(which, []).append((time_s, float(m.Volt) * float(m.Curr)))
+    elif kind == "CURR" and hasattr(m, "Curr"):
+        old.append((time_s, float(m.Volt) * float(m.Curr)))
+
+
+def _require(file: Path, places: list[Any], batteries: dict[int, list[tuple[float, float]]]) -> None:
+    if not places:
+        raise InputError("holds no places (POS or GPS): was there a fix?", where=str(file))
+    if not any(w > 0.0 for rows in batteries.values() for _, w in rows):
+        raise InputError(
+            "holds no battery current (BAT with Volt and Curr): a power module must measure it (BATT_MONITOR 4), and "
+            "LOG_BITMASK must hold the battery",
+            where=str(file),
+        )
+
+
+def together(batteries: dict[int, list[tuple[float, float]]]) -> list[tuple[float, float]]:
+    """The power of all batteries, at the readings of the one with the most."""
+    series = sorted(batteries.values(), key=len, reverse=True)
+    if len(series) == 1:
+        return series[0]
+    import numpy as np
+
+    base = np.array(sorted(series[0]))
+    for other in series[1:]:
+        rows = np.array(sorted(other))
+        base[:, 1] += np.interp(base[:, 0], rows[:, 0], rows[:, 1])
+    return [(float(t), float(w)) for t, w in base]

@@ -1,0 +1,116 @@
+"""CSV logs: a header line that names the columns, one reading a line."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from gcsplan.errors import InputError
+from gcsplan.logs.flight_log import FlightLog
+
+NAMES: dict[str, tuple[str, ...]] = {
+    "time_s": ("time_s", "time", "t", "seconds", "timestamp_s"),
+    "lat": ("lat", "latitude", "lat_deg", "latitude_deg"),
+    "lon": ("lon", "lng", "longitude", "lon_deg", "longitude_deg"),
+    "east_m": ("east_m", "east", "x_m", "x"),
+    "north_m": ("north_m", "north", "y_m", "y"),
+    "amsl_m": ("amsl_m", "amsl", "alt_m", "alt", "altitude", "altitude_m", "up_m", "z_m", "z"),
+    "power_w": ("power_w", "power", "watts", "w"),
+    "volt": ("volt", "voltage", "voltage_v", "volts", "v"),
+    "amp": ("amp", "current", "current_a", "amps", "a"),
+}
+"""What a column may be called, by what it is; in any case of letters."""
+
+WANTED = (
+    "time_s, lat and lon (or east_m and north_m), amsl_m, and power_w (or volt and amp); name others with "
+    "--csv-columns time_s=Time,lat=Latitude"
+)
+MOST_BAD = 0.1
+"""Part of the lines that may be unreadable before the file is refused."""
+
+
+def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
+    """The flight in a CSV file; ``columns``: what (see `NAMES`) to the file's own name. Raises InputError."""
+    for key in columns:
+        if key not in NAMES:
+            near = difflib.get_close_matches(key, NAMES, 1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise InputError(f"--csv-columns knows {', '.join(NAMES)}, given {key!r}{hint}", where=str(file))
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"is no readable text: {error}", where=str(file)) from None
+    head = text.split("\n", 1)[0]
+    mark = max(",;\t", key=head.count)
+    try:
+        lines = list(csv.reader(text.splitlines(), delimiter=mark))
+    except csv.Error as error:
+        raise InputError(f"is no CSV: {error}", where=str(file)) from None
+    names = [n.strip() for n in lines[0]] if lines else []
+    at = _places(names, columns, str(file))
+    flat = "east_m" in at
+    keys = ("time_s", *(("east_m", "north_m") if flat else ("lat", "lon")), "amsl_m")
+    places: list[tuple[float, float, float, float]] = []
+    power: list[tuple[float, float]] = []
+    bad: list[int] = []
+    for number, line in enumerate(lines[1:], start=2):
+        if not any(cell.strip() for cell in line):
+            continue
+        values = {key: _number(line, k) for key, k in at.items()}
+        watts = values["power_w"] if "power_w" in at else values["volt"] * values["amp"]
+        time_s = values["time_s"]
+        good = False
+        if all(math.isfinite(values[k]) for k in keys):  # a line may hold either, where the two have rates of their own
+            places.append((time_s, values[keys[1]], values[keys[2]], values["amsl_m"]))
+            good = True
+        if math.isfinite(time_s) and math.isfinite(watts):
+            power.append((time_s, watts))
+            good = True
+        if not good:
+            bad.append(number)
+    if len(bad) > MOST_BAD * max(len(lines) - 1, 1):
+        raise InputError(f"{len(bad)} lines hold no numbers, the first is line {bad[0]}", where=str(file))
+    notes = (f"{file.name}: {len(bad)} lines without numbers were passed over",) if bad else ()
+    return FlightLog.of(str(file), places, power, notes, degrees=not flat)
+
+
+def _places(names: list[str], columns: Mapping[str, str], where: str) -> dict[str, int]:
+    """Which column holds what; InputError where something is missing."""
+    lower = [n.lower() for n in names]
+    at: dict[str, int] = {}
+    for key, known in NAMES.items():
+        if key in columns:
+            if columns[key] not in names:
+                raise InputError(f"has no column {columns[key]!r}; its header is {', '.join(names)[:200]}", where=where)
+            at[key] = names.index(columns[key])
+        else:
+            found = next((lower.index(n) for n in known if n in lower), None)
+            if found is not None:
+                at[key] = found
+    for pair in (("lat", "lon"), ("east_m", "north_m"), ("volt", "amp")):
+        if len({*pair} & set(at)) == 1:
+            at.pop(pair[0], None)
+            at.pop(pair[1], None)
+    if "lat" in at:
+        at.pop("east_m", None)
+        at.pop("north_m", None)
+    lacking = [k for k in ("time_s", "amsl_m") if k not in at]
+    lacking += [] if "lat" in at or "east_m" in at else ["lat and lon"]
+    lacking += [] if "power_w" in at or "volt" in at else ["power_w"]
+    if lacking:
+        raise InputError(
+            f"has no column for {', '.join(lacking)}; its header is {', '.join(names)[:200] or 'empty'}. "
+            f"Wanted are {WANTED}",
+            where=where,
+        )
+    return at
+
+
+def _number(line: list[str], k: int) -> float:
+    try:
+        return float(line[k])
+    except (ValueError, IndexError):
+        return math.nan

@@ -1,0 +1,88 @@
+"""How far convex regions of the plane lie from points and polygons, many regions at once.
+
+A region is the convex hull of a few points. All of its border lies on segments between pairs of them, and all of those
+lie in it, so that no hull is ever built: distances are the least over all pairs, insides the union of all triangles.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+AT_ONCE = 1_000_000
+MEETS = -1.0
+"""Not 0, which is to touch: touching is legal, where nothing is demanded besides."""
+
+
+def to_point(regions: Floats, point: Floats) -> Floats:
+    """(M,) distance of each region (M, K, 2) from a point (2,); 0 inside."""
+    best = np.full(len(regions), np.inf)
+    for a, b in _pairs(regions):
+        best = np.minimum(best, _to_segment(point - a, b - a))
+    best[_holds(regions, np.broadcast_to(point, (len(regions), 1, 2)))[:, 0]] = 0.0
+    return best
+
+
+def to_polygon(regions: Floats, corners: Floats) -> Floats:
+    """(M,) distance of each region (M, K, 2) from a polygon (V, 2) with its inside; `MEETS` where they overlap."""
+    at_once = max(AT_ONCE // (len(corners) * regions.shape[1]), 1)
+    parts = [_to_polygon(regions[i : i + at_once], corners) for i in range(0, len(regions), at_once)]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def _to_polygon(regions: Floats, corners: Floats) -> Floats:
+    after = np.roll(corners, -1, axis=0)
+    # The polygon's edges from the region's points, and the region's pairs from the polygon's corners.
+    away = regions[:, :, None] - corners
+    best = _to_segment(away, after - corners).min(axis=(1, 2))
+    meets = _inside(regions, corners).any(axis=1)
+    meets |= _holds(regions, np.broadcast_to(corners, (len(regions), *corners.shape))).any(axis=1)
+    for a, b in _pairs(regions):
+        a, b = a[:, None], b[:, None]
+        best = np.minimum(best, _to_segment(corners - a, b - a).min(axis=1))
+        sides = _cross(b - a, corners - a), _cross(b - a, after - a)
+        ends = _cross(after - corners, a - corners), _cross(after - corners, b - corners)
+        meets |= ((sides[0] * sides[1] < 0.0) & (ends[0] * ends[1] < 0.0)).any(axis=1)
+    return np.where(meets, MEETS, best)
+
+
+def _pairs(regions: Floats) -> list[tuple[Floats, Floats]]:
+    return [(regions[:, i], regions[:, j]) for i, j in combinations(range(regions.shape[1]), 2)]
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _to_segment(away: Floats, step: Floats) -> Floats:
+    """Distance of a point ``away`` from a segment's start from that segment."""
+    square = np.maximum((step * step).sum(axis=-1), 1e-30)
+    part = np.clip((away * step).sum(axis=-1) / square, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(away - part[..., None] * step, axis=-1))
+
+
+def _holds(regions: Floats, points: Floats) -> Bools:
+    """(M, P) whether each region holds points (M, P, 2) of its own."""
+    held = np.zeros(points.shape[:2], np.bool_)
+    for i, j, k in combinations(range(regions.shape[1]), 3):
+        a, b, c = (regions[:, n, None] for n in (i, j, k))
+        sides = _cross(b - a, points - a), _cross(c - b, points - b), _cross(a - c, points - c)
+        size = _cross(b - a, c - a)
+        left = (sides[0] > 0.0) & (sides[1] > 0.0) & (sides[2] > 0.0)
+        right = (sides[0] < 0.0) & (sides[1] < 0.0) & (sides[2] < 0.0)
+        held |= (left | right) & (size != 0.0)
+    return held
+
+
+def _inside(points: Floats, corners: Floats) -> Bools:
+    """(M, K) whether points (M, K, 2) lie inside a polygon (V, 2)."""
+    after = np.roll(corners, -1, axis=0)
+    e, n = points[..., :1], points[..., 1:]
+    spans = (corners[:, 1] > n) != (after[:, 1] > n)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        east = corners[:, 0] + (n - corners[:, 1]) / (after[:, 1] - corners[:, 1]) * (after[:, 0] - corners[:, 0]) > e
+    return np.asarray((spans & east).sum(axis=-1) % 2 == 1)

@@ -1,0 +1,285 @@
+"""Many straight ways at once: how high the ground is under each, and which zones each meets.
+
+What `Airspace.tube` is for one track, for hundreds of lines that are to be flown level, with the same kernels and the
+same margins: never below what `Airspace.examine` demands.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.world import hulls
+from gcsplan.world._compiled import pieces
+from gcsplan.world._shared import (
+    BAND_HIGH,
+    BAND_LOW,
+    BOW_M,
+    CEILING,
+    CEILING_AGL,
+    EAST,
+    EAST_E,
+    FIRST,
+    FLOOR,
+    FLOOR_AGL,
+    LAST,
+    NORTH,
+    NORTH_N,
+    RADIUS,
+    SOUTH_N,
+    TOUCH_M,
+    WEST_E,
+)
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.tube import MARGIN_M, ZONE_ROOM_M, Reaches
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+BOX_LOW, BOX_HIGH = [WEST_E, SOUTH_N], [EAST_E, NORTH_N]
+WIDER = 1.6
+UNUSED = -1e9
+"""A reach that the kernel need not look within."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """K times that a way comes within reach of a zone; all arrays (K,).
+
+    From ``s0_m`` to ``s1_m`` along the way (the hull, where there are several parts): fly at or below ``bottom_m`` or
+    at or above ``top_m`` AMSL; -inf, inf where there is no below or above. Altitude errors are in them. ``begins``: the
+    way begins within reach of it.
+    """
+
+    way: Ints
+    zone: Ints
+    s0_m: Floats
+    s1_m: Floats
+    bottom_m: Floats
+    top_m: Floats
+    begins: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Swept:
+    """What N bundles of ways cover, for zones, which are met by it exactly.
+
+    ``regions`` (N, K, 2): the convex hull of these points; the first two are the ends of where the bundle begins.
+    ``extra_m`` (N,): by how much, in metres of the plane, it is wider than the limits' errors make it.
+    """
+
+    regions: Floats
+    extra_m: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """What N ways meet.
+
+    ``clear_m`` (N,): the lowest AMSL level over the whole way that meets no ground or obstacle within errors and
+    clearance; ``legal_m`` (N,): that keeps min AGL too; +inf over unknown ground. ``ceiling_m`` (N,): the highest
+    level that keeps max AGL. By piece (P,): the way, how far along it begins (of its two ends the nearer to the start),
+    and the two floors over it.
+    """
+
+    clear_m: Floats
+    legal_m: Floats
+    ceiling_m: Floats
+    crossings: Crossings
+    piece_way: Ints
+    piece_s_m: Floats
+    piece_clear_m: Floats
+    piece_legal_m: Floats
+
+
+def over(
+    air: Airspace, starts: Floats, ends: Floats, limits: Limits, wide_m: float = 0.0, swept: Swept | None = None
+) -> Ways:
+    """The ways from each of ``starts`` (N, 2) straight to its ``ends`` (N, 2), all widened by ``wide_m`` of the plane.
+
+    Errors and clearance of ``limits`` are in; a way of no length stands for its point. ``swept``: what the ways stand
+    for, which lies within ``wide_m`` of them: zones that it does not meet are left out.
+    """
+    starts, ends = (np.ascontiguousarray(a, dtype=np.float64) for a in (starts, ends))
+    reach = Reaches.of(limits, air._field, air.scale)
+    near, far = reach.near_m + wide_m, reach.far_m + wide_m
+    way, s0, rows = _pieces(
+        air, starts, ends, (near if limits.max_agl_m is not None else UNUSED, near, far), of_top=True
+    )
+    error = limits.altitude_error_m
+    margin = reach.near_margin_m if wide_m == 0.0 else MARGIN_M
+    high = rows[:, 3:5].max(axis=1) + (error + margin)
+    legal = high + limits.min_agl_m
+    if limits.horizontal_clearance_m > 0.0:
+        beside = rows[:, 5:7].max(axis=1) + (error + max(reach.far_margin_m, margin))
+        high, legal = np.maximum(high, beside), np.maximum(legal, beside)
+    unknown = np.isnan(high) | np.isnan(legal)
+    high, legal = np.where(unknown, np.inf, high), np.where(unknown, np.inf, legal)
+    low = np.where(unknown, -np.inf, rows[:, 1:3].min(axis=1) - (error + margin))
+    n = len(starts)
+    clear_m, legal_m, ceiling_m = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, np.inf)
+    np.maximum.at(clear_m, way, high)
+    np.maximum.at(legal_m, way, legal)
+    if limits.max_agl_m is not None:
+        np.minimum.at(ceiling_m, way, low + limits.max_agl_m)
+    found = _crossings(air, starts, ends, reach, wide_m, error, swept)
+    return Ways(clear_m, legal_m, ceiling_m, found, way, s0, high, legal)
+
+
+def _pieces(
+    air: Airspace, starts: Floats, ends: Floats, reaches: tuple[float, float, float], *, of_top: bool
+) -> tuple[Ints, Floats, Floats]:
+    """The way of each piece, how far along it begins, and the kernel's rows (of the ground alone unless ``of_top``).
+
+    Every other way is walked backwards, so that one track leads over all of them: out, and home, and out again.
+    """
+    n = len(starts)
+    still = np.hypot(*(ends - starts).T) == 0.0
+    if still.any():  # the kernel knows no way of no length: a hair instead
+        ends = np.where(still[:, None], ends + np.array([1e-4, 0.0]), ends)
+    track = np.empty((2 * n, 2))
+    back = np.arange(n) % 2 == 1
+    track[0::2], track[1::2] = np.where(back[:, None], ends, starts), np.where(back[:, None], starts, ends)
+    bow = 0.0 if air._field.affine else BOW_M + 2.0 * air._field.error_m
+    kinds = zip((False, of_top, of_top), reaches, strict=True)
+    held = [air._held(top, _few(max(reach, 0.0) + bow, air)) for top, reach in kinds]
+    surfaces = air._surfaces if of_top else air._grounds
+    length = np.hypot(*np.diff(track, axis=0).T)
+    room = 4096 + 16 * n + int(3.0 * float(length.sum()) / min(air._field.step_x, air._field.step_y))
+    while True:
+        rows = np.empty((room, 7))
+        count = pieces(surfaces, *held, track, *reaches, rows)
+        if count <= room:
+            break
+        room = count
+    rows = rows[:count]
+    after = np.cumsum(length)
+    begin = np.concatenate([[0.0], rows[:-1, 0]])
+    leg = np.minimum(np.searchsorted(after, 0.5 * (begin + rows[:, 0]), side="right"), 2 * n - 2)
+    own = leg % 2 == 0  # the others lead from way to way
+    leg, begin, rows = leg[own], begin[own], rows[own]
+    way = leg // 2
+    base = np.concatenate([[0.0], after])[leg]
+    s0 = np.where(back[way], after[leg] - rows[:, 0], begin - base)
+    return way, np.maximum(s0, 0.0), rows
+
+
+def _few(reach_m: float, air: Airspace) -> float:
+    """A reach that is no less, one of few: each has a halo made for it, which holds for smaller ones too."""
+    cell = min(air._field.step_x, air._field.step_y)
+    if reach_m <= cell:
+        return reach_m
+    return float(cell * WIDER ** math.ceil(math.log(reach_m / cell) / math.log(WIDER)))
+
+
+def _crossings(
+    air: Airspace, starts: Floats, ends: Floats, reach: Reaches, wide_m: float, error_m: float, swept: Swept | None
+) -> Crossings:
+    table, vertex = air._zones.table, air._zones.vertex
+    step = ends - starts
+    length = np.hypot(*step.T)
+    unit = np.divide(step, length[:, None], out=np.tile([1.0, 0.0], (len(starts), 1)), where=length[:, None] > 0.0)
+    over_ground = (table[:, FLOOR_AGL] != 0.0) | (table[:, CEILING_AGL] != 0.0)
+    ways, zones, firsts, lasts, begins = [], [], [], [], []
+    low, high = np.minimum(starts, ends).min(axis=0), np.maximum(starts, ends).max(axis=0)
+    around = reach.far_m + wide_m + ZONE_ROOM_M
+    near = (table[:, BOX_LOW] <= high + around).all(axis=1) & (table[:, BOX_HIGH] >= low - around).all(axis=1)
+    for k in np.flatnonzero(near).tolist():
+        row = table[k]
+        if row[FLOOR_AGL] == row[CEILING_AGL] and not row[FLOOR] < row[CEILING]:
+            continue  # upside down: nothing is inside
+        within = reach.far_m + wide_m + (ZONE_ROOM_M if over_ground[k] else 0.0)
+        if row[RADIUS] >= 0.0:
+            s0, s1 = _in_circle(row[[EAST, NORTH]] - starts, unit, float(row[RADIUS]) + within, length)
+        else:
+            s0, s1 = _in_polygon(vertex[int(row[FIRST]) : int(row[LAST])], starts, unit, within, length)
+        met = np.flatnonzero(s0 <= s1)
+        if swept is None:
+            begin = s0[met] <= 0.0
+        else:
+            demanded = swept.extra_m[met] + (within - wide_m if over_ground[k] else reach.zone_m)
+            near_it = _apart(swept.regions[met], row, vertex) < demanded - TOUCH_M
+            met, demanded = met[near_it], demanded[near_it]
+            begin = _apart(swept.regions[met, :2], row, vertex) < demanded - TOUCH_M
+        ways.append(met)
+        begins.append(begin)
+        zones.append(np.full(len(met), k))
+        firsts.append(s0[met])
+        lasts.append(s1[met])
+    if not ways:
+        nothing, none = np.zeros(0), np.zeros(0, np.intp)
+        return Crossings(none, none, nothing, nothing, nothing, nothing, np.zeros(0, np.bool_))
+    way, zone = np.concatenate(ways), np.concatenate(zones)
+    s0, s1 = np.concatenate(firsts), np.concatenate(lasts)
+    bottom, top = table[zone, FLOOR], table[zone, CEILING]
+    follow = np.flatnonzero(over_ground[zone])
+    if len(follow):
+        wide = reach.far_m + wide_m + ZONE_ROOM_M
+        a = starts[way[follow]] + s0[follow, None] * unit[way[follow]]
+        b = starts[way[follow]] + s1[follow, None] * unit[way[follow]]
+        part, _, rows = _pieces(air, a, b, (wide, wide, UNUSED), of_top=False)
+        low, high = np.full(len(follow), np.inf), np.full(len(follow), -np.inf)
+        # What is known of all the ground under the zone is a bound too; where ground is unknown there is no way past.
+        row = table[zone[follow]]
+        with np.errstate(invalid="ignore"):
+            unknown = np.isnan(rows[:, 1:3]).any(axis=1)
+            np.minimum.at(low, part, np.where(unknown, -np.inf, rows[:, 1:3].min(axis=1)))
+            np.maximum.at(high, part, np.where(unknown, np.inf, rows[:, 3:5].max(axis=1)))
+            known = np.isfinite(low) & np.isfinite(high)
+            floor = np.fmax(low + (bottom[follow] - MARGIN_M), row[:, BAND_LOW])
+            ceiling = np.fmin(high + (top[follow] + MARGIN_M), row[:, BAND_HIGH])
+        agl = row[:, FLOOR_AGL] != 0.0
+        bottom[follow[agl]] = np.where(known, floor, -np.inf)[agl]
+        agl = row[:, CEILING_AGL] != 0.0
+        top[follow[agl]] = np.where(known, ceiling, np.inf)[agl]
+    return Crossings(way, zone, s0, s1, bottom - error_m, top + error_m, np.concatenate(begins))
+
+
+def _apart(regions: Floats, row: Floats, vertex: Floats) -> Floats:
+    """How far regions lie from a zone, negative where they overlap."""
+    if row[RADIUS] >= 0.0:
+        return hulls.to_point(regions, row[[EAST, NORTH]]) - float(row[RADIUS])
+    return hulls.to_polygon(regions, vertex[int(row[FIRST]) : int(row[LAST])])
+
+
+def _in_circle(away: Floats, unit: Floats, radius: float, length: Floats) -> tuple[Floats, Floats]:
+    """From where to where (empty: first > last) each line from the origin along ``unit`` lies in a disc ``away``."""
+    middle = (away * unit).sum(axis=1)
+    aside = away[:, 1] * unit[:, 0] - away[:, 0] * unit[:, 1]
+    half = np.sqrt(np.maximum((radius - np.abs(aside)) * (radius + np.abs(aside)), 0.0))
+    s0, s1 = np.maximum(middle - half, 0.0), np.minimum(middle + half, length)
+    return np.where(np.abs(aside) < radius, s0, np.inf), np.where(np.abs(aside) < radius, s1, -np.inf)
+
+
+def _in_polygon(corners: Floats, starts: Floats, unit: Floats, reach: float, length: Floats) -> tuple[Floats, Floats]:
+    """The same for a polygon grown by ``reach``: the hull of all parts."""
+    away = corners[None] - starts[:, None]
+    along = (away * unit[:, None]).sum(axis=-1)
+    aside = away[..., 1] * unit[:, None, 0] - away[..., 0] * unit[:, None, 1]
+    along1, aside1 = np.roll(along, -1, axis=1), np.roll(aside, -1, axis=1)
+    first, last = np.full(along.shape, np.inf), np.full(along.shape, -np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # An edge grown by a disc is a strip and two discs.
+        for a, o in ((along, aside), (along1, aside1)):
+            half = np.sqrt(reach * reach - o * o)
+            first, last = np.fmin(first, a - half), np.fmax(last, a + half)
+        edge = np.hypot(along1 - along, aside1 - aside)
+        for side in (-reach, reach):
+            a = along - side * (aside1 - aside) / edge
+            o = aside + side * (along1 - along) / edge
+            w = -o / (aside1 - aside)
+            cut = np.where((w >= 0.0) & (w <= 1.0), a + w * (along1 - along), np.nan)
+            first, last = np.fmin(first, cut), np.fmax(last, cut)
+        crossing = np.where((aside > 0.0) != (aside1 > 0.0), along - aside * (along1 - along) / (aside1 - aside), -1.0)
+    meets = (last >= 0.0) & (first <= length[:, None])
+    s0 = np.where(meets, np.maximum(first, 0.0), np.inf).min(axis=1)
+    s1 = np.where(meets, np.minimum(last, length[:, None]), -np.inf).max(axis=1)
+    begins = (crossing > 0.0).sum(axis=1) % 2 == 1
+    ends = (crossing > length[:, None]).sum(axis=1) % 2 == 1
+    s0 = np.where(begins, 0.0, np.where(ends, np.minimum(s0, length), s0))
+    s1 = np.where(ends, length, np.where(begins, np.maximum(s1, 0.0), s1))
+    return s0, s1
