@@ -43,6 +43,7 @@ class Vehicle:
 
     ``accel_m_s2`` speeds up and brakes along the path, ``corner_accel_m_s2`` bounds the speed in a rounded corner,
     ``vertical_accel_m_s2`` holds in the columns of take-off and landing, ``land_m_s`` is the descent just above ground.
+    ``leg_jerk_m_s3``: of the S-curves that ArduPilot lays its legs out with, which bound the speed on a short leg.
     An accel of ``inf`` is instant speed, a corner accel of ``inf`` a sharp corner at full speed; a climb or descent of
     ``inf`` means that the cruise speed counts in space, whatever the slope: the ideal vehicle of the papers.
     """
@@ -62,6 +63,12 @@ class Vehicle:
     corner_accel_m_s2: float = 2.5
     land_m_s: float = 0.5
     vertical_accel_m_s2: float = 1.0
+    leg_jerk_m_s3: float = math.inf
+
+    @property
+    def lays_curves(self) -> bool:
+        """Whether it flies legs as ArduPilot lays them out: each an S-curve of its own, in ArduPilot's own metres."""
+        return self.autopilot.is_ardupilot and math.isfinite(self.leg_jerk_m_s3) and math.isfinite(self.accel_m_s2)
 
     @property
     def can_hold(self) -> bool:

@@ -97,6 +97,22 @@ def test_a_sequence_arrives_at_its_intervals_with_the_speeds_that_the_missions_c
         assert v.verdict.mission == v.mission
 
 
+def test_speeds_are_commanded_in_the_metres_that_ardupilot_counts() -> None:
+    """At 36.6 degrees a metre of its own is 1.2 mm more of the ellipsoid eastwards, and 3.1 mm less northwards."""
+    real: dict[str, Any] = {"leg_jerk_m_s3": 1.0}
+    done = planned(sequence(20), real, real)
+    for v, east_or_north, pace in zip(done.vehicles, (0, 1), (1.00119, 0.99688), strict=True):
+        route = route_of(v, done.world)
+        assert route.pace is not None
+        assert route.pace == pytest.approx(pace, abs=2e-5)  # the way home has the same course
+        assert done.fleet is not None
+        motion = done.fleet.motion(v.name)
+        middle = motion.at([motion.arrive_s - 60.0, motion.arrive_s - 50.0])[:, east_or_north]
+        assert (middle[1] - middle[0]) / 10.0 == pytest.approx(speeds_of(done)[east_or_north] * pace, rel=5e-5)
+    plain = planned(sequence(20))
+    assert all(route_of(v, plain.world).pace is None for v in plain.vehicles)
+
+
 def test_together_all_are_at_their_goals_at_the_same_moment() -> None:
     done = planned({"mode": "together", "separation_m": 30}, {"start": {"east_m": -800, "north_m": 0}})
     arrivals = [v["arrive_s"] for v in summary_of(done)["vehicles"]]

@@ -137,6 +137,28 @@ def test_a_short_leg_is_flown_as_slowly_as_a_real_arducopter_flew_it(leg_m: floa
     assert speed_at(flown, 50 + 400) == pytest.approx(15.0, rel=0.01)
 
 
+@pytest.mark.parametrize("lat_deg", [0.0, 36.6, -65.0])
+@pytest.mark.parametrize(("autopilot", "jerk_m_s3"), [("arducopter", 1.0), ("arducopter", math.inf), ("px4", 1.0)])
+def test_a_speed_counts_in_the_metres_of_the_autopilot(lat_deg: float, autopilot: str, jerk_m_s3: float) -> None:
+    """Against the ellipsoid's radii: what ArduPilot takes for a metre is more north, and less east, by its latitude."""
+    world = worlds.world(GROUND_M, lat_deg=lat_deg)
+    vehicle = replace(COPTER, autopilot=Autopilot(autopilot), leg_jerk_m_s3=jerk_m_s3)
+    lat, lon = (float(x) for x in world.frame.to_degrees(0.0, 0.0))
+    s2 = 0.00669437999 * math.sin(math.radians(lat)) ** 2
+    along_parallel = 6378137.0 / math.sqrt(1 - s2) / math.degrees(1.0)
+    along_meridian = 6378137.0 * (1 - 0.00669437999) / (1 - s2) ** 1.5 / math.degrees(1.0)
+    for way, degree_m in (((2000.0, 0.0), along_parallel), ((0.0, 2000.0), along_meridian)):
+        place = world.frame.to_degrees(*way)
+        goal = MissionItem(
+            m.WAYPOINT, m.RELATIVE, (0, 0, 0, 0), m.degrees_e7(float(place[0])), m.degrees_e7(float(place[1])), 50
+        )
+        top = MissionItem(m.TAKEOFF, m.RELATIVE, (0, 0, 0, 0), m.degrees_e7(lat), m.degrees_e7(lon), 50)
+        mission = Mission(vehicle.autopilot, Home.at(lat, lon, GROUND_M), (top, speed(8), goal))
+        flown = make_track(mission, vehicle, world, Kinematics.of(vehicle))
+        ratio = degree_m / 111318.845 if vehicle.lays_curves else 1.0
+        assert flown.command_m_s[-1] == pytest.approx(8.0 * ratio, rel=2e-5)
+
+
 def test_short_legs_cost_nothing_where_no_curve_is_laid_out_for_each() -> None:
     assert math.isinf(Kinematics.of(replace(COPTER, autopilot=Autopilot.PX4)).leg_m_s(5.0))
     assert math.isinf(Kinematics.of(replace(COPTER, accel_m_s2=math.inf)).leg_m_s(5.0))

@@ -25,6 +25,7 @@ def vehicle(**changes: Any) -> Vehicle:
     return replace(Vehicle("a", 1, Autopilot.ARDUCOPTER, Limits(min_agl_m=5)), **changes)
 
 
+JERKY = vehicle(leg_jerk_m_s3=1.0)  # ArduPilot's S-curves, as they are left at the factory
 IDEAL = vehicle(
     climb_m_s=FREE, descent_m_s=FREE, land_m_s=FREE, accel_m_s2=FREE, corner_accel_m_s2=FREE, vertical_accel_m_s2=FREE
 )
@@ -108,6 +109,73 @@ def test_a_slight_turn_costs_no_time() -> None:
     bent = route((0, 0, 100), (300, 0, 100), (600, 10, 100))
     straight = route((0, 0, 100), (300, 0, 100), (600.166, 0, 100))
     assert time_to_goal_s(bent, vehicle(), 10.0) == pytest.approx(time_to_goal_s(straight, vehicle(), 10.0), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("leg_m", "measured_m_s"),
+    [(12.0, 3.08), (22.9, 4.80), (38.8, 6.93), (49.7, 8.17), (60.7, 9.20), (70.3, 10.1)],
+)
+def test_a_short_leg_is_flown_as_slowly_as_a_real_arducopter_flew_it(leg_m: float, measured_m_s: float) -> None:
+    way = route((0, 0, 100), (600, 0, 100), (600 + leg_m, 0, 100), (1200 + leg_m, 0, 100))
+    motion = fly(way, JERKY, 15.0, error_m=0.001)
+    speed = np.linalg.norm(np.diff(motion.points, axis=0), axis=1) / np.diff(motion.times_s)
+    east = 0.5 * (motion.points[1:, 0] + motion.points[:-1, 0])
+    assert speed[(east > 600) & (east < 600 + leg_m)] == pytest.approx(measured_m_s, rel=0.04)
+    assert speed[east < 600].max() == pytest.approx(15.0, rel=0.01)  # it brakes before, and speeds up again
+
+
+def test_short_legs_cost_nothing_where_no_curve_is_laid_out_for_each() -> None:
+    way = route((0, 0, 100), (600, 0, 100), (612, 0, 100), (1200, 0, 100))
+    plain = 1200 / 15 + 15 / 1.5
+    assert time_to_goal_s(way, vehicle(), 15.0) == pytest.approx(plain, rel=1e-12)
+    assert time_to_goal_s(way, replace(JERKY, autopilot=Autopilot.PX4), 15.0) == pytest.approx(plain, rel=1e-12)
+    assert time_to_goal_s(way, replace(IDEAL, leg_jerk_m_s3=1.0), 15.0) == pytest.approx(1200 / 15, rel=1e-12)
+    v, top, a = 0.96 * 6 ** (2 / 3), 15.0, 1.5
+    level = (1188 - top**2 / a - (top**2 - v**2) / a) / top
+    ramps = 2 * top / a + 2 * (top - v) / a
+    assert time_to_goal_s(way, JERKY, top) == pytest.approx(level + ramps + 12 / v, rel=1e-12)
+
+
+def test_a_leg_in_parts_is_as_fast_as_in_one() -> None:
+    whole = route((0, 0, 100), (400, 0, 130), (900, 0, 100), (912, 0, 100), (1500, 0, 100), items=np.arange(6))
+    east = np.unique([*range(0, 1500, 20), 900, 912, 1500]).astype(float)
+    corners = whole.points[:, 0]
+    cut = np.column_stack([east, 0 * east, np.interp(east, corners, whole.points[:, 2])])
+    owner = np.searchsorted(corners, east[1:])
+    parts = Route("a", cut, items=np.array([0, *owner, 5]))
+    assert time_to_goal_s(parts, JERKY, 12.0) == pytest.approx(time_to_goal_s(whole, JERKY, 12.0), rel=1e-9)
+    assert time_to_goal_s(replace(parts, items=None), JERKY, 12.0) > 2 * time_to_goal_s(whole, JERKY, 12.0)
+
+
+def test_a_leg_is_flown_at_its_pace_of_the_commanded_speed_and_so_is_the_way_home() -> None:
+    more = {"start_ground_amsl_m": 100.0, "end": "rtl", "rtl_amsl_m": 100.0}
+    way = route((0, 0, 100), (600, 0, 100), (1500, 0, 100), **more)
+    plain, v, a = fly(way, SHARP, 10.0), 10.0, 1.5
+    paced = fly(replace(way, pace=np.array([1.01, 0.98, 1.05])), SHARP, v)
+    fast, slow, home = 1.01 * v, 0.98 * v, 1.05 * v
+    out_s = 600 / fast + fast / (2 * a) + 900 / slow + slow / (2 * a) + (fast - slow) ** 2 / (2 * a * fast)
+    assert paced.arrive_s == pytest.approx(out_s, rel=1e-12)
+    assert paced.end_s - paced.arrive_s == pytest.approx(1500 / home + home / a, rel=1e-12)
+    assert fly(replace(way, pace=np.ones(3)), SHARP, v).arrive_s == plain.arrive_s
+    climb = route((0, 0, 100), (160, 0, 220))  # where the climb rate is what counts, the pace is nothing
+    assert time_to_goal_s(replace(climb, pace=np.full(2, 1.1)), SHARP, v) == time_to_goal_s(climb, SHARP, v)
+
+
+@pytest.mark.parametrize("turn_deg", [0.02, 0.3, 0.9])
+def test_hilltops_on_nearly_straight_tracks_are_not_cut_off(turn_deg: float) -> None:
+    run = np.array([2000.0, 3000.0, 1200.0, 2500.0])
+    course = np.radians(turn_deg) * np.array([0.0, 1.0, 0.0, -1.0])
+    steps = np.column_stack([run * np.cos(course), run * np.sin(course), [300.0, -350.0, 200.0, -100.0]])
+    points = np.array([0.0, 0.0, 400.0]) + np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    motion = fly(Route("a", points, end="none"), JERKY, 12.0)
+    flown = motion.at(np.linspace(0.0, motion.end_s, 40001))
+    # Where it is over the mission's own line, it is as high as that line is there.
+    high = np.interp(flown[:, 0], points[:, 0], points[:, 2])
+    assert np.abs(flown[:, 2] - high).max() < POSITION_ERROR_M
+    for point in points[1:-1]:
+        near = flown[np.argmin(np.linalg.norm(flown[:, :2] - point[:2], axis=1))]
+        assert near[2] == pytest.approx(point[2], abs=POSITION_ERROR_M)
+        assert np.linalg.norm(near[:2] - point[:2]) <= CUT_M + POSITION_ERROR_M
 
 
 def test_take_off_rests_at_the_top_and_landing_is_slow_near_the_ground() -> None:
@@ -202,7 +270,8 @@ def test_a_route_that_makes_no_sense_is_refused() -> None:
     line = np.array([[0.0, 0, 100], [300, 0, 100]])
     for more in (
         {"points": line[:1]}, {"points": line * math.nan}, {"holds_s": np.zeros(3)}, {"holds_s": -np.ones(2)},
-        {"items": np.arange(2)}, {"start_ground_amsl_m": 101.0}, {"goal_ground_amsl_m": 101.0}, {"end": "rtl"},
+        {"items": np.arange(2)}, {"pace": np.ones(1)}, {"pace": np.zeros(2)}, {"start_ground_amsl_m": 101.0},
+        {"goal_ground_amsl_m": 101.0}, {"end": "rtl"},
     ):  # fmt: skip
         with pytest.raises(ValueError, match=r"route|need|above"):
             Route(**({"name": "a", "points": line} | more))
@@ -289,20 +358,44 @@ def test_a_time_out_of_reach_gives_the_nearer_end() -> None:
 # -- step by step -------------------------------------------------------------------------------------------------
 
 
+def leg_peak_m_s(length_m: float, craft: Vehicle) -> float:
+    """How fast a leg of its own is flown: bisected for the peak of a bounded jerk from rest to rest, 0.96 of which is
+    what ArduCopter does.
+    """
+    jerk, accel = craft.leg_jerk_m_s3, 2.5
+    if math.isinf(jerk):
+        return math.inf
+
+    def needs_m(peak: float) -> float:
+        ramp_s = math.sqrt(peak / jerk) if peak <= accel**2 / jerk else 0.5 * (accel / jerk + peak / accel)
+        return 2 * peak * ramp_s  # twice half the peak for twice the ramp
+
+    low, high = 0.0, 1e3
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if needs_m(middle) <= length_m else (low, middle)
+    return 0.96 * low
+
+
 def dense(points: Floats, craft: Vehicle, speed: float, step_m: float) -> tuple[Floats, Floats]:
     """Places along the rounded path every ``step_m`` or nearer, and the largest speed at each: another derivation.
 
-    Arcs are walked on their circle about its centre (on the bisector), not by chords.
+    Arcs are walked on their circle about its centre (on the bisector), not by chords; their middle is as high as the
+    way point.
     """
     places: list[Floats] = []
     caps: list[float] = []
 
-    def walk(a: Floats, b: Floats, run_m: float, cap_m_s: float, circle: tuple[Floats, float] | None = None) -> None:
+    def walk(
+        a: Floats, b: Floats, run_m: float, leg_m_s: float, cap_m_s: float = math.inf,
+        circle: tuple[Floats, float] | None = None,
+    ) -> None:  # fmt: skip
         rise = b[2] - a[2]
         length = math.hypot(run_m, rise)
         if length <= 1e-9:
             return
-        most = [cap_m_s * length / run_m] if run_m > 0 else []
+        most = [leg_m_s]
+        most += [cap_m_s * length / run_m] if run_m > 0 else []
         most += [speed * length / run_m] if run_m > 0 else []
         most += [craft.climb_m_s * length / rise] if rise > 1e-12 else []
         most += [craft.descent_m_s * length / -rise] if rise < -1e-12 else []
@@ -323,6 +416,7 @@ def dense(points: Floats, craft: Vehicle, speed: float, step_m: float) -> tuple[
         a, b = points[i - 1], points[i]
         leg = b[:2] - a[:2]
         run = float(np.linalg.norm(leg))
+        own = leg_peak_m_s(float(np.linalg.norm(b - a)), craft)
         if i < n - 1:
             following = points[i + 1][:2] - b[:2]
             run_next = float(np.linalg.norm(following))
@@ -335,12 +429,16 @@ def dense(points: Floats, craft: Vehicle, speed: float, step_m: float) -> tuple[
                 out = b + (points[i + 1] - b) * (tangent / run_next)
                 left = np.array([-leg[1], leg[0]]) / run
                 centre = into[:2] + left * radius * math.copysign(1.0, turn)
-                walk(at, into, float(np.linalg.norm(into[:2] - at[:2])), math.inf)
+                to_centre = centre - b[:2]
+                apex = np.append(centre - to_centre * (radius / np.linalg.norm(to_centre)), b[2])
                 bend = math.sqrt(craft.corner_accel_m_s2 * radius)
-                walk(into, out, radius * abs(turn), bend, (centre, turn))
+                walk(at, into, float(np.linalg.norm(into[:2] - at[:2])), own)
+                walk(into, apex, radius * abs(turn) / 2, own, bend, (centre, turn / 2))
+                after = leg_peak_m_s(float(np.linalg.norm(points[i + 1] - b)), craft)
+                walk(apex, out, radius * abs(turn) / 2, after, bend, (centre, turn / 2))
                 at = out
                 continue
-        walk(at, b, float(np.linalg.norm(b[:2] - at[:2])), math.inf)
+        walk(at, b, float(np.linalg.norm(b[:2] - at[:2])), own)
         at = b
     return np.array(places), np.array(caps)
 
@@ -363,6 +461,7 @@ def stepped(points: Floats, craft: Vehicle, speed: float) -> tuple[Floats, Float
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_step_by_step_flight_takes_as_long_and_is_in_the_same_places(seed: int) -> None:
+    craft = JERKY if seed % 2 else vehicle()
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 8))
     length = rng.choice([3.0, 8.0, 25.0, 60.0], n)
@@ -370,8 +469,8 @@ def test_a_step_by_step_flight_takes_as_long_and_is_in_the_same_places(seed: int
     steps = np.column_stack([length * np.cos(course), length * np.sin(course), length * rng.uniform(-0.6, 0.6, n)])
     points = np.vstack([[0.0, 0.0, 100.0], np.array([0.0, 0.0, 100.0]) + np.cumsum(steps, axis=0)])
     speed = float(rng.uniform(2, 14))
-    times, places = stepped(points, vehicle(), speed)
-    motion = fly(Route("a", points, end="none"), vehicle(), speed, error_m=0.01)
+    times, places = stepped(points, craft, speed)
+    motion = fly(Route("a", points, end="none"), craft, speed, error_m=0.01)
     assert motion.arrive_s == pytest.approx(times[-1], rel=2e-3, abs=0.02)
     some = np.linspace(0, len(times) - 1, 200).astype(int)
     scaled = times[some] * (motion.arrive_s / times[-1])

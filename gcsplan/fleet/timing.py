@@ -1,9 +1,9 @@
 """From a path to a motion in time: take-off, gate, way-point legs with acceleration and corners, landing.
 
 A multicopter that follows way points: vertical take-off from rest to rest; an optional hold at the top (the gate), then
-the speed is set from a standstill; legs at the largest speed that cruise, climb and descent rates, corners and the
-acceleration allow, looking ahead (`speeds`); way points without a hold are passed in a rounded corner, the goal is
-reached with a stop: that moment is the arrival. Wind and noise are not in here.
+the speed is set from a standstill; legs at the largest speed that cruise, climb and descent rates, their own length,
+corners and the acceleration allow, looking ahead (`speeds`); way points without a hold are passed in a rounded corner,
+the goal is reached with a stop: that moment is the arrival. Wind and noise are not in here.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class Route:
     ``goal_ground_amsl_m`` there is no landing. ``end`` as in a mission file; ``rtl`` climbs to ``rtl_amsl_m`` if it is
     lower, flies straight home at cruise speed, and lands; ``none`` is gone on arrival. ``holds_s`` (N,): seconds of
     standing at each point; the first one's is the gate. ``items`` (N + 1,): the caller's number of the take-off, of
-    each way point but the first, and of what ends the flight.
+    each way point but the first, and of what ends the flight; a number twice running is one leg in parts. ``pace``
+    (N,): the speed over ground that comes of a commanded one of 1 on each leg, and last on the straight way home.
 
     A fixed wing has no columns: ``climb_out`` (K, 3) leads from the ground to the first point, ``glide`` (K, 3) from
     the last one down to the ground where it lands; home after a return it circles, and stays in the air.
@@ -58,6 +59,7 @@ class Route:
     items: Ints | None = None
     climb_out: Floats | None = None
     glide: Floats | None = None
+    pace: Floats | None = None
 
     def __post_init__(self) -> None:
         p = self.points
@@ -65,6 +67,8 @@ class Route:
             raise ValueError(f"a route is (N, 3) finite metres with N >= 2, given shape {p.shape}")
         if self.holds_s is not None and (self.holds_s.shape != (len(p),) or not (self.holds_s >= 0.0).all()):
             raise ValueError(f"{len(p)} points need as many holds of 0 s or more, given {self.holds_s}")
+        if self.pace is not None and (self.pace.shape != (len(p),) or not (self.pace > 0.0).all()):
+            raise ValueError(f"{len(p)} points need as many paces above 0, given {self.pace}")
         if self.items is not None and self.items.shape != (len(p) + 1,):
             raise ValueError(f"{len(p)} points need {len(p) + 1} item numbers, given {len(self.items)}")
         if self.start_ground_amsl_m is not None and self.start_ground_amsl_m > p[0, 2]:
@@ -109,9 +113,12 @@ class Course:
         self.takeoff = _takeoff(route, vehicle)
         self.to_goal: list[tuple[Stretch, float]] = []
         stops = [0, *(np.flatnonzero(holds[1:-1] > 0.0) + 1).tolist(), len(holds) - 1]
+        leg_m = _leg_m(route)
         waited = 0.0
         for i, j in pairwise(stops):
-            stretch = legs(route.points[i : j + 1], vehicle, np.arange(i + 1, j + 1, dtype=np.intp))
+            owner = np.arange(i + 1, j + 1, dtype=np.intp)
+            pace = None if route.pace is None else route.pace[i:j]
+            stretch = legs(route.points[i : j + 1], vehicle, owner, leg_m=leg_m[i:j], pace=pace)
             held = float(holds[j]) if j < stops[-1] else 0.0
             if stretch is not None:
                 self.to_goal.append((stretch, held))
@@ -247,6 +254,22 @@ class _Motion:
         return TimedPath(route.name, times[keep], points[keep], arrive_s, stays, items[keep[1:]])
 
 
+def _leg_m(route: Route) -> Floats:
+    """(N - 1,) from way point to way point, metres: of the mission's leg that each piece of the route is part of.
+
+    Pieces with one item number are one leg, cut to follow the ground.
+    """
+    p = route.points
+    own = np.asarray(np.linalg.norm(np.diff(p, axis=0), axis=1))
+    if route.items is None:
+        return own
+    item = route.items[1:-1]
+    first = np.flatnonzero(np.append(True, item[1:] != item[:-1]))
+    last = np.append(first[1:], len(item))
+    whole = np.linalg.norm(p[last] - p[first], axis=1)
+    return np.asarray(np.maximum(own, np.repeat(whole, last - first)))
+
+
 def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | None:
     ground, top = route.start_ground_amsl_m, route.points[0]
     if route.climb_out is not None:
@@ -277,7 +300,8 @@ def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
         climb = np.array([vehicle.climb_m_s])
         stretches.append(column(np.array([goal[2], level]), climb, goal[:2], vehicle, number, stops=True))
     above = np.array([[goal[0], goal[1], level], [home[0], home[1], level]])
-    way = legs(above, vehicle, np.array([number], dtype=np.intp))
+    pace = None if route.pace is None else route.pace[-1:]
+    way = legs(above, vehicle, np.array([number], dtype=np.intp), pace=pace)
     stretches += [way] if way is not None else []
     return stretches + _landing(above[1], home_amsl, vehicle, number)
 

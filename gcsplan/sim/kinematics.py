@@ -16,6 +16,7 @@ AT_ONCE_M_S2 = 1e4
 
 SHORT_LEG = 0.96
 """Of the peak of a short leg's S-curve that was measured."""
+
 AIRSPEED_SPARE = 1.2
 """How much faster through the air than its fastest cruise a vehicle is taken to be: what it has against wind."""
 
@@ -56,7 +57,7 @@ class Kinematics:
             AIRSPEED_SPARE * vehicle.speed_max_m_s if airspeed_m_s is None else airspeed_m_s,
             vertical_accel_m_s2=vehicle.vertical_accel_m_s2, accel_m_s2=vehicle.accel_m_s2,
             corner_accel_m_s2=vehicle.corner_accel_m_s2, land_m_s=vehicle.land_m_s,
-            leg_jerk_m_s3=_leg_jerk_m_s3(vehicle),
+            leg_jerk_m_s3=vehicle.leg_jerk_m_s3 if vehicle.lays_curves else math.inf,
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -95,10 +96,3 @@ class Kinematics:
     def corner_m_s(self, radius_m: float) -> float:
         """Fastest speed over ground on an arc."""
         return math.sqrt(self.corner_accel_m_s2 * radius_m)
-
-
-def _leg_jerk_m_s3(vehicle: Vehicle) -> float:
-    """Of the S-curves: ArduPilot's alone, and no concern of one that changes its speed at once."""
-    if not vehicle.autopilot.is_ardupilot or math.isinf(vehicle.accel_m_s2):
-        return math.inf
-    return float(getattr(vehicle, "leg_jerk_m_s3", math.inf))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ FAST_M_S = 60.0
 """A corner that allows more, and is cut by next to nothing, is none."""
 SAME_M = 0.01
 """Places nearer than this are one place."""
+METRES_PER_DEGREE = 0.011131884502145034 * 1e7
+"""ArduPilot's, of latitude (`LOCATION_SCALING_FACTOR`)."""
 PASSED = -1.0
 """In `Track.hold_s`: a node that is passed without a stop."""
 
@@ -42,9 +44,9 @@ class Track:
 
     ``points`` (N, 3): east_m, north_m, amsl_m. ``hold_s`` (N,): how long the vehicle stands at a node, `PASSED` where
     it does not stop; infinite for good. Of the pieces (N - 1,): ``cap_m_s`` the most that climb, descent and corners
-    allow along it; ``command_m_s`` the speed over ground that is commanded; ``level`` the horizontal part of a metre;
-    ``accel_m_s2``; ``column`` (take-off or landing); ``seq`` the wire item. ``goal`` is the node where the path ends.
-    ``bend_m_s2``: the most that its velocity changes.
+    allow along it; ``command_m_s`` the speed over ground that the command means; ``level`` the horizontal part of a
+    metre; ``accel_m_s2``; ``column`` (take-off or landing); ``seq`` the wire item. ``goal`` is the node where the path
+    ends. ``bend_m_s2``: the most that its velocity changes.
     """
 
     name: str
@@ -146,6 +148,8 @@ def make_track(
     flight = follow(mission, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
     if not flight.stretches:
         raise ValueError(f"{vehicle.name}: the mission flies nowhere")
+    if vehicle.lays_curves:
+        flight.stretches = [_as_measured(s, mission, world) for s in flight.stretches]
     wing = vehicle.turn_radius_m > 0.0
     if wing:
         bend(flight, mission, vehicle, world.frame)
@@ -179,6 +183,26 @@ def make_track(
     if not line.pieces:
         raise ValueError(f"{vehicle.name}: the mission flies nowhere")
     return _track(vehicle, line, goal, flight, kinematics, stretches[min(i, len(stretches) - 1)])
+
+
+def _as_measured(s: Stretch, mission: Mission, world: World) -> Stretch:
+    """A leg with the speed over ground that comes of the commanded one: ArduPilot counts in metres of its own.
+
+    They are of a sphere, from home; longitudes shrink with the cosine of the latitude midway between home and the way
+    point (`Location::get_vector_xy_from_origin_NE`).
+    """
+    if s.column:
+        return s
+    home_lat, home_lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
+
+    def from_home(lat: float, lon: float) -> tuple[float, float]:
+        east = math.remainder(lon - home_lon, 360.0) * math.cos(math.radians(lat + home_lat) / 2.0)
+        return east * METRES_PER_DEGREE, (lat - home_lat) * METRES_PER_DEGREE
+
+    counted_m = math.dist(from_home(*s.start[:2]), from_home(*s.end[:2]))
+    places = np.array([s.start[:2], s.end[:2]])
+    true_m = math.dist(*world.frame.to_plane(places[:, 0], places[:, 1]).tolist())
+    return s if counted_m <= SAME_M else replace(s, speed_m_s=s.speed_m_s * true_m / counted_m)
 
 
 def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics: Kinematics, last: Stretch) -> Track:
