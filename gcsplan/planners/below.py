@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -33,6 +34,8 @@ ZONES_SHUT = 8
 """Zones whose underside is given up, one after the other, because no profile fits under them."""
 CONTENT = 0.4
 """A first path whose gap is that part of the wanted one is good enough; else both are looked at with more care."""
+STEEP = 0.5
+"""What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
 LAPS = (0.5, 0.25, 1.0)
 """What part of the gap may be flown in laps near the ends, where a path without them was not good enough."""
 CLOSER = 7
@@ -163,6 +166,8 @@ class Below:
 
     def _tighten_length(self) -> None:
         self.try_below(self.top_m, fine=True)
+        if not self._done() and self._steep():
+            self._raise_bound(self._search_caps(lambda layer: math.hypot(layer.track_m, self._rise(layer.low_m))))
         for closely in (False, True):
             low, high = self.bound, self.cost
             for k in range(CLOSER):
@@ -179,6 +184,12 @@ class Below:
         for part in LAPS:
             if not self._done() and self._climbs() and self._in_time():
                 self.try_below(self.top_m, fine=True, spare_m=part * (self.cost - self.bound))
+
+    def _steep(self) -> bool:
+        """Whether what the best path climbs is more than half of what it lacks: a longer track may climb less."""
+        assert self.best is not None
+        track_m = float(np.hypot(*np.diff(self.best[:, :2], axis=0).T).sum())
+        return self.cost - math.hypot(track_m, self._rise(-math.inf)) > STEEP * (self.cost - self.bound)
 
     def _climbs(self) -> bool:
         """Whether there is a climb limit."""
@@ -227,6 +238,13 @@ class Below:
 
     def _tighten_energy(self) -> None:
         p = self.problem
+        self.try_below(self.top_m, fine=True)
+        self._raise_bound(
+            self._search_caps(lambda layer: layer.cost(self._rise, p.vertical_j_per_m, p.horizontal_j_per_m))
+        )
+
+    def _search_caps(self, cost_of: Callable[[Layer], float]) -> float:
+        """Look below lower caps for what climbs less; the bound of all caps, given that of a layer."""
         tried: set[float] = set()
 
         def track_m(cap: float, care: int) -> float:
@@ -241,13 +259,9 @@ class Below:
                 if self.try_below(cap, fine=False):
                     self.try_below(cap, fine=True)
 
-        def cost_of(layer: Layer) -> float:
-            return layer.cost(self._rise, p.vertical_j_per_m, p.horizontal_j_per_m)
-
-        self.try_below(self.top_m, fine=True)
         layers = [Layer(max(self.known_m), self.top_m, sum(leg.length_m for leg in self.legs))]
-        bound = search_caps(layers, cost_of, track_m, lambda: self.cost, try_at, p.gap_percent / 100.0, self._in_time)
-        self._raise_bound(bound)
+        part = self.problem.gap_percent / 100.0
+        return search_caps(layers, cost_of, track_m, lambda: self.cost, try_at, part, self._in_time)
 
     def bound_of_tracks(self) -> float:
         """The bound of tracks alone, for regimes in which paths are found elsewhere; inf: there is none, proved."""
