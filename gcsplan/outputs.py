@@ -30,19 +30,28 @@ Homes = Mapping[str, WayHome]
 
 
 def outputs_of(
-    plan: Plan, homes: Homes = MappingProxyType({}), fences: Mapping[str, Sequence[MissionItem]] = MappingProxyType({})
+    plan: Plan,
+    homes: Homes = MappingProxyType({}),
+    fences: Mapping[str, Sequence[MissionItem]] = MappingProxyType({}),
+    *,
+    rally: bool = False,
 ) -> dict[str, str]:
     """File name to text, of all that INTERFACE's ``plan -o DIR`` names but the report and the upload.
 
     ``homes``: vehicle to its way home, where that was judged; it stands in the summary then. ``fences``: vehicle to
-    the items of its fence, for the `.plan`.
+    the items of its fence, for the `.plan`; with ``rally`` the rally points that were proposed stand there too.
     """
+    from gcsplan.check.rally import rally_items
+
     tracks = [_track(v) for v in plan.vehicles]
     frame, zones = plan.world.frame, plan.world.airspace.zones
     files = {}
     for v in plan.vehicles:
         files[f"{v.name}.waypoints"] = write_waypoints(v.mission)
-        files[f"{v.name}.plan"] = write_plan(v.mission, vehicle=v.request.vehicle, fence=fences.get(v.name, ()))
+        points = rally_items(homes[v.name].rally) if rally and v.name in homes else ()
+        files[f"{v.name}.plan"] = write_plan(
+            v.mission, vehicle=v.request.vehicle, fence=fences.get(v.name, ()), rally=points
+        )
     files["mission.kml"] = write_kml(plan.source.name, tracks, zones, frame)
     files["mission.geojson"] = write_geojson(plan.source.name, tracks, zones, frame)
     motions = {m.name: m for m in plan.fleet.motions} if plan.fleet is not None else {}

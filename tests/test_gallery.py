@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from gcsplan import load_mission, plan
 from gcsplan.mavlink.compare import compare, faults
 from gcsplan.mavlink.files import read_mission_file
-from gcsplan.outputs import outputs_of
+from gcsplan.outputs import homes_of, outputs_of
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 SLOW = {"fleet-100"}
@@ -31,3 +32,14 @@ def test_a_mission_of_the_gallery_is_safe_and_its_files_are_what_was_judged(file
         read = read_mission_file(written, autopilot=None)
         sent, stored = vehicle.mission.wire_items(), read.mission.wire_items()
         assert not faults(compare(sent, stored, vehicle.mission.autopilot))
+
+
+def test_proposed_rally_points_stand_in_the_plan_file_on_request_alone() -> None:
+    planned = plan(load_mission(MISSIONS / "jacksboro.yaml"))
+    homes = homes_of(planned)
+    points = homes["uav1"].rally
+    assert points
+    asked, plain = (json.loads(outputs_of(planned, homes, rally=on)["uav1.plan"]) for on in (True, False))
+    written = asked["rallyPoints"]["points"]
+    assert [tuple(p) for p in written] == [(p.lat_deg, p.lon_deg, p.rel_home_m) for p in points]
+    assert plain["rallyPoints"]["points"] == []

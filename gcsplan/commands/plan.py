@@ -61,6 +61,10 @@ def plan(
     way_home: Annotated[
         bool, typer.Option("--way-home", help="Judge the return home from everywhere (--report does so too).")
     ] = False,
+    rally: Annotated[
+        bool,
+        typer.Option("--rally", help="Write the rally points that the way home proposes into each .plan."),
+    ] = False,
     fence: Annotated[
         bool,
         typer.Option("--fence", help="Zones without floor and ceiling as a fence: in the .plan, and sent first."),
@@ -129,14 +133,14 @@ def plan(
                 gate_utc=None if gate is None else gate.start,
             )
         pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
-        homes = outputs.homes_of(planned) if report or way_home else {}
+        homes = outputs.homes_of(planned) if report or way_home or rally else {}
         names = [v.name for v in planned.vehicles]
         jobs = delivery.jobs_of(planned, targets or dict.fromkeys(names, ""))
         fence_notes: list[tuple[str, str]] = []
         if fence or fence_infinite:  # one that the mission would breach is found before anything is written
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
         fences = {job.name: job.fence.items for job in jobs if job.fence is not None}
-        files = outputs.outputs_of(planned, homes, fences)
+        files = outputs.outputs_of(planned, homes, fences, rally=rally)
         if report:
             files["report.html"] = outputs.report_of(planned, (), homes)
     except UsageError:
