@@ -24,9 +24,9 @@ import pytest
 import yaml
 
 from gcsplan import cli, delivery, outputs, pipeline
+from gcsplan.commands.options import MISBEHAVIOURS
 from gcsplan.mavlink import session
 from gcsplan.mavlink.files import read_mission_file, write_plan
-from gcsplan.commands.options import MISBEHAVIOURS
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
