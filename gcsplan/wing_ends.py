@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.check.climb_out import circle_missing_m, slant_room
+from gcsplan.check.climb_out import REACHED_M, above_slant, circle_missing_m, flared, slant_room
 from gcsplan.check.returning import circle_growth
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build import MARGINS
@@ -75,7 +75,7 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
     given = request.takeoff_heading_deg
     heading = None if given is None else math.radians(90.0 - given)
     found = False
-    for end in _ends(problem, request.start, slope, request.takeoff_agl_m, sharp, heading):
+    for end in _ends(problem, request.start, slope, request.takeoff_agl_m, sharp, heading, 0.0):
         found = True
         yield end
     for end in () if found else _circles(problem, request.start, slope, request.takeoff_agl_m, sharp, heading):
@@ -99,7 +99,9 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
         return
     slope = request.vehicle.limits.max_descent_slope * (1.0 - MARGINS.slope)
     found = False
-    for end in _ends(problem, request.goal, slope, request.approach_agl_m, sharp[::-1], None):
+    for end in _ends(
+        problem, request.goal, slope, request.approach_agl_m, sharp[::-1], None, request.vehicle.speed_max_m_s
+    ):
         found = True
         yield end
     if not found:
@@ -117,13 +119,17 @@ def _ends(
     agl_m: float | None,
     sharp: Floats,
     heading: float | None,
+    lands_m_s: float,
 ) -> Iterator[FlightEnd]:
-    """The legal ends at ``place`` (on the ground), seen outwards from it; ``sharp`` (N, 3) is the way from there."""
+    """The legal ends at ``place`` (on the ground), seen outwards from it; ``sharp`` (N, 3) is the way from there.
+
+    ``lands_m_s``: the speed of a landing; 0 for a take-off.
+    """
     ground, radius = np.array(place), problem.turn_radius_m
     run_m = radius * math.tan(0.5 * SHARPEST) + 20.0
     aim = _along(sharp, (float(sharp[0, 2]) - place[2]) / slope + run_m + 2.0 * radius)
     for one in _headings(ground, aim, heading):
-        end = _end(problem, ground, one, slope, agl_m, aim, run_m)
+        end = _end(problem, ground, one, slope, agl_m, aim, run_m, lands_m_s)
         if end is not None:
             yield end
 
@@ -139,7 +145,14 @@ def _headings(ground: Floats, aim: Floats, given: float | None) -> list[float]:
 
 
 def _end(
-    problem: Problem, ground: Floats, heading: float, slope: float, agl_m: float | None, aim: Floats, run_m: float
+    problem: Problem,
+    ground: Floats,
+    heading: float,
+    slope: float,
+    agl_m: float | None,
+    aim: Floats,
+    run_m: float,
+    lands_m_s: float,
 ) -> FlightEnd | None:
     """The shortest legal end on a heading; None where there is none."""
     air, limits = problem.airspace, problem.limits
@@ -157,7 +170,7 @@ def _end(
         if needed > z:
             length += max((needed - z) / slope, 1.0) if needed - z < 50.0 else LONGER_M
             continue
-        if not _slant_clear(ground, top, limits, air):
+        if not _slant_clear(ground, top, limits, air, lands_m_s):
             return None
         if air.clear(Legs.of_path(np.vstack([top, chain]), slanted), slanted).all():
             return FlightEnd(ground, top, chain, heading)
@@ -165,15 +178,31 @@ def _end(
     return None
 
 
-def _slant_clear(ground: Floats, top: Floats, limits: Limits, air: Airspace) -> bool:
-    return _column_clear(ground, top, 0.0, limits, air) and (
-        slant_room(np.array([ground, top]), ground, 0.0, limits, air) is None
+def _slant_clear(ground: Floats, top: Floats, limits: Limits, air: Airspace, lands_m_s: float) -> bool:
+    lines = [np.array([ground, top])]
+    if lands_m_s > 0.0:
+        below = flared(_three(top), _three(ground), math.dist(top[:2], ground[:2]), lands_m_s)
+        lines += [np.array([b, a]) for a, b in pairwise(below)]
+    elif not all(
+        _column_clear(np.array(a), np.array(b), 0.0, limits, air, band_m)
+        for a, b, band_m in above_slant(_three(ground), _three(top), limits)
+    ):
+        return False
+    return all(
+        _column_clear(line[0], line[1], 0.0, limits, air) and slant_room(line, ground, 0.0, limits, air) is None
+        for line in lines
     )
 
 
-def _column_clear(low: Floats, high: Floats, reach_m: float, limits: Limits, air: Airspace) -> bool:
-    """Whether zones and ceilings leave room from ``low`` to ``high``, ``reach_m`` around."""
-    track, height = np.array([limits.track_error_m + reach_m]), np.array([limits.altitude_error_m])
+def _three(point: Floats) -> tuple[float, float, float]:
+    return float(point[0]), float(point[1]), float(point[2])
+
+
+def _column_clear(
+    low: Floats, high: Floats, reach_m: float, limits: Limits, air: Airspace, band_m: float = 0.0
+) -> bool:
+    """Whether zones and ceilings leave room from ``low`` to ``high``, ``reach_m`` around and ``band_m`` up and down."""
+    track, height = np.array([limits.track_error_m + reach_m]), np.array([limits.altitude_error_m + band_m])
     legs = Legs(low[None], high[None], np.ones(1, bool), track, height)
     return bool(air.clear(legs, _steep(limits)).all())
 
@@ -198,12 +227,16 @@ def _circles(
         way = np.array([math.cos(one), math.sin(one)])
         for low_m in CIRCLES_FROM_M:
             top = np.array([*(ground[:2] + low_m / slope * way), place[2] + low_m])
-            if not _slant_clear(ground, top, limits, air):
+            if not _slant_clear(ground, top, limits, air, 0.0):
                 break
             for side in (0.5 * math.pi, -0.5 * math.pi, 0.0):  # to the left and right, where it is on the circle; ahead
                 towards = np.array([math.cos(one + side), math.sin(one + side)])
                 high = _circle(problem, top + np.array([*(radius * towards), 0.0]), wanted, aim)
-                if high is not None:  # anticlockwise with the sign of ArduPlane's
+                if high is None:
+                    continue
+                middle, half = 0.5 * (high[0, 2] + top[2]), 0.5 * (high[0, 2] - top[2])
+                line = np.array([[*ground[:2], middle], [*top[:2], middle]])  # it may climb there, and fly on higher
+                if _column_clear(line[0], line[1], 0.0, limits, air, half):  # anticlockwise with ArduPlane's sign
                     yield FlightEnd(ground, top, high[1:], one, high[0], -radius if side > 0.0 else radius)
 
 
@@ -220,7 +253,7 @@ def _circle(problem: Problem, middle: Floats, wanted_m: float, aim: Floats) -> F
     needed = max(_floor(air, np.array([[*middle[:2], 0.0], [*there, 0.0]]), wide), wanted_m)
     if not middle[2] < needed <= middle[2] + HIGHEST_CIRCLE_M:
         return None
-    z = middle[2] + math.ceil((needed - middle[2]) * 100.0 - 1e-6) / 100.0
+    z = middle[2] + math.ceil((needed - middle[2]) * 100.0 - 1e-6) / 100.0 + REACHED_M  # it may leave so much lower
     line = np.array([[*middle[:2], z], [*there, z]])
     clear = _column_clear(middle, line[0], reach_m, limits, air) and air.clear(Legs.of_path(line, wide), wide).all()
     return line if clear else None

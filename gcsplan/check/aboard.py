@@ -48,6 +48,7 @@ class Aboard:
         self.airborne = False
         self.known = True
         self.landed = False
+        self.low_m, self.around_m = 0.0, 0.0  # so far below `at`, and aside, it may begin its next leg
 
     def note(self, words: str) -> None:
         """Say ``words`` once: a round may be flown more than once."""

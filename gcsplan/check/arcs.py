@@ -6,6 +6,7 @@ What is assumed of ArduPlane (commands_logic.cpp, `verify_nav_wp`; AP_L1_Control
   WP_RADIUS and the L1 distance, times turn/90°. There the turn begins, on an arc of ``turn_radius_m``.
 - Where that is not the tangent length of the corner, the arc is moved along the leg before it by the difference, and
   the leg behind it aside by its sine: both are widened by that.
+- Nor does it fly the arc itself (`tracking`): what it is off it in calm air beyond ``track_error_m`` widens both too.
 - Altitude runs evenly along what is flown, from the middle of one arc to that of the next. ArduPlane reckons along
   the straight line between way points instead, and from where a turn begins it is after the altitude of the way point:
   what lies between all of these is judged besides (``Flight.instead``).
@@ -24,7 +25,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.check.returning import circle_growth
 from gcsplan.check.stretch import Flight, Place, Stretch
+from gcsplan.check.tracking import tracking_m
 from gcsplan.mavlink import mission as m
 from gcsplan.mavlink.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -86,6 +89,12 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame) -> No
         )
     bent, other = [], list(flight.instead)
     new: list[Stretch] = []
+    flight.not_judged += [
+        f"item {k}: flies {item.params[2]:.0f} m past its way point before it turns (param3): that is not judged"
+        for k, item in enumerate(mission.items, mission.first_seq)
+        if item.command == m.WAYPOINT and item.params[2] >= 1.0
+    ]
+    wander_m = 0.0
     for first, last in _runs(flight.stretches):
         run = flight.stretches[first:last]
         if not _moves(run[0]):
@@ -94,6 +103,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame) -> No
         before = flight.stretches[first - 1] if first else None
         behind = before.reach_m if before is not None and not _moves(before) else 0.0
         legs = _Run(run, mission, vehicle, frame, flight, behind)
+        wander_m = max(wander_m, legs.wander_m)
         bent += [piece for k in range(len(run)) for piece in legs.flown(k)]
         for k, s in enumerate(run):
             banded = [i for i in other if _same_way(i, s)]
@@ -102,11 +112,15 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame) -> No
             new += legs.banded(k, banded[0]) if banded else legs.instead(k)
     flight.stretches[:] = bent
     flight.instead[:] = other + new
+    error_m = vehicle.limits.track_error_m
     note = (
         f"turns are judged as arcs of {radius:g} m that begin at the acceptance radius of their way point; that the "
-        f"aircraft follows them within track_error_m {vehicle.limits.track_error_m:g} is assumed (NAVL1_PERIOD, wind; "
+        f"aircraft follows them within track_error_m {error_m:g} is assumed (NAVL1_PERIOD, wind; "
         f"a bank of {bank_deg:.0f}° at {fastest:g} m/s)"
     )
+    if wander_m > 0.0:
+        note += f"; in calm air ArduPlane with NAVL1_PERIOD 17 is up to {wander_m:.0f} m off them"
+        note += ", so the sharpest are judged wider" if wander_m > error_m else ""
     if note not in flight.notes:
         flight.notes.append(note)
 
@@ -131,6 +145,7 @@ class _Run:
         self, run: Sequence[Stretch], mission: Mission, vehicle: Vehicle, frame: Frame, flight: Flight, behind_m: float
     ) -> None:
         self.run, self.frame, self.radius = run, frame, vehicle.turn_radius_m
+        self.error_m, self.wander_m = vehicle.limits.track_error_m, 0.0
         places = np.array([run[0].start, *(s.end for s in run)])
         self.points = np.column_stack([frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
         way = np.diff(self.points[:, :2], axis=0)
@@ -159,8 +174,12 @@ class _Run:
                 continue
             tangent = tangent_m(self.radius, turn)
             begins = self._begins_m(mission, s, abs(turn), flight)
-            off_m = abs(begins - tangent) * math.sin(min(abs(turn), 0.5 * math.pi))
-            found.append(_Corner(turn, tangent, off_m, begins))
+            early_m, late_m = (abs(b - tangent) for b in begins)
+            wander_m = tracking_m(self.radius, turn, s.speed_m_s)
+            self.wander_m = max(self.wander_m, wander_m)
+            off_m = max(early_m, late_m) * math.sin(min(abs(turn), 0.5 * math.pi))
+            off_m += max(0.0, wander_m - self.error_m)
+            found.append(_Corner(turn, tangent, off_m, max(begins)))
         found.append(_Corner())
         for k, s in enumerate(self.run):
             a, b = found[k], found[k + 1]
@@ -182,20 +201,23 @@ class _Run:
                 found[k + 1] = replace(found[k + 1], off_m=found[k + 1].off_m + found[k].off_m)
         return found
 
-    def _begins_m(self, mission: Mission, s: Stretch, turn: float, flight: Flight) -> float:
-        """How far before the end of ``s`` the turn behind it begins."""
+    def _begins_m(self, mission: Mission, s: Stretch, turn: float, flight: Flight) -> tuple[float, float]:
+        """How far before the end of ``s`` the turn behind it begins, at least and at most."""
         item = _item(mission, s.seq)
         if item is None or item.command != m.WAYPOINT:
-            return 0.0  # a take-off ends where its height is reached, not before
+            return 0.0, 0.0  # a take-off ends where its height is reached, not before
         if math.isfinite(item.params[1]) and item.params[1] > 0.0:
-            return item.params[1]
+            return item.params[1], item.params[1]
         words = (
             f"item {s.seq} gives no acceptance radius: its turn is judged as begun by WP_RADIUS {WP_RADIUS_M:g} m and "
             f"NAVL1_PERIOD 17, the defaults"
         )
         if words not in flight.notes:
             flight.notes.append(words)
-        return min(WP_RADIUS_M, L1_S * s.speed_m_s) * min(1.0, turn / (0.5 * math.pi))
+        part = min(1.0, turn / (0.5 * math.pi))
+        thin = circle_growth(max(s.start[2], s.end[2]))  # WP_RADIUS grows with altitude as circles do
+        least, most = (min(WP_RADIUS_M * growth, L1_S * s.speed_m_s) * part for growth in (1.0, thin))
+        return least, most
 
     def _widen_m(self, k: int) -> float:
         """What a leg is widened by: how late or early the turn before it began, the circle that it leaves."""

@@ -1,10 +1,14 @@
 """A fixed wing leaving the ground and coming back to it: straight and slanting, where a multicopter has its columns.
 
-What ArduPlane does (commands_logic.cpp, `do_takeoff`, `verify_takeoff`; AP_Landing): it holds the course on which it
-was launched until it is as high as the item says, climbing with at least the pitch of param1 (4° where that is 0), and
-then makes straight for the next item. The mission holds no heading, so the place of the item is read as it is drawn on
-maps: where the climb-out leads to; without one it leads towards the next item. A NAV_LAND glides straight from the way
-point before it to its place and altitude.
+What ArduPlane does (commands_logic.cpp, `do_takeoff`, `verify_takeoff`; takeoff.cpp): it notes the course over ground
+on which it was launched, once it is fast, and keeps its nose there, so that a cross wind carries it aside. It climbs
+with the pitch of param1 (4° where that is 0), which is a least one where it has an airspeed sensor: with power to
+spare it climbs up to PTCH_LIM_MAX_DEG, so what lies between the slant and the item's altitude is judged too. As high
+as the item says it makes straight for the next item. The mission holds no heading, so the place of the item is read as
+it is drawn on maps: where the climb-out leads to; without one it leads towards the next item.
+
+A NAV_LAND glides straight from the way point before it (AP_Landing_Slope.cpp), towards a point before and above its
+place from which the flare is flat: a few metres below the line between both.
 
 Both are exempt from min AGL, climb angle and terrain clearance, as columns are; never from zones, their clearance and
 ceilings. What they must keep is `room_m` over bare ground: the altitude error, and near the ends, where the aircraft
@@ -47,6 +51,15 @@ SPARED = 0.5
 """The part of its height that the aircraft needs below itself while it is lower than the altitude error allows."""
 
 
+MOST_PARTS = 24
+"""Of what lies above a climb-out."""
+
+REACHED_M = 5.0
+"""LOITER_TO_ALT counts an altitude as reached this near to it (navigation.cpp, `loiter_angle_update`)."""
+
+FLARE_S, FLARE_MOST_M, LAND_SINK_M_S = 2.0, 6.0, 0.25
+"""LAND_FLARE_SEC, twice LAND_FLARE_ALT, TECS_LAND_SINK: the defaults."""
+
 CHORD_M = 2.0
 """How far the chords of a circle that is climbed in may lie inside it."""
 
@@ -87,8 +100,31 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
         f"{_bearing(pilot.home, ahead):.0f}° over {run_m:.0f} m: launch it that way; ArduPlane holds the heading that "
         f"it is launched on, and turns when it is high enough"
     )
+    pilot.note(
+        f"item {seq}: in a cross wind it drifts aside, by up to {run_m / max(pilot.pace.speed_m_s, 1.0):.0f} m for "
+        f"each m/s, as its nose holds the heading: launch into the wind, or let track_error_m hold that"
+    )
     pilot.add(seq, "takeoff", pilot.home, end, column=True)
+    for low, high, band_m in above_slant(pilot.home, end, pilot.vehicle.limits):
+        pilot.instead(seq, "takeoff", low, high, column=True, band_m=band_m)
     pilot.at, pilot.direction = end, towards(pilot.home, end)
+
+
+def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, Place, float]]:
+    """What lies between a climb-out and the altitude of its end, as level lines and half their heights.
+
+    Any three numbers do for a place. What is left out between them and the slant, both altitude errors cover.
+    """
+    rise = top[2] - ground[2]
+    parts = min(max(1, math.ceil(0.5 * rise / max(limits.altitude_error_m, 0.1))), MOST_PARTS)
+    found = []
+    for i in range(parts - 1):
+        a, b, half = i / parts, (i + 1) / parts, 0.5 * rise * (1.0 - (i + 1) / parts)
+        low, high = (
+            (ground[0] + f * (top[0] - ground[0]), ground[1] + f * (top[1] - ground[1]), top[2] - half) for f in (a, b)
+        )
+        found.append((low, high, half))
+    return found
 
 
 def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bool:
@@ -109,7 +145,11 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
         pilot.add(seq, "takeoff", a, b, column=True, reach_m=reach_m - radius_m + CHORD_M)
     pilot.add(seq, "takeoff", target, target, reach_m=reach_m)
     pilot.instead(seq, "takeoff", low, target, column=True, reach_m=reach_m)
+    middle, half = 0.5 * (low[2] + target[2]), 0.5 * (target[2] - low[2])  # steeper than judged, it climbs on the way
+    start, end = ((*place[:2], middle) for place in (before.start, before.end))
+    pilot.instead(seq, "takeoff", start, end, column=True, band_m=half)
     pilot.note(f"item {seq}: the take-off goes on in circles, judged as {reach_m:.0f} m wide all the way up")
+    pilot.low_m, pilot.around_m = min(REACHED_M, target[2] - low[2]), reach_m
     pilot.at, pilot.direction = target, None
     return True
 
@@ -147,9 +187,35 @@ def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
         )
         return
     end = (*target[:2], ground)
-    pilot.note(f"item {seq}: the landing is judged as a straight glide from the way point before it; it is not flared")
+    pilot.note(
+        f"item {seq}: the landing is judged as a straight glide from the way point before it, and as ArduPlane's "
+        f"defaults (LAND_FLARE_SEC, LAND_FLARE_ALT) flare it"
+    )
     pilot.add(seq, "land", pilot.at, end, column=True)
+    for a, b in pairwise(flared(pilot.at, end, flat_m(pilot.at, end), pilot.pace.speed_m_s)):
+        pilot.instead(seq, "land", a, b, column=True)
     pilot.at = end
+
+
+def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Place]:
+    """The second half of a glide as it is flown below its line: towards where the flare begins, then to the ground.
+
+    Any three numbers do for a place; empty where the line is not undercut. AP_Landing_Slope.cpp,
+    `type_slope_setup_landing_glide_slope`, with the defaults.
+    """
+    fall = top[2] - ground[2]
+    sink_m_s = speed_m_s * fall / max(run_m, 1.0)
+    high_m = min(FLARE_S * sink_m_s, FLARE_MOST_M)
+    part = min(0.5, speed_m_s * high_m / max(0.5 * (LAND_SINK_M_S + sink_m_s), 0.1) / max(run_m, 1.0))
+    if high_m >= part * fall:
+        return []
+
+    def at(down: float, z: float) -> Place:
+        return top[0] + down * (ground[0] - top[0]), top[1] + down * (ground[1] - top[1]), z
+
+    aim = at(1.0 - part, ground[2] + high_m)
+    middle = at(0.5, top[2] - 0.5 * (fall - high_m) / (1.0 - part))
+    return [aim, ground] if part == 0.5 else [middle, aim, ground]
 
 
 def slants(stretches: Sequence[Stretch]) -> list[Stretch]:
@@ -179,7 +245,7 @@ def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World)
                 found.append(_low(s, *worst, world))
             steep = math.degrees(math.atan2(s.start[2] - s.end[2], max(flat_m(s.start, s.end), 1e-9)))
             limit = vehicle.limits.max_descent_deg
-            if kind == "land" and steep > limit * 1.01 + 0.01:
+            if kind == "land" and s is mine[0] and steep > limit * 1.01 + 0.01:
                 words = f"item {s.seq} (land): glides down too steeply: {steep:.2f}°, limit {limit:g}°"
                 found.append(Finding(s.seq, "descent", words, *s.start, steep, limit, steep - limit, "deg"))
     return found

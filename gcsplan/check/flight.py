@@ -29,7 +29,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.check.aboard import Aboard
-from gcsplan.check.climb_out import circle_up, climb_out, glide, is_wing
+from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
 from gcsplan.check.commands import LOITER_TO_ALT, moves_nothing
 from gcsplan.check.returning import PLANE_LOITER_RADIUS_M, circle_growth, flat_m, return_home
 from gcsplan.check.route import DO_JUMP_TAG, fly_in_order
@@ -232,6 +232,11 @@ class _Pilot(Aboard):
         self.direction = None if hold_s else towards(here, target)
         if self.autopilot is not Autopilot.ARDUPLANE:
             return
+        if self.low_m and not terrain:  # it regains that soon: within half the leg
+            half = tuple(0.5 * (a + b) for a, b in zip(here, target, strict=True))
+            low, on = (*here[:2], here[2] - self.low_m), (half[0], half[1], half[2] - self.low_m)
+            self.instead(seq, kind, low, on, reach_m=self.around_m)
+        self.low_m = 0.0
         start = self.ground(*target[:2]) + here[2] - self.ground(*here[:2]) if terrain else here[2]
         rise = target[2] - start
         if abs(rise) < PLANE_GLIDE_SLOPE_MIN_M or (rise > 0 and here[2] - self.home[2] <= PLANE_LOW_M):
@@ -288,6 +293,7 @@ class _Pilot(Aboard):
             around = (*place, 0.5 * (low + high))
             reach_m *= circle_growth(high)
             self.add(seq, "loiter", around, around, band_m=0.5 * (high - low), reach_m=reach_m)
+            self.low_m, self.around_m = min(REACHED_M, self.at[2] - low), reach_m
         elif self.autopilot is Autopilot.PX4 and before[2] != self.at[2]:  # level first, then there
             self.instead(seq, "cruise", before, (*place, before[2]))
             self.instead(seq, "loiter", (*place, before[2]), self.at, column=True)

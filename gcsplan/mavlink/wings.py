@@ -1,7 +1,7 @@
 """A fixed wing's mission on the wire: take-off straight ahead, way points that are flown by, and how it ends.
 
-- NAV_TAKEOFF: param1 is the pitch in whole degrees; ArduPlane holds the heading it is launched on. The place of the
-  item is where the climb-out leads to, for whoever launches it, and for whoever checks the file.
+- NAV_TAKEOFF: param1 is the least pitch in whole degrees; ArduPlane holds the heading it is launched on. The place of
+  the item is where the climb-out leads to, for whoever launches it, and for whoever checks the file.
 - NAV_WAYPOINT: param2, the acceptance radius, is the tangent length of the corner, rounded up to whole metres: there
   the turn begins. ArduPlane keeps a byte of it, so a corner that needs more is given two way points, on one arc.
 - No DO_LAND_START before a landing: with it ArduPlane does not arm unless RTL_AUTOLAND is set.
