@@ -27,6 +27,8 @@ from tests.random_worlds import (
     turned,
 )
 
+pytestmark = pytest.mark.slow
+
 Floats = NDArray[np.float64]
 SURE_M = 1e-3  # what brute force finds beyond this is a violation
 TERRAIN = ("min_agl", "terrain_clearance", "max_agl")

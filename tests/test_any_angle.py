@@ -325,6 +325,7 @@ def test_a_limit_shuts_out_all_that_is_longer_and_nothing_else() -> None:
     assert compared > 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slack", [0.1, 0.5, math.inf])
 @pytest.mark.parametrize("form", FORMS)
 def test_a_flood_says_of_no_piece_that_it_is_farther_than_it_is(slack: float, form: str) -> None:

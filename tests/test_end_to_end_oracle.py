@@ -22,6 +22,8 @@ from gcsplan.outputs import outputs_of
 from gcsplan.pipeline import Plan, plan
 from tests import flown
 
+pytestmark = pytest.mark.slow
+
 CROSSING: dict[str, Any] = yaml.safe_load((Path(__file__).parent / "data" / "crossing.yaml").read_text())
 STEP_M = 2.0
 ZONES = [

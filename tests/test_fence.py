@@ -74,6 +74,7 @@ def outline(shape: Circle | Polygon) -> shapely.Polygon:
     return shapely.Point(shape.east_m, shape.north_m).buffer(shape.radius_m, 256)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=80)
 @given(zones(), st.sampled_from(list(Autopilot)))
 def test_a_zone_comes_back_from_its_items_as_they_are_stored(zone: Zone, autopilot: Autopilot) -> None:

@@ -13,7 +13,7 @@ from gcsplan.mavlink.files import read_mission_file
 from gcsplan.outputs import homes_of, outputs_of
 
 MISSIONS = Path(__file__).parent.parent / "missions"
-SLOW = {"fleet-100"}
+SLOW = {"fleet-100", "fleet-4", "jacksboro-high"}
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,8 @@ from tests.optima_polish import PATIENT, Effort, cost_of, is_feasible
 from tests.optima_search import best_path
 from tests.optima_worlds import FAMILIES, hills, make, pass_height, plane_ground
 
+pytestmark = pytest.mark.slow
+
 Floats = NDArray[np.float64]
 
 WORLDS = dict.fromkeys(FAMILIES, 12) | {"clearances": 6, "passes": 6, "stops": 6, "pockets": 4}

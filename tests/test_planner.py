@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 from gcsplan.errors import InputError
-from gcsplan.pipeline import load_mission
+from gcsplan.pipeline import load_mission, make_problem, world_of
 from gcsplan.pipeline import plan as plan_mission
+from gcsplan.planners.below import Below
 from gcsplan.planners.optimal import plan
 from gcsplan.planners.problem import Problem, Progress, Solution, Via
+from gcsplan.planners.steep import is_steep, steep_path
 from gcsplan.planners.table import get, names
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
+from gcsplan.world.path import Path as FlownPath
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.planner_worlds import FIELD, Floats, faults, ground, random_mission
@@ -266,6 +269,81 @@ def test_jacksboro_mission_winds_through_the_gaps_that_its_ceiling_and_zones_lea
     # Where a zone is lifted that matters, the way gets shorter.
     bare = replace(p, airspace=Airspace(p.airspace.surface, scale=p.airspace.scale))
     assert plan(bare).path.length_m < s.path.length_m - 500.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "most_m"), [("krill-forest", 188.9), ("abo", 129.4), ("krill-hills", 162.6), ("krill-mound", 156.72)]
+)
+def test_worlds_as_high_as_wide_are_solved_no_worse_than_by_swarms(name: str, most_m: float) -> None:
+    source = load_mission(Path(__file__).parents[1] / "missions" / "papers" / f"{name}.yaml")
+    p, _ = make_problem(source, source.vehicles[0], world_of(source), "length", 1)
+    s = plan(p)
+    assert p.airspace.examine(Legs.of_path(s.path.points, p.limits), p.limits).violations == ()
+    assert faults(p, s.path, step_m=0.2) == []
+    assert s.lower_bound is not None
+    assert s.lower_bound <= p.cost(s.path) <= most_m
+
+
+def needles(east: Floats, north: Floats) -> Floats:
+    """Nine needles 90 m high, 30 m apart."""
+    z = np.zeros_like(east)
+    for x in (30.0, 60.0, 90.0):
+        for y in (30.0, 60.0, 90.0):
+            z += 90.0 * np.exp(-(((east - x) / 8.0) ** 2) - ((north - y) / 8.0) ** 2)
+    return z
+
+
+AMONG = Limits(min_agl_m=3.0, horizontal_clearance_m=0.2, max_amsl_m=120.0)
+MAST = Zone("mast", Circle(45.0, 38.0, 9.0), None, Level(60.0, "amsl"))
+ROOF = Zone("roof", Circle(75.0, 60.0, 20.0), Level(50.0, "agl"), None)
+
+
+@pytest.mark.parametrize(
+    ("zones", "via", "degrees", "objective"),
+    [
+        ((), (Via(45.0, 75.0), Via(75.0, 45.0, 30.0)), 90.0, "length"),
+        ((MAST, ROOF), (), 90.0, "length"),
+        ((MAST,), (Via(75.0, 45.0, 10.0),), 60.0, "length"),
+        ((), (Via(75.0, 45.0),), 90.0, "energy"),
+    ],
+)
+def test_search_in_space_among_needles(
+    zones: tuple[Zone, ...], via: tuple[Via, ...], degrees: float, objective: str
+) -> None:
+    limits = replace(AMONG, max_climb_deg=degrees, max_descent_deg=max(degrees - 10.0, 50.0))
+    surface = ground(needles, size_m=120.0, step_m=1.0)
+    p = problem(surface, zones, limits, (5.0, 5.0, 3.5), (115.0, 115.0, 80.0), via=via, objective=objective)
+    # Far over everything: a path that is legal, known, and bad.
+    low, high = ([*p.start[:2], z] for z in (p.start[2], 110.0))
+    over = [low, high, *([v.east_m, v.north_m, 110.0] for v in via), [*p.goal[:2], 110.0], list(p.goal)]
+    known = np.array(over)
+    assert is_steep(p, known)
+    found = steep_path(p, known, lambda: True)
+    assert found is not None
+    points, pinned = found
+    assert p.airspace.examine(Legs.of_path(points, limits), limits).violations == ()
+    stops = points[pinned]
+    assert stops[0].tolist() == list(p.start)
+    assert stops[-1].tolist() == list(p.goal)
+    assert [s[:2] for s in stops[1:-1].tolist()] == [[v.east_m, v.north_m] for v in via]
+    assert all(v.amsl_m is None or s[2] == v.amsl_m for s, v in zip(stops[1:-1], via, strict=True))
+    # Not above what is found below a cap at once, but for a little: each finds ways that the other does not.
+    below = Below(p, 0.0)
+    below.look()
+    assert below.best is not None
+    assert below.bound - 1e-6 <= p.cost(FlownPath(points)) <= 1.003 * below.cost
+    again = steep_path(p, known, lambda: True)
+    assert again is not None
+    assert again[0].tobytes() == points.tobytes()
+
+
+def test_search_in_space_is_given_up_when_time_is_over_and_not_begun_over_real_terrain() -> None:
+    p = problem(ground(needles, size_m=120.0, step_m=1.0), (), AMONG, (5.0, 5.0, 3.5), (115.0, 115.0, 80.0))
+    known = np.array([p.start, [5.0, 5.0, 110.0], [115.0, 115.0, 110.0], p.goal])
+    assert steep_path(p, known, lambda: False) is None
+    real = random_mission(0)
+    assert not is_steep(real, plan(real).path.points)
 
 
 def test_table_names_the_nearest_planner() -> None:

@@ -561,6 +561,7 @@ def test_the_way_home_is_drawn_and_told_at_the_top_where_it_is_not_safe() -> Non
         assert "the way home is not safe from" not in read.text
 
 
+@pytest.mark.slow
 def test_each_figure_is_drawn_as_a_png_too() -> None:
     drawn = figures(planned())
     assert set(drawn) == {"report-map.png", "report-space.png", "report-profile.png"}

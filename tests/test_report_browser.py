@@ -18,9 +18,13 @@ from tests.browser import Browser
 from tests.test_report import HOSTILE, fleet_page, small_page
 
 PROGRAM = chromium.find()
-pytestmark = pytest.mark.skipif(
-    PROGRAM is None, reason=f"no browser: none of {', '.join(chromium.NAMES)} is installed (GCSPLAN_CHROMIUM names one)"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        PROGRAM is None,
+        reason=f"no browser: none of {', '.join(chromium.NAMES)} is installed (GCSPLAN_CHROMIUM names one)",
+    ),
+]
 
 
 @pytest.fixture(scope="module")

@@ -142,15 +142,18 @@ def raise_cone(
     wide, tall = int(1.05 * farthest / step_x) + 2, int(1.05 * farthest / step_y) + 2
     left, right = max(i0 - wide, 0), min(i0 + wide + 1, nx - 1)
     low, high = max(j0 - tall, 0), min(j0 + tall + 1, ny - 1)
+    # Only where the cone could be a wall, and some nodes around that, anything needs to be known.
+    if not _mark(excess, floor, x, y, at_x, at_y, height, slope, left, right, low, high, seen):
+        return
     for j in range(low, high + 1):
         for i in range(left, right + 1):
-            if excess[j, i] <= 0.0 and _sees(excess, of, col, row, i, j):
+            if seen[j, i] < 0 and excess[j, i] <= 0.0 and _sees(excess, of, col, row, i, j):
                 seen[j, i] = 1
                 away[j, i] = math.sqrt((x[j, i] - at_x) ** 2 + (y[j, i] - at_y) ** 2)
     for ring in range(2, 2 + RINGS):
         for j in range(low, high + 1):
             for i in range(left, right + 1):
-                if seen[j, i] == 0 and excess[j, i] <= 0.0:
+                if seen[j, i] < 0 and excess[j, i] <= 0.0:
                     near = _beside(excess, of, x, y, seen, away, i, j, ring)
                     if near < math.inf:
                         away[j, i] = near
@@ -158,7 +161,7 @@ def raise_cone(
     # The wall's own nodes, as far away as the farthest of those beside them that are free says.
     for j in range(low, high + 1):
         for i in range(left, right + 1):
-            if 0.0 < excess[j, i] < math.inf:
+            if seen[j, i] < 0 and 0.0 < excess[j, i] < math.inf:
                 away[j, i] = _behind(excess, x, y, away, i, j)
     diagonal = math.sqrt(step_x * step_x + step_y * step_y)
     spare = 0.25 * slope * diagonal
@@ -181,6 +184,32 @@ def raise_cone(
 
 
 @device
+def _mark(
+    excess: Floats, floor: Floats, x: Floats, y: Floats, at_x: float, at_y: float, height: float, slope: float,
+    left: int, right: int, low: int, high: int, seen: NDArray[np.int8],
+) -> bool:  # fmt: skip
+    """Set ``seen`` to -1 at nodes over a cone, and `RINGS` + 2 around them; whether there are any."""
+    wide, found = RINGS + 2, False
+    for j in range(low, high + 1):
+        last = -wide - 1
+        for i in range(left, right + 1):
+            cone = height + slope * math.sqrt((x[j, i] - at_x) ** 2 + (y[j, i] - at_y) ** 2)
+            if excess[j, i] < math.inf and floor[j, i] > cone:
+                for k in range(max(i - wide, left, last + 1), min(i + wide, right) + 1):
+                    seen[j, k] = -1
+                last, found = min(i + wide, right), True
+    if not found:
+        return False
+    for i in range(left, right + 1):
+        for j in range(low, high + 1):
+            if seen[j, i] == -1:
+                for k in range(max(j - wide, low), min(j + wide, high) + 1):
+                    if seen[k, i] == 0:
+                        seen[k, i] = -2
+    return True
+
+
+@device
 def _beside(
     excess: Floats, of: Ints, x: Floats, y: Floats, seen: NDArray[np.int8], away: Floats, i: int, j: int, ring: int
 ) -> float:
@@ -192,7 +221,7 @@ def _beside(
             b, a = j + q, i + p
             if (p == 0 and q == 0) or not (0 <= b < ny and 0 <= a < nx):
                 continue
-            if seen[b, a] == 0 or seen[b, a] >= ring:
+            if seen[b, a] <= 0 or seen[b, a] >= ring:
                 continue
             free = False
             for cj in range(max(max(j, b) - 1, 0), min(min(j, b), ny - 2) + 1):

@@ -38,7 +38,9 @@ STEEP = 0.5
 """What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
 LAPS = (0.5, 0.25, 1.0)
 """What part of the gap may be flown in laps near the ends, where a path without them was not good enough."""
-CLOSER = 7
+FAR = 5e-3
+"""Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
+CLOSER, CLOSELY = 7, 3
 """Times that what lies between path and bound is halved: close to the ends a shorter path has less way to climb."""
 
 
@@ -54,7 +56,7 @@ class Below:
         self.bound = straight_bound(problem)
         self.first_s = math.inf
         self.proved_shut = False
-        self.timed_out = False
+        self.timed_out = self.in_space = False
         limits = problem.limits
         top_m = limits.max_amsl_m
         self.top_m = _above_all(problem) if top_m is None else top_m - limits.altitude_error_m
@@ -139,6 +141,17 @@ class Below:
         self.under[why.zone] = False
         return True
 
+    def search_space(self) -> bool:
+        """Look for a path that is no cap's, where the best one climbs much; True if that is the best so far."""
+        p, best = self.problem, self.best
+        if best is None or self.gap <= FAR or not self._in_time() or (p.objective == "length" and not self._steep()):
+            return False
+        from gcsplan.planners.steep import is_steep, steep_path  # few worlds are as high as wide
+
+        self.in_space = is_steep(p, best)
+        found = steep_path(p, best, self._in_time) if self.in_space else None
+        return found is not None and not self.judge.violations(found[0]) and self.take(*found)
+
     def take(self, points: Floats, pinned: Bools | None = None) -> bool:
         """Keep a path if it is the best so far; ``pinned`` (N,) its stops."""
         cost = self.problem.cost(Path(points))
@@ -166,24 +179,29 @@ class Below:
 
     def _tighten_length(self) -> None:
         self.try_below(self.top_m, fine=True)
-        if not self._done() and self._steep():
+        if not self._done() and (self.in_space or self._steep()):
             self._raise_bound(self._search_caps(lambda layer: math.hypot(layer.track_m, self._rise(layer.low_m))))
-        for closely in (False, True):
-            low, high = self.bound, self.cost
-            for k in range(CLOSER):
-                if self._done() or high - low < 2e-5 * low or not self._in_time():
-                    break
-                # No path is shorter than `low`; is any shorter than `middle`?
-                middle = high if k == 0 else 0.5 * (low + high)
-                found = self._bound_shorter(middle, closely)
-                if found < middle:
-                    high = middle
-                low = max(low, min(found, middle))
-                self._raise_bound(low)
-
+        self._halve(self.cost, CLOSER, closely=False)
+        # A closer look tells nothing where much is missing, or where heights are as large as distances.
+        if not self.in_space and self.gap <= FAR:
+            self._halve(self.cost / (1.0 + 0.01 * self.problem.gap_percent), CLOSELY, closely=True)
         for part in LAPS:
             if not self._done() and self._climbs() and self._in_time():
                 self.try_below(self.top_m, fine=True, spare_m=part * (self.cost - self.bound))
+
+    def _halve(self, high: float, times: int, *, closely: bool) -> None:
+        """Raise the bound, up to ``high`` if it can be; what lies between is halved."""
+        low = self.bound
+        for k in range(times):
+            if self._done() or high - low < 2e-5 * low or not self._in_time():
+                break
+            # No path is shorter than `low`; is any shorter than `middle`?
+            middle = high if k == 0 else 0.5 * (low + high)
+            found = self._bound_shorter(middle, closely)
+            if found < middle:
+                high = middle
+            low = max(low, min(found, middle))
+            self._raise_bound(low)
 
     def _steep(self) -> bool:
         """Whether what the best path climbs is more than half of what it lacks: a longer track may climb less."""

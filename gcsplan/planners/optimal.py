@@ -12,7 +12,8 @@ cap itself is what costs: caps are searched from both sides until no height betw
 better (`caps`). Close to the ends a path can be no higher than it has had way to climb, which moves the walls.
 
 **Where that does not hold**, under a maximum AGL, or where the climb limit binds far from the ends, the ways are
-searched on a lattice of reachable altitudes (`band`); the bound of the plane is true there as well.
+searched on a lattice of reachable altitudes (`band`); the bound of the plane is true there as well. In worlds as high
+as they are wide, where paths below one cap are not the shortest, ways are searched in space (`steep`).
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.band import plan_band
-from gcsplan.planners.below import Below
+from gcsplan.planners.below import FAR, Below
 from gcsplan.planners.diagnose import Refusal, check_ends, explain
 from gcsplan.planners.lattice import terminals
 from gcsplan.planners.problem import Problem, Solution
@@ -34,9 +35,9 @@ from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
 
-FAR, MOST_NODES = 5e-3, 1_500_000
-"""Gap, as a part, beyond which the lattice of reachable altitudes is asked for a better path too; on terrain of so many
-nodes at most, for its rasters are as fine as the terrain."""
+MOST_NODES = 1_500_000
+"""The lattice of reachable altitudes is asked for a better path, too, on terrain of so many nodes at most, for its
+rasters are as fine as the terrain."""
 
 TURNS_NOTE = "the lower bound is that of paths with sharp corners: it ignores turn_radius_m"
 BAND_NOTE = "the lower bound knows ground, zones and ceilings, but not the room between min and max AGL"
@@ -82,6 +83,7 @@ def _sharp(problem: Problem, begun: float) -> Solution:
     asked = below.best is None
     if asked:
         below.take(plan_band(problem, tell, begun).path.points)
+    below.search_space()
     below.tighten()
     if not asked and below.gap > FAR and problem.airspace.surface.ground_m.size <= MOST_NODES:
         # Over or under, or a climb on the way: other regimes know more about those.

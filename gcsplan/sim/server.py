@@ -128,12 +128,11 @@ def serve(
     vehicles: Sequence[LoopbackVehicle], listen_url: str, *, on_ready: Callable[[SimServer], None] | None = None
 ) -> None:
     """Serve until interrupted (Ctrl-C); ``on_ready`` is told when the socket is open. Blocks."""
-    with SimServer(vehicles, listen_url) as server:
+    with SimServer(vehicles, listen_url) as server, contextlib.suppress(KeyboardInterrupt):
         if on_ready is not None:
             on_ready(server)
-        with contextlib.suppress(KeyboardInterrupt):
-            while True:
-                time.sleep(3600)
+        while True:
+            time.sleep(3600)
 
 
 def _serve_in_child(vehicles: Sequence[LoopbackVehicle], url: str, speedup: float, pipe: Connection) -> None:
