@@ -14,13 +14,13 @@ from rich.table import Table
 from gcsplan.native import notice
 
 if TYPE_CHECKING:
-    from gcsplan.check.return_verdict import WayHome
     from gcsplan.check.verdict import Verdict
-    from gcsplan.delivery import Delivery
-    from gcsplan.gate import GateTime
     from gcsplan.mavlink.machine import Progress as Transfer
     from gcsplan.pipeline import FleetPlan, Plan, VehiclePlan
     from gcsplan.planners.problem import Progress
+    from gcsplan.steps.delivery import Delivery
+    from gcsplan.steps.gate import GateTime
+    from gcsplan.way_home.verdict import WayHome
 
 PLAIN_WIDTH = 130  # of a log file or a pipe, where nobody says how wide it is
 WIDEST = 100_000

@@ -16,9 +16,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from gcsplan import delivery
-from gcsplan.delivery import Delivery, ProgressCall
 from gcsplan.pipeline import Plan, require_passing
+from gcsplan.steps import delivery
+from gcsplan.steps.delivery import Delivery, ProgressCall
 
 if TYPE_CHECKING:
     from gcsplan.sim.outcome import Rehearsal
@@ -45,7 +45,7 @@ def upload(
 
     One `Delivery` for each vehicle, in the plan's order: ``verified`` is True only where the mission was read back
     and equals what was sent; ``message`` says what went wrong. One vehicle's failure leaves the others standing and
-    raises nothing; `gcsplan.delivery.exit_code` sums them up. Raises UsageError for targets that are none,
+    raises nothing; `gcsplan.steps.delivery.exit_code` sums them up. Raises UsageError for targets that are none,
     CheckFailed, before anything is sent, where a verdict does not pass.
     """
     if isinstance(to, Mapping):

@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 
-from gcsplan import cli, delivery
+from gcsplan import cli
 from gcsplan.mavlink.files import read_mission_file
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.steps import delivery
 from gcsplan.vehicle import Autopilot
 
 CROSSING = Path(__file__).parent / "data" / "crossing.yaml"

@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 import yaml
 
-from gcsplan import cli, delivery
+from gcsplan import cli
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.steps import delivery
 from gcsplan.vehicle import Autopilot
 from tests.test_fleeting import CROSS
 

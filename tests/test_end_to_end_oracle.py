@@ -13,13 +13,13 @@ import pytest
 import yaml
 
 from gcsplan.check.judge import judge
-from gcsplan.checking import check_files
 from gcsplan.mavlink import mission as m
 from gcsplan.mavlink.files import write_waypoints
 from gcsplan.mavlink.mission import Home, Mission
 from gcsplan.mission_file import load_mission
-from gcsplan.outputs import outputs_of
 from gcsplan.pipeline import Plan, plan
+from gcsplan.steps.checking import check_files
+from gcsplan.steps.outputs import outputs_of
 from tests import flown
 
 pytestmark = pytest.mark.slow

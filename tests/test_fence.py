@@ -15,7 +15,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan import cli, delivery, fencing
+from gcsplan import cli
 from gcsplan.check.judge import judge
 from gcsplan.errors import CheckFailed, InputError
 from gcsplan.mavlink import mission as m
@@ -33,6 +33,7 @@ from gcsplan.sim.loopback import loopback_fleet
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.steps import delivery, fencing
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
 from gcsplan.world.path import Path as FlightPath

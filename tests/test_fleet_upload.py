@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from gcsplan import console, delivery
+from gcsplan import console
 from gcsplan.bench import upload_fleet as upload_fleet_bench
-from gcsplan.delivery import Delivery, Job
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, VehicleRefused
 from gcsplan.mavlink import session
 from gcsplan.mavlink.autopilots import altitude_of_cm
@@ -26,6 +25,8 @@ from gcsplan.mavlink.transfer import Timers
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.steps import delivery
+from gcsplan.steps.delivery import Delivery, Job
 from gcsplan.vehicle import Autopilot
 
 COPTER = Autopilot.ARDUCOPTER

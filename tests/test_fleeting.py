@@ -15,11 +15,11 @@ import pytest
 import yaml
 
 from gcsplan.errors import InputError, NoMission
-from gcsplan.fleeting import route_of
 from gcsplan.mavlink import mission as m
 from gcsplan.mission_file import load_mission
-from gcsplan.outputs import outputs_of, summary_of
 from gcsplan.pipeline import Plan, plan
+from gcsplan.steps.fleeting import route_of
+from gcsplan.steps.outputs import outputs_of, summary_of
 
 MISSIONS = Path(__file__).parents[1] / "missions"
 

@@ -10,7 +10,7 @@ import pytest
 from gcsplan import load_mission, plan
 from gcsplan.mavlink.compare import compare, faults
 from gcsplan.mavlink.files import read_mission_file
-from gcsplan.outputs import homes_of, outputs_of
+from gcsplan.steps.outputs import homes_of, outputs_of
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 SLOW = {"fleet-100", "fleet-4", "jacksboro-high"}

@@ -8,11 +8,11 @@ import pytest
 import yaml
 
 from gcsplan.errors import InputError, UsageError
-from gcsplan.gate import SLACK_S, GateTime
 from gcsplan.mavlink import mission as m
 from gcsplan.mission_file import load_mission
-from gcsplan.outputs import summary_of
 from gcsplan.pipeline import Plan, plan
+from gcsplan.steps.gate import SLACK_S, GateTime
+from gcsplan.steps.outputs import summary_of
 from tests.test_fleeting import CROSS
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)

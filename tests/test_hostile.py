@@ -23,13 +23,14 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan import cli, delivery, outputs, pipeline
+from gcsplan import cli, pipeline
 from gcsplan.commands.options import MISBEHAVIOURS
 from gcsplan.mavlink import session
 from gcsplan.mavlink.files import read_mission_file, write_plan
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.steps import delivery, outputs
 from gcsplan.vehicle import Autopilot
 
 CODES = {0, 2, 3, 4, 5, 6, 7}

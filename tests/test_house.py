@@ -18,7 +18,7 @@ TOPS = {path.relative_to(ROOT).with_suffix("").parts[0] for path in MODULES}
 # The rooms from the bottom up. Each may import what stands in its set, and itself; a module in none is a mistake.
 WORLD = {"errors", "native", "world"}
 VEHICLE = WORLD | {"vehicle"}
-ABOVE = VEHICLE | {"swarm", "planners", "fleet", "mavlink", "check"}
+ABOVE = VEHICLE | {"swarm", "planners", "fleet", "mavlink", "check", "way_home"}
 OUTWARD = ABOVE | {"export", "report"}
 EVERYTHING = OUTWARD | {"mission_file", "pipeline", "sim", "rehearsing", "bench", "console", "logs"}
 
@@ -34,6 +34,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "mavlink": VEHICLE,
     # The mission and how each autopilot stores it: never the transfer, never a link.
     "check": VEHICLE | {"mavlink.mission", "mavlink.autopilots"},
+    "way_home": VEHICLE | {"mavlink.mission", "mavlink.autopilots", "check"},
     "export": ABOVE,
     "report": ABOVE | {"export"},
     "mission_file": OUTWARD,
@@ -46,22 +47,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "cli": EVERYTHING,
 }
 
-# Modules beside the rooms that belong to one: the way of the data.
-STEPS = {
-    "outputs",
-    "delivery",
-    "withdrawal",
-    "checking",
-    "fencing",
-    "planning",
-    "fleeting",
-    "detours",
-    "gate",
-    "wings",
-    "wing_ends",
-    "slants",
-}
-# Likewise of the command line: a folder of its commands.
+# Folders that belong to a room: the steps of the way of the data, and the commands of the command line.
+STEPS = {"steps"}
 COMMAND_LINE = {"commands"}
 
 PROJECTION = {"world/frame.py", "world/datum.py", "world/terrain.py"}
@@ -120,7 +107,7 @@ def own(module: str) -> str | None:
     first, *rest = module.split(".")
     if first != "gcsplan" or not rest or rest[0] not in TOPS:
         return None
-    return ".".join(rest[:2]) if rest[0] not in COMMAND_LINE and (ROOT / rest[0]).is_dir() else room(rest[0])
+    return ".".join(rest[:2]) if rest[0] not in COMMAND_LINE | STEPS and (ROOT / rest[0]).is_dir() else room(rest[0])
 
 
 def identifiers(tree: ast.AST) -> Iterator[str]:

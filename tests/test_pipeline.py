@@ -13,8 +13,8 @@ from gcsplan.errors import CheckFailed, InputError, NoMission
 from gcsplan.mavlink import mission as m
 from gcsplan.mavlink.files import read_plan, read_waypoints
 from gcsplan.mission_file import load_mission
-from gcsplan.outputs import outputs_of, summary_of
 from gcsplan.pipeline import Plan, plan, require_passing
+from gcsplan.steps.outputs import outputs_of, summary_of
 from gcsplan.vehicle import Autopilot
 
 DATA = Path(__file__).parent / "data"

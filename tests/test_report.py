@@ -20,7 +20,6 @@ from PIL import Image
 
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
-from gcsplan.check.way_home import way_home
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Rules, separation
 from gcsplan.mavlink.build import Order, build_mission
@@ -34,6 +33,7 @@ from gcsplan.report.samples import distance_m, line_of, passages
 from gcsplan.report.scene_data import triangles, zone_meshes
 from gcsplan.report.subject import Page, Subject
 from gcsplan.vehicle import Energy, Vehicle
+from gcsplan.way_home.everywhere import way_home
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone

@@ -12,7 +12,6 @@ import pytest
 import yaml
 
 import gcsplan
-from gcsplan import delivery
 from gcsplan.errors import CheckFailed, UsageError
 from gcsplan.mission_file import load_mission
 from gcsplan.pipeline import Plan, plan
@@ -20,6 +19,7 @@ from gcsplan.scripting import rehearse, upload
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.steps import delivery
 from gcsplan.vehicle import Autopilot
 from tests.test_fleeting import CROSS
 

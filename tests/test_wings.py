@@ -21,23 +21,23 @@ from gcsplan.check.judge import judge
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tracking import l1_off_m, tracking_m
 from gcsplan.check.verdict import Verdict
-from gcsplan.checking import check_files
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.timing import Course
-from gcsplan.fleeting import route_of
 from gcsplan.mavlink import mission as m
 from gcsplan.mavlink.autopilots import stored
 from gcsplan.mavlink.build import Order
 from gcsplan.mavlink.mission import Home, Mission, MissionItem
 from gcsplan.mavlink.wings import Wing, build_wing, flown_m, parted, tangents_m, thinned
 from gcsplan.mission_file import VehicleRequest, load_mission
-from gcsplan.outputs import outputs_of
 from gcsplan.pipeline import Plan, plan
 from gcsplan.planners.problem import Problem
 from gcsplan.sim.kinematics import Kinematics
 from gcsplan.sim.track import make_track
+from gcsplan.steps.checking import check_files
+from gcsplan.steps.fleeting import route_of
+from gcsplan.steps.outputs import outputs_of
+from gcsplan.steps.wing_ends import starts
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.wing_ends import starts
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone

@@ -52,7 +52,7 @@ CLOSE = 0.01
 """A run has converged when its cost is within this part of its last."""
 
 CODE = (
-    "planners/*.py", "swarm/*.py", "world/*.py", "mission_file/*.py", "pipeline.py", "planning.py", "vehicle.py",
+    "planners/*.py", "swarm/*.py", "world/*.py", "mission_file/*.py", "pipeline.py", "steps/planning.py", "vehicle.py",
     "bench/papers_runs.py", "bench/papers_scenarios.py",
 )  # fmt: skip
 """Source files that decide a run's result, within the package; rather one too many than one too few."""

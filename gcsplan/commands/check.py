@@ -12,8 +12,8 @@ from gcsplan.commands.options import JsonOption, UnjudgedOption
 from gcsplan.errors import InputError, UsageError
 
 if TYPE_CHECKING:
-    from gcsplan.checking import Batch, Checked
     from gcsplan.mission_file.from_options import WorldOptions
+    from gcsplan.steps.checking import Batch, Checked
 
 Number = float | None
 
@@ -82,7 +82,7 @@ def check(
     each altitude frame. Ends with 0 if all pass, 4 on a violation or on anything that could not be judged, 2 on a file
     that cannot be read.
     """
-    from gcsplan import checking, outputs
+    from gcsplan.steps import checking, outputs
 
     given: dict[str, object] = {
         "--dem": dem, "--vertical-datum": vertical_datum, "--geoid-grid": geoid_grid, "--crs": crs,
@@ -118,7 +118,8 @@ def _is_mission(argument: str) -> bool:
 
 
 def _in_mission(files: list[str], given: dict[str, object], returns: bool) -> Batch:
-    from gcsplan import checking, pipeline
+    from gcsplan import pipeline
+    from gcsplan.steps import checking
 
     if given:
         raise UsageError(f"{', '.join(given)}: the mission file says that; leave it out, or give no mission file")
@@ -128,7 +129,7 @@ def _in_mission(files: list[str], given: dict[str, object], returns: bool) -> Ba
 
 
 def _with_options(files: list[str], given: dict[str, object], returns: bool) -> Batch:
-    from gcsplan import checking
+    from gcsplan.steps import checking
     from gcsplan.vehicle import Autopilot
 
     missing = [name for name in ("--dem", "--min-agl") if name not in given]
@@ -195,8 +196,8 @@ def _say_all(batch: Batch) -> None:
 
 
 def _say_findings(batch: Batch, allow_unjudged: bool) -> None:
-    from gcsplan.checking import finding_lines
     from gcsplan.console import say
+    from gcsplan.steps.checking import finding_lines
 
     for c in batch.checked:
         for line in finding_lines(c, allow_unjudged=allow_unjudged):

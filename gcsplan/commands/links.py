@@ -54,9 +54,10 @@ def upload(
     A file goes out only with a passing verdict in --mission's world, or with --unchecked. The file's name (uav1.plan)
     or NAME= says which vehicle of the mission it is for.
     """
-    from gcsplan import checking, delivery, fencing, pipeline
+    from gcsplan import pipeline
     from gcsplan.console import delivery_table, say_notes, say_notes_of, transfer_progress, verdict_table
     from gcsplan.sim.loopback import loopback_fleet
+    from gcsplan.steps import checking, delivery, fencing
 
     if (mission is None) == (not unchecked):
         raise UsageError("give either --mission FILE, in whose world the files are checked, or --unchecked")
@@ -104,8 +105,8 @@ def verify(
     as_json: JsonOption = False,
 ) -> None:
     """Is exactly this file on board? Reads the mission back and compares; sends nothing else."""
-    from gcsplan import delivery
     from gcsplan.console import delivery_table
+    from gcsplan.steps import delivery
 
     done = delivery.verify_file(file, to, sysid)
     if as_json:
@@ -124,8 +125,8 @@ def download(
     as_json: JsonOption = False,
 ) -> None:
     """Read the mission on board into a file."""
-    from gcsplan import delivery
     from gcsplan.console import say
+    from gcsplan.steps import delivery
 
     items = delivery.download_to(source, sysid, out)
     if as_json:
@@ -142,8 +143,8 @@ def clear(
     as_json: JsonOption = False,
 ) -> None:
     """Remove the mission, fence or rally points on board, and read back that nothing is left."""
-    from gcsplan import delivery
     from gcsplan.console import say
+    from gcsplan.steps import delivery
 
     with talking([f"vehicle {sysid}"]):
         delivery.clear(to, sysid, kind, allow_armed=allow_armed)

@@ -22,7 +22,7 @@ from gcsplan.commands.options import (
 from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
-    from gcsplan.delivery import Delivery
+    from gcsplan.steps.delivery import Delivery
 
 
 def plan(
@@ -90,7 +90,7 @@ def plan(
     Without --upload nothing is ever sent. The outputs are written whole or not at all; where no safe mission
     exists, earlier outputs are moved to DIR/previous, so that no old mission is flown by mistake.
     """
-    from gcsplan import delivery, fencing, outputs, pipeline
+    from gcsplan import pipeline
     from gcsplan.console import (
         delivery_table,
         homes_table,
@@ -102,8 +102,9 @@ def plan(
         transfer_progress,
     )
     from gcsplan.export.outdir import add_output, retire_outputs, write_outputs, write_whole
-    from gcsplan.gate import GateTime
     from gcsplan.planners import table
+    from gcsplan.steps import delivery, fencing, outputs
+    from gcsplan.steps.gate import GateTime
 
     directory = Path(mission.stem) if out is None else out
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gcsplan import __version__
-from gcsplan.check.return_verdict import WayHome
 from gcsplan.report import tables
 from gcsplan.report.fleet_view import fleet_html
 from gcsplan.report.home_view import home_html, home_lines
@@ -28,11 +27,12 @@ from gcsplan.report.relief import Relief, extent_of, relief_of
 from gcsplan.report.samples import MOST_SAMPLES, Line, Passage, line_of, passages
 from gcsplan.report.scene_data import exaggeration, zone_meshes
 from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check, page_of_plan
+from gcsplan.way_home.verdict import WayHome
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
-    from gcsplan.delivery import Delivery
     from gcsplan.pipeline import Plan
+    from gcsplan.steps.delivery import Delivery
 
 __all__ = ["render", "render_check", "render_page"]
 

@@ -6,17 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from gcsplan.check.return_verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Separation
 from gcsplan.vehicle import Vehicle
+from gcsplan.way_home.verdict import WayHome
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
-    from gcsplan.delivery import Delivery
     from gcsplan.pipeline import Plan
+    from gcsplan.steps.delivery import Delivery
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class Page:
 
 
 class CheckedFile(Protocol):
-    """What a check of one file gives (`gcsplan.checking.Checked`)."""
+    """What a check of one file gives (`gcsplan.steps.checking.Checked`)."""
 
     @property
     def file(self) -> object: ...

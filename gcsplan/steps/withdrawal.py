@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from gcsplan.errors import GcsplanError, LinkError
 
 if TYPE_CHECKING:
-    from gcsplan.delivery import Delivery
     from gcsplan.mavlink import session
     from gcsplan.mavlink.results import UploadResult
+    from gcsplan.steps.delivery import Delivery
 
 
 def withdrawn(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gcsplan.check.returning import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.verdict import LegFigures
-from gcsplan.planning import VehiclePlan
+from gcsplan.steps.planning import VehiclePlan
 from gcsplan.world.world import World
 
 __all__ = ["circling_m", "slants_of"]

@@ -11,10 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.check.judge import TERRAIN_ERROR_M, judge
-from gcsplan.check.return_verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, InputError, Problem, UsageError
-from gcsplan.fencing import own_fence
 from gcsplan.mavlink.file_items import HAS_PLACE, MissionFileRead
 from gcsplan.mavlink.files import read_mission_file
 from gcsplan.mavlink.mission import (
@@ -30,7 +28,9 @@ from gcsplan.mavlink.mission import (
 from gcsplan.mission_file import MissionFile, VehicleRequest, load_mission
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
 from gcsplan.pipeline import world_of
+from gcsplan.steps.fencing import own_fence
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.way_home.verdict import WayHome
 from gcsplan.world.world import World
 
 SAME_PLACE_M = 1.0
@@ -257,7 +257,7 @@ def _judged(
         notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")
     home: WayHome | None = None
     if returns:
-        from gcsplan.check.way_home import way_home
+        from gcsplan.way_home.everywhere import way_home
 
         rtl_m = request.rtl_rel_home_m
         home = way_home(verdict, vehicle, world, rtl_rel_home_m=rtl_m, terrain_error_m=terrain_error_m)

@@ -19,10 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
-from gcsplan.checking import Checked, split_name
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
-from gcsplan.fencing import not_fenced, upload_fences
 from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.fence import Fence
 from gcsplan.mavlink.files import read_mission_file, write_plan, write_waypoints
@@ -30,8 +28,10 @@ from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, Mission
 from gcsplan.mavlink.url import parse_url
 from gcsplan.mission_file import MissionFile
 from gcsplan.pipeline import Plan
+from gcsplan.steps.checking import Checked, split_name
+from gcsplan.steps.fencing import not_fenced, upload_fences
+from gcsplan.steps.withdrawal import withdrawn
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.withdrawal import withdrawn
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.separation import Conflict, Rules
 from gcsplan.fleet.timing import Route
 from gcsplan.mission_file import VehicleRequest
-from gcsplan.planning import Brief, VehiclePlan, plan_vehicle
+from gcsplan.steps.planning import Brief, VehiclePlan, plan_vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World

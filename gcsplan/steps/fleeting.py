@@ -15,17 +15,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.detours import Detours
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.resolve import resolve
 from gcsplan.fleet.separation import Conflict, Encounter, Place, Rules, Separation, separation
 from gcsplan.fleet.timing import Course, Route, motion_error_m
-from gcsplan.gate import SLACK_S, GateTime, gated
 from gcsplan.mission_file import ArrivalRequest
-from gcsplan.planning import Brief, VehiclePlan, rebuilt
-from gcsplan.slants import circling_m, slants_of
+from gcsplan.steps.detours import Detours
+from gcsplan.steps.gate import SLACK_S, GateTime, gated
+from gcsplan.steps.planning import Brief, VehiclePlan, rebuilt
+from gcsplan.steps.slants import circling_m, slants_of
 from gcsplan.world.world import World
 
 Floats = NDArray[np.float64]

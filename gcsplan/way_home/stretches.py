@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.check.return_rules import Target
-from gcsplan.check.return_study import CLEAR, Study
-from gcsplan.check.return_trail import Trail
-from gcsplan.check.return_verdict import UnsafeStretch
-from gcsplan.check.return_walls import GROUND, MAX_AGL, MAX_AMSL, Walls
 from gcsplan.check.stretch import Place
+from gcsplan.way_home.rules import Target
+from gcsplan.way_home.study import CLEAR, Study
+from gcsplan.way_home.trail import Trail
+from gcsplan.way_home.verdict import UnsafeStretch
+from gcsplan.way_home.walls import GROUND, MAX_AGL, MAX_AMSL, Walls
 
 Ints = NDArray[np.intp]
 ROUND_M = 0.1

@@ -12,13 +12,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.check.return_rules import Returns
-from gcsplan.check.return_trail import Cuts, Trail
-from gcsplan.check.return_walls import Walls
+from gcsplan.way_home.rules import Returns
+from gcsplan.way_home.trail import Cuts, Trail
+from gcsplan.way_home.walls import Walls
 
 Bools = NDArray[np.bool_]
 Judge = Callable[[Cuts, bool], Returns]
-"""``judge(cuts, whole)``: see `return_rules.returns`."""
+"""``judge(cuts, whole)``: see `rules.returns`."""
 
 CLEAR, LEGAL = 0, 1
 FIRST_PIECES = 120_000  # of ground, on which the size of the first parts is laid out

@@ -17,14 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.check.return_rules import Returns, Target, returns
-from gcsplan.check.return_stretches import stretches_of
-from gcsplan.check.return_study import CLEAR, Study
-from gcsplan.check.return_trail import Cuts, Trail
-from gcsplan.check.return_verdict import RallyPoint, UnsafeStretch
-from gcsplan.check.return_walls import Walls
 from gcsplan.mavlink.mission import RELATIVE, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.way_home.rules import Returns, Target, returns
+from gcsplan.way_home.stretches import stretches_of
+from gcsplan.way_home.study import CLEAR, Study
+from gcsplan.way_home.trail import Cuts, Trail
+from gcsplan.way_home.verdict import RallyPoint, UnsafeStretch
+from gcsplan.way_home.walls import Walls
 
 Floats = NDArray[np.float64]
 RALLY_POINT = 5100  # MAV_CMD_NAV_RALLY_POINT

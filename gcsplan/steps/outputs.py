@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 
 from gcsplan import __version__
-from gcsplan.check.return_verdict import WayHome
 from gcsplan.check.verdict import LegFigures, Verdict
-from gcsplan.delivery import Delivery
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import write_kml
 from gcsplan.export.profile import write_profile
@@ -25,6 +23,8 @@ from gcsplan.mavlink.compare import command_name
 from gcsplan.mavlink.files import write_plan, write_waypoints
 from gcsplan.mavlink.mission import MissionItem
 from gcsplan.pipeline import FleetPlan, Plan, VehiclePlan
+from gcsplan.steps.delivery import Delivery
+from gcsplan.way_home.verdict import WayHome
 
 Homes = Mapping[str, WayHome]
 
@@ -41,7 +41,7 @@ def outputs_of(
     ``homes``: vehicle to its way home, where that was judged; it stands in the summary then. ``fences``: vehicle to
     the items of its fence, for the `.plan`; with ``rally`` the rally points that were proposed stand there too.
     """
-    from gcsplan.check.rally import rally_items
+    from gcsplan.way_home.rally import rally_items
 
     tracks = [_track(v) for v in plan.vehicles]
     frame, zones = plan.world.frame, plan.world.airspace.zones
@@ -64,7 +64,7 @@ def outputs_of(
 
 def homes_of(plan: Plan) -> dict[str, WayHome]:
     """The way home of every vehicle, from everywhere on its mission: about a second for 20 km."""
-    from gcsplan.check.way_home import way_home
+    from gcsplan.way_home.everywhere import way_home
 
     return {
         v.name: way_home(

@@ -89,7 +89,7 @@ def plan_vehicle(
     """
     source, vehicle = brief.source, request.vehicle
     if vehicle.turn_radius_m > 0.0:
-        from gcsplan.wings import plan_wing  # few missions have wings
+        from gcsplan.steps.wings import plan_wing  # few missions have wings
 
         return plan_wing(brief, request, progress, searched=searched, limits=limits, options=options)
     asked = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))

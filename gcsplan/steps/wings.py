@@ -25,8 +25,8 @@ from gcsplan.mavlink.build import MARGINS, Margins, Order
 from gcsplan.mavlink.wings import Wing, flown_m, tangents_m, thinned
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Solution
-from gcsplan.planning import Brief, VehiclePlan, built, make_problem, run_planner, unsafe
-from gcsplan.wing_ends import FlightEnd, circle_m, goals, starts
+from gcsplan.steps.planning import Brief, VehiclePlan, built, make_problem, run_planner, unsafe
+from gcsplan.steps.wing_ends import FlightEnd, circle_m, goals, starts
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.world import World

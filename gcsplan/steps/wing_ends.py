@@ -21,7 +21,7 @@ from gcsplan.mavlink.build import MARGINS
 from gcsplan.mavlink.wings import pitch_deg
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Problem
-from gcsplan.planning import lowest_amsl
+from gcsplan.steps.planning import lowest_amsl
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 

@@ -23,10 +23,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.check.return_trail import Cuts, Trail
-from gcsplan.check.return_walls import GROUND, MAX_AGL, MAX_AMSL, Walls
 from gcsplan.check.returning import COPTER_CONE_SLOPE, PLANE_LOITER_RADIUS_M, PX4_CONE_SLOPE, circle_growth
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.way_home.trail import Cuts, Trail
+from gcsplan.way_home.walls import GROUND, MAX_AGL, MAX_AMSL, Walls
 from gcsplan.world import ways
 
 Floats = NDArray[np.float64]

@@ -4,7 +4,7 @@ A mission is a continuum of points, and each has its own straight way home. Part
 every return from a part lies within half its length of the one from its middle; the ground is bounded over the line so
 widened, with the kernels and margins of the exact check (`gcsplan.world.ways`), and zones are held against the region
 that the returns sweep. So nothing is sampled, and what is called safe is safe. What is called unsafe is so but for the
-ends of a stretch (`return_study.SMALLEST_M`), safe gaps shorter than `COARSE_M` (`COARSEST_M` on long missions) within
+ends of a stretch (`study.SMALLEST_M`), safe gaps shorter than `COARSE_M` (`COARSEST_M` on long missions) within
 one, and what the bounds of the ground beside a line cost: the widening times the slope there. The lowest altitude is
 given `LEVEL_M` too high at most beside that.
 """
@@ -20,16 +20,16 @@ from gcsplan.check.arcs import bend
 from gcsplan.check.battery import BatteryHome, battery_home
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import TERRAIN_ERROR_M
-from gcsplan.check.rally import propose
-from gcsplan.check.return_rules import RULES, Returns, Target, returns
-from gcsplan.check.return_stretches import rel_home, stretches_of
-from gcsplan.check.return_study import CLEAR, LEGAL, Study, sizes_m
-from gcsplan.check.return_trail import Cuts, Trail, trail_of
-from gcsplan.check.return_verdict import ProfilePoint, RallyPoint, UnsafeStretch, WayHome
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.autopilots import manner
 from gcsplan.vehicle import Vehicle
+from gcsplan.way_home.rally import propose
+from gcsplan.way_home.rules import RULES, Returns, Target, returns
+from gcsplan.way_home.stretches import rel_home, stretches_of
+from gcsplan.way_home.study import CLEAR, LEGAL, Study, sizes_m
+from gcsplan.way_home.trail import Cuts, Trail, trail_of
+from gcsplan.way_home.verdict import ProfilePoint, RallyPoint, UnsafeStretch, WayHome
 from gcsplan.world.world import World
 
 __all__ = ["RallyPoint", "UnsafeStretch", "WayHome", "way_home"]

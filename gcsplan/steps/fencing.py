@@ -26,10 +26,10 @@ from gcsplan.world.world import World
 from gcsplan.world.zones import Circle
 
 if TYPE_CHECKING:
-    from gcsplan.delivery import Job
     from gcsplan.mavlink import session
     from gcsplan.mavlink.link import Link
     from gcsplan.mavlink.results import UploadResult
+    from gcsplan.steps.delivery import Job
 
 ROUNDING_M = 0.15
 
