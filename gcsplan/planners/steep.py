@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from gcsplan.planners.polish import polished
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.slide import FIXED, FREE, UPRIGHT, cheapest, clear, cost_of, drawn
 
@@ -94,7 +93,7 @@ def steep_path(problem: Problem, known: Floats, in_time: Callable[[], bool]) -> 
     if cost_of(problem, points) > HOPE * best:
         return None
     points, kinds = drawn(problem, points, kinds, min(x.step_m for x in lattices), in_time)
-    return polished(problem, points, kinds != FREE) if cost_of(problem, points) < best else None
+    return (points, kinds != FREE) if cost_of(problem, points) < best else None
 
 
 def _stops(problem: Problem, points: Floats) -> Floats:
