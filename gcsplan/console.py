@@ -300,3 +300,11 @@ def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
 def say(message: str) -> None:
     """One line."""
     console.print(message, markup=False)
+
+
+def rows_table(title: str, rows: Sequence[Mapping[str, str]], *, left: Sequence[str] = ("vehicle",)) -> None:
+    """Rows of words by the names of their columns; numbers stand to the right, ``left`` to the left."""
+    table = _table(title, [(name, name not in left) for name in rows[0]])
+    for row in rows:
+        table.add_row(*row.values())
+    _print(table)

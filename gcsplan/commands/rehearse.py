@@ -101,19 +101,11 @@ def rehearse(
 
 def _show(planned: Plan, result: Rehearsal) -> None:
     """A row for each vehicle."""
-    from rich.table import Table
-
-    from gcsplan.console import console
+    from gcsplan.console import rows_table
 
     by = "built-in simulator" if result.simulator == "gcsplan" else "ArduCopter SITL"
     runs = f", {result.runs} runs" if result.runs > 1 else ""
-    table = Table(title=f"rehearsal of {planned.source.name}, {by}{runs}", title_justify="left")
-    rows = result.rows()
-    for name in rows[0]:
-        table.add_column(name, justify="left" if name == "vehicle" else "right")
-    for row in rows:
-        table.add_row(*row.values())
-    console.print(table)
+    rows_table(f"rehearsal of {planned.source.name}  {by}{runs}", result.rows())
 
 
 def _ending(result: Rehearsal) -> list[str]:
