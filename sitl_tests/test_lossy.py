@@ -17,6 +17,8 @@ from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission, a_vehicle
 from sitl_tests.relay import LossyRelay
 
+pytestmark = pytest.mark.slow
+
 COPTER, PX4 = Autopilot.ARDUCOPTER, Autopilot.PX4
 SPEEDUP = 30.0
 # A verdict is not what these tests are about: the missions are sent as they are.

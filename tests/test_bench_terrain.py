@@ -20,6 +20,8 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.path import Path as Flight
 from gcsplan.world.zones import Circle
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def main() -> list[NamedProblem]:

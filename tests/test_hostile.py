@@ -33,6 +33,8 @@ from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.steps import delivery, outputs
 from gcsplan.vehicle import Autopilot
 
+pytestmark = pytest.mark.slow
+
 CODES = {0, 2, 3, 4, 5, 6, 7}
 MISSION = """
 version: 1

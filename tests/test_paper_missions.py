@@ -134,6 +134,7 @@ def test_fleets_have_their_order() -> None:
     assert {(e - 250, n - 250) for e, n in goals} == {(-20, -20), (-20, 20), (20, -20), (20, 20)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(NAMES))
 def test_every_scenario_is_planned_by_its_own_system_or_refused(name: str) -> None:
     """A short run; what comes out passes the exact check, whatever the swarm made of it."""

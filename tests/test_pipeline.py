@@ -79,6 +79,7 @@ def test_every_end_is_planned(end: str) -> None:
     assert commands(done)[-1] == {"land": m.LAND, "loiter": m.LOITER_UNLIM, "none": m.WAYPOINT}[end]
 
 
+@pytest.mark.slow
 def test_a_return_that_meets_the_hills_is_no_mission_and_a_higher_one_is() -> None:
     with pytest.raises(NoMission, match="rtl"):
         planned({"end": "rtl", "rtl_rel_home_m": 70}, no_fly=[])

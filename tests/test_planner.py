@@ -106,6 +106,7 @@ def test_wall_is_passed_through_its_gap() -> None:
     assert 1400.0 < crossing < 1600.0
 
 
+@pytest.mark.slow
 def test_ridge_under_a_ceiling_is_passed_where_it_is_low_enough() -> None:
     s = solve(problem(ground(ridge), limits=replace(LOW, max_amsl_m=80.0)))
     crossing = np.interp(1000.0, s.path.points[:, 0], s.path.points[:, 1])
@@ -230,6 +231,7 @@ def test_ssgwo_table_3_is_solved_within_one_percent(unlimited: bool, optimum_m: 
     assert optimum_m - 0.01 <= s.path.length_m <= 1.01 * optimum_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
     _is_solved(random_mission(seed))

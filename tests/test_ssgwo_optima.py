@@ -24,6 +24,8 @@ from tests.optima_polish import PATIENT, cost_of, is_feasible
 from tests.optima_search import best_path
 from tests.planner_worlds import faults, ground
 
+pytestmark = pytest.mark.slow
+
 # East, north, radius, top. The middles that Table 7 prints would have its cylinders float half a metre or a metre over
 # the ground: here they stand on it, as high as printed ("7"), or up to where they would reach ("7 raised").
 TABLES = {

@@ -684,6 +684,7 @@ def trouble_of(seed: int) -> dict[str, object]:
     ])  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunk", range(CHUNKS))
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
 def test_in_any_weather_nothing_is_falsely_verified_and_nothing_hangs(autopilot: Autopilot, chunk: int) -> None:
