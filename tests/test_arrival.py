@@ -385,7 +385,7 @@ def test_an_interval_works_exactly_where_its_range_says(windows: list[tuple[floa
     for interval in np.linspace(0.05, 120, 60):
         begins = [float((fast - turn * interval).max())] if fleet else [float(fast[0])]
         works = any(
-            (fast <= b + turn * interval + 1e-9).all() and (latest >= b + turn * interval).all() for b in begins
+            (fast <= b + turn * interval + 1e-9).all() and (latest >= b + turn * interval - 1e-9).all() for b in begins
         )
         if abs(interval - low) > 1e-6 and abs(interval - high) > 1e-6:
             assert works == (low <= interval <= high)
