@@ -24,6 +24,9 @@ from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 if TYPE_CHECKING:
     from gcsplan.steps.delivery import Delivery
 
+SHOWN = 15
+"""Names of written files that are told; a fleet has hundreds."""
+
 
 def plan(
     mission: MissionArgument,
@@ -165,7 +168,8 @@ def plan(
         plan_table(planned)
         homes_table(homes)
         say_notes_of(fence_notes)
-        say(f"written to {directory}{os.sep}: {', '.join(files)}")
+        shown = [*list(files)[:SHOWN], f"… and {len(files) - SHOWN} more"] if len(files) > SHOWN + 1 else list(files)
+        say(f"written to {directory}{os.sep}: {', '.join(shown)}")
     deliveries: list[Delivery] = []
     if targets:
         from gcsplan.sim.loopback import loopback_fleet
