@@ -214,4 +214,5 @@ def _report(batch: Batch, file: Path) -> None:
     worlds: list[Checked] = list({id(c.world): c for c in batch.checked}.values())
     if len(worlds) != 1:
         raise InputError("a report shows files of one area; none could be judged, or they lie too far apart")
-    write_whole(file, render_check(batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=batch.notes))
+    notes = [*batch.notes, *(f"not read, and not on this page: {error}" for _, error in batch.unreadable)]
+    write_whole(file, render_check(batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=notes))

@@ -84,7 +84,7 @@ class Mesh:
         middle = (0.25 * (z[:-1, :-1] + z[:-1, 1:] + z[1:, :-1] + z[1:, 1:]) for z in (x, y))
         across = np.hypot(x[1:, 1:] - x[:-1, :-1], y[1:, 1:] - y[:-1, :-1])
         other = np.hypot(x[1:, :-1] - x[:-1, 1:], y[1:, :-1] - y[:-1, 1:])
-        return np.asarray((np.hypot(*middle) - 0.5 * np.maximum(across, other)).ravel())
+        return np.asarray((np.hypot(*middle) - 0.5 * np.maximum(across, other) - BENT_M).ravel())
 
     def pieces_at(self, place: tuple[float, float]) -> list[int]:
         """The free pieces that a place lies in, or next to where its own is not free."""

@@ -147,7 +147,7 @@ def _numbers(x: Floats, clear: Floats, legal: Floats, amsl: Floats, level: float
 
 def _stretches(subject: Subject, home: WayHome) -> str:
     rows, marks = [], []
-    for kind, stretches in (("unsafe", home.unsafe), ("min AGL broken", home.irregular)):
+    for kind, stretches in (("unsafe", home.unsafe), ("limits broken", home.irregular)):
         for s in stretches:
             rows.append(
                 (

@@ -75,23 +75,7 @@ def _polygon(corners: Floats, unit: Floats, reach: float, length: float) -> list
     """Parts of the line from the origin along ``unit`` within ``reach`` of a polygon, its inside included."""
     along = corners @ unit
     aside = corners[:, 1] * unit[0] - corners[:, 0] * unit[1]
-    along1, aside1 = np.roll(along, -1), np.roll(aside, -1)
-    low, high = np.full(len(along), np.inf), np.full(len(along), -np.inf)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # An edge grown by a disc is a strip and two discs; the hull of the line's parts in them is exact.
-        for a, o in ((along, aside), (along1, aside1)):
-            half = np.sqrt(reach * reach - o * o)
-            low, high = np.fmin(low, a - half), np.fmax(high, a + half)
-        edge = np.hypot(along1 - along, aside1 - aside)
-        for side in (-reach, reach):
-            a = along - side * (aside1 - aside) / edge
-            o = aside + side * (along1 - along) / edge
-            w = -o / (aside1 - aside)
-            cut = np.where((w >= 0.0) & (w <= 1.0), a + w * (along1 - along), np.nan)
-            low, high = np.fmin(low, cut), np.fmax(high, cut)
-        crossing = np.where(
-            (aside > 0.0) != (aside1 > 0.0), along - aside * (along1 - along) / (aside1 - aside), np.nan
-        )
+    low, high, crossing = grown_edges(along, aside, reach)
     keep = (low <= high) & (high >= 0.0) & (low <= length)
     marks = sorted(zip(low[keep].clip(0.0, length).tolist(), high[keep].clip(0.0, length).tolist(), strict=True))
     crossings = np.sort(crossing[~np.isnan(crossing)])
@@ -134,3 +118,29 @@ def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, 
         half = (high - low) / 16
         low, high = max(at - half, 0.0), min(at + half, 1.0)
     return best, at
+
+
+def grown_edges(along: Floats, aside: Floats, reach: float) -> tuple[Floats, Floats, Floats]:
+    """Of each edge of a polygon, grown by ``reach``: the part of a line in it, and where the line crosses the edge.
+
+    ``along``, ``aside`` (…, N) are the corners' places along and beside the line. Begins above ends (inf, -inf) where
+    no part is met, and NaN where nothing is crossed.
+    """
+    along1, aside1 = np.roll(along, -1, axis=-1), np.roll(aside, -1, axis=-1)
+    low, high = np.full(along.shape, np.inf), np.full(along.shape, -np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # An edge grown by a disc is a strip and two discs; the hull of the line's parts in them is exact.
+        for a, o in ((along, aside), (along1, aside1)):
+            half = np.sqrt(reach * reach - o * o)
+            low, high = np.fmin(low, a - half), np.fmax(high, a + half)
+        edge = np.hypot(along1 - along, aside1 - aside)
+        for side in (-reach, reach):
+            a = along - side * (aside1 - aside) / edge
+            o = aside + side * (along1 - along) / edge
+            w = -o / (aside1 - aside)
+            cut = np.where((w >= 0.0) & (w <= 1.0), a + w * (along1 - along), np.nan)
+            low, high = np.fmin(low, cut), np.fmax(high, cut)
+        crossing = np.where(
+            (aside > 0.0) != (aside1 > 0.0), along - aside * (along1 - along) / (aside1 - aside), np.nan
+        )
+    return low, high, crossing

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gcsplan.world import hulls
 from gcsplan.world._compiled import pieces
+from gcsplan.world._shapes import grown_edges
 from gcsplan.world._shared import (
     BAND_HIGH,
     BAND_LOW,
@@ -260,21 +261,7 @@ def _in_polygon(corners: Floats, starts: Floats, unit: Floats, reach: float, len
     away = corners[None] - starts[:, None]
     along = (away * unit[:, None]).sum(axis=-1)
     aside = away[..., 1] * unit[:, None, 0] - away[..., 0] * unit[:, None, 1]
-    along1, aside1 = np.roll(along, -1, axis=1), np.roll(aside, -1, axis=1)
-    first, last = np.full(along.shape, np.inf), np.full(along.shape, -np.inf)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # An edge grown by a disc is a strip and two discs.
-        for a, o in ((along, aside), (along1, aside1)):
-            half = np.sqrt(reach * reach - o * o)
-            first, last = np.fmin(first, a - half), np.fmax(last, a + half)
-        edge = np.hypot(along1 - along, aside1 - aside)
-        for side in (-reach, reach):
-            a = along - side * (aside1 - aside) / edge
-            o = aside + side * (along1 - along) / edge
-            w = -o / (aside1 - aside)
-            cut = np.where((w >= 0.0) & (w <= 1.0), a + w * (along1 - along), np.nan)
-            first, last = np.fmin(first, cut), np.fmax(last, cut)
-        crossing = np.where((aside > 0.0) != (aside1 > 0.0), along - aside * (along1 - along) / (aside1 - aside), -1.0)
+    first, last, crossing = grown_edges(along, aside, reach)
     meets = (last >= 0.0) & (first <= length[:, None])
     s0 = np.where(meets, np.maximum(first, 0.0), np.inf).min(axis=1)
     s1 = np.where(meets, np.minimum(last, length[:, None]), -np.inf).max(axis=1)
