@@ -3,6 +3,10 @@
 A search node is an interval on a portal together with the last corner of the path, its *root*: the whole interval is
 seen from there. Pushed through the piece behind, it becomes an interval for each portal that it sees; where an end
 of the interval is a corner of a wall, the path may turn there, and what lies beyond in the piece is reached from it.
+
+Two things keep their number down, and take no shortest path away. Intervals of one root that meet on a portal are made
+one again before they are pushed on; so that they meet, nodes are taken in bands of about equal promise, and in a band by
+how near they are. And an interval is dropped where another root reaches all of it for less.
 """
 
 from __future__ import annotations
@@ -20,11 +24,17 @@ Ints = NDArray[np.int32]
 Names = NDArray[np.int64]
 
 ROOT_X, ROOT_Y, COST, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, AHEAD = range(8)
-PIECE, CAME, PARENT, TURNS = range(4)
+PIECE, CAME, PARENT, TURNS, PORTAL, NEXT = range(6)
 LEFT, RIGHT, ROOT = range(3)
 
 SAME_M = 1e-6
 """Places nearer than this are one."""
+BAND = 0.005
+"""How wide a band of promise is, as a part of the straight way to the goal."""
+BANDS = 1e8
+"""In metres more than any way; what it leaves of a number's precision orders the nodes of a band."""
+GONE = -2
+"""The piece of a node that needs not be looked at any more."""
 MOST_TURNS = 8
 """No more pieces than this meet at one place; who passes more of them turns in a circle around it."""
 
@@ -98,20 +108,90 @@ def _off(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> fl
     return math.sqrt((ax + t * ex - px) ** 2 + (ay + t * ey - py) ** 2)
 
 
+@device
+def _place(ends: Floats, p: int, x: float, y: float) -> float:
+    """Where on a portal a place is, as a part of it."""
+    ex, ey = ends[p, 2] - ends[p, 0], ends[p, 3] - ends[p, 1]
+    square = ex * ex + ey * ey
+    if square <= SAME_M * SAME_M:
+        return 0.0
+    t = ((x - ends[p, 0]) * ex + (y - ends[p, 1]) * ey) / square
+    return 0.0 if t < 1e-9 else 1.0 if t > 1.0 - 1e-9 else t
+
+
+@device
+def _join(node: Floats, link: Ints, name: Names, first: Ints, list_of: int, current: int) -> bool:
+    """Make the interval of a node one with those on its portal that touch it and have the same root; whether any do.
+
+    Those are gone; so are from the list (numbers from 1) those that have been looked at.
+    """
+    joined, again = False, True
+    while again:
+        again = False
+        before, k = -1, first[list_of] - 1
+        while k >= 0:
+            after = link[k, NEXT]
+            drop = link[k, PIECE] == GONE
+            if not drop and k != current and name[k, ROOT] == name[current, ROOT]:
+                same = abs(node[k, COST] - node[current, COST]) < SAME_M
+                for side in range(2):
+                    # Its right end is this one's left end, or the other way round.
+                    mine, its = (LEFT_X, RIGHT_X) if side == 0 else (RIGHT_X, LEFT_X)
+                    dx, dy = node[k, its] - node[current, mine], node[k, its + 1] - node[current, mine + 1]
+                    if same and not drop and dx * dx + dy * dy < SAME_M * SAME_M:
+                        node[current, mine], node[current, mine + 1] = node[k, mine], node[k, mine + 1]
+                        name[current, side] = name[k, side]
+                        link[k, PIECE] = GONE
+                        drop = joined = again = True
+            if drop or k == current:
+                if before < 0:
+                    first[list_of] = after + 1
+                else:
+                    link[before, NEXT] = after
+            else:
+                before = k
+            k = after
+    return joined
+
+
+@device
+def _beaten(
+    node: Floats, other: int, rx: float, ry: float, cost: float, off: float, ax: float, ay: float, bx: float, by: float
+) -> bool:
+    """Whether another node ``other``, whose interval holds this one from a to b, reaches every place of it for less.
+
+    ``off``: how far the root is from the interval at least.
+    """
+    ox, oy, known = node[other, ROOT_X], node[other, ROOT_Y], node[other, COST]
+    to_a = known + math.sqrt((ax - ox) ** 2 + (ay - oy) ** 2)
+    to_b = known + math.sqrt((bx - ox) ** 2 + (by - oy) ** 2)
+    if max(to_a, to_b) < cost + off - SAME_M:
+        return True
+    if known < cost:
+        return known + math.sqrt((rx - ox) ** 2 + (ry - oy) ** 2) < cost - SAME_M
+    # The places that are nearer to one of two points by some length are convex: the ends tell of all between.
+    return (
+        to_a < cost + math.sqrt((ax - rx) ** 2 + (ay - ry) ** 2) - SAME_M
+        and to_b < cost + math.sqrt((bx - rx) ** 2 + (by - ry) ** 2) - SAME_M
+    )
+
+
 @kernel(
-    "i4[] f8[,] i8[,] i4[,] i4[] f8[] i8[] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[] f8[,] i4[,] i8[,] f8[] i4[] f8[,]"
+    "i4[] f8[,] i8[,] i4[,] i4[] f8[] i8[] i4[] i4[] f8[,] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[]"
+    " f8[,] i4[,] i8[,] f8[] i4[] f8[,]"
 )
 def search(
-    start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats, origin: Names,
-    sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float, slack: float, most: int,
-    remaining: Floats, entered: Floats,
+    start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats, origin: Names, first: Ints,
+    widest: Ints, span: Floats, sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float,
+    slack: float, most: int, remaining: Floats, entered: Floats,
     node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats,
 ) -> int:  # fmt: skip
     """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
 
     ``order`` (start[p] : start[p + 1]) lists the portals of piece p. ``sources_at`` (K, 3) x, y, cost so far, each in
-    piece ``sources_piece`` (K,); a goal in any of ``goal_piece``. ``best``, ``origin`` (names,) zeros; ``node``
-    (room, 8), ``link`` (room, 4), ``name`` (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining``
+    piece ``sources_piece`` (K,); a goal in any of ``goal_piece``. ``best``, ``origin`` (names,),
+    ``first`` (2 * portals,) and ``widest`` (portals,) zeros; ``span`` (portals, 2); ``node`` (room, 8), ``link``
+    (room, 6), ``name`` (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining``
     (pieces,): no way on from a piece's entrance is shorter. ``slack`` >= 0: go on after the goal is reached, as far as
     that much (as a part of the length) beyond it; ``entered`` (pieces,), inf, receives the least cost at each
     piece's entrance; both may be empty. Returns the number of corners, ends included, with ``out[0, 2]`` the source's
@@ -123,8 +203,10 @@ def search(
     count = size = opened = 0
     reached = -1
     flood, guided = len(entered) > 0, len(remaining) > 0
+    far, shortest = limit, np.inf
+    band = max(BAND * math.sqrt((gx - sources_at[0, 0]) ** 2 + (gy - sources_at[0, 1]) ** 2), 1e-3)
     # What a node pushes is listed here as from, to and root; sources push all portals of their piece.
-    current = -1
+    current, key = -1, 0.0
     source = 0
     while True:
         if source < len(sources_piece):
@@ -136,22 +218,33 @@ def search(
             parent, turns = np.int64(-1), 0
             source += 1
         else:
-            if size == 0 or heap[0] >= limit:
+            if size == 0 or math.floor(heap[0] / BANDS) * band >= limit:
                 break
-            current = ids[0]
+            current, key = ids[0], heap[0]
             size = _pop(heap, ids, size)
             piece, came = link[current, PIECE], link[current, CAME]
-            if piece < 0:
-                if reached < 0:
-                    reached = current
-                    limit = min(limit, (node[current, COST] + node[current, AHEAD]) * (1.0 + slack))
-                if slack < 0.0:
-                    break
+            if piece == GONE:
+                continue
+            link[current, PIECE] = GONE
+            if node[current, COST] + node[current, AHEAD] >= limit:
                 continue
             rx, ry, cost = node[current, ROOT_X], node[current, ROOT_Y], node[current, COST]
             root = name[current, ROOT]
             if root >= 0 and cost + 1.0 > best[root] + SAME_M:
                 continue
+            p = link[current, PORTAL]
+            if _join(node, link, name, first, 2 * p + (1 if joins[p, 1] == piece else 0), current):
+                s0 = _place(ends, p, node[current, RIGHT_X], node[current, RIGHT_Y])
+                s1 = _place(ends, p, node[current, LEFT_X], node[current, LEFT_Y])
+                s0, s1 = min(s0, s1), max(s0, s1)
+                if s1 - s0 > span[p, 1] - span[p, 0]:
+                    widest[p], span[p, 0], span[p, 1] = current + 1, s0, s1
+            other = widest[p] - 1
+            if other != current and span[p, 0] == 0.0 and span[p, 1] == 1.0:
+                ax, ay = node[current, RIGHT_X], node[current, RIGHT_Y]
+                bx, by = node[current, LEFT_X], node[current, LEFT_Y]
+                if _beaten(node, other, rx, ry, cost, _off(rx, ry, ax, ay, bx, by), ax, ay, bx, by):
+                    continue
             lx, ly, qx, qy = (
                 node[current, LEFT_X],
                 node[current, LEFT_Y],
@@ -163,7 +256,7 @@ def search(
             all_round = False
             opened += 1
             if opened > most:
-                out[0, 0] = node[current, COST] + node[current, AHEAD]
+                out[0, 0] = math.floor(key / BANDS) * band
                 return -2
         width_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
         width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
@@ -180,14 +273,16 @@ def search(
                 is_goal = True
         for at in range(start[piece] - (1 if is_goal else 0), start[piece + 1]):
             to_goal = at < start[piece]
-            behind = -1
+            behind = p = -1
+            forward = True
             if to_goal:
                 ax, ay, bx, by = gx, gy, gx, gy
                 va = vb = np.int64(-1)
             else:
                 p = order[at]
                 # From its right end a to its left end b, as seen from inside.
-                if joins[p, 0] == piece:
+                forward = joins[p, 0] == piece
+                if forward:
                     behind = joins[p, 1]
                     ax, ay, bx, by = ends[p, 0], ends[p, 1], ends[p, 2], ends[p, 3]
                     va, vb = names[p, 0], names[p, 1]
@@ -237,6 +332,7 @@ def search(
                 # 0: what is seen; 1: right of it, round the right end; 2: left of it, round the left end.
                 x0, y0, x1, y1, n0, n1 = ax, ay, bx, by, va, vb
                 nx, ny, ncost, nroot = rx, ry, cost, root
+                s0, s1 = 0.0, 1.0
                 if along >= 0:
                     if part > 0:
                         continue
@@ -247,6 +343,7 @@ def search(
                 elif part == 0:
                     if t0 > t1:
                         continue
+                    s0, s1 = t0, t1
                     if t0 > 0.0:
                         x0, y0, n0 = ax + t0 * (bx - ax), ay + t0 * (by - ay), np.int64(-1)
                     if t1 < 1.0:
@@ -255,12 +352,14 @@ def search(
                     if all_round or t0 == 0.0 or right < 0:
                         continue
                     nx, ny, ncost, nroot = qx, qy, cost + width_r, right
+                    s1 = min(t0, 1.0)
                     if t0 < 1.0:
                         x1, y1, n1 = ax + t0 * (bx - ax), ay + t0 * (by - ay), np.int64(-1)
                 else:
                     if all_round or t1 == 1.0 or left < 0:
                         continue
                     nx, ny, ncost, nroot = lx, ly, cost + width_l, left
+                    s0 = max(t1, 0.0)
                     if t1 > 0.0:
                         x0, y0, n0 = ax + t1 * (bx - ax), ay + t1 * (by - ay), np.int64(-1)
                 if nroot >= 0 and nroot == root:
@@ -276,13 +375,26 @@ def search(
                 if to_goal:
                     ahead = math.sqrt((gx - nx) ** 2 + (gy - ny) ** 2)
                 else:
-                    ahead = _ahead(nx, ny, x1, y1, x0, y0, gx, gy)
-                    if guided or flood:
-                        off = _off(nx, ny, x0, y0, x1, y1)
-                        if guided:
-                            ahead = max(ahead, off + remaining[behind])
+                    off = _off(nx, ny, x0, y0, x1, y1)
+                    ahead = off + remaining[behind] if guided else 0.0
+                    if ncost + ahead >= limit:
+                        continue
+                    ahead = max(ahead, _ahead(nx, ny, x1, y1, x0, y0, gx, gy))
                 if ncost + ahead >= limit:
                     continue
+                if not to_goal:
+                    if not forward:
+                        s0, s1 = 1.0 - s1, 1.0 - s0
+                    if widest[p] > 0 and span[p, 0] <= s0 and s1 <= span[p, 1]:
+                        if _beaten(node, widest[p] - 1, nx, ny, ncost, off, x0, y0, x1, y1):
+                            continue
+                        # As wide, and cheaper at its ends: what comes later is held to this one.
+                        other = widest[p] - 1
+                        wider = s0 == span[p, 0] and s1 == span[p, 1] and ncost + off < node[other, COST]
+                    else:
+                        wider = widest[p] == 0 or s1 - s0 > span[p, 1] - span[p, 0]
+                    if wider and count < room:
+                        widest[p], span[p, 0], span[p, 1] = count + 1, s0, s1
                 if flood and not to_goal:
                     entered[behind] = min(entered[behind], ncost + off)
                 if count >= room:
@@ -294,7 +406,16 @@ def search(
                 link[count, PIECE], link[count, CAME] = -1 if to_goal else behind, piece
                 link[count, PARENT], link[count, TURNS] = parent, turns
                 name[count, LEFT], name[count, RIGHT], name[count, ROOT] = n1, n0, nroot
-                size = _push(heap, ids, size, ncost + ahead, count)
+                if to_goal:
+                    if ncost + ahead < shortest:
+                        reached, shortest = count, ncost + ahead
+                        limit = min(far, shortest * (1.0 + max(slack, 0.0)))
+                else:
+                    list_of = 2 * p + (1 if joins[p, 1] == behind else 0)
+                    link[count, PORTAL], link[count, NEXT] = p, first[list_of] - 1
+                    first[list_of] = count + 1
+                    near = min(ncost + off, 0.99 * BANDS)
+                    size = _push(heap, ids, size, math.floor((ncost + ahead) / band) * BANDS + near, count)
                 count += 1
     if reached < 0:
         return 0

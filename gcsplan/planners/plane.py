@@ -148,10 +148,13 @@ class Mesh:
         while True:
             names = 8 * (self.excess.size + 1)
             best, origin = np.zeros(names), np.zeros(names, np.int64)  # cost nothing until they are touched
-            node, link, name = np.empty((room, 8)), np.empty((room, 4), np.int32), np.empty((room, 3), np.int64)
+            node, link, name = np.empty((room, 8)), np.empty((room, 6), np.int32), np.empty((room, 3), np.int64)
+            portals = len(self.joins)
+            first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
             out = np.empty((1 << 14, 3))
             n = search(
-                self.start, self.ends, self.names, self.joins, self.order, best, origin, sources,
+                self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span,
+                sources,
                 np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32), limit_m, slack,
                 MOST_OPENED, remaining, entered,
                 node, link, name, np.empty(room), np.empty(room, np.int32), out,
