@@ -4,9 +4,9 @@ A search node is an interval on a portal together with the last corner of the pa
 seen from there. Pushed through the piece behind, it becomes an interval for each portal that it sees; where an end
 of the interval is a corner of a wall, the path may turn there, and what lies beyond in the piece is reached from it.
 
-Two things keep their number down, and take no shortest path away. Intervals of one root that meet on a portal are made
-one again before they are pushed on; so that they meet, nodes are taken in bands of about equal promise, and in a band by
-how near they are. And an interval is dropped where another root reaches all of it for less.
+Two things keep their number down, and take no shortest path away. Intervals of one root that meet on a portal are
+made one again before they are pushed on; so that they meet, nodes are taken in bands of about equal promise, and in a
+band by how near they are. And an interval is dropped where another root reaches all of it for less.
 """
 
 from __future__ import annotations
@@ -16,164 +16,47 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.compiled import device, kernel
+from gcsplan.planners._intervals import (
+    AHEAD,
+    CAME,
+    COST,
+    GONE,
+    LEFT,
+    LEFT_X,
+    LEFT_Y,
+    NEXT,
+    PARENT,
+    PIECE,
+    PORTAL,
+    RIGHT,
+    RIGHT_X,
+    RIGHT_Y,
+    ROOT,
+    ROOT_X,
+    ROOT_Y,
+    SAME_M,
+    TURNS,
+    ahead_of,
+    beaten,
+    join,
+    off_of,
+    place_on,
+    pop,
+    push,
+)
+from gcsplan.planners.compiled import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 Names = NDArray[np.int64]
 
-ROOT_X, ROOT_Y, COST, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, AHEAD = range(8)
-PIECE, CAME, PARENT, TURNS, PORTAL, NEXT = range(6)
-LEFT, RIGHT, ROOT = range(3)
-
-SAME_M = 1e-6
-"""Places nearer than this are one."""
 BAND = 0.005
 """How wide a band of promise is, as a part of the straight way to the goal."""
 BANDS = 1e8
 """In metres more than any way; what it leaves of a number's precision orders the nodes of a band."""
-GONE = -2
-"""The piece of a node that needs not be looked at any more."""
 MOST_TURNS = 8
 """No more pieces than this meet at one place; who passes more of them turns in a circle around it."""
-
-
-@device
-def _push(heap: Floats, ids: Ints, size: int, key: float, item: int) -> int:
-    k = size
-    while k > 0:
-        up = (k - 1) >> 1
-        if heap[up] <= key:
-            break
-        heap[k], ids[k] = heap[up], ids[up]
-        k = up
-    heap[k], ids[k] = key, item
-    return size + 1
-
-
-@device
-def _pop(heap: Floats, ids: Ints, size: int) -> int:
-    size -= 1
-    key, item = heap[size], ids[size]
-    k = 0
-    while True:
-        down = 2 * k + 1
-        if down >= size:
-            break
-        if down + 1 < size and heap[down + 1] < heap[down]:
-            down += 1
-        if key <= heap[down]:
-            break
-        heap[k], ids[k] = heap[down], ids[down]
-        k = down
-    heap[k], ids[k] = key, item
-    return size
-
-
-@device
-def _ahead(rx: float, ry: float, lx: float, ly: float, qx: float, qy: float, gx: float, gy: float) -> float:
-    """The shortest way from a root through an interval to the goal, nothing else in the way."""
-    ex, ey = qx - lx, qy - ly
-    side_r = ex * (ry - ly) - ey * (rx - lx)
-    side_g = ex * (gy - ly) - ey * (gx - lx)
-    if abs(side_r) <= SAME_M * math.sqrt(ex * ex + ey * ey):
-        # Seen edge-on, left and right may be the wrong way round.
-        to_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
-        to_q = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
-        if max(to_l, to_q) < math.sqrt(ex * ex + ey * ey):
-            return math.sqrt((gx - rx) ** 2 + (gy - ry) ** 2)
-        by_l = to_l + math.sqrt((gx - lx) ** 2 + (gy - ly) ** 2)
-        return min(by_l, to_q + math.sqrt((gx - qx) ** 2 + (gy - qy) ** 2))
-    if side_r * side_g > 0.0:  # on the same side: the goal's mirror image
-        square = ex * ex + ey * ey
-        if square > 0.0:
-            gx, gy = gx + 2.0 * side_g * ey / square, gy - 2.0 * side_g * ex / square
-    dx, dy = gx - rx, gy - ry
-    if dx * (ly - ry) - dy * (lx - rx) < 0.0:  # the left end lies right of the straight way
-        return math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2) + math.sqrt((gx - lx) ** 2 + (gy - ly) ** 2)
-    if dx * (qy - ry) - dy * (qx - rx) > 0.0:
-        return math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2) + math.sqrt((gx - qx) ** 2 + (gy - qy) ** 2)
-    return math.sqrt(dx * dx + dy * dy)
-
-
-@device
-def _off(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """How far a point is from a segment."""
-    ex, ey = bx - ax, by - ay
-    square = ex * ex + ey * ey
-    t = 0.0
-    if square > 0.0:
-        t = min(max(((px - ax) * ex + (py - ay) * ey) / square, 0.0), 1.0)
-    return math.sqrt((ax + t * ex - px) ** 2 + (ay + t * ey - py) ** 2)
-
-
-@device
-def _place(ends: Floats, p: int, x: float, y: float) -> float:
-    """Where on a portal a place is, as a part of it."""
-    ex, ey = ends[p, 2] - ends[p, 0], ends[p, 3] - ends[p, 1]
-    square = ex * ex + ey * ey
-    if square <= SAME_M * SAME_M:
-        return 0.0
-    t = ((x - ends[p, 0]) * ex + (y - ends[p, 1]) * ey) / square
-    return 0.0 if t < 1e-9 else 1.0 if t > 1.0 - 1e-9 else t
-
-
-@device
-def _join(node: Floats, link: Ints, name: Names, first: Ints, list_of: int, current: int) -> bool:
-    """Make the interval of a node one with those on its portal that touch it and have the same root; whether any do.
-
-    Those are gone; so are from the list (numbers from 1) those that have been looked at.
-    """
-    joined, again = False, True
-    while again:
-        again = False
-        before, k = -1, first[list_of] - 1
-        while k >= 0:
-            after = link[k, NEXT]
-            drop = link[k, PIECE] == GONE
-            if not drop and k != current and name[k, ROOT] == name[current, ROOT]:
-                same = abs(node[k, COST] - node[current, COST]) < SAME_M
-                for side in range(2):
-                    # Its right end is this one's left end, or the other way round.
-                    mine, its = (LEFT_X, RIGHT_X) if side == 0 else (RIGHT_X, LEFT_X)
-                    dx, dy = node[k, its] - node[current, mine], node[k, its + 1] - node[current, mine + 1]
-                    if same and not drop and dx * dx + dy * dy < SAME_M * SAME_M:
-                        node[current, mine], node[current, mine + 1] = node[k, mine], node[k, mine + 1]
-                        name[current, side] = name[k, side]
-                        link[k, PIECE] = GONE
-                        drop = joined = again = True
-            if drop or k == current:
-                if before < 0:
-                    first[list_of] = after + 1
-                else:
-                    link[before, NEXT] = after
-            else:
-                before = k
-            k = after
-    return joined
-
-
-@device
-def _beaten(
-    node: Floats, other: int, rx: float, ry: float, cost: float, off: float, ax: float, ay: float, bx: float, by: float
-) -> bool:
-    """Whether another node ``other``, whose interval holds this one from a to b, reaches every place of it for less.
-
-    ``off``: how far the root is from the interval at least.
-    """
-    ox, oy, known = node[other, ROOT_X], node[other, ROOT_Y], node[other, COST]
-    to_a = known + math.sqrt((ax - ox) ** 2 + (ay - oy) ** 2)
-    to_b = known + math.sqrt((bx - ox) ** 2 + (by - oy) ** 2)
-    if max(to_a, to_b) < cost + off - SAME_M:
-        return True
-    if known < cost:
-        return known + math.sqrt((rx - ox) ** 2 + (ry - oy) ** 2) < cost - SAME_M
-    # The places that are nearer to one of two points by some length are convex: the ends tell of all between.
-    return (
-        to_a < cost + math.sqrt((ax - rx) ** 2 + (ay - ry) ** 2) - SAME_M
-        and to_b < cost + math.sqrt((bx - rx) ** 2 + (by - ry) ** 2) - SAME_M
-    )
 
 
 @kernel(
@@ -183,7 +66,7 @@ def _beaten(
 def search(
     start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats, origin: Names, first: Ints,
     widest: Ints, span: Floats, sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float,
-    slack: float, most: int, remaining: Floats, entered: Floats,
+    slack: float, most: int, remaining: Floats, met: Floats,
     node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats,
 ) -> int:  # fmt: skip
     """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
@@ -193,8 +76,8 @@ def search(
     ``first`` (2 * portals,) and ``widest`` (portals,) zeros; ``span`` (portals, 2); ``node`` (room, 8), ``link``
     (room, 6), ``name`` (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining``
     (pieces,): no way on from a piece's entrance is shorter. ``slack`` >= 0: go on after the goal is reached, as far as
-    that much (as a part of the length) beyond it; ``entered`` (pieces,), inf, receives the least cost at each
-    piece's entrance; both may be empty. Returns the number of corners, ends included, with ``out[0, 2]`` the source's
+    that much (as a part of the length) beyond it; ``met`` (portals,), inf, receives the least cost at which each is
+    met; both may be empty. Returns the number of corners, ends included, with ``out[0, 2]`` the source's
     number and ``out[1, 2]`` the length; 0: no path of less than ``limit``; -1: no room left; -2: more than ``most``
     nodes were opened, paths shorter than ``out[0, 0]`` all of them.
     """
@@ -202,7 +85,7 @@ def search(
     gx, gy = goal[0], goal[1]
     count = size = opened = 0
     reached = -1
-    flood, guided = len(entered) > 0, len(remaining) > 0
+    flood, guided = len(met) > 0, len(remaining) > 0
     far, shortest = limit, np.inf
     band = max(BAND * math.sqrt((gx - sources_at[0, 0]) ** 2 + (gy - sources_at[0, 1]) ** 2), 1e-3)
     # What a node pushes is listed here as from, to and root; sources push all portals of their piece.
@@ -221,7 +104,7 @@ def search(
             if size == 0 or math.floor(heap[0] / BANDS) * band >= limit:
                 break
             current, key = ids[0], heap[0]
-            size = _pop(heap, ids, size)
+            size = pop(heap, ids, size)
             piece, came = link[current, PIECE], link[current, CAME]
             if piece == GONE:
                 continue
@@ -233,9 +116,9 @@ def search(
             if root >= 0 and cost + 1.0 > best[root] + SAME_M:
                 continue
             p = link[current, PORTAL]
-            if _join(node, link, name, first, 2 * p + (1 if joins[p, 1] == piece else 0), current):
-                s0 = _place(ends, p, node[current, RIGHT_X], node[current, RIGHT_Y])
-                s1 = _place(ends, p, node[current, LEFT_X], node[current, LEFT_Y])
+            if join(node, link, name, first, 2 * p + (1 if joins[p, 1] == piece else 0), current):
+                s0 = place_on(ends, p, node[current, RIGHT_X], node[current, RIGHT_Y])
+                s1 = place_on(ends, p, node[current, LEFT_X], node[current, LEFT_Y])
                 s0, s1 = min(s0, s1), max(s0, s1)
                 if s1 - s0 > span[p, 1] - span[p, 0]:
                     widest[p], span[p, 0], span[p, 1] = current + 1, s0, s1
@@ -243,7 +126,7 @@ def search(
             if other != current and span[p, 0] == 0.0 and span[p, 1] == 1.0:
                 ax, ay = node[current, RIGHT_X], node[current, RIGHT_Y]
                 bx, by = node[current, LEFT_X], node[current, LEFT_Y]
-                if _beaten(node, other, rx, ry, cost, _off(rx, ry, ax, ay, bx, by), ax, ay, bx, by):
+                if beaten(node, other, rx, ry, cost, off_of(rx, ry, ax, ay, bx, by), ax, ay, bx, by):
                     continue
             lx, ly, qx, qy = (
                 node[current, LEFT_X],
@@ -375,18 +258,18 @@ def search(
                 if to_goal:
                     ahead = math.sqrt((gx - nx) ** 2 + (gy - ny) ** 2)
                 else:
-                    off = _off(nx, ny, x0, y0, x1, y1)
+                    off = off_of(nx, ny, x0, y0, x1, y1)
                     ahead = off + remaining[behind] if guided else 0.0
                     if ncost + ahead >= limit:
                         continue
-                    ahead = max(ahead, _ahead(nx, ny, x1, y1, x0, y0, gx, gy))
+                    ahead = max(ahead, ahead_of(nx, ny, x1, y1, x0, y0, gx, gy))
                 if ncost + ahead >= limit:
                     continue
                 if not to_goal:
                     if not forward:
                         s0, s1 = 1.0 - s1, 1.0 - s0
                     if widest[p] > 0 and span[p, 0] <= s0 and s1 <= span[p, 1]:
-                        if _beaten(node, widest[p] - 1, nx, ny, ncost, off, x0, y0, x1, y1):
+                        if beaten(node, widest[p] - 1, nx, ny, ncost, off, x0, y0, x1, y1):
                             continue
                         # As wide, and cheaper at its ends: what comes later is held to this one.
                         other = widest[p] - 1
@@ -396,7 +279,7 @@ def search(
                     if wider and count < room:
                         widest[p], span[p, 0], span[p, 1] = count + 1, s0, s1
                 if flood and not to_goal:
-                    entered[behind] = min(entered[behind], ncost + off)
+                    met[p] = min(met[p], ncost + off)
                 if count >= room:
                     return -1
                 node[count, ROOT_X], node[count, ROOT_Y], node[count, COST] = nx, ny, ncost
@@ -415,7 +298,7 @@ def search(
                     link[count, PORTAL], link[count, NEXT] = p, first[list_of] - 1
                     first[list_of] = count + 1
                     near = min(ncost + off, 0.99 * BANDS)
-                    size = _push(heap, ids, size, math.floor((ncost + ahead) / band) * BANDS + near, count)
+                    size = push(heap, ids, size, math.floor((ncost + ahead) / band) * BANDS + near, count)
                 count += 1
     if reached < 0:
         return 0

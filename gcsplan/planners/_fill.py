@@ -48,6 +48,8 @@ def fill(
                     jj, ii = j * fineness + q, i * fineness + p
                     if q < fineness and p < fineness:
                         diagonal[jj * fine_cols + ii] = way
+                    if excess[jj, ii] < math.inf:
+                        continue  # a cell beside this one knew as much
                     height = _mix(top, j, i, a, b, c, d)
                     if math.isnan(height):
                         continue
@@ -63,6 +65,29 @@ def fill(
                     excess[jj, ii], floor[jj, ii] = e, height
                     under[jj, ii] = _mix(ground, j, i, a, b, c, d)
                     fine_x[jj, ii], fine_y[jj, ii] = px, py
+
+
+@kernel("f8[,] f8[,] i8 f8 f8 f8 f8 f8 f8[,] f8[,] b1[,]")
+def lay(
+    corner_x: Floats, corner_y: Floats, step: int, ax: float, ay: float, bx: float, by: float, most: float, x: Floats,
+    y: Floats, inside: NDArray[np.bool_],
+) -> None:  # fmt: skip
+    """Places of a lattice's nodes, bilinear between every ``step``-th; ``inside`` (rows - 1, cols - 1) the cells of
+    whose corners none is farther than ``most`` from (ax, ay) and (bx, by) together."""
+    rows, cols = x.shape
+    for j in range(rows):
+        v, b = (j % step) / step, j // step
+        for i in range(cols):
+            u, a = (i % step) / step, i // step
+            x[j, i] = _mix(corner_x, b, a, (1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v)
+            y[j, i] = _mix(corner_y, b, a, (1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v)
+            away = math.sqrt((x[j, i] - ax) ** 2 + (y[j, i] - ay) ** 2)
+            away += math.sqrt((x[j, i] - bx) ** 2 + (y[j, i] - by) ** 2)
+            if away > most:
+                for k in range(4):
+                    jj, ii = j - (k >> 1), i - (k & 1)
+                    if 0 <= jj < rows - 1 and 0 <= ii < cols - 1:
+                        inside[jj, ii] = False
 
 
 @kernel("f8[,] i8 f8[,] f8[,]")

@@ -10,6 +10,8 @@ Only the portals are kept, the parts of edges that two pieces share: walls are w
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -260,6 +262,8 @@ def least_of_cells(
         if fine_piece[k, 0] < 0 and fine_piece[k, 1] < 0:
             continue
         j, i = (k // fine_cols) // ratio + row, (k % fine_cols) // ratio + col
+        if not (0 <= i < cols and 0 <= j < len(piece) // cols):
+            continue
         least = np.inf
         for half in range(2):
             if piece[j * cols + i, half] >= 0:
@@ -268,3 +272,54 @@ def least_of_cells(
             p = fine_piece[k, half]
             if p >= 0 and least < out[p]:
                 out[p] = least
+
+
+@kernel("i4[,] f8[] f8[]")
+def least_of_portals(joins: Ints, met: Floats, entered: Floats) -> None:
+    """For each piece (``entered``, inf before) the least of its portals' values."""
+    for n in range(len(joins)):
+        for k in range(2):
+            p = joins[n, k]
+            if met[n] < entered[p]:
+                entered[p] = met[n]
+
+
+@kernel("i4[,] f8[] f8[] f8 i4[] i4[,] b1[]")
+def crossed(
+    joins: Ints, from_start: Floats, from_goal: Floats, limit: float, times: Ints, piece: Ints, out: NDArray[np.bool_]
+) -> None:
+    """The cells (``out``, all false) of pieces that ways no longer than ``limit`` can cross: those with two portals, at
+    least, that such ways meet. ``times`` (pieces,): 2 for the pieces of both ends, else 0."""
+    for n in range(len(joins)):
+        if from_start[n] + from_goal[n] <= limit:
+            times[joins[n, 0]] += 1
+            times[joins[n, 1]] += 1
+    for k in range(len(piece)):
+        for half in range(2):
+            if piece[k, half] >= 0 and times[piece[k, half]] >= 2:
+                out[k] = True
+
+
+@kernel("i4[,] f8[] f8[,] f8[,] f8 f8 f8 b1[,]")
+def in_reach(
+    piece: Ints, entered: Floats, x: Floats, y: Floats, at_x: float, at_y: float, limit: float, out: NDArray[np.bool_]
+) -> None:
+    """The cells (``out``, all false) whose pieces are ``entered`` after no more than ``limit`` less the straight way
+    from a place to the cell."""
+    ny, nx = x.shape
+    for j in range(ny - 1):
+        for i in range(nx - 1):
+            k = j * (nx - 1) + i
+            least = np.inf
+            for half in range(2):
+                if piece[k, half] >= 0:
+                    least = min(least, entered[piece[k, half]])
+            if least < np.inf:
+                wide = 0.0
+                middle_x = 0.25 * (x[j, i] + x[j, i + 1] + x[j + 1, i] + x[j + 1, i + 1])
+                middle_y = 0.25 * (y[j, i] + y[j, i + 1] + y[j + 1, i] + y[j + 1, i + 1])
+                for q in range(4):
+                    jj, ii = j + (q >> 1), i + (q & 1)
+                    wide = max(wide, math.sqrt((x[jj, ii] - middle_x) ** 2 + (y[jj, ii] - middle_y) ** 2))
+                straight = math.sqrt((middle_x - at_x) ** 2 + (middle_y - at_y) ** 2) - wide
+                out[j, i] = least + straight <= limit

@@ -40,8 +40,11 @@ LAPS = (0.5, 0.25, 1.0)
 """What part of the gap may be flown in laps near the ends, where a path without them was not good enough."""
 FAR = 5e-3
 """Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
-CLOSER, CLOSELY = 7, 3
-"""Times that what lies between path and bound is halved: close to the ends a shorter path has less way to climb."""
+CLOSER, LEFT = 8, 0.03
+"""Times that what lies between path and bound is halved, at most, and what part of the gap is not worth it: close to
+the ends a shorter path has less way to climb."""
+NEARER = 0.5
+"""What part of the wanted gap is tried first."""
 
 
 class Below:
@@ -93,8 +96,9 @@ class Below:
         for _ in range(ZONES_SHUT):
             ways = []
             for leg in self.legs:
-                wanted = leg.corridor(self._limit(leg)) if fine and leg.has_fine else None
-                way = leg.track(cap_m, wanted, self.under, spare_m)
+                limit = self._limit(leg)
+                wanted = leg.corridor(limit) if fine and leg.has_fine else None
+                way = leg.track(cap_m, wanted, limit, self.under, spare_m)
                 if way is None:
                     return False
                 ways.append(way.points)
@@ -181,23 +185,22 @@ class Below:
         self.try_below(self.top_m, fine=True)
         if not self._done() and (self.in_space or self._steep()):
             self._raise_bound(self._search_caps(lambda layer: math.hypot(layer.track_m, self._rise(layer.low_m))))
-        self._halve(self.cost, CLOSER, closely=False)
-        # A closer look tells nothing where much is missing, or where heights are as large as distances.
-        if not self.in_space and self.gap <= FAR:
-            self._halve(self.cost / (1.0 + 0.01 * self.problem.gap_percent), CLOSELY, closely=True)
+        self._halve()
         for part in LAPS:
             if not self._done() and self._climbs() and self._in_time():
                 self.try_below(self.top_m, fine=True, spare_m=part * (self.cost - self.bound))
 
-    def _halve(self, high: float, times: int, *, closely: bool) -> None:
-        """Raise the bound, up to ``high`` if it can be; what lies between is halved."""
-        low = self.bound
-        for k in range(times):
-            if self._done() or high - low < 2e-5 * low or not self._in_time():
+    def _halve(self) -> None:
+        """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""
+        low, high = self.bound, self.cost
+        for k in range(CLOSER):
+            if self._done() or high - low < max(2e-5 * low, LEFT * (self.cost - low)) or not self._in_time():
                 break
             # No path is shorter than `low`; is any shorter than `middle`?
-            middle = high if k == 0 else 0.5 * (low + high)
-            found = self._bound_shorter(middle, closely)
+            middle = 0.5 * (low + high)
+            if k == 0:
+                middle = max(middle, self.cost / (1.0 + 0.01 * NEARER * self.problem.gap_percent))
+            found = self._bound_shorter(middle)
             if found < middle:
                 high = middle
             low = max(low, min(found, middle))
@@ -214,7 +217,7 @@ class Below:
         limits = self.problem.limits
         return math.isfinite(limits.max_climb_slope) or math.isfinite(limits.max_descent_slope)
 
-    def _bound_shorter(self, longest_m: float, closely: bool) -> float:
+    def _bound_shorter(self, longest_m: float) -> float:
         """A bound of all paths shorter than ``longest_m``: their tracks on the fine lattice, then what they climb."""
         most_m = self._longest_track(longest_m)
         spare = most_m - sum(leg.length_m for leg in self.legs)
@@ -225,7 +228,7 @@ class Below:
             tracks.append(leg.bound(self.top_m, wanted, limit, True))
         # Each leg's limit is what the others leave, which is less now that they are known better.
         spare = max(most_m - sum(tracks), 0.0)
-        return rise_bound(self.legs, tracks, [track + spare for track in tracks], closely=closely)
+        return rise_bound(self.legs, tracks, [track + spare for track in tracks])
 
     def _longest_track(self, longest_m: float) -> float:
         """No track of a path shorter than ``longest_m`` is longer than this, for it must climb as well."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners._fill import pool
+from gcsplan.planners._fill import lay, pool
 from gcsplan.world.surface import GridMap
 
 Floats = NDArray[np.float64]
@@ -59,19 +59,18 @@ def _finer(z: Floats, parts: int) -> Floats:
 
 
 def places(
-    grid: GridMap, col0: int, row1: int, shape: tuple[int, int], parts: float, span: int
-) -> tuple[Floats, Floats]:
-    """(rows, cols) x and y of a lattice's nodes, bilinear between the corners of blocks of ``span`` cells."""
+    grid: GridMap, col0: int, row1: int, shape: tuple[int, int], parts: float, span: int,
+    reach: tuple[tuple[float, float], tuple[float, float], float] | None = None,
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:  # fmt: skip
+    """(rows, cols) x and y of a lattice's nodes, bilinear between the corners of blocks of ``span`` cells, and
+    (rows - 1, cols - 1) which cells are as near as ``reach`` (two places, metres from both together) allows."""
     rows, cols = shape
     step = min(span, max(rows, cols))
-    c = np.arange(0, cols - 1 + step, step)
-    r = np.arange(0, rows - 1 + step, step)
+    c = np.arange(0, cols + step, step)
+    r = np.arange(0, rows + step, step)
     corner = grid.to_plane(col0 + c[None, :] / parts, row1 - r[:, None] / parts)
-    j, i = np.arange(rows), np.arange(cols)
-    v, u = (j % step) / step, (i % step) / step
-    out = []
-    for k in range(2):
-        z = np.pad(corner[..., k], ((0, 1), (0, 1)), mode="edge")
-        side = z[:, i // step] * (1.0 - u) + z[:, i // step + 1] * u
-        out.append(np.ascontiguousarray(side[j // step] * (1.0 - v)[:, None] + side[j // step + 1] * v[:, None]))
-    return out[0], out[1]
+    x, y, inside = np.empty(shape), np.empty(shape), np.ones((rows - 1, cols - 1), np.bool_)
+    a, b, most = reach if reach is not None else ((0.0, 0.0), (0.0, 0.0), math.inf)
+    corner_x, corner_y = (np.ascontiguousarray(corner[..., k]) for k in range(2))
+    lay(corner_x, corner_y, step, *a, *b, most, x, y, inside)
+    return x, y, inside

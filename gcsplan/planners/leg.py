@@ -14,11 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.plane import Exhausted, Guide, Mesh, Plane, Way, make_plane
+from gcsplan.planners.mesh import Exhausted, Guide, Mesh, Way
+from gcsplan.planners.plane import Plane, make_plane
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 Cone = tuple[float, float, float, float]
 """Where it stands (east_m, north_m), its height there, and its slope."""
 
@@ -29,8 +31,6 @@ COARSE_M = 100.0
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 """Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
 
-FEWER = 0.6
-"""Cells are looked up anew for tracks that are longer than the shortest by that part of what was asked before."""
 RAISED, WORTHWHILE = 4, 0.05
 """Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
 
@@ -50,14 +50,21 @@ class End:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Cells:
-    """Of each cell the lowest floor and how long ways there and on are at least; all cells that tracks no longer than
-    ``limit_m`` may meet."""
+class Corridor:
+    """(rows - 1, cols - 1) the cells of a leg's lattice that tracks of some length may cross, and how far the goal is
+    from there at least."""
+
+    cells: Bools
+    guide: Guide
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Close:
+    """What tracks shorter than ``limit_m`` may meet, cell by cell, and how far that is from start and goal."""
 
     limit_m: float
-    low_m: Floats
-    away_m: Floats
-    left_m: Floats
+    away: Guide
+    left: Guide
 
 
 class Leg:
@@ -74,7 +81,7 @@ class Leg:
         self._twin: Plane | None = None
         self._guide: Guide
         self._ahead: Guide | None = None
-        self._seen: dict[bool, Cells] = {}
+        self._close: Close | None = None
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
         wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
         self.parts = max(1, round(cell_m / wanted_m))
@@ -107,8 +114,7 @@ class Leg:
 
         Widens the lattice until that way lies within it.
         """
-        self._ahead = None
-        self._seen.clear()
+        self._ahead = self._close = None
         for detour in DETOURS:
             if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                 continue
@@ -133,36 +139,43 @@ class Leg:
         self,
         cap_m: float,
         low: bool,
-        wanted: NDArray[np.bool_] | None,
-        cones: list[Cone] | None = None,
-        under: NDArray[np.bool_] | None = None,
-    ) -> Mesh:
-        """The first look's mesh, or with ``wanted`` (cells of the first look) the finer one there."""
-        if wanted is None or not self.has_fine:
-            return self.plane.mesh(cap_m, low, 1, wanted, cones, under)
+        within: Corridor | None,
+        limit_m: float,
+        cones: list[Cone],
+        under: Bools | None = None,
+    ) -> tuple[Mesh, Guide]:
+        """The mesh, finer ``within`` a corridor, or else the first look's for tracks shorter than ``limit_m``; and how
+        far the goal is."""
+        if within is None:
+            near = self._guide.reach(self.start.place, limit_m)
+            return self.plane.mesh(cap_m, low, 1, near, cones, under), self._guide
+        if not self.has_fine:
+            return self.plane.mesh(cap_m, low, 1, within.cells, cones, under), within.guide
         if self._stride == 1:
-            return self.plane.mesh(cap_m, low, self._cut, wanted, cones, under)
+            return self.plane.mesh(cap_m, low, self._cut, within.cells, cones, under), within.guide
         if self._twin is None:
             self._twin = self._lattice(self._detour, self._fine_stride)
-        finer = np.repeat(np.repeat(wanted, self._ratio, axis=0), self._ratio, axis=1)
-        return self._twin.mesh(cap_m, low, 1, finer, cones, under)
+        finer = np.repeat(np.repeat(within.cells, self._ratio, axis=0), self._ratio, axis=1)
+        return self._twin.mesh(cap_m, low, 1, finer, cones, under), within.guide
 
     def track(
-        self, cap_m: float, wanted: NDArray[np.bool_] | None, under: NDArray[np.bool_] | None, spare_m: float = 0.0
+        self, cap_m: float, within: Corridor | None, limit_m: float, under: Bools | None, spare_m: float = 0.0
     ) -> Way | None:
-        """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``.
+        """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``, if it is shorter than
+        ``limit_m``, and than `reach_m`.
 
-        ``spare_m``: metres that may be added near the ends to climb.
+        ``within``: on the finer lattice there; else on that of the first look. ``spare_m``: metres that may be added
+        near the ends to climb.
         """
-        limits = self.problem.limits
+        limit, limits = min(limit_m, self.reach_m), self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare_m)
-        mesh = self._mesh(cap_m, False, wanted, cones, under)
+        mesh, guide = self._mesh(cap_m, False, within, limit, cones, under)
         try:
-            return mesh.way(self.start.place, self.goal.place, self.reach_m, self._guide)
+            return mesh.way(self.start.place, self.goal.place, limit, guide)
         except Exhausted:
             return None
 
-    def bound(self, cap_m: float, wanted: NDArray[np.bool_] | None, limit_m: float, climbs: bool = False) -> float:
+    def bound(self, cap_m: float, within: Corridor | None, limit_m: float, climbs: bool = False) -> float:
         """A lower bound of every track's length below ``cap_m``; ``limit_m``, or `reach_m`, if it is more.
 
         ``climbs``: near the ends hold tracks to what they can climb to, if they are shorter than ``limit_m``.
@@ -174,9 +187,9 @@ class Leg:
             spare = max(limit - known, 0.0)
             if climbs:
                 cones += self._cones(limits.max_climb_slope, limits.max_descent_slope, spare)
-            mesh = self._mesh(cap_m, True, wanted, cones)
+            mesh, guide = self._mesh(cap_m, True, within, limit, cones)
             try:
-                way = mesh.way(self.start.place, self.goal.place, limit, self._guide)
+                way = mesh.way(self.start.place, self.goal.place, limit, guide)
             except Exhausted as given_up:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:
@@ -187,52 +200,40 @@ class Leg:
             known = way.length_m
         return known
 
-    def corridor(self, limit_m: float) -> NDArray[np.bool_]:
-        """(rows - 1, cols - 1) the lattice's cells that a track shorter than ``limit_m`` may meet."""
-        mesh = self._guide.mesh
-        through = np.append(self._from_start().entered + self._guide.entered, np.inf)
-        out = np.zeros(self.plane.inside.shape, np.bool_)
-        near = through[mesh.piece].min(axis=1) <= limit_m
-        rows, cols = mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1
-        out[mesh.row : mesh.row + rows, mesh.col : mesh.col + cols] = near.reshape(rows, cols)
-        return out
+    def corridor(self, limit_m: float) -> Corridor:
+        """What tracks shorter than ``limit_m``, and than `reach_m`, may meet."""
+        limit = min(limit_m, self.reach_m)
+        close = self._closer(limit)
+        if close is None:
+            return Corridor(self._from_start().between(self._guide, limit), self._guide)
+        return Corridor(close.away.between(close.left, limit), close.left)
 
-    def cells(self, limit_m: float, *, closely: bool = False) -> tuple[Floats, Floats, Floats]:
-        """Of the cells that tracks shorter than ``limit_m`` may meet (and more): lowest floor, ways there and on.
-
-        ``closely``: the ways of each cell alone, where else whole pieces are as near as their entrances.
-        """
+    def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats]:
+        """Of the cells that tracks shorter than ``limit_m`` may meet (and more): lowest floor, ways there and on."""
         if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that the flood did not
             return np.full(1, -math.inf), np.zeros(1), np.zeros(1)  # of nothing it is known that it is high
-        seen = self._seen.get(closely)
-        again = seen is None or limit_m > seen.limit_m
-        if seen is not None and closely:  # fewer cells lie on shorter tracks
-            again = again or limit_m - self.length_m < FEWER * (seen.limit_m - self.length_m)
-        if seen is None or again:
-            seen = self._seen[closely] = self._cells_alone(limit_m) if closely else self._cells_of_pieces()
-        near = seen.away_m + seen.left_m <= limit_m
-        return seen.low_m[near], seen.away_m[near], seen.left_m[near]
+        close = self._closer(min(limit_m, self.reach_m))
+        away, left = (self._from_start(), self._guide) if close is None else (close.away, close.left)
+        mesh = left.mesh
+        near = mesh.of_plane(away.between(left, limit_m)).ravel()
+        ways = away.cells()[near], left.cells()[near]
+        if close is None:
+            straight = mesh.straight_to(self.start.place)[near], mesh.straight_to(self.goal.place)[near]
+            ways = np.maximum(ways[0], straight[0]), np.maximum(ways[1], straight[1])
+        return mesh.lowest()[near], *ways
 
-    def _cells_of_pieces(self) -> Cells:
-        mesh = self._guide.mesh
-        both = mesh.piece.reshape(-1, 2)
-        ways = []
-        for guide, end in ((self._from_start(), self.start), (self._guide, self.goal)):
-            entered = np.append(guide.entered, np.inf)[both].min(axis=1)
-            ways.append(np.maximum(entered, mesh.straight_to(end.place)))
-        return Cells(math.inf, mesh.lowest(), *ways)
-
-    def _cells_alone(self, limit_m: float) -> Cells:
-        mesh = self.plane.mesh(self.top_m, True, 1, self.corridor(limit_m), single=True)
-        a, b = self.start.place, self.goal.place
-        try:
-            _, left = mesh.flood(b, a, limit_m, math.inf, self._from_start())
-            _, away = mesh.flood(a, b, limit_m, math.inf, left)
-        except Exhausted:
-            return self._cells_of_pieces()
-        both = mesh.piece.reshape(-1, 2)
-        ways = [np.append(guide.entered, np.inf)[both].min(axis=1) for guide in (away, left)]
-        return Cells(limit_m, mesh.lowest(), *ways)
+    def _closer(self, limit_m: float) -> Close | None:
+        """A look at each cell alone, that of tracks shorter than ``limit_m``; None where that is too much."""
+        if self._close is None or limit_m > self._close.limit_m:
+            wanted = self._from_start().between(self._guide, limit_m)
+            mesh = self.plane.mesh(self.top_m, True, 1, wanted, single=True)
+            a, b = self.start.place, self.goal.place
+            try:
+                left = mesh.flood(b, a, limit_m, math.inf, self._from_start())[1]
+                self._close = Close(limit_m, mesh.flood(a, b, limit_m, math.inf, left)[1], left)
+            except Exhausted:
+                return None
+        return self._close
 
     def _from_start(self) -> Guide:
         """Distances from the start over the coarse mesh, as far as the flood from the goal has seen."""
@@ -241,7 +242,7 @@ class Leg:
             try:
                 _, self._ahead = mesh.flood(self.start.place, self.goal.place, self.reach_m, math.inf, self._guide)
             except Exhausted:
-                self._ahead = Guide(mesh, np.zeros(len(mesh.start) - 1))
+                self._ahead = Guide(mesh, self.start.place, np.zeros(len(mesh.joins)), np.zeros(len(mesh.start) - 1))
         return self._ahead
 
     def _cones(self, climb: float, descent: float, slack_m: float) -> list[Cone]:
@@ -262,8 +263,5 @@ class Leg:
         box = (min(a[0], b[0]) - more, min(a[1], b[1]) - more, max(a[0], b[0]) + more, max(a[1], b[1]) + more)
         cell = self._stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
 
-        def inside(x: Floats, y: Floats) -> NDArray[np.bool_]:
-            to = np.hypot(x - a[0], y - a[1]) + np.hypot(x - b[0], y - b[1])
-            return np.asarray(to <= detour * d + 4.0 * cell)
-
-        return make_plane(self.problem, box, self.parts, stride, self._stride, inside)
+        reach = a, b, detour * d + 4.0 * cell
+        return make_plane(self.problem, box, self.parts, stride, self._stride, reach)

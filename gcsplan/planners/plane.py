@@ -12,18 +12,17 @@ nothing moves by more than a few centimetres, for which `SPARE_M` makes up.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners._any_angle import search
 from gcsplan.planners._fill import fill, raise_cone
-from gcsplan.planners._mesh import least_of_cells, make_pieces, make_portals, sort_portals
+from gcsplan.planners._mesh import make_pieces, make_portals, sort_portals
 from gcsplan.planners._stamp import UNDER, UNDER_2, stamp_zones
 from gcsplan.planners.ground_nodes import nodes, places, slopes
+from gcsplan.planners.mesh import BENT_M, Mesh
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.shapes import SPARE_M, Shapes, make_shapes
 
@@ -32,173 +31,13 @@ Ints = NDArray[np.int32]
 
 HAIR_M = 0.07
 """Kept from the ground, upward and sideways, by paths: what the exact check spares, and what the lattice rounds."""
-BENT_M = 0.03
-"""Most that a raster's line may bow between the corners of a block."""
-MOST_OPENED = 3_000_000
-
-
-class Exhausted(Exception):
-    """A search was given up; all ways shorter than ``seen_m`` had been looked at, and none led to the goal."""
-
-    def __init__(self, seen_m: float) -> None:
-        super().__init__(f"no way of less than {seen_m:.1f} m, and too much to look at beyond")
-        self.seen_m = seen_m
-
-
-@dataclass(eq=False, slots=True)
-class Way:
-    """A shortest track over a mesh: ``points`` (N, 2) and its length."""
-
-    points: Floats
-    length_m: float
-
-
-@dataclass(eq=False, slots=True)
-class Mesh:
-    """Convex free pieces and their portals, see `_mesh`; ``row``, ``col``: the plane's cell that it begins at."""
-
-    plane: Plane
-    fineness: int
-    row: int
-    col: int
-    excess: Floats
-    floor: Floats
-    diagonal: NDArray[np.int8]
-    piece: Ints
-    start: Ints
-    ends: Floats
-    names: NDArray[np.int64]
-    joins: Ints
-    order: Ints
-
-    def lowest(self) -> Floats:
-        """(cells,) the lowest floor of each; of cells that are not looked at, anything."""
-        f = self.floor
-        return np.minimum(np.minimum(f[:-1, :-1], f[:-1, 1:]), np.minimum(f[1:, :-1], f[1:, 1:])).ravel()
-
-    def straight_to(self, place: tuple[float, float]) -> Floats:
-        """(cells,) metres that no way from a place to each is shorter than; of meshes as fine as their plane."""
-        rows, cols = self.excess.shape
-        part = np.s_[self.row : self.row + rows, self.col : self.col + cols]
-        x, y = self.plane.x[part] - place[0], self.plane.y[part] - place[1]
-        middle = (0.25 * (z[:-1, :-1] + z[:-1, 1:] + z[1:, :-1] + z[1:, 1:]) for z in (x, y))
-        across = np.hypot(x[1:, 1:] - x[:-1, :-1], y[1:, 1:] - y[:-1, :-1])
-        other = np.hypot(x[1:, :-1] - x[:-1, 1:], y[1:, :-1] - y[:-1, 1:])
-        return np.asarray((np.hypot(*middle) - 0.5 * np.maximum(across, other) - BENT_M).ravel())
-
-    def pieces_at(self, place: tuple[float, float]) -> list[int]:
-        """The free pieces that a place lies in, or next to where its own is not free."""
-        found: list[int] = []
-        rows, cols = self.excess.shape
-        c, r = self.plane.at(place)
-        c, r = self.fineness * (c - self.col), self.fineness * (r - self.row)
-        for dj in (0.0, -1e-3, 1e-3):
-            for di in (0.0, -1e-3, 1e-3):
-                i, j = math.floor(c + di), math.floor(r + dj)
-                if not (0 <= i < cols - 1 and 0 <= j < rows - 1):
-                    continue
-                u, v, k = c - i, r - j, j * (cols - 1) + i
-                lower = u >= v if self.diagonal[k] == 0 else u + v <= 1.0
-                p = int(self.piece[k, 0 if lower else 1])
-                if p >= 0 and p not in found:
-                    found.append(p)
-        return found
-
-    def way(
-        self,
-        start: tuple[float, float],
-        goal: tuple[float, float],
-        limit_m: float = math.inf,
-        guide: Guide | None = None,
-    ) -> Way | None:
-        """The shortest way that is shorter than ``limit_m``. ``guide``: distances to ``goal`` over a mesh that leaves
-        no less room."""
-        return self._search(start, goal, limit_m, -1.0, guide, np.zeros(0))
-
-    def flood(
-        self,
-        start: tuple[float, float],
-        goal: tuple[float, float],
-        limit_m: float,
-        slack: float,
-        guide: Guide | None = None,
-    ) -> tuple[Way | None, Guide]:
-        """The same, and how far every piece is from ``start`` at least, as far as ways to ``goal`` lead that are
-        shorter than ``limit_m`` and than the shortest with ``slack`` (as a part of it) added."""
-        entered = np.full(len(self.start) - 1, np.inf)
-        way = self._search(start, goal, limit_m, slack, guide, entered)
-        entered[self.pieces_at(start)] = 0.0
-        return way, Guide(self, entered)
-
-    def _search(
-        self,
-        start: tuple[float, float],
-        goal: tuple[float, float],
-        limit_m: float,
-        slack: float,
-        guide: Guide | None,
-        entered: Floats,
-    ) -> Way | None:
-        pieces, goal_pieces = self.pieces_at(start), self.pieces_at(goal)
-        if not pieces or not goal_pieces:
-            return None
-        sources = np.array([(*start, 0.0)] * len(pieces))
-        remaining = np.zeros(0) if guide is None else guide.over(self)
-        room = 1 << 17
-        while True:
-            names = 8 * (self.excess.size + 1)
-            best, origin = np.zeros(names), np.zeros(names, np.int64)  # cost nothing until they are touched
-            node, link, name = np.empty((room, 8)), np.empty((room, 6), np.int32), np.empty((room, 3), np.int64)
-            portals = len(self.joins)
-            first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
-            out = np.empty((1 << 14, 3))
-            n = search(
-                self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span,
-                sources,
-                np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32), limit_m, slack,
-                MOST_OPENED, remaining, entered,
-                node, link, name, np.empty(room), np.empty(room, np.int32), out,
-            )  # fmt: skip
-            if n != -1:
-                break
-            room *= 4
-            entered[:] = np.inf
-        if n == -2:
-            raise Exhausted(float(out[0, 0]))
-        if n <= 0:
-            return None
-        points = out[:n][::-1, :2].copy()
-        keep = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
-        keep[-1] = True
-        return Way(points[keep], float(out[1, 2]))
-
-
-@dataclass(eq=False, slots=True)
-class Guide:
-    """``entered`` (pieces,): no way from where a search began to the entrance of a piece is shorter; inf: none was
-    looked for."""
-
-    mesh: Mesh
-    entered: Floats
-
-    def over(self, finer: Mesh) -> Floats:
-        """The same for the pieces of a mesh on the same lattice, or one that is some times finer."""
-        ratio = finer.fineness * self.mesh.plane.stride // (self.mesh.fineness * finer.plane.stride)
-        out = np.full(len(finer.start) - 1, np.inf)
-        cols, fine_cols = self.mesh.excess.shape[1] - 1, finer.excess.shape[1] - 1
-        # A finer lattice's meshes begin at corners of coarse cells.
-        share = self.mesh.plane.stride // finer.plane.stride
-        row, col = finer.row // share - self.mesh.row, finer.col // share - self.mesh.col
-        least_of_cells(self.mesh.piece, self.entered, cols, finer.piece, fine_cols, ratio, row, col, out)
-        return out
 
 
 @dataclass(eq=False, slots=True)
 class Plane:
     """A lattice over a part of the terrain model: node (j, i) lies at ``x[j, i]``, ``y[j, i]``, north of (j - 1, i).
 
-    ``tops``, ``grounds`` (rows, cols) AMSL, NaN where unknown: for bounds and for paths; ``steep`` the
-    steepest slope of the cells around a node;
+    ``tops``, ``grounds`` (rows, cols) AMSL, NaN where unknown: for bounds and for paths;
     ``inside`` (rows - 1, cols - 1) the cells that are looked at. A cell of the terrain model is ``parts`` cells wide
     and long here, or each cell here ``stride`` of those; ``block`` cells lie on straight lines.
     """
@@ -213,9 +52,10 @@ class Plane:
     y: Floats
     tops: tuple[Floats, Floats]
     grounds: tuple[Floats, Floats]
-    steep: Floats
     inside: NDArray[np.bool_]
     shapes: Shapes
+    known: dict[tuple[float, float], tuple[float, float]] = field(default_factory=dict)
+    """Places that were asked for, and where they lie on the lattice."""
 
     def mesh(
         self,
@@ -238,10 +78,10 @@ class Plane:
         wanted = self.inside if wanted is None else wanted
         row, col, last_row, last_col = _box_of(wanted)
         part, corners = np.s_[row:last_row, col:last_col], np.s_[row : last_row + 1, col : last_col + 1]
-        top, ground, steep, x, y = (
-            np.ascontiguousarray(a[corners])
-            for a in (self.tops[not low], self.grounds[not low], self.steep, self.x, self.y)
+        top, ground, x, y = (
+            np.ascontiguousarray(a[corners]) for a in (self.tops[not low], self.grounds[not low], self.x, self.y)
         )
+        steep = np.empty((0, 0)) if low else self._steep(row, col, last_row + 1, last_col + 1)
         rows, cols = ((n - 1) * fineness + 1 for n in top.shape)
         excess = np.full((rows, cols), np.inf)
         floor, under_m, fine_x, fine_y = (np.empty((rows, cols)) for _ in range(4))
@@ -254,7 +94,7 @@ class Plane:
             # Beside cliffs it is the clearance that binds; this is more than both demand together.
             beside += limits.horizontal_clearance_m * scale
         fill(
-            top, ground, steep[:0] if low else steep, x, y, np.ascontiguousarray(wanted[part]), fineness,
+            top, ground, steep, x, y, np.ascontiguousarray(wanted[part]), fineness,
             more + (-SPARE_M if low else HAIR_M), beside, cap_m, climbs, low, excess, floor, under_m, fine_x, fine_y,
             diagonal,
         )  # fmt: skip
@@ -297,11 +137,20 @@ class Plane:
             self, fineness, row, col, excess, floor, diagonal, piece, start, ends[:n], names[:n], joins[:n], order
         )
 
+    def _steep(self, row: int, col: int, last_row: int, last_col: int) -> Floats:
+        """The steepest slope of the cells around each node of a part of the lattice."""
+        less_row, less_col = min(row, 1), min(col, 1)
+        part = np.s_[row - less_row : last_row + 1, col - less_col : last_col + 1]
+        around = slopes(self.tops[1][part], self.x[part], self.y[part])
+        return np.ascontiguousarray(around[less_row:, less_col:][: last_row - row, : last_col - col])
+
     def at(self, place: tuple[float, float]) -> tuple[float, float]:
         """Column and row of a place on this lattice."""
-        c, r = self.problem.airspace.surface.grid(*place)
-        scale = self.parts / self.stride
-        return scale * (float(c) - self.col0), scale * (self.row1 - float(r))
+        if place not in self.known:
+            c, r = self.problem.airspace.surface.grid(*place)
+            scale = self.parts / self.stride
+            self.known[place] = scale * (float(c) - self.col0), scale * (self.row1 - float(r))
+        return self.known[place]
 
 
 def make_plane(
@@ -310,13 +159,13 @@ def make_plane(
     parts: int = 1,
     stride: int = 1,
     whole: int = 1,
-    inside: Callable[[Floats, Floats], NDArray[np.bool_]] | None = None,
+    reach: tuple[tuple[float, float], tuple[float, float], float] | None = None,
 ) -> Plane:
     """The lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
 
     ``parts``: into how many cells a side the terrain model's are cut; or ``stride``: how many become one, of lattices
-    that are ``whole`` cells of the terrain model wide and long, times some number. ``inside(x, y)`` tells which nodes
-    are to be looked at.
+    that are ``whole`` cells of the terrain model wide and long, times some number. ``reach``: only what is no farther
+    from two places together is looked at.
     """
     surface = problem.airspace.surface
     grid = surface.grid
@@ -338,12 +187,7 @@ def make_plane(
         tops = nodes(surface.top_m[part][::-1], parts, stride, whole)
     shape = tops[0].shape
     block = max(problem.airspace.straight_cells(BENT_M) * parts // stride, 1)
-    x, y = places(grid, col0, row1, shape, parts / stride, block)
-    cells = shape[0] - 1, shape[1] - 1
-    looked_at = np.ones(cells, np.bool_)
-    if inside is not None:
-        node = inside(x, y)
-        looked_at = node[:-1, :-1] & node[:-1, 1:] & node[1:, :-1] & node[1:, 1:]
+    x, y, looked_at = places(grid, col0, row1, shape, parts / stride, block, reach)
     return Plane(
         problem,
         col0,
@@ -355,7 +199,6 @@ def make_plane(
         y,
         tops,
         grounds,
-        slopes(tops[1], x, y),
         looked_at,
         make_shapes(problem, x, y),
     )

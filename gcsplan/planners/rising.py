@@ -21,13 +21,13 @@ STEPS = 400
 """Places along a leg at which the floor is looked up."""
 
 
-def floors(leg: Leg, track_m: float, limit_m: float, *, closely: bool = False) -> tuple[Floats, Floats]:
+def floors(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats]:
     """Places along a leg (M,) and the floor there (M,), for tracks as long as ``track_m`` at least.
 
     Tracks of more than ``limit_m`` are not asked about. A longer track is squeezed into ``track_m`` by moving its
     points towards its start by what it is longer at most; the floor is the least within that.
     """
-    low, away, left = leg.cells(limit_m, closely=closely)
+    low, away, left = leg.cells(limit_m)
     met = np.isfinite(away) & np.isfinite(left)
     low, away, left = low[met], away[met], left[met]
     at = np.linspace(0.0, track_m, STEPS + 1)[1:-1]
@@ -55,15 +55,15 @@ def _least(value: Floats, first: NDArray[np.intp], last: NDArray[np.intp], size:
     return np.asarray(table[0])
 
 
-def rise_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float], *, closely: bool = False) -> float:
+def rise_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> float:
     """No path over tracks of at least ``tracks_m`` and at most ``limits_m`` metres is shorter in space.
 
-    Climb limits are not in it: they only make paths longer. ``closely``: as of `Leg.cells`.
+    Climb limits are not in it: they only make paths longer.
     """
     places, lows, highs = [np.zeros(1)], [np.full(1, -np.inf)], [np.full(1, np.inf)]
     begin = 0.0
     for k, (leg, track_m, limit_m) in enumerate(zip(legs, tracks_m, limits_m, strict=True)):
-        at, low = floors(leg, track_m, limit_m, closely=closely)
+        at, low = floors(leg, track_m, limit_m)
         low = np.where(np.isfinite(low), low, -np.inf)
         end = leg.goal.amsl_m if k < len(legs) - 1 else None
         places += [begin + at, np.array([begin + track_m])]

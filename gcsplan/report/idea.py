@@ -28,7 +28,7 @@ def draw(problem: Problem) -> Figure:
     leg = below.legs[0]
     plane = leg.plane
     walls = plane.mesh(below.top_m, True).piece.max(axis=1).reshape(plane.inside.shape) < 0
-    room = leg.corridor(below.cost)
+    room = leg.corridor(below.cost).cells
     points = solution.path.points
     figure = Figure(figsize=(9.5, 5.6), layout="constrained")
     FigureCanvasAgg(figure)

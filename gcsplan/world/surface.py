@@ -79,8 +79,11 @@ class GridMap:
         target = np.stack(np.broadcast_arrays(np.asarray(col, float), np.asarray(row, float)), axis=-1)
         inverse = np.linalg.inv(self.jacobian(*self.centre))
         plane = np.asarray(self.centre) + (target - self(*self.centre)) @ inverse.T
-        for _ in range(8):
-            plane = plane + (target - self(plane[..., 0], plane[..., 1])) @ inverse.T
+        for _ in range(9):
+            off = (target - self(plane[..., 0], plane[..., 1])) @ inverse.T
+            plane = plane + off
+            if not np.abs(off).max(initial=0.0) > 1e-9:  # a nanometre
+                break
         return np.asarray(plane)
 
 

@@ -1,0 +1,227 @@
+"""A mesh of convex free pieces: shortest ways over it, and how far everything is that a way could meet."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners._any_angle import search
+from gcsplan.planners._mesh import crossed, in_reach, least_of_cells, least_of_portals
+
+if TYPE_CHECKING:
+    from gcsplan.planners.plane import Plane
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+Place = tuple[float, float]
+
+BENT_M = 0.03
+"""Most that a raster's line may bow between the corners of a block."""
+MOST_OPENED = 3_000_000
+"""Intervals that are looked at before a search is given up."""
+
+
+class Exhausted(Exception):
+    """A search was given up; all ways shorter than ``seen_m`` had been looked at, and none led to the goal."""
+
+    def __init__(self, seen_m: float) -> None:
+        super().__init__(f"no way of less than {seen_m:.1f} m, and too much to look at beyond")
+        self.seen_m = seen_m
+
+
+@dataclass(eq=False, slots=True)
+class Way:
+    """A shortest track over a mesh: ``points`` (N, 2) and its length."""
+
+    points: Floats
+    length_m: float
+
+
+@dataclass(eq=False, slots=True)
+class Mesh:
+    """Convex free pieces and their portals, see `_mesh`; ``row``, ``col``: the plane's cell that it begins at."""
+
+    plane: Plane
+    fineness: int
+    row: int
+    col: int
+    excess: Floats
+    floor: Floats
+    diagonal: NDArray[np.int8]
+    piece: Ints
+    start: Ints
+    ends: Floats
+    names: NDArray[np.int64]
+    joins: Ints
+    order: Ints
+
+    def lowest(self) -> Floats:
+        """(cells,) the lowest floor of each; of cells that are not looked at, anything."""
+        f = self.floor
+        return np.minimum(np.minimum(f[:-1, :-1], f[:-1, 1:]), np.minimum(f[1:, :-1], f[1:, 1:])).ravel()
+
+    def straight_to(self, place: Place) -> Floats:
+        """(cells,) metres that no way from a place to each is shorter than; of meshes as fine as their plane."""
+        x, y = (at - own for at, own in zip(self.places(), place, strict=True))
+        middle = (0.25 * (z[:-1, :-1] + z[:-1, 1:] + z[1:, :-1] + z[1:, 1:]) for z in (x, y))
+        across = np.hypot(x[1:, 1:] - x[:-1, :-1], y[1:, 1:] - y[:-1, :-1])
+        other = np.hypot(x[1:, :-1] - x[:-1, 1:], y[1:, :-1] - y[:-1, 1:])
+        return np.asarray((np.hypot(*middle) - 0.5 * np.maximum(across, other) - BENT_M).ravel())
+
+    def places(self) -> tuple[Floats, Floats]:
+        """(rows, cols) x and y of the plane's nodes that the mesh is over; of meshes as fine as their plane."""
+        rows, cols = self.excess.shape
+        part = np.s_[self.row : self.row + rows, self.col : self.col + cols]
+        return np.ascontiguousarray(self.plane.x[part]), np.ascontiguousarray(self.plane.y[part])
+
+    def over_plane(self, cells: Bools) -> Bools:
+        """The same of all the plane's cells: false elsewhere; of meshes as fine as their plane."""
+        out = np.zeros(self.plane.inside.shape, np.bool_)
+        out[self.row : self.row + cells.shape[0], self.col : self.col + cells.shape[1]] = cells
+        return out
+
+    def of_plane(self, cells: Bools) -> Bools:
+        """That part of all the plane's cells that the mesh is over."""
+        rows, cols = self.excess.shape
+        return cells[self.row : self.row + rows - 1, self.col : self.col + cols - 1]
+
+    def pieces_at(self, place: Place) -> list[int]:
+        """The free pieces that a place lies in, or next to where its own is not free."""
+        found: list[int] = []
+        rows, cols = self.excess.shape
+        c, r = self.plane.at(place)
+        c, r = self.fineness * (c - self.col), self.fineness * (r - self.row)
+        for dj in (0.0, -1e-3, 1e-3):
+            for di in (0.0, -1e-3, 1e-3):
+                i, j = math.floor(c + di), math.floor(r + dj)
+                if not (0 <= i < cols - 1 and 0 <= j < rows - 1):
+                    continue
+                u, v, k = c - i, r - j, j * (cols - 1) + i
+                lower = u >= v if self.diagonal[k] == 0 else u + v <= 1.0
+                p = int(self.piece[k, 0 if lower else 1])
+                if p >= 0 and p not in found:
+                    found.append(p)
+        return found
+
+    def way(
+        self,
+        start: Place,
+        goal: Place,
+        limit_m: float = math.inf,
+        guide: Guide | None = None,
+    ) -> Way | None:
+        """The shortest way that is shorter than ``limit_m``. ``guide``: distances to ``goal`` over a mesh that leaves
+        no less room."""
+        return self._search(start, goal, limit_m, -1.0, guide, np.zeros(0))
+
+    def flood(
+        self,
+        start: Place,
+        goal: Place,
+        limit_m: float,
+        slack: float,
+        guide: Guide | None = None,
+    ) -> tuple[Way | None, Guide]:
+        """The same, and how far every piece is from ``start`` at least, as far as ways to ``goal`` lead that are
+        shorter than ``limit_m`` and than the shortest with ``slack`` (as a part of it) added."""
+        met = np.full(len(self.joins), np.inf)
+        way = self._search(start, goal, limit_m, slack, guide, met)
+        entered = np.full(len(self.start) - 1, np.inf)
+        least_of_portals(self.joins, met, entered)
+        entered[self.pieces_at(start)] = 0.0
+        return way, Guide(self, start, met, entered)
+
+    def _search(
+        self,
+        start: Place,
+        goal: Place,
+        limit_m: float,
+        slack: float,
+        guide: Guide | None,
+        met: Floats,
+    ) -> Way | None:
+        pieces, goal_pieces = self.pieces_at(start), self.pieces_at(goal)
+        if not pieces or not goal_pieces:
+            return None
+        sources = np.array([(*start, 0.0)] * len(pieces))
+        remaining = np.zeros(0) if guide is None else guide.over(self)
+        room = 1 << 17
+        while True:
+            names = 8 * (self.excess.size + 1)
+            best, origin = np.zeros(names), np.zeros(names, np.int64)  # cost nothing until they are touched
+            node, link, name = np.empty((room, 8)), np.empty((room, 6), np.int32), np.empty((room, 3), np.int64)
+            portals = len(self.joins)
+            first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
+            out = np.empty((1 << 14, 3))
+            n = search(
+                self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span,
+                sources,
+                np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32), limit_m, slack,
+                MOST_OPENED, remaining, met,
+                node, link, name, np.empty(room), np.empty(room, np.int32), out,
+            )  # fmt: skip
+            if n != -1:
+                break
+            room *= 4
+            met[:] = np.inf
+        if n == -2:
+            raise Exhausted(float(out[0, 0]))
+        if n <= 0:
+            return None
+        points = out[:n][::-1, :2].copy()
+        keep = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
+        keep[-1] = True
+        return Way(points[keep], float(out[1, 2]))
+
+
+@dataclass(eq=False, slots=True)
+class Guide:
+    """``met`` (portals,), ``entered`` (pieces,): no way from ``place``, where a search began, to a portal or to the
+    entrance of a piece is shorter; inf: none was looked for."""
+
+    mesh: Mesh
+    place: Place
+    met: Floats
+    entered: Floats
+
+    def over(self, finer: Mesh) -> Floats:
+        """The same for the pieces of a mesh on the same lattice, or one that is some times finer."""
+        ratio = finer.fineness * self.mesh.plane.stride // (self.mesh.fineness * finer.plane.stride)
+        out = np.full(len(finer.start) - 1, np.inf)
+        cols, fine_cols = self.mesh.excess.shape[1] - 1, finer.excess.shape[1] - 1
+        # A finer lattice's meshes begin at corners of coarse cells.
+        share = self.mesh.plane.stride // finer.plane.stride
+        row, col = finer.row // share - self.mesh.row, finer.col // share - self.mesh.col
+        least_of_cells(self.mesh.piece, self.entered, cols, finer.piece, fine_cols, ratio, row, col, out)
+        return out
+
+    def reach(self, place: Place, limit_m: float) -> Bools:
+        """(rows - 1, cols - 1) the plane's cells that ways shorter than ``limit_m`` from here to a place may meet."""
+        x, y = self.mesh.places()
+        out = np.zeros((x.shape[0] - 1, x.shape[1] - 1), np.bool_)
+        in_reach(self.mesh.piece, self.entered, x, y, *place, limit_m + BENT_M, out)
+        return self.mesh.over_plane(out)
+
+    def between(self, other: Guide, limit_m: float) -> Bools:
+        """(rows - 1, cols - 1) the plane's cells that ways no longer than ``limit_m`` from here to where another
+        search over the same mesh began may cross.
+
+        Such a way meets the portals through which it enters and leaves a piece, and is no shorter than the ways to
+        either of them from both its ends.
+        """
+        mesh = self.mesh
+        times = np.zeros(len(mesh.start) - 1, np.int32)
+        times[mesh.pieces_at(self.place)] = 2
+        times[mesh.pieces_at(other.place)] = 2
+        out = np.zeros(len(mesh.piece), np.bool_)
+        crossed(mesh.joins, self.met, other.met, limit_m, times, mesh.piece, out)
+        return mesh.over_plane(out.reshape(mesh.excess.shape[0] - 1, -1))
+
+    def cells(self) -> Floats:
+        """(cells,) how far the mesh's cells are at least."""
+        return np.asarray(np.append(self.entered, np.inf)[self.mesh.piece].min(axis=1))
