@@ -11,6 +11,7 @@ import typer
 from gcsplan.commands import check, energy, fly, links, plan, rehearse
 from gcsplan.commands.bench import bench_app
 from gcsplan.commands.ending import Interrupted, explained, fail, put, speak_plainly
+from gcsplan.commands.memory import settle_memory
 from gcsplan.errors import GcsplanError, InputError
 
 app = typer.Typer(
@@ -55,6 +56,7 @@ def main() -> NoReturn:
     arguments = [a for a in sys.argv[1:] if a != "--debug"]
     as_json = "--json" in arguments
     speak_plainly()
+    settle_memory()
     try:
         # Outside standalone mode click hands typer.Exit's code back instead of exiting.
         code = app(args=arguments, prog_name="gcsplan", standalone_mode=False)

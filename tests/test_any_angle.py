@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -64,7 +65,7 @@ def mesh_of(
         c, r = inverse @ np.array(place)
         return float(c), float(r)
 
-    plane = cast(Plane, SimpleNamespace(at=at, parts=1, stride=1))
+    plane = cast(Plane, SimpleNamespace(at=at, parts=1, stride=1, inside=np.ones((ny - 1, nx - 1), np.bool_)))
     return Mesh(plane, 1, 0, 0, excess, excess, diagonal, piece, start, ends[:n], names[:n], joins[:n], order)
 
 
@@ -355,6 +356,45 @@ def test_a_flood_says_of_no_piece_that_it_is_farther_than_it_is(slack: float, fo
                 assert guide.entered[own_pieces[0]] <= true[0, k] + 1e-6
                 compared += 1
     assert compared > 5
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("block", [1, 4])
+def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block: int) -> None:
+    """Ways by a third place are about as long as one likes; whatever they cross belongs to the corridor."""
+    rng = np.random.default_rng([17, block, *form.encode()])
+    inverse = np.linalg.inv(FORMS[form])
+    crossed = left_out = 0
+    for _ in range(12):
+        excess = hilly(rng, 10, 1) - 0.3
+        diagonal = rng.integers(0, 2, 81).astype(np.int8)
+        own = own_cells(rng, excess, 6)
+        mesh = mesh_of(excess, diagonal, FORMS[form], own, block=block)
+        places = Free(excess, diagonal, FORMS[form], own).places(rng, 24, FORMS[form], excess.shape)
+        if len(places) < 6:
+            continue
+        a, b = turned(places[0]), turned(places[1])
+        shortest = mesh.way(a, b)
+        if shortest is None:
+            continue
+        limit = shortest.length_m * float(rng.choice([1.0 + 1e-9, 1.02, 1.1, 1.4]))
+        _, left = mesh.flood(b, a, limit, math.inf)
+        _, away = mesh.flood(a, b, limit, math.inf, left)
+        corridor = away.between(left, limit)
+        left_out += int((~corridor).sum())
+        for place in [places[0], *places[2:]]:
+            first, second = mesh.way(a, turned(place)), mesh.way(turned(place), b)
+            if first is None or second is None or first.length_m + second.length_m >= limit:
+                continue
+            points = np.vstack([first.points, second.points])
+            t = np.linspace(0.0, 1.0, 400)[:, None]
+            on = np.vstack([p + t * (q - p) for p, q in pairwise(points)]) @ inverse.T
+            inner = (np.abs(on - np.round(on)) > 1e-6).all(axis=1)  # which cell the border is of cannot be told
+            i, j = np.floor(on[inner]).astype(int).T
+            assert corridor[j, i].all()
+            crossed += len(set(zip(i.tolist(), j.tolist(), strict=True)))
+    assert crossed > 60
+    assert left_out > 60
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -190,3 +190,19 @@ def test_the_centre_is_near_all_points_even_across_the_antimeridian(
         assert abs(a - middle_lat) <= half_lat + 1e-4
         assert abs((b - middle_lon + 180.0) % 360.0 - 180.0) <= half_lon + 1e-4
     assert abs(middle_lat) <= 85.0
+
+
+@pytest.mark.parametrize(
+    "origin", [(36.6, -84.3), (0.0, 0.0), (-84.9999, 179.9999), (12.345678901, -0.1), (70.0, -180.0)]
+)
+def test_the_plane_is_what_proj_makes_of_both_coordinate_systems_to_the_last_bit(origin: tuple[float, float]) -> None:
+    frame, rng = Frame(*origin), np.random.default_rng(3)
+    degrees = CRS.from_epsg(4326)
+    forward = Transformer.from_crs(degrees, frame.crs, always_xy=True)
+    back = Transformer.from_crs(frame.crs, degrees, always_xy=True)
+    east, north = np.concatenate([rng.uniform(-2e5, 2e5, (200, 2)), [[0.0, 0.0], [1e9, 0.0], [math.nan, 0.0]]]).T
+    lon, lat = back.transform(east, north)
+    np.testing.assert_array_equal(frame.to_degrees(east, north), np.stack([lat, lon], axis=-1))
+    lat, lon = np.append(lat, [95.0, 10.0, -90.0]), np.append(lon, [0.0, 720.0, 0.0])
+    there = np.stack(forward.transform(lon, lat), axis=-1)
+    np.testing.assert_array_equal(frame.to_plane(lat, lon), there)

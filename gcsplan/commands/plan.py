@@ -22,7 +22,7 @@ from gcsplan.commands.options import (
 from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
-    from gcsplan.steps.delivery import Delivery
+    from gcsplan.steps.delivery import Delivery, Job
 
 SHOWN = 15
 """Names of written files that are told; a fleet has hundreds."""
@@ -106,7 +106,7 @@ def plan(
     )
     from gcsplan.export.outdir import add_output, retire_outputs, write_outputs, write_whole
     from gcsplan.planners import table
-    from gcsplan.steps import delivery, fencing, outputs
+    from gcsplan.steps import outputs
     from gcsplan.steps.gate import GateTime
 
     directory = Path(mission.stem) if out is None else out
@@ -124,7 +124,11 @@ def plan(
         raise UsageError(f"--png {png}: a directory, or a name that ends in .png in one that is there, is wanted")
     try:
         source = pipeline.load_mission(mission)
-        targets = delivery.targets(upload or [], [r.vehicle for r in source.vehicles])
+        targets: dict[str, str] = {}
+        if upload or fence or fence_infinite:  # else nothing of what sends is needed
+            from gcsplan.steps import delivery, fencing
+
+            targets = delivery.targets(upload or [], [r.vehicle for r in source.vehicles])
         with planning_status() as tell:
             told = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
             planned = pipeline.plan(
@@ -138,8 +142,9 @@ def plan(
             )
         pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
         homes = outputs.homes_of(planned) if report or way_home or rally else {}
-        names = [v.name for v in planned.vehicles]
-        jobs = delivery.jobs_of(planned, targets or dict.fromkeys(names, ""))
+        jobs: list[Job] = []
+        if upload or fence or fence_infinite:
+            jobs = delivery.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""))
         fence_notes: list[tuple[str, str]] = []
         if fence or fence_infinite:  # one that the mission would breach is found before anything is written
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
@@ -190,8 +195,8 @@ def plan(
         except InputError as error:  # what became of the upload matters more
             say(f"note: what became of the upload is not written: {error}")
     if as_json:
-        emit(outputs.summary_of(planned, deliveries, homes), delivery.failure(deliveries))
-    raise typer.Exit(delivery.exit_code(deliveries))
+        emit(outputs.summary_of(planned, deliveries, homes), delivery.failure(deliveries) if targets else None)
+    raise typer.Exit(delivery.exit_code(deliveries) if targets else 0)
 
 
 def planners(as_json: JsonOption = False) -> None:

@@ -97,7 +97,7 @@ def _area(ring: Floats) -> dict[str, Any]:
     for turn in range(_turn(low, high), _turn(high, low) + 1):
         west, east = 360.0 * turn - 180.0, 360.0 * turn + 180.0
         part = _clip(_clip(points, west, keep_east=True), east, keep_east=False)
-        corners = [_position(lon - 360.0 * turn, lat) for lon, lat in part]
+        corners = [[round(lon, 7), round(lat, 7)] for lon, lat in (part - (360.0 * turn, 0.0)).tolist()]
         if len({lon for lon, _ in corners}) >= 2:  # more than a hair's breadth beyond the seam
             polygons.append([[*corners, corners[0]]])
     if len(polygons) == 1:

@@ -16,7 +16,8 @@ TRACK_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff
 DRAWN_TOP_M = 300.0
 """A zone without a ceiling is drawn to this far above the highest track."""
 
-_NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+"""XML 1.0, production 2 (Char), turned round."""
 
 
 def write_kml(name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame) -> str:
@@ -54,7 +55,7 @@ def _text(words: str) -> str:
 
 
 def _coordinates(lat_deg: Floats, lon_deg: Floats, height_m: Floats) -> str:
-    return " ".join(_place(*p) for p in zip(lat_deg, lon_deg, height_m, strict=True))
+    return " ".join(_place(*p) for p in np.stack([lat_deg, lon_deg, height_m], axis=-1).tolist())
 
 
 def _place(lat_deg: float, lon_deg: float, height_m: float) -> str:

@@ -42,7 +42,7 @@ SwarmCost = Literal["krill", "ssgwo", "msfoa", "abo", "ib-abc"]
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
     @property
     def given(self) -> dict[str, Any]:

@@ -284,19 +284,19 @@ def least_of_portals(joins: Ints, met: Floats, entered: Floats) -> None:
                 entered[p] = met[n]
 
 
-@kernel("i4[,] f8[] f8[] f8 i4[] i4[,] b1[]")
-def crossed(
-    joins: Ints, from_start: Floats, from_goal: Floats, limit: float, times: Ints, piece: Ints, out: NDArray[np.bool_]
-) -> None:
-    """The cells (``out``, all false) of pieces that ways no longer than ``limit`` can cross: those with two portals, at
-    least, that such ways meet. ``times`` (pieces,): 2 for the pieces of both ends, else 0."""
+@kernel("i4[,] f8[] f8[] f8 b1[] i4[,] b1[]")
+def within(
+    joins: Ints, from_start: Floats, from_goal: Floats, limit: float, met: NDArray[np.bool_], piece: Ints,
+    out: NDArray[np.bool_],
+) -> None:  # fmt: skip
+    """The cells (``out``, all false) of pieces that ways no longer than ``limit`` may enter, through portals that such
+    ways meet. ``met`` (pieces,): true for the pieces of both ends alone."""
     for n in range(len(joins)):
         if from_start[n] + from_goal[n] <= limit:
-            times[joins[n, 0]] += 1
-            times[joins[n, 1]] += 1
+            met[joins[n, 0]] = met[joins[n, 1]] = True
     for k in range(len(piece)):
         for half in range(2):
-            if piece[k, half] >= 0 and times[piece[k, half]] >= 2:
+            if piece[k, half] >= 0 and met[piece[k, half]]:
                 out[k] = True
 
 

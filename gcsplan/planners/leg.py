@@ -51,7 +51,7 @@ class End:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Corridor:
-    """(rows - 1, cols - 1) the cells of a leg's lattice that tracks of some length may cross, and how far the goal is
+    """(rows - 1, cols - 1) the cells of a leg's lattice that tracks of some length may enter, and how far the goal is
     from there at least."""
 
     cells: Bools

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners._any_angle import search
-from gcsplan.planners._mesh import crossed, in_reach, least_of_cells, least_of_portals
+from gcsplan.planners._mesh import in_reach, least_of_cells, least_of_portals, within
 
 if TYPE_CHECKING:
     from gcsplan.planners.plane import Plane
@@ -209,17 +209,16 @@ class Guide:
 
     def between(self, other: Guide, limit_m: float) -> Bools:
         """(rows - 1, cols - 1) the plane's cells that ways no longer than ``limit_m`` from here to where another
-        search over the same mesh began may cross.
+        search over the same mesh began may enter.
 
-        Such a way meets the portals through which it enters and leaves a piece, and is no shorter than the ways to
-        either of them from both its ends.
+        Such a way meets the portal through which it enters a piece, and is no shorter than the ways there from both its
+        ends. It may leave through the same one: a shortest way does so where finer walls stand that are not known here.
         """
         mesh = self.mesh
-        times = np.zeros(len(mesh.start) - 1, np.int32)
-        times[mesh.pieces_at(self.place)] = 2
-        times[mesh.pieces_at(other.place)] = 2
+        met = np.zeros(len(mesh.start) - 1, np.bool_)
+        met[[*mesh.pieces_at(self.place), *mesh.pieces_at(other.place)]] = True
         out = np.zeros(len(mesh.piece), np.bool_)
-        crossed(mesh.joins, self.met, other.met, limit_m, times, mesh.piece, out)
+        within(mesh.joins, self.met, other.met, limit_m, met, mesh.piece, out)
         return mesh.over_plane(out.reshape(mesh.excess.shape[0] - 1, -1))
 
     def cells(self) -> Floats:

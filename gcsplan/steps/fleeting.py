@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.fleet.resolve import resolve
 from gcsplan.fleet.separation import Conflict, Encounter, Place, Rules, Separation, separation
 from gcsplan.fleet.timing import Course, Route, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
@@ -248,6 +247,8 @@ def _kept_apart(
     detours: Detours,
 ) -> Schedule:
     """The schedule with its conflicts resolved: departures, speeds, holds, other paths."""
+    from gcsplan.fleet.resolve import resolve  # most plans are of one vehicle
+
     settled = resolve(
         plan, crews, rules_of(arrival, vehicles),
         priority=arrival.order if brief.by_priority else None,

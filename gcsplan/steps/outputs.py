@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -23,10 +23,12 @@ from gcsplan.mavlink.compare import command_name
 from gcsplan.mavlink.files import write_plan, write_waypoints
 from gcsplan.mavlink.mission import MissionItem
 from gcsplan.pipeline import FleetPlan, Plan, VehiclePlan
-from gcsplan.steps.delivery import Delivery
-from gcsplan.way_home.verdict import WayHome
 
-Homes = Mapping[str, WayHome]
+if TYPE_CHECKING:
+    from gcsplan.steps.delivery import Delivery
+    from gcsplan.way_home.verdict import WayHome
+
+Homes: TypeAlias = "Mapping[str, WayHome]"
 
 
 def outputs_of(
@@ -41,14 +43,12 @@ def outputs_of(
     ``homes``: vehicle to its way home, where that was judged; it stands in the summary then. ``fences``: vehicle to
     the items of its fence, for the `.plan`; with ``rally`` the rally points that were proposed stand there too.
     """
-    from gcsplan.way_home.rally import rally_items
-
     tracks = [_track(v) for v in plan.vehicles]
     frame, zones = plan.world.frame, plan.world.airspace.zones
     files = {}
     for v in plan.vehicles:
         files[f"{v.name}.waypoints"] = write_waypoints(v.mission)
-        points = rally_items(homes[v.name].rally) if rally and v.name in homes else ()
+        points = _rally_items(homes[v.name]) if rally and v.name in homes else ()
         files[f"{v.name}.plan"] = write_plan(
             v.mission, vehicle=v.request.vehicle, fence=fences.get(v.name, ()), rally=points
         )
@@ -60,6 +60,12 @@ def outputs_of(
     )
     files["summary.json"] = write_summary(summary_of(plan, homes=homes))
     return files
+
+
+def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
+    from gcsplan.way_home.rally import rally_items
+
+    return rally_items(home.rally)
 
 
 def homes_of(plan: Plan) -> dict[str, WayHome]:

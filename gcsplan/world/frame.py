@@ -8,6 +8,7 @@ ellipsoid is never used: its "up" is off by d²/2R, 7.8 m at 10 km.
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,12 +41,20 @@ class Frame:
         self.lat_deg = float(lat_deg)
         self.lon_deg = float(lon_deg)
         self.amsl_m = float(amsl_m)
-        self.crs = CRS.from_proj4(
-            f"+proj=tmerc +lat_0={self.lat_deg!r} +lon_0={self.lon_deg!r} +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"
+        self._projection = f"+proj=tmerc +lat_0={self.lat_deg:.15g} +lon_0={self.lon_deg:.15g} +k=1 +x_0=0 +y_0=0"
+        # What PROJ makes of the two coordinate systems, to the last bit, without looking for it in its database.
+        plane = f"{self._projection} +ellps=WGS84"
+        self._forward = Transformer.from_pipeline(
+            f"+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step {plane}"
         )
-        geographic = CRS.from_epsg(4326)
-        self._forward = Transformer.from_crs(geographic, self.crs, always_xy=True)
-        self._back = Transformer.from_crs(self.crs, geographic, always_xy=True)
+        self._back = Transformer.from_pipeline(
+            f"+proj=pipeline +step +inv {plane} +step +proj=unitconvert +xy_in=rad +xy_out=deg"
+        )
+
+    @cached_property
+    def crs(self) -> CRS:
+        """The plane as a coordinate system, for what has one of its own."""
+        return CRS.from_proj4(f"{self._projection} +datum=WGS84 +units=m")
 
     def to_plane(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> NDArray[np.float64]:
         """(..., 2) east_m, north_m of points in degrees (arrays of equal shape)."""
