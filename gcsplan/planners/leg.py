@@ -79,6 +79,7 @@ class Leg:
         """Tracks shorter than this lie within the lattice, and within what the flood has seen."""
         self.plane: Plane
         self._twin: Plane | None = None
+        self._detour = 0.0
         self._guide: Guide
         self._ahead: Guide | None = None
         self._close: Close | None = None
@@ -119,8 +120,9 @@ class Leg:
             if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                 continue
             within = detour * self.straight_m if math.isfinite(detour) else math.inf
-            self.plane, self._twin = self._lattice(detour, self._stride), None
-            self._detour = detour
+            if detour != self._detour:
+                self.plane, self._twin = self._lattice(detour, self._stride), None
+                self._detour = detour
             mesh = self.plane.mesh(self.top_m, True)
             a, b = self.goal.place, self.start.place
             try:

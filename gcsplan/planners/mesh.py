@@ -150,7 +150,7 @@ class Mesh:
             return None
         sources = np.array([(*start, 0.0)] * len(pieces))
         remaining = np.zeros(0) if guide is None else guide.over(self)
-        room = 1 << 19
+        room = max(1 << 19, 8 * len(self.start))  # what is not touched costs nothing
         while True:
             names = 8 * (self.excess.size + 1)
             best, origin = np.zeros(names), np.zeros(names, np.int64)  # cost nothing until they are touched
