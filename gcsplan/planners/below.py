@@ -30,6 +30,8 @@ SLACKS = (0.008, 0.15, 0.6)
 """How much longer than the shortest the tracks are that are looked at, as a part of it, until a path is known."""
 LITTLE, WORTH = 5e-6, 2e-5
 """What fewer way points may cost, as a part of the cost: on the way, and at last."""
+HOPE = 1.5
+"""A path is made simpler if it would be the best so far by gaining that times what one of its kind has gained yet."""
 ZONES_SHUT = 8
 """Zones whose underside is given up, one after the other, because no profile fits under them."""
 CONTENT = 0.4
@@ -58,6 +60,8 @@ class Below:
         self.cost = math.inf
         self.bound = straight_bound(problem)
         self.first_s = math.inf
+        self._gained: dict[tuple[bool, bool], float] = {}
+        self._simplified: set[tuple[bool, bytes]] = set()
         self.proved_shut = False
         self.timed_out = self.in_space = False
         limits = problem.limits
@@ -122,13 +126,28 @@ class Below:
                     return False
                 if self.best is None:  # what follows makes it better; it could be flown now
                     self.first_s = time.perf_counter() - self.begun_s
-                few, kept = fewer(self.problem, *found, LITTLE * flown.cost)
-                if fine:
-                    few, kept = polished(self.problem, few, kept)
-                return self.take(few, kept)
+                return self._take_simpler(*found, fine=fine, longer=spare_m > 0.0)
             if not self._give_up(flown):
                 return False
         return False
+
+    def _take_simpler(self, points: Floats, pinned: Bools, *, fine: bool, longer: bool) -> bool:
+        """Make a path simpler and keep it, if it is the best so far; not where there is no hope of that.
+
+        ``fine``, ``longer``: its kind, whether its track is of the fine lattice, and whether it was made longer.
+        """
+        cost = self.problem.cost(Path(points))
+        hope = self._gained.get((fine, longer), math.inf)
+        as_given = fine, points.tobytes()
+        if as_given in self._simplified or cost > self.cost * (1.0 + HOPE * hope + LITTLE):
+            return False
+        self._simplified.add(as_given)
+        points, pinned = fewer(self.problem, points, pinned, LITTLE * cost)
+        if fine:
+            points, pinned = polished(self.problem, points, pinned)
+        gained = cost / self.problem.cost(Path(points)) - 1.0
+        self._gained[fine, longer] = max(self._gained.get((fine, longer), 0.0), gained)
+        return self.take(points, pinned)
 
     def _exact(self, track: Track, flown: Flown) -> tuple[Floats, Bools] | None:
         """Way points over a track that the exact check passes: of this profile, or of one drawn with more care."""

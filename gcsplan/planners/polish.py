@@ -1,6 +1,12 @@
-"""A legal path made shorter and simpler by many small moves at once, each put to the exact check."""
+"""A legal path made shorter and simpler by many small moves at once, each put to the exact check.
+
+Most of the work is the exact check's, so nothing is put to it twice: what is known of a move holds until a point that
+it depends on has moved, and the second leg of a move is looked at only where the first is legal.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +16,8 @@ from gcsplan.world.airspace import Legs
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.intp]
+Marks = NDArray[np.int8]
 
 PARTS = np.array([1.0, 0.5, 0.22, 0.1, 0.04, 0.015])
 """How far a point is moved towards the line between its neighbours, as parts of the way."""
@@ -17,12 +25,17 @@ ROUNDS = 24
 LITTLE = 2e-6
 """A round of moves that gains no more, as a part of the cost, is the last."""
 
+OPEN, LEGAL, SHUT = 0, 1, 2
+"""What is known of a choice: nothing, that its legs are legal, or that one is not."""
+
 
 def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, Bools]:
     """Move free points towards the lines between their neighbours, in space and in the plane, as far as is legal."""
     cost = _cost(problem, points)
+    points = points.copy()
+    still = np.zeros(len(points), np.bool_)
     for k in range(2 * ROUNDS):
-        points = _moved(problem, points, pinned, k % 2)
+        _move(problem, points, pinned, still, k % 2)
         if k % 2:
             now = _cost(problem, points)
             if cost - now <= LITTLE * cost:
@@ -31,117 +44,153 @@ def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, B
     return points, pinned
 
 
-def _moved(problem: Problem, points: Floats, pinned: Bools, parity: int) -> Floats:
-    """The path with every second point moved to the cheapest of its legal places."""
+def _move(problem: Problem, points: Floats, pinned: Bools, still: Bools, parity: int) -> None:
+    """Move every second point to the cheapest of its legal places, in place.
+
+    ``still`` (N,) points that have no cheaper one, which is so until a neighbour moves; kept up to date.
+    """
     at = np.arange(1 + parity, len(points) - 1, 2)
-    at = at[~pinned[at]]
+    at = at[~(pinned[at] | still[at])]
     if not len(at):
-        return points
+        return
     before, here, after = points[at - 1], points[at], points[at + 1]
     chord = after - before
     flat = (chord[:, :2] ** 2).sum(axis=1)
     t = ((here - before)[:, :2] * chord[:, :2]).sum(axis=1) / np.maximum(flat, 1e-12)
     foot = before + np.clip(t, 0.0, 1.0)[:, None] * chord
-    level = foot.copy()
-    level[:, 2] = here[:, 2]  # in the plane alone
-    upright = here.copy()
-    upright[:, 2] = foot[:, 2]  # in height alone
-    aims = np.stack([foot, level, upright], axis=1)  # (n, 3, 3)
+    aims = np.stack([foot, foot, here], axis=1)  # (n, 3, 3): in space, in the plane alone, in height alone
+    aims[:, 1, 2], aims[:, 2, 2] = here[:, 2], foot[:, 2]
     places = here[:, None, None] + PARTS[None, None, :, None] * (aims - here[:, None])[:, :, None]
     places = places.reshape(len(at), -1, 3)
     old = problem.leg_costs(before, here) + problem.leg_costs(here, after)
     new = problem.leg_costs(before[:, None], places) + problem.leg_costs(places, after[:, None])
     gain = old[:, None] - new
-    worth = gain > 1e-9 * old[:, None]
-    row, column = np.nonzero(worth)
-    if not len(row):
-        return points
+    row, column = np.nonzero(gain > 1e-9 * old[:, None])
     place = places[row, column]
-    legal = _clear(problem, before[row], place) & _clear(problem, place, after[row])
-    gain = np.where(worth, gain, -np.inf)
-    gain[row[~legal], column[~legal]] = -np.inf
-    best = gain.argmax(axis=1)
-    better = np.isfinite(gain[np.arange(len(at)), best])
-    out = points.copy()
-    out[at[better]] = places[np.arange(len(at)), best][better]
-    return out
+    legal = _clear(problem, before[row], place)
+    legal[legal] = _clear(problem, place[legal], after[row[legal]])
+    row, column = row[legal], column[legal]
+    legally = np.full(gain.shape, -np.inf)
+    legally[row, column] = gain[row, column]
+    best = legally.argmax(axis=1)
+    moved = np.unique(row)
+    points[at[moved]] = places[moved, best[moved]]
+    still[at] = True
+    still[at[moved, None] + np.arange(-1, 2)] = False
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Choices:
+    """Ways to do with one point less, a row for each stretch of a path (N, 3): N - 2 with one point inside, then N - 3
+    with two.
+
+    ``first``, ``last`` (R,): points that a stretch begins and ends with; ``mids`` (R, 12, 3): places for the one point
+    inside instead of two, where ``allowed`` (R, 12). With one point inside there is one choice, to leave it out: then
+    the place is that of ``first``.
+    """
+
+    first: Ints
+    last: Ints
+    mids: Floats
+    allowed: Bools
 
 
 def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tuple[Floats, Bools]:
     """Fewer points: one left out, or two made one where their outer legs meet, all of it for ``worth`` at most."""
     spent = 0.0
+    came_from, marks = np.full(len(points), -1), np.zeros((0, 12), np.int8)
     while len(points) > 2:
-        n = len(points)
-        drop = np.array([i for i in range(1, n - 1) if not pinned[i]], np.intp)
-        legs_a: list[Floats] = []
-        legs_b: list[Floats] = []
-        choices: list[tuple[int, Floats | None]] = []
-        for i in drop.tolist():
-            legs_a.append(points[i - 1 : i])
-            legs_b.append(points[i + 1 : i + 2])
-            choices.append((i, None))
-        for i in range(1, n - 2):
-            if not pinned[i] and not pinned[i + 1]:
-                for corner in _corners(points[i - 1 : i + 3]):
-                    choices.append((i, corner))
-                    legs_a.append(np.array([points[i - 1], corner]))
-                    legs_b.append(np.array([corner, points[i + 2]]))
-        if not choices:
-            break
-        # Costs of what is now, and of what would be instead: two legs for one, three for two.
+        choices = _choices(points, pinned)
+        first, last, mids = choices.first, choices.last, choices.mids
+        # Costs of what is now, and of what would be instead.
         now = np.concatenate([[0.0], np.cumsum(problem.leg_costs(points[:-1], points[1:]))])
-        first = np.array([i - 1 for i, _ in choices])
-        last = np.array([i + (1 if choice is None else 2) for i, choice in choices])
-        mids = np.array([points[i - 1] if choice is None else choice for i, choice in choices])
-        extra = (
-            problem.leg_costs(points[first], mids) + problem.leg_costs(mids, points[last]) - (now[last] - now[first])
-        )
-        cheap = [k for k in np.argsort(extra, kind="stable").tolist() if spent + max(float(extra[k]), 0.0) <= worth]
-        if not cheap:
-            break
-        sizes = [len(legs_a[k]) for k in cheap]
-        ok = _clear(problem, np.concatenate([legs_a[k] for k in cheap]), np.concatenate([legs_b[k] for k in cheap]))
-        firsts = np.cumsum([0, *sizes[:-1]])
-        legal = [k for k, f, size in zip(cheap, firsts, sizes, strict=True) if ok[f : f + size].all()]
-        taken: list[tuple[int, Floats | None]] = []
-        busy: set[int] = set()
-        for k in legal:
-            i, choice = choices[k]
-            touched = set(range(i - 1, i + (2 if choice is None else 3)))
-            if touched & busy or spent + max(float(extra[k]), 0.0) > worth:
-                continue
-            busy |= touched
-            spent += max(float(extra[k]), 0.0)
-            taken.append((i, choice))
-        if not taken:
-            break
-        keep = np.ones(n, np.bool_)
+        extra = problem.leg_costs(points[first][:, None], mids) + problem.leg_costs(mids, points[last][:, None])
+        extra -= (now[last] - now[first])[:, None]
+        cheap = choices.allowed & (np.maximum(extra, 0.0) + spent <= worth)
+        marks = _still_known(marks, came_from)
+        _look(problem, points, choices, cheap & (marks == OPEN), marks)
+        extra[~(cheap & (marks == LEGAL))] = np.inf
+        best = extra.argmin(axis=1)
+        more = extra[np.arange(len(best)), best]
+        busy = bytearray(len(points))
+        keep = np.ones(len(points), np.bool_)
+        came_from = np.arange(len(points))
         points = points.copy()
-        for i, place in taken:
-            if place is None:
-                keep[i] = False
-            else:
-                points[i] = place
-                keep[i + 1] = False
-        points, pinned = points[keep], pinned[keep]
+        for row in np.argsort(more, kind="stable")[: np.count_nonzero(np.isfinite(more))].tolist():
+            a, b, dearer = int(first[row]), int(last[row]), max(float(more[row]), 0.0)
+            if any(busy[a : b + 1]) or spent + dearer > worth:
+                continue
+            busy[a : b + 1] = bytes([1]) * (b + 1 - a)
+            spent += dearer
+            keep[b - 1] = False
+            if b - a == 3:
+                points[a + 1], came_from[a + 1] = mids[row, best[row]], -1
+        if keep.all():
+            break
+        points, pinned, came_from = points[keep], pinned[keep], came_from[keep]
     return points, pinned
 
 
-def _corners(four: Floats) -> list[Floats]:
-    """Places for one point instead of the two in the middle: where the outer legs meet, at a few heights."""
-    a, b, c, d = four
+def _choices(points: Floats, pinned: Bools) -> _Choices:
+    """Of a path's points all that could be done with one less; see `_Choices`.
+
+    One place instead of two points: either's, the middle, or where the outer legs meet, at three heights each.
+    """
+    n = len(points)
+    one, two = np.arange(n - 2), np.arange(n - 3)
+    mids, allowed = np.zeros((2 * n - 5, 12, 3)), np.zeros((2 * n - 5, 12), np.bool_)
+    mids[: n - 2] = points[:-2, None]
+    allowed[: n - 2, 0] = ~pinned[1:-1]
+    a, b, c, d = points[:-3], points[1:-2], points[2:-1], points[3:]
     p, q, w = b - a, c - d, d - a
-    det = p[0] * q[1] - p[1] * q[0]
-    places = [b[:2], c[:2], 0.5 * (b + c)[:2]]
-    if abs(det) > 1e-9 * max(float(p[:2] @ p[:2]), float(q[:2] @ q[:2]), 1e-12):
-        t, u = (w[0] * q[1] - w[1] * q[0]) / det, (w[0] * p[1] - w[1] * p[0]) / det
-        if t >= 1.0 and u >= 1.0:
-            places.append(a[:2] + t * p[:2])
-    heights = {max(b[2], c[2]), min(b[2], c[2]), 0.5 * (b[2] + c[2])}
-    return [np.array([*place, z]) for place in places for z in sorted(heights)]
+    det = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+    long = np.maximum((p[:, :2] ** 2).sum(axis=1), (q[:, :2] ** 2).sum(axis=1))
+    meet = np.abs(det) > 1e-9 * np.maximum(long, 1e-12)
+    det[~meet] = 1.0
+    t, u = (w[:, 0] * q[:, 1] - w[:, 1] * q[:, 0]) / det, (w[:, 0] * p[:, 1] - w[:, 1] * p[:, 0]) / det
+    meet &= (t >= 1.0) & (u >= 1.0)
+    t[~meet] = 0.0
+    middle = 0.5 * (b + c)
+    height = np.sort(np.stack([b[:, 2], middle[:, 2], c[:, 2]], axis=1), axis=1)
+    places, free = mids[n - 2 :].reshape(n - 3, 4, 3, 3), allowed[n - 2 :].reshape(n - 3, 4, 3)
+    for k, place in enumerate((b, c, middle, a + t[:, None] * p)):
+        places[:, k, :, :2] = place[:, None, :2]
+    places[..., 2] = height[:, None]
+    free[:] = ~(pinned[1:-2] | pinned[2:-1])[:, None, None]
+    free[:, 3] &= meet[:, None]
+    free[:, :, 1:] &= (height[:, 1:] != height[:, :-1])[:, None]
+    return _Choices(np.concatenate([one, two]), np.concatenate([one + 2, two + 3]), mids, allowed)
+
+
+def _still_known(marks: Marks, came_from: Ints) -> Marks:
+    """What is known of the choices of a path whose points were those of the path before, or are new (-1).
+
+    ``marks``: of the choices of the path before; nothing is known of a stretch with a new or another point in it.
+    """
+    n, before = len(came_from), (len(marks) + 5) // 2
+    known = np.zeros((2 * n - 5, 12), np.int8)
+    beside = (came_from[:-1] >= 0) & (came_from[1:] == came_from[:-1] + 1)
+    one = np.flatnonzero(beside[:-1] & beside[1:])
+    known[one] = marks[came_from[one]]
+    two = np.flatnonzero(beside[:-2] & beside[1:-1] & beside[2:])
+    known[n - 2 + two] = marks[before - 2 + came_from[two]]
+    return known
+
+
+def _look(problem: Problem, points: Floats, choices: _Choices, asked: Bools, marks: Marks) -> None:
+    """Put the choices that are ``asked`` for (R, 12) to the exact check, and mark them."""
+    row, column = np.nonzero(asked)
+    first, last, place = choices.first[row], choices.last[row], choices.mids[row, column]
+    legal = np.ones(len(row), np.bool_)
+    two = last - first == 3
+    legal[two] = _clear(problem, points[first[two]], place[two])
+    legal[legal] = _clear(problem, place[legal], points[last[legal]])
+    marks[row, column] = np.where(legal, LEGAL, SHUT)
 
 
 def _clear(problem: Problem, start: Floats, end: Floats) -> Bools:
+    if not len(start):
+        return np.zeros(0, np.bool_)
     return problem.airspace.clear(Legs.between(start, end, problem.limits), problem.limits)
 
 
