@@ -45,8 +45,8 @@ FAR = 5e-3
 CLOSER, LEFT = 8, 0.03
 """Times that what lies between path and bound is halved, at most, and what part of the gap is not worth it: close to
 the ends a shorter path has less way to climb."""
-NEARER = 0.5
-"""What part of the wanted gap is tried first."""
+NEARER = 0.45
+"""What part of the wanted gap is tried first, and worth a look even where the gap is small enough."""
 
 
 class Below:
@@ -213,12 +213,12 @@ class Below:
         """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""
         low, high = self.bound, self.cost
         for k in range(CLOSER):
-            if self._done() or high - low < max(2e-5 * low, LEFT * (self.cost - low)) or not self._in_time():
+            nearer = self.cost / (1.0 + 0.01 * NEARER * self.problem.gap_percent)
+            enough = low >= nearer if k == 0 else self._done()
+            if enough or high - low < max(2e-5 * low, LEFT * (self.cost - low)) or not self._in_time():
                 break
             # No path is shorter than `low`; is any shorter than `middle`?
-            middle = 0.5 * (low + high)
-            if k == 0:
-                middle = max(middle, self.cost / (1.0 + 0.01 * NEARER * self.problem.gap_percent))
+            middle = max(0.5 * (low + high), nearer if k == 0 else 0.0)
             found = self._bound_shorter(middle)
             if found < middle:
                 high = middle
