@@ -145,7 +145,7 @@ class Below:
         points, pinned = fewer(self.problem, points, pinned, LITTLE * cost)
         if fine:
             points, pinned = polished(self.problem, points, pinned)
-        gained = cost / self.problem.cost(Path(points)) - 1.0
+        gained = cost / max(self.problem.cost(Path(points)), 1e-9) - 1.0  # a level flight may cost nothing
         self._gained[fine, longer] = max(self._gained.get((fine, longer), 0.0), gained)
         return self.take(points, pinned)
 

@@ -52,6 +52,9 @@ ACROSS_M = 0.02
 
 ZONE_BOW_M = 0.003
 
+GLIMPSES = 8
+"""Places on a leg that are looked at before all of it, where only a yes or no is wanted."""
+
 
 @device
 def signed_distance(zone, vertex, k, e, n):  # type: ignore[no-untyped-def]
@@ -259,6 +262,37 @@ def nearest_conflict(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, 
     return best, at
 
 
+@device
+def glimpsed(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, t0, t1, altitude_m):  # type: ignore[no-untyped-def]
+    """Whether a place on the leg itself, of a few between ``t0`` and ``t1``, lies in a zone and at its heights there.
+
+    If so the zone is broken, and the search for the nearest such place, which takes long near the zone's levels, would
+    find it too. If not, nothing is known.
+    """
+    rows, cols = z.shape
+    floor_agl, ceiling_agl = zone[k, FLOOR_AGL] != 0.0, zone[k, CEILING_AGL] != 0.0
+    for q in range(GLIMPSES):
+        t = t0 + (t1 - t0) * (q + 0.5) / GLIMPSES
+        e, n = e0 + t * (e1 - e0), n0 + t * (n1 - n0)
+        if signed_distance(zone, vertex, k, e, n) > -2.0 * TOUCH_M:
+            continue
+        c, r = to_grid(m, e, n)
+        if not (0.0 <= c < cols - 1.0 and 0.0 <= r < rows - 1.0):
+            continue
+        i, j = int(c), int(r)
+        za = z[j, i]
+        kb, kc = z[j, i + 1] - za, z[j + 1, i] - za
+        u, v = c - i, r - j
+        ground = za + kb * u + kc * v + (z[j + 1, i + 1] - za - kb - kc) * u * v
+        h = h0 + t * (h1 - h0)
+        low = zone[k, FLOOR] + (ground if floor_agl else 0.0)
+        high = zone[k, CEILING] + (ground if ceiling_agl else 0.0)
+        # False for NaN, where the ground is unknown.
+        if h + altitude_m - low > 2.0 * TOUCH_M and high - h + altitude_m > 2.0 * TOUCH_M:
+            return True
+    return False
+
+
 @inlined
 def meets(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stack, events, full):  # type: ignore[no-untyped-def]
     """Whether a leg breaks a zone; its signed distance from the shape at the worst point, and where on the leg.
@@ -289,6 +323,8 @@ def meets(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stac
         t0, t1 = slab(n0, dn, zone[k, SOUTH_N] - reach - 1.0, zone[k, NORTH_N] + reach + 1.0, t0, t1)
     best, at = math.inf, 0.0
     if t0 <= t1:
+        if not full and glimpsed(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, t0, t1, altitude_m):
+            return True, 0.0, 0.5 * (t0 + t1)
         parts, _ = parts_of(m, (t1 - t0) * math.hypot(de, dn), ZONE_BOW_M)
         for p in range(parts):
             ta, tb = t0 + (t1 - t0) * p / parts, t0 + (t1 - t0) * (p + 1) / parts
