@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +16,7 @@ from gcsplan.planners.caps import Layer, search_caps
 from gcsplan.planners.climb import extend
 from gcsplan.planners.finish import way_points
 from gcsplan.planners.lattice import terminals
-from gcsplan.planners.leg import End, Leg
+from gcsplan.planners.leg import End, Leg, Spare
 from gcsplan.planners.polish import fewer, polished
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.planners.rising import rise_bound
@@ -40,11 +41,19 @@ STEEP = 0.5
 """What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
 LAPS = (0.5, 0.25, 1.0)
 """What part of the gap may be flown in laps near the ends, where a path without them was not good enough."""
+LAPS_AT = ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
+"""Near which ends."""
+GENTLER = (1.0, 0.98, 0.94)
+"""What part of the climb limit laps make use of: a profile that just holds may not hold over every metre of ground."""
 FAR = 5e-3
 """Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
+NEAR, FINER = 1e-2, 2
+"""Gap, as a part, up to which cells are cut once more where it is still too large, and into how many parts a side."""
 CLOSER, LEFT = 8, 0.03
 """Times that what lies between path and bound is halved, at most, and what part of the gap is not worth it: close to
 the ends a shorter path has less way to climb."""
+CLIMBED = (0.98, 0.9, 0.75, 0.5)
+"""What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
 NEARER = 0.45
 """What part of the wanted gap is tried first, and worth a look even where the gap is small enough."""
 
@@ -92,10 +101,10 @@ class Below:
             if self.try_below(self.top_m, fine=False) or self.try_below(self.top_m, fine=True):
                 return
 
-    def try_below(self, cap_m: float, *, fine: bool, spare_m: float = 0.0) -> bool:
+    def try_below(self, cap_m: float, *, fine: bool, spare_m: Spare = (0.0, 0.0)) -> bool:
         """Look for a path below a cap; True if it is the best so far.
 
-        ``spare_m``: about how much longer than its track it may be made near the ends, to climb.
+        ``spare_m``: about how much longer than its track it may be made near start and goal, to climb.
         """
         for _ in range(ZONES_SHUT):
             ways = []
@@ -116,19 +125,26 @@ class Below:
                 pin_m[at] = math.nan if leg.goal.amsl_m is None else leg.goal.amsl_m
             track = make_track(self.problem, points, pinned, pin_m)
             flown = fly(self.problem, track)
-            if spare_m > 0.0 and isinstance(flown, Obstruction):
-                longer = extend(self.problem, points, pinned, pin_m)
-                if longer is not None:
-                    track, flown = longer
+            if max(spare_m) > 0.0 and isinstance(flown, Obstruction):
+                return self._with_laps(points, pinned, pin_m)
             if isinstance(flown, Flown):
                 found = self._exact(track, flown)
-                if found is None:
-                    return False
-                if self.best is None:  # what follows makes it better; it could be flown now
-                    self.first_s = time.perf_counter() - self.begun_s
-                return self._take_simpler(*found, fine=fine, longer=spare_m > 0.0)
+                return found is not None and self._take_simpler(*found, fine=fine, longer=False)
             if not self._give_up(flown):
                 return False
+        return False
+
+    def _with_laps(self, points: Floats, pinned: Bools, pin_m: Floats) -> bool:
+        """Take a track (N, 2) with laps where its profile is too steep: some more where the exact check asks for it."""
+        limits = self.problem.limits
+        for part in GENTLER:
+            gentler = replace(
+                limits, max_climb_deg=part * limits.max_climb_deg, max_descent_deg=part * limits.max_descent_deg
+            )
+            longer = extend(replace(self.problem, limits=gentler), points, pinned, pin_m)
+            found = None if longer is None else self._exact(*longer)
+            if found is not None:
+                return self._take_simpler(*found, fine=True, longer=True)
         return False
 
     def _take_simpler(self, points: Floats, pinned: Bools, *, fine: bool, longer: bool) -> bool:
@@ -136,6 +152,8 @@ class Below:
 
         ``fine``, ``longer``: its kind, whether its track is of the fine lattice, and whether it was made longer.
         """
+        if self.best is None:  # what follows makes it better; it could be flown now
+            self.first_s = time.perf_counter() - self.begun_s
         cost = self.problem.cost(Path(points))
         hope = self._gained.get((fine, longer), math.inf)
         as_given = fine, points.tobytes()
@@ -206,8 +224,16 @@ class Below:
             self._raise_bound(self._search_caps(lambda layer: math.hypot(layer.track_m, self._rise(layer.low_m))))
         self._halve()
         for part in LAPS:
-            if not self._done() and self._climbs() and self._in_time():
-                self.try_below(self.top_m, fine=True, spare_m=part * (self.cost - self.bound))
+            for start, goal in LAPS_AT:
+                if not self._done() and self._climbs() and self._in_time():
+                    spare_m = part * (self.cost - self.bound)
+                    self.try_below(self.top_m, fine=True, spare_m=(start * spare_m, goal * spare_m))
+        if not self.in_space and not self._done() and self.gap <= NEAR and self._in_time():
+            # On a finer lattice, for walls and zones that the first one rounds off.
+            for leg in self.legs:
+                leg.closer = FINER
+            self.try_below(self.top_m, fine=True)
+            self._halve()
 
     def _halve(self) -> None:
         """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""
@@ -254,8 +280,11 @@ class Below:
         if len(self.legs) > 1:
             return longest_m
         climbing = rise_bound(self.legs, [longest_m], [longest_m]) - longest_m
-        shorter = max(longest_m - 0.98 * climbing, self.legs[0].length_m)
-        return shorter if rise_bound(self.legs, [shorter], [longest_m]) >= longest_m else longest_m
+        for part in CLIMBED:
+            shorter = max(longest_m - part * climbing, self.legs[0].length_m)
+            if rise_bound(self.legs, [shorter], [longest_m]) >= longest_m:
+                return shorter
+        return longest_m
 
     def _longest(self) -> float:
         """No track of a path that is better than the best is longer."""

@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Cone = tuple[float, float, float, float]
 """Where it stands (east_m, north_m), its height there, and its slope."""
+Spare = tuple[float, float]
+"""Metres that a path may fly in laps near its start and near its goal."""
 
 DETOURS = (1.25, 2.5, math.inf)
 """How long tracks may be, in times the straight way, before the lattice must be widened."""
@@ -96,6 +98,8 @@ class Leg:
         self._cut = 1
         if self._stride == 1:
             self._ratio = self._cut = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
+        self.closer = 1
+        """Into how many parts a side the finer lattice's cells are cut once more."""
         self.has_fine = self._ratio > 1
         """Whether there is a lattice finer than that of the first look."""
 
@@ -152,25 +156,25 @@ class Leg:
             near = self._guide.reach(self.start.place, limit_m)
             return self.plane.mesh(cap_m, low, 1, near, cones, under), self._guide
         if not self.has_fine:
-            return self.plane.mesh(cap_m, low, 1, within.cells, cones, under), within.guide
+            return self.plane.mesh(cap_m, low, self.closer, within.cells, cones, under), within.guide
         if self._stride == 1:
-            return self.plane.mesh(cap_m, low, self._cut, within.cells, cones, under), within.guide
+            return self.plane.mesh(cap_m, low, self._cut * self.closer, within.cells, cones, under), within.guide
         if self._twin is None:
             self._twin = self._lattice(self._detour, self._fine_stride)
         finer = np.repeat(np.repeat(within.cells, self._ratio, axis=0), self._ratio, axis=1)
-        return self._twin.mesh(cap_m, low, 1, finer, cones, under), within.guide
+        return self._twin.mesh(cap_m, low, self.closer, finer, cones, under), within.guide
 
     def track(
-        self, cap_m: float, within: Corridor | None, limit_m: float, under: Bools | None, spare_m: float = 0.0
+        self, cap_m: float, within: Corridor | None, limit_m: float, under: Bools | None, spare_m: Spare = (0.0, 0.0)
     ) -> Way | None:
         """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``, if it is shorter than
         ``limit_m``, and than `reach_m`.
 
         ``within``: on the finer lattice there; else on that of the first look. ``spare_m``: metres that may be added
-        near the ends to climb.
+        near start and goal to climb.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
-        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare_m)
+        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
         mesh, guide = self._mesh(cap_m, False, within, limit, cones, under)
         try:
             return mesh.way(self.start.place, self.goal.place, limit, guide)
@@ -188,7 +192,7 @@ class Leg:
         for _ in range(RAISED):
             spare = max(limit - known, 0.0)
             if climbs:
-                cones += self._cones(limits.max_climb_slope, limits.max_descent_slope, spare)
+                cones += self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare)
             mesh, guide = self._mesh(cap_m, True, within, limit, cones)
             try:
                 way = mesh.way(self.start.place, self.goal.place, limit, guide)
@@ -247,12 +251,12 @@ class Leg:
                 self._ahead = Guide(mesh, self.start.place, np.zeros(len(mesh.joins)), np.zeros(len(mesh.start) - 1))
         return self._ahead
 
-    def _cones(self, climb: float, descent: float, slack_m: float) -> list[Cone]:
-        """Height and slope of what can be reached near the ends, by paths with ``slack_m`` to spare."""
-        ends = ((self.start, climb), (self.goal, descent))
+    def _cones(self, climb: float, descent: float, at_start_m: float, at_goal_m: float) -> list[Cone]:
+        """Height and slope of what can be reached near the ends, by paths with so many metres to spare there."""
+        ends = ((self.start, climb, at_start_m), (self.goal, descent, at_goal_m))
         return [
-            (end.east_m, end.north_m, end.amsl_m + slope * slack_m, slope)
-            for end, slope in ends
+            (end.east_m, end.north_m, end.amsl_m + slope * spare_m, slope)
+            for end, slope, spare_m in ends
             if end.amsl_m is not None and math.isfinite(slope)
         ]
 

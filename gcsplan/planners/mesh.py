@@ -61,8 +61,8 @@ class Mesh:
     order: Ints
 
     def lowest(self) -> Floats:
-        """(cells,) the lowest floor of each; of cells that are not looked at, anything."""
-        f = self.floor
+        """(cells,) the lowest floor of each; -inf where a corner is not looked at."""
+        f = np.where(np.isposinf(self.excess), -np.inf, self.floor)
         return np.minimum(np.minimum(f[:-1, :-1], f[:-1, 1:]), np.minimum(f[1:, :-1], f[1:, 1:])).ravel()
 
     def straight_to(self, place: Place) -> Floats:
