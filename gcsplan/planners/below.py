@@ -47,11 +47,14 @@ GENTLER = (1.0, 0.98, 0.94)
 """What part of the climb limit laps make use of: a profile that just holds may not hold over every metre of ground."""
 FAR = 5e-3
 """Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
-NEAR, FINER = 1e-2, 2
-"""Gap, as a part, up to which cells are cut once more where it is still too large, and into how many parts a side."""
-CLOSER, LEFT = 8, 0.03
+SMALL = 50.0
+"""A world is small where the straight ways from stop to stop are so many cells of the terrain model long, at most."""
+TWICE, NEAR, FINER = 2.0, 1e-2, 4
+"""From so many times the wanted gap on, and up to which gap, as a part, cells are cut once more, and into how many
+parts a side: for walls and zones that the first lattice rounds off."""
+CLOSER, LEFT, FLAT = 8, 0.05, 0.12
 """Times that what lies between path and bound is halved, at most, and what part of the gap is not worth it: close to
-the ends a shorter path has less way to climb."""
+the ends a shorter path has less way to climb. How little shorter paths' bounds rise that are taken to rise no more."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
 NEARER = 0.45
@@ -72,7 +75,7 @@ class Below:
         self._gained: dict[tuple[bool, bool], float] = {}
         self._simplified: set[tuple[bool, bytes]] = set()
         self.proved_shut = False
-        self.timed_out = self.in_space = False
+        self.timed_out = self.in_space = self.searched = False
         limits = problem.limits
         top_m = limits.max_amsl_m
         self.top_m = _above_all(problem) if top_m is None else top_m - limits.altitude_error_m
@@ -193,6 +196,26 @@ class Below:
         found = steep_path(p, best, self._in_time) if self.in_space else None
         return found is not None and not self.judge.violations(found[0]) and self.take(*found)
 
+    @property
+    def is_small(self) -> bool:
+        """Whether every leg is so short that a search among few places costs little beside all else."""
+        cell_m = float(self.problem.airspace.surface.grid.metres_per_cell(*self.problem.start[:2]).max())
+        short = [leg for leg in self.legs if leg.straight_m <= SMALL * cell_m]
+        return len(short) == len(self.problem.via) + 1  # legs from a place to itself are not among the legs
+
+    def search_small(self, wanted: float = FAR) -> bool:
+        """Look for a path between few places, in small worlds where the best is farther than ``wanted`` (a part) from
+        the bound; True if that is the best so far."""
+        missing = self.best is None
+        if self.searched or not self.is_small or (not missing and (self.gap <= wanted or not self._in_time())):
+            return False
+        from gcsplan.planners.small import small_path  # most missions are longer
+
+        self.searched = True
+        # A first path is worth more than the time it takes.
+        found = small_path(self.problem, self.best, (lambda: True) if missing else self._in_time)
+        return found is not None and not self.judge.violations(found[0]) and self.take(*found)
+
     def take(self, points: Floats, pinned: Bools | None = None) -> bool:
         """Keep a path if it is the best so far; ``pinned`` (N,) its stops."""
         cost = self.problem.cost(Path(points))
@@ -228,26 +251,27 @@ class Below:
                 if not self._done() and self._climbs() and self._in_time():
                     spare_m = part * (self.cost - self.bound)
                     self.try_below(self.top_m, fine=True, spare_m=(start * spare_m, goal * spare_m))
-        if not self.in_space and not self._done() and self.gap <= NEAR and self._in_time():
-            # On a finer lattice, for walls and zones that the first one rounds off.
+        far = TWICE * self.problem.gap_percent / 100.0
+        if not self.in_space and far < self.gap <= NEAR and self._in_time():
             for leg in self.legs:
-                leg.closer = FINER
+                leg.look_closer(self._limit(leg), FINER)
             self.try_below(self.top_m, fine=True)
             self._halve()
 
     def _halve(self) -> None:
         """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""
-        low, high = self.bound, self.cost
+        low, high, before, flat = self.bound, self.cost, 0.0, False
         for k in range(CLOSER):
             nearer = self.cost / (1.0 + 0.01 * NEARER * self.problem.gap_percent)
             enough = low >= nearer if k == 0 else self._done()
             if enough or high - low < max(2e-5 * low, LEFT * (self.cost - low)) or not self._in_time():
                 break
             # No path is shorter than `low`; is any shorter than `middle`?
-            middle = max(0.5 * (low + high), nearer if k == 0 else 0.0)
+            middle = max(low + (FLAT if flat else 0.5) * (high - low), nearer if k == 0 else 0.0)
             found = self._bound_shorter(middle)
+            flat = 0 < k and found < min(middle, before + FLAT * (high - middle))
             if found < middle:
-                high = middle
+                high, before = middle, found  # the bound of shorter paths is higher; where it hardly is, they are close
             low = max(low, min(found, middle))
             self._raise_bound(low)
 

@@ -99,7 +99,7 @@ class Leg:
         if self._stride == 1:
             self._ratio = self._cut = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
         self.closer = 1
-        """Into how many parts a side the finer lattice's cells are cut once more."""
+        """Into how many parts a side the finer lattice's cells are cut once more, see `look_closer`."""
         self.has_fine = self._ratio > 1
         """Whether there is a lattice finer than that of the first look."""
 
@@ -120,6 +120,7 @@ class Leg:
         Widens the lattice until that way lies within it.
         """
         self._ahead = self._close = None
+        self.closer = 1
         for detour in DETOURS:
             if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                 continue
@@ -155,8 +156,9 @@ class Leg:
         if within is None:
             near = self._guide.reach(self.start.place, limit_m)
             return self.plane.mesh(cap_m, low, 1, near, cones, under), self._guide
-        if not self.has_fine:
-            return self.plane.mesh(cap_m, low, self.closer, within.cells, cones, under), within.guide
+        plane = within.guide.mesh.plane
+        if plane is not self.plane or not self.has_fine:
+            return plane.mesh(cap_m, low, self.closer, within.cells, cones, under), within.guide
         if self._stride == 1:
             return self.plane.mesh(cap_m, low, self._cut * self.closer, within.cells, cones, under), within.guide
         if self._twin is None:
@@ -205,6 +207,31 @@ class Leg:
                 return max(known, way.length_m)
             known = way.length_m
         return known
+
+    def look_closer(self, limit_m: float, parts: int) -> None:
+        """Look anew, at each cell of the finer lattice alone, at what tracks shorter than ``limit_m`` may meet.
+
+        No longer ones are known after that. `track` and `bound` cut the cells of such corridors into ``parts`` a side.
+        """
+        limit = min(limit_m, self.reach_m)
+        close = self._closer(limit)
+        if close is None:
+            return
+        if self._stride == 1:
+            twin = self._lattice(self._detour, 1, self.parts * self._cut) if self._cut > 1 else self.plane
+        else:
+            twin = self._twin or self._lattice(self._detour, self._fine_stride)
+        wanted = close.away.between(close.left, limit)
+        mesh = twin.mesh(
+            self.top_m, True, 1, np.repeat(np.repeat(wanted, self._ratio, axis=0), self._ratio, axis=1), single=True
+        )
+        a, b = self.start.place, self.goal.place
+        try:
+            left = mesh.flood(b, a, limit, math.inf, close.away)[1]
+            self._close = Close(limit, mesh.flood(a, b, limit, math.inf, left)[1], left)
+        except Exhausted:
+            return
+        self.reach_m, self.closer = limit, parts
 
     def corridor(self, limit_m: float) -> Corridor:
         """What tracks shorter than ``limit_m``, and than `reach_m`, may meet."""
@@ -260,14 +287,15 @@ class Leg:
             if end.amsl_m is not None and math.isfinite(slope)
         ]
 
-    def _lattice(self, detour: float, stride: int) -> Plane:
+    def _lattice(self, detour: float, stride: int, parts: int | None = None) -> Plane:
         a, b, d = self.start.place, self.goal.place, self.straight_m
+        parts = self.parts if parts is None else parts
         if math.isinf(detour):
             everywhere = (-math.inf, -math.inf, math.inf, math.inf)
-            return make_plane(self.problem, everywhere, self.parts, stride, self._stride)
+            return make_plane(self.problem, everywhere, parts, stride, self._stride)
         more = max(0.5 * d * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * d) + 1.0
         box = (min(a[0], b[0]) - more, min(a[1], b[1]) - more, max(a[0], b[0]) + more, max(a[1], b[1]) + more)
         cell = self._stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
 
         reach = a, b, detour * d + 4.0 * cell
-        return make_plane(self.problem, box, self.parts, stride, self._stride, reach)
+        return make_plane(self.problem, box, parts, stride, self._stride, reach)

@@ -191,11 +191,11 @@ class Guide:
 
     def over(self, finer: Mesh) -> Floats:
         """The same for the pieces of a mesh on the same lattice, or one that is some times finer."""
-        ratio = finer.fineness * self.mesh.plane.stride // (self.mesh.fineness * finer.plane.stride)
+        # A finer lattice's meshes begin at corners of coarse cells.
+        share = finer.plane.parts * self.mesh.plane.stride // (self.mesh.plane.parts * finer.plane.stride)
+        ratio = finer.fineness * share // self.mesh.fineness
         out = np.full(len(finer.start) - 1, np.inf)
         cols, fine_cols = self.mesh.excess.shape[1] - 1, finer.excess.shape[1] - 1
-        # A finer lattice's meshes begin at corners of coarse cells.
-        share = self.mesh.plane.stride // finer.plane.stride
         row, col = finer.row // share - self.mesh.row, finer.col // share - self.mesh.col
         least_of_cells(self.mesh.piece, self.entered, cols, finer.piece, fine_cols, ratio, row, col, out)
         return out

@@ -13,7 +13,8 @@ better (`caps`). Close to the ends a path can be no higher than it has had way t
 
 **Where that does not hold**, under a maximum AGL, or where the climb limit binds far from the ends, the ways are
 searched on a lattice of reachable altitudes (`band`); the bound of the plane is true there as well. In worlds as high
-as they are wide, where paths below one cap are not the shortest, ways are searched in space (`steep`).
+as they are wide, where paths below one cap are not the shortest, ways are searched in space (`steep`); in worlds of a
+few dozen cells, where a slit or a pass may be narrower than every lattice, between few places that matter (`small`).
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ Floats = NDArray[np.float64]
 MOST_NODES = 1_500_000
 """The lattice of reachable altitudes is asked for a better path, too, on terrain of so many nodes at most, for its
 rasters are as fine as the terrain."""
+MUCH = 0.05
+"""Gap, as a part, beyond which small worlds are searched for a better path before time is spent on a closer bound."""
 
 TURNS_NOTE = "the lower bound is that of paths with sharp corners: it ignores turn_radius_m"
 BAND_NOTE = "the lower bound knows ground, zones and ceilings, but not the room between min and max AGL"
@@ -82,8 +85,13 @@ def _sharp(problem: Problem, begun: float) -> Solution:
         raise explain(problem, proved=True)
     asked = below.best is None
     if asked:
-        below.take(plan_band(problem, tell, begun).path.points)
+        try:
+            below.take(plan_band(problem, tell, begun).path.points)
+        except Refusal as refusal:
+            if refusal.reason == "infeasible" or not below.search_small():
+                raise
     below.search_space()
+    below.search_small(MUCH)
     below.tighten()
     if not asked and below.gap > FAR and problem.airspace.surface.ground_m.size <= MOST_NODES:
         # Over or under, or a climb on the way: other regimes know more about those.
@@ -93,6 +101,8 @@ def _sharp(problem: Problem, begun: float) -> Solution:
             better = False
         if better:
             below.tighten()
+    if below.search_small():
+        below.tighten()
     return below.solution()
 
 

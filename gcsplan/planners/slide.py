@@ -25,6 +25,8 @@ HALVINGS, ROUNDS = 7, 6
 """How often the moves are halved, and moves of one size at most."""
 LITTLE = 1e-4
 """Gain, as a part, below which moves are halved."""
+ASIDE, UP = (0.0, -1.0, 1.0), (0.0, -1.0, -0.25, 0.25, 1.0)
+"""Places that a point may be moved to, in moves aside and up."""
 FAR_AHEAD = 24
 """Points that may be left out in one piece, at most."""
 
@@ -45,12 +47,14 @@ def drawn(
             if not in_time():
                 return points, kinds
             finer, its_kinds = _divided(points, kinds, 1.5 * math.sqrt(size_m * move_m))
-            moved, its_kinds = cheapest(problem, _moved(problem, finer, its_kinds, move_m), its_kinds)
+            moved = _moved(problem, finer, its_kinds, move_m)
             before, now = cost, cost_of(problem, moved)
             if now < cost:
                 points, kinds, cost = moved, its_kinds, now
             if cost > before * (1.0 - LITTLE):
                 break
+        points, kinds = cheapest(problem, points, kinds)
+        cost = cost_of(problem, points)
     return points, kinds
 
 
@@ -79,7 +83,7 @@ def cheapest(problem: Problem, points: Floats, kinds: Ints) -> tuple[Floats, Int
 
 
 def _moved(problem: Problem, points: Floats, kinds: Ints, move_m: float) -> Floats:
-    """The cheapest chain over nine places around each point, across the path and in height."""
+    """The cheapest chain over places around each point, across the path and in height."""
     if len(points) < 3:
         return points
     along = points[2:] - points[:-2]
@@ -93,8 +97,10 @@ def _moved(problem: Problem, points: Floats, kinds: Ints, move_m: float) -> Floa
     aside[kind != FREE] = 0.0
     up[kind == UPRIGHT] = 0.0, 0.0, 1.0
     up[kind == FIXED] = 0.0
-    i, j = (a.ravel()[:, None] for a in np.meshgrid([0.0, -1.0, 1.0], [0.0, -1.0, 1.0]))
-    places = points[1:-1, None] + move_m * (i * aside[:, None] + j * up[:, None])  # (n, 9, 3)
+    # Where the climb is limited, what is moved aside must move up or down by less, or the legs are too steep.
+    upright = min(1.0, problem.limits.max_climb_slope, problem.limits.max_descent_slope)
+    i, j = (a.ravel()[:, None] for a in np.meshgrid(ASIDE, UP))
+    places = points[1:-1, None] + move_m * (i * aside[:, None] + upright * j * up[:, None])  # (n, 15, 3)
     n, w = places.shape[:2]
     start = np.concatenate([np.repeat(points[:1], w, axis=0), np.repeat(places[:-1], w, axis=1).reshape(-1, 3)])
     end = np.concatenate([places[0], np.tile(places[1:], (1, w, 1)).reshape(-1, 3)])

@@ -54,7 +54,7 @@ def is_steep(problem: Problem, points: Floats) -> bool:
     limits = problem.limits
     track_m = float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
     may = min(limits.max_climb_slope, limits.max_descent_slope)
-    stops = _stops(problem, points)
+    stops = stops_of(problem, points)
     apart = all(math.dist(a[:2], b[:2]) > 1e-3 for a, b in pairwise(stops))
     return apart and may >= RATIO and float(np.ptp(points[:, 2])) >= RATIO * track_m
 
@@ -66,37 +66,73 @@ def steep_path(problem: Problem, known: Floats, in_time: Callable[[], bool]) -> 
     ``known`` (M, 3): the best path so far. Deterministic but for ``in_time``,
     which ends it early.
     """
-    stops = _stops(problem, known)
+    stops = stops_of(problem, known)
+    return path_of(problem, stops, cost_of(problem, known), None, in_time, _lattice)
+
+
+def path_of(
+    problem: Problem,
+    stops: Floats,
+    best: float,
+    known: Floats | None,
+    in_time: Callable[[], bool],
+    lattice: Callable[[Problem, Floats, Floats, float], Lattice],
+    hope: float = HOPE,
+) -> tuple[Floats, Bools] | None:
+    """The same over lattices of any kind: ``lattice(problem, starts, goals, limit)`` makes that between two stops.
+
+    ``stops`` (K, 3) as of `stops_of`; ``best``: the cost to beat, inf where there is no path. ``known`` (M, 3) is drawn
+    together, too, where it is given. A path drawn together coarsely that costs ``hope`` times ``best`` is not worth
+    more.
+    """
     straight = problem.leg_costs(stops[:-1], stops[1:])
-    spare = WINDING * cost_of(problem, known) - float(straight.sum())
+    spare = WINDING * best - float(straight.sum())
     columns = [stops[:1], *(_heights(problem, k, stops) for k in range(1, len(stops) - 1)), stops[-1:]]
     lattices, reached = [], [np.zeros(1)]
     for k, limit in enumerate((straight + spare).tolist()):
         if not in_time():
             return None
-        lattices.append(_lattice(problem, columns[k], columns[k + 1], limit))
+        lattices.append(lattice(problem, columns[k], columns[k + 1], limit))
         reached.append(lattices[k].beyond(reached[k]))
-    if not np.isfinite(reached[-1]).any():
-        return None
-    # The heights over the vias, from the last stop back, then the ways between those.
-    at, parts = 0, []
-    for k in range(len(lattices) - 1, -1, -1):
-        before, ways = lattices[k].ways(reached[k], at)
-        parts.append(_best(problem, ways, lattices[k].step_m, in_time))
-        at = before
-    parts.reverse()
-    points = np.vstack([parts[0], *(part[1:] for part in parts[1:])])
+    tried = [] if known is None else [(known, _kinds_of(problem, known))]
+    if np.isfinite(reached[-1]).any():
+        # The heights over the vias, from the last stop back, then the ways between those.
+        at, parts = 0, []
+        for k in range(len(lattices) - 1, -1, -1):
+            before, ways = lattices[k].ways(reached[k], at)
+            parts.append(_best(problem, ways, lattices[k].step_m, in_time))
+            at = before
+        parts.reverse()
+        points = np.vstack([parts[0], *(part[1:] for part in parts[1:])])
+        kinds = np.full(len(points), FREE)
+        ends = np.cumsum([0, *(len(part) - 1 for part in parts)])
+        kinds[ends] = [FIXED, *(UPRIGHT if v.amsl_m is None else FIXED for v in problem.via), FIXED]
+        if cost_of(problem, points) <= hope * best:
+            tried.append((points, kinds))
+    size_m = min(x.step_m for x in lattices)
+    out: tuple[Floats, Bools] | None = None
+    for points, kinds in tried:
+        points, kinds = drawn(problem, points, kinds, size_m, in_time)
+        cost = cost_of(problem, points)
+        if cost < best:
+            best, out = cost, (points, kinds != FREE)
+    return out
+
+
+def _kinds_of(problem: Problem, points: Floats) -> Ints:
+    """(N,) kinds of the points of a path that passes start, vias and goal."""
     kinds = np.full(len(points), FREE)
-    ends = np.cumsum([0, *(len(part) - 1 for part in parts)])
-    kinds[ends] = [FIXED, *(UPRIGHT if v.amsl_m is None else FIXED for v in problem.via), FIXED]
-    best = cost_of(problem, known)
-    if cost_of(problem, points) > HOPE * best:
-        return None
-    points, kinds = drawn(problem, points, kinds, min(x.step_m for x in lattices), in_time)
-    return (points, kinds != FREE) if cost_of(problem, points) < best else None
+    at = 0
+    for via in problem.via:
+        off = np.hypot(points[at:, 0] - via.east_m, points[at:, 1] - via.north_m)
+        off += 0.0 if via.amsl_m is None else np.abs(points[at:, 2] - via.amsl_m)
+        at += int(np.argmax(off <= off.min() + 1e-6))
+        kinds[at] = UPRIGHT if via.amsl_m is None else FIXED
+    kinds[[0, -1]] = FIXED
+    return kinds
 
 
-def _stops(problem: Problem, points: Floats) -> Floats:
+def stops_of(problem: Problem, points: Floats) -> Floats:
     """(K, 3) start, vias, goal; a via of free height as high as the path ``points`` (N, 3) is there."""
     stops = [np.array(problem.start)]
     for via in problem.via:
@@ -134,7 +170,7 @@ def _best(problem: Problem, ways: list[Floats], step_m: float, in_time: Callable
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Lattice:
+class Lattice:
     """Nodes (N, 3), the places of the one stop first and then those of the other; legal edges with their costs."""
 
     problem: Problem
@@ -143,6 +179,18 @@ class _Lattice:
     goals: int
     step_m: float
     graph: csr_array
+
+    @classmethod
+    def of(cls, problem: Problem, nodes: Floats, pairs: Ints, starts: int, goals: int, step_m: float) -> Lattice:
+        """The lattice of what is legal of ``pairs`` (2, E) of ``nodes``, there and back."""
+        a, b = pairs
+        limits = problem.limits
+        there = clear(problem, nodes[a], nodes[b])
+        back = there if limits.max_climb_deg == limits.max_descent_deg else clear(problem, nodes[b], nodes[a])
+        cost = problem.leg_costs(nodes[a], nodes[b])
+        rows, columns = np.concatenate([a[there], b[back]]), np.concatenate([b[there], a[back]])
+        graph = csr_array((np.concatenate([cost[there], cost[back]]), (rows, columns)), shape=(len(nodes), len(nodes)))
+        return cls(problem, nodes, starts, goals, step_m, graph)
 
     def beyond(self, cost: Floats) -> Floats:
         """The least cost of being at each place of the second stop, given that at those of the first."""
@@ -183,7 +231,7 @@ def _trace(before: Ints, node: int) -> list[int]:
     return out
 
 
-def _lattice(problem: Problem, starts: Floats, goals: Floats, limit: float) -> _Lattice:
+def _lattice(problem: Problem, starts: Floats, goals: Floats, limit: float) -> Lattice:
     """The lattice of places on ways from one of ``starts`` (K, 3) to one of ``goals`` that cost ``limit`` at most."""
     limits = problem.limits
     upright = min(1.0, limits.max_climb_slope, limits.max_descent_slope)
@@ -222,13 +270,7 @@ def _lattice(problem: Problem, starts: Floats, goals: Floats, limit: float) -> _
         near = near[near >= len(ends)]
         pairs.append(np.stack([np.full(len(near), k), near]))
     pairs.append(np.indices((len(starts), len(goals))).reshape(2, -1) + np.array([[0], [len(starts)]]))
-    a, b = np.concatenate(pairs, axis=1)
-    there = clear(problem, nodes[a], nodes[b])
-    back = there if limits.max_climb_deg == limits.max_descent_deg else clear(problem, nodes[b], nodes[a])
-    cost = problem.leg_costs(nodes[a], nodes[b])
-    rows, columns = np.concatenate([a[there], b[back]]), np.concatenate([b[there], a[back]])
-    graph = csr_array((np.concatenate([cost[there], cost[back]]), (rows, columns)), shape=(len(nodes), len(nodes)))
-    return _Lattice(problem, nodes, len(starts), len(goals), step_m, graph)
+    return Lattice.of(problem, nodes, np.concatenate(pairs, axis=1), len(starts), len(goals), step_m)
 
 
 def _neighbours(number: Ints, step: Ints) -> Ints:
