@@ -29,7 +29,7 @@ ZONES = (
     Zone("mast", Circle(0.0, 1500.0, 60.0), None, Level(100.0, "agl")),
     Zone("pond", Circle(-1500.0, 0.0, 80.0)),
 )
-QUICK = Options(unchecked=True, listen_s=0.5)
+QUICK = Options(unchecked=True, listen_s=0.1)
 
 
 def a_fence(autopilot: Autopilot) -> Fence:

@@ -25,7 +25,7 @@ from sitl_tests.peers import MavsdkVehicle, item_of, mavsdk_station, row_for
 from sitl_tests.wire_json import Row
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
-UNCHECKED = Options(unchecked=True, listen_s=0.5)
+UNCHECKED = Options(unchecked=True, listen_s=0.1)
 
 
 def a_fence(n: int) -> list[MissionItem]:

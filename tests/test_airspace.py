@@ -349,6 +349,7 @@ def test_without_clearance_a_polygon_may_be_touched() -> None:
     assert kinds(airspace, leg([600, 600, 50], [600, 600, 50]), limits) == {"zone"}
 
 
+@pytest.mark.slow
 def test_thousands_of_zones_are_found_through_the_lattice_as_one_by_one() -> None:
     rng = np.random.default_rng(3)
     ground = jacksboro()

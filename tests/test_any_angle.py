@@ -30,6 +30,7 @@ FORMS = {
     "sheared": np.array([[9.0, 3.5], [-1.0, 13.0]]),
 }
 """Columns: one step along a row, and one step to the next row."""
+EACH_FORM = ["plain", pytest.param("turned", marks=pytest.mark.slow), "sheared"]
 REACH_M = 1e-7
 """By so much the free area is grown before lines are held to it: coordinates are rounded."""
 
@@ -179,7 +180,7 @@ def turned(place: Floats) -> Place:
     return float(place[0]), float(place[1])
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", EACH_FORM)
 @pytest.mark.parametrize("holes", [0, 5])
 @pytest.mark.parametrize("zones", [0, 12])
 def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str, holes: int, zones: int) -> None:
@@ -219,7 +220,7 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
     assert exact > 0.8 * compared
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", EACH_FORM)
 def test_where_walls_touch_exactly_ways_are_legal_and_shorter_than_round_the_touching_places(form: str) -> None:
     """A touching point may be passed or not, but nothing may be lost beside it, and no wall may be crossed."""
     rng = np.random.default_rng(list(form.encode()))
@@ -397,7 +398,7 @@ def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block
     assert left_out > 60
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", EACH_FORM)
 @pytest.mark.parametrize("slack", [0.05, math.inf])
 def test_a_guide_from_a_mesh_with_more_room_never_changes_the_answer(form: str, slack: float) -> None:
     rng = np.random.default_rng([9, *form.encode()])

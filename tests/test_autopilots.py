@@ -176,7 +176,7 @@ ITEMS = st.builds(
 )
 
 
-@settings(max_examples=800)
+@settings(max_examples=400)
 @given(ITEMS, st.sampled_from(ARDUPILOTS))
 def test_ardupilots_rules_agree_with_an_independent_reading_of_its_source(
     one: MissionItem, autopilot: Autopilot
@@ -233,7 +233,7 @@ def test_px4_passes_raw_x_and_y_through_float32_without_a_frame() -> None:
     assert jump.params[:2] == (5.0, 4464.0)
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(ITEMS, st.sampled_from([*LOCATED, 20, 93, 112, 177, 178, 179, 206, 211, 2000, 2500]))
 def test_px4s_rules_agree_with_an_independent_reading_of_its_source(shape: MissionItem, command: int) -> None:
     one = MissionItem(command, shape.frame, shape.params, shape.x, shape.y, shape.z)

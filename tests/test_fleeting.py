@@ -273,6 +273,7 @@ def test_the_same_fleet_twice_gives_the_same_bytes() -> None:
     assert first == second
 
 
+@pytest.mark.slow
 def test_the_papers_sequence_and_together_arrive_by_their_ideal_arithmetic() -> None:
     done = plan(load_mission(MISSIONS / "papers" / "ib-abc-sequence.yaml"))
     told = summary_of(done)["vehicles"]

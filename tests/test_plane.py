@@ -261,7 +261,9 @@ def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str,
 
 
 @pytest.mark.parametrize("low", [True, False])
-@pytest.mark.parametrize("world", ["hills", "amsl", "agl", "turned"])
+@pytest.mark.parametrize(
+    "world", ["hills", *(pytest.param(w, marks=pytest.mark.slow) for w in ("amsl", "turned")), "agl"]
+)
 def test_a_cropped_mesh_is_the_same_where_it_is_looked_at(world: str, low: bool) -> None:
     rng = np.random.default_rng([low, *world.encode()])
     compared = 0

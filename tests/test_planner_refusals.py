@@ -107,6 +107,7 @@ def test_one_zone_across_the_map_is_named_alone() -> None:
     assert "'dot'" not in e.message
 
 
+@pytest.mark.slow
 def test_climb_limit_too_tight_says_what_would_do() -> None:
     def cliff(east: Floats, north: Floats) -> Floats:
         return np.where(east < 1000.0, 300.0, 0.0)

@@ -118,7 +118,8 @@ def small_page(name: str = "Over the hills", low_m: float = 430.0) -> Page:
 
 @cache
 def planned() -> Plan:
-    return plan(load_mission("missions/jacksboro.yaml"))
+    source = load_mission("missions/jacksboro.yaml")
+    return plan(replace(source, planner=replace(source.planner, gap_percent=1.0)))
 
 
 @cache

@@ -67,6 +67,7 @@ def verify(found: Resolved, crews: Sequence[Crew], rules: Rules = RULES) -> None
 # -- shifts -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_shift_is_forbidden_exactly_where_the_shifted_motion_is_judged_a_conflict() -> None:
     free = looked = 0
     for seed in range(100):
@@ -407,6 +408,7 @@ def test_whatever_is_resolved_keeps_its_separation_and_its_arrivals(seed: int, m
             assert abs(slot.arrive_s - plan.of(slot.name).arrive_s - found.later_s) < 1e-5
 
 
+@pytest.mark.slow
 def test_a_hundred_vehicles_are_kept_apart() -> None:
     crews = made_fleet(100, 4, 3000.0, legs=20)
     plan = schedule(crews, "none")

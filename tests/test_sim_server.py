@@ -287,7 +287,7 @@ INTERESTING = [
 ]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     autopilot=st.sampled_from(list(Autopilot)),
     said=st.lists(

@@ -530,7 +530,7 @@ def test_rally_points_are_kept_in_whole_metres_on_ardupilot() -> None:
     assert upload(vehicle, [at(16)], RALLY) == Ack(3, RALLY)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     autopilot=st.sampled_from(list(Autopilot)),
     command=st.integers(0, 65535) | st.sampled_from([16, 17, 18, 19, 20, 21, 22, 31, 84, 85, 93, 177, 178, 5004]),

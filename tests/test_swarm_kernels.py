@@ -95,6 +95,7 @@ def test_no_sum_of_what_is_shipped_may_still_be_reordered_or_fused() -> None:
     assert {name for name in called if not name.startswith("llvm.")} <= {"sqrt"}
 
 
+@pytest.mark.slow
 def test_two_processes_that_compile_for_themselves_get_the_same_bytes(tmp_path: Path) -> None:
     script = (
         "import hashlib, sys\n"

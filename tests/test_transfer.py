@@ -484,7 +484,7 @@ MESSAGES = st.one_of(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(st.integers(0, 3), st.lists(st.tuples(MESSAGES, st.floats(0, 5), st.booleans()), max_size=60))
 def test_nothing_that_a_vehicle_says_breaks_a_machine_or_keeps_it_from_ending(
     which: int, script: list[tuple[MissionMessage, float, bool]]

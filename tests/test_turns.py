@@ -160,6 +160,7 @@ def _distance(x: Floats, a: Floats, b: Floats) -> float:
     return float(np.hypot(*(x - a - t * (b - a))))
 
 
+@pytest.mark.slow
 def test_random_paths_that_touch_zones_at_their_corners_are_rounded_and_legal_as_flown() -> None:
     solved = 0
     for seed in range(10):

@@ -155,6 +155,7 @@ def path_of(turns: list[tuple[float, float, float]]) -> list[tuple[float, float,
 
 @settings(max_examples=12, deadline=None)
 @given(corners)
+@pytest.mark.slow
 def test_the_judged_pieces_hold_the_flown_track_with_every_way_to_reckon_its_altitude(
     turns: list[tuple[float, float, float]],
 ) -> None:
