@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.band import straight_bound
-from gcsplan.planners.caps import Layer, search_caps
+from gcsplan.planners.caps import Layer, above_all, search_caps
 from gcsplan.planners.climb import extend
 from gcsplan.planners.finish import way_points
 from gcsplan.planners.lattice import terminals
@@ -78,7 +78,7 @@ class Below:
         self.timed_out = self.in_space = self.searched = False
         limits = problem.limits
         top_m = limits.max_amsl_m
-        self.top_m = _above_all(problem) if top_m is None else top_m - limits.altitude_error_m
+        self.top_m = above_all(problem) if top_m is None else top_m - limits.altitude_error_m
         stops = terminals(problem)
         heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
         ends = [End(*place, z) for place, z in zip(stops, heights, strict=True)]
@@ -207,7 +207,8 @@ class Below:
         """Look for a path between few places, in small worlds where the best is farther than ``wanted`` (a part) from
         the bound; True if that is the best so far."""
         missing = self.best is None
-        if self.searched or not self.is_small or (not missing and (self.gap <= wanted or not self._in_time())):
+        enough = not missing and (self._done() or self.gap <= wanted or not self._in_time())
+        if self.searched or enough or not self.is_small:
             return False
         from gcsplan.planners.small import small_path  # most missions are longer
 
@@ -269,7 +270,7 @@ class Below:
             # No path is shorter than `low`; is any shorter than `middle`?
             middle = max(low + (FLAT if flat else 0.5) * (high - low), nearer if k == 0 else 0.0)
             found = self._bound_shorter(middle)
-            flat = 0 < k and found < min(middle, before + FLAT * (high - middle))
+            flat = k > 0 and found < min(middle, before + FLAT * (high - middle))
             if found < middle:
                 high, before = middle, found  # the bound of shorter paths is higher; where it hardly is, they are close
             low = max(low, min(found, middle))
@@ -406,15 +407,3 @@ class Below:
             planning_s=time.perf_counter() - self.begun_s,
             first_path_s=self.first_s,
         )
-
-
-def _above_all(problem: Problem) -> float:
-    """An altitude above everything that could be in the way."""
-    surface, limits = problem.airspace.surface, problem.limits
-    high = float(np.nanmax(surface.top_m))
-    tops = [0.0]
-    for zone in problem.airspace.zones:
-        if zone.ceiling is not None:
-            tops.append(zone.ceiling.value_m + (high if zone.ceiling.datum == "agl" else 0.0))
-    ends = [problem.start[2], problem.goal[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None)]
-    return max(high + limits.min_agl_m, *tops, *ends) + limits.altitude_error_m + 2.0 * limits.track_error_m + 100.0

@@ -10,6 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
+from gcsplan.planners.problem import Problem
+
 MOST_CAPS = 40
 NARROW_M = 0.25
 """Caps nearer to each other are not told apart."""
@@ -62,3 +66,15 @@ def search_caps(
         layer.low_m = middle
         layers.append(lower)
     return min(min(map(cost_of, layers)), best())
+
+
+def above_all(problem: Problem) -> float:
+    """An altitude above everything that could be in the way."""
+    surface, limits = problem.airspace.surface, problem.limits
+    high = float(np.nanmax(surface.top_m))
+    tops = [0.0]
+    for zone in problem.airspace.zones:
+        if zone.ceiling is not None:
+            tops.append(zone.ceiling.value_m + (high if zone.ceiling.datum == "agl" else 0.0))
+    ends = [problem.start[2], problem.goal[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None)]
+    return max(high + limits.min_agl_m, *tops, *ends) + limits.altitude_error_m + 2.0 * limits.track_error_m + 100.0
