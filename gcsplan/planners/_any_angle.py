@@ -184,6 +184,8 @@ def search(
                 if abs(ex * (ry - ay) - ey * (rx - ax)) <= SAME_M * long:
                     at_a = math.sqrt((rx - ax) ** 2 + (ry - ay) ** 2)
                     at_b = math.sqrt((rx - bx) ** 2 + (ry - by) ** 2)
+                    if min(at_a, at_b) <= SAME_M and not all_round:
+                        continue  # back to the root along an edge, and round and round
                     if min(at_a, at_b) > SAME_M and max(at_a, at_b) >= long:
                         # Nothing behind it is seen from here; whoever goes on behind it turns at its end, or at a
                         # portal's that is nearer to the root.

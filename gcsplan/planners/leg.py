@@ -215,7 +215,7 @@ class Leg:
         """
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
-        if close is None:
+        if close is None or self.closer > 1:
             return
         if self._stride == 1:
             twin = self._lattice(self._detour, 1, self.parts * self._cut) if self._cut > 1 else self.plane
