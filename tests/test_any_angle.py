@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from gcsplan.bench.terrain_problems import problems
+from gcsplan.planners import mesh as mesh_module
+from gcsplan.planners import optimal
 from gcsplan.planners._mesh import make_pieces, make_portals, sort_portals
 from gcsplan.planners.plane import Mesh, Plane
 
@@ -428,6 +431,26 @@ def test_a_guide_from_a_mesh_with_more_room_never_changes_the_answer(form: str, 
         longer += plain.length_m > first.length_m * (1.0 + 1e-6)
     assert compared > (3 if slack < 1.0 else 10)
     assert longer > 0
+
+
+@pytest.mark.slow
+def test_no_search_circles_about_a_corner_along_edges_that_are_all_but_straight(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On this mission two portals in line with a corner led round and round it, until three million were looked at."""
+    (one,) = [p for p in problems("main", 102) if p.name == "main 102/04, 10 zones"]
+    given_up = []
+    real = mesh_module.search
+
+    def search(*arguments: Any) -> int:
+        found = int(real(*arguments))
+        given_up.append(found < 0)
+        return found
+
+    monkeypatch.setattr(mesh_module, "search", search)
+    optimal.plan(one.problem)
+    assert len(given_up) > 5
+    assert not any(given_up)
 
 
 def test_nothing_is_found_from_where_nothing_is_free() -> None:
