@@ -28,7 +28,7 @@ def draw(problem: Problem) -> Figure:
     leg = below.legs[0]
     plane = leg.plane
     walls = plane.mesh(below.top_m, True).piece.max(axis=1).reshape(plane.inside.shape) < 0
-    room = leg.corridor(below.cost).cells
+    room = leg.corridor(below.cost)
     points = solution.path.points
     figure = Figure(figsize=(9.5, 5.6), layout="constrained")
     FigureCanvasAgg(figure)
@@ -38,9 +38,12 @@ def draw(problem: Problem) -> Figure:
     ground = np.where(np.isnan(plane.grounds[0]), np.nanmin(plane.grounds[0]), plane.grounds[0])
     shade = LightSource(azdeg=315, altdeg=40).hillshade(ground[::-1], vert_exag=1.5, dx=cell_m, dy=cell_m)[::-1]
     ax.pcolormesh(x, y, shade, cmap="gray", vmin=-0.2, vmax=1.1, shading="gouraud", rasterized=True)
-    for mask, colour, alpha in ((walls & plane.inside, WALL, 0.45), (room, ROOM, 0.75)):
+    fine = room.guide.mesh.plane  # cells of a finer lattice where that was looked at
+    layers = ((walls & plane.inside, plane, WALL, 0.45), (room.cells, fine, ROOM, 0.75))
+    for mask, lattice, colour, alpha in layers:
         layer = np.where(mask, 1.0, np.nan)
-        ax.pcolormesh(x, y, layer, cmap=ListedColormap([colour]), alpha=alpha, lw=0, rasterized=True)
+        at = lattice.x / 1000.0, lattice.y / 1000.0
+        ax.pcolormesh(*at, layer, cmap=ListedColormap([colour]), alpha=alpha, lw=0, rasterized=True)
     ax.plot(points[:, 0] / 1000.0, points[:, 1] / 1000.0, color="#111111", lw=1.8, marker=".", ms=5)
     far = 0.08 * float(np.ptp(points[:, :2], axis=0).max()) + 200.0
     low, high = (points[:, :2].min(axis=0) - far) / 1000.0, (points[:, :2].max(axis=0) + far) / 1000.0
