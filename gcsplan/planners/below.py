@@ -35,8 +35,6 @@ HOPE = 1.5
 """A path is made simpler if it would be the best so far by gaining that times what one of its kind has gained yet."""
 ZONES_SHUT = 8
 """Zones whose underside is given up, one after the other, because no profile fits under them."""
-CONTENT = 0.4
-"""A first path whose gap is that part of the wanted one is good enough; else both are looked at with more care."""
 STEEP = 0.5
 """What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
 LAPS = (0.5, 0.25, 1.0)
@@ -58,7 +56,8 @@ the ends a shorter path has less way to climb. How little shorter paths' bounds 
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
 NEARER = 0.45
-"""What part of the wanted gap is tried first, and worth a look even where the gap is small enough."""
+"""What part of the wanted gap is tried first, and worth a look even where the gap is small enough; a first path that is
+as near is good enough."""
 
 
 class Below:
@@ -230,7 +229,7 @@ class Below:
 
     def tighten(self) -> None:
         """Improve path and bound until they are as near as wanted."""
-        if self.gap <= CONTENT * self.problem.gap_percent / 100.0 or not self._in_time():
+        if self.gap <= NEARER * self.problem.gap_percent / 100.0 or not self._in_time():
             return
         # Whatever is not longer than the best path must have been looked at.
         for leg in self.legs:
