@@ -70,7 +70,9 @@ def mesh_of(
         return float(c), float(r)
 
     plane = cast(Plane, SimpleNamespace(at=at, parts=1, stride=1, inside=np.ones((ny - 1, nx - 1), np.bool_)))
-    return Mesh(plane, 1, 0, 0, excess, excess, diagonal, piece, start, ends[:n], names[:n], joins[:n], order)
+    return Mesh(
+        plane, 1, 0, 0, excess, excess, diagonal, piece, start, ends[:n], names[:n], joins[:n], order, 8 * (nx * ny + 1)
+    )
 
 
 def below_zero(corners: Floats, values: Floats) -> Floats:

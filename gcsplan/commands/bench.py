@@ -96,9 +96,7 @@ def bench_terrain(
     kept: Annotated[bool, typer.Option("--kept", help="Rivals' answers already in DIR only.")] = False,
     minute: Annotated[bool, typer.Option("--minute", help="Ours once more with 60 s.")] = False,
     errors: Annotated[bool, typer.Option("--errors", help="With the clearance and errors of a real mission.")] = False,
-    gap: Annotated[
-        float, typer.Option("--gap", metavar="PERCENT", help="Certified gap at which ours may stop.")
-    ] = 0.1,
+    gap: Annotated[float, typer.Option("--gap", metavar="PERCENT", help="Certified gap at which ours may stop.")] = 0.1,
     count: Annotated[int | None, typer.Option(metavar="N", help="Problems of each group [default: all]")] = None,
 ) -> None:
     """A set of planning problems made by a seed; every planner held to the same exact check."""

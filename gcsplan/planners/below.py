@@ -253,10 +253,10 @@ class Below:
                     self.try_below(self.top_m, fine=True, spare_m=(start * spare_m, goal * spare_m))
         far = TWICE * self.problem.gap_percent / 100.0
         if not self.in_space and far < self.gap <= NEAR and self._in_time():
-            for leg in self.legs:
-                leg.look_closer(self._limit(leg), FINER)
-            self.try_below(self.top_m, fine=True)
-            self._halve()
+            closer = [leg.look_closer(self._limit(leg), FINER) for leg in self.legs]
+            if any(closer):
+                self.try_below(self.top_m, fine=True)
+                self._halve()
 
     def _halve(self) -> None:
         """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""

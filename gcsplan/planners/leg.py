@@ -33,6 +33,8 @@ COARSE_M = 100.0
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 """Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
 
+MOST_NODES = 16e6
+"""Nodes of the finest lattice, at most, in the box around a corridor."""
 RAISED, WORTHWHILE = 4, 0.05
 """Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
 
@@ -208,20 +210,24 @@ class Leg:
             known = way.length_m
         return known
 
-    def look_closer(self, limit_m: float, parts: int) -> None:
+    def look_closer(self, limit_m: float, parts: int) -> bool:
         """Look anew, at each cell of the finer lattice alone, at what tracks shorter than ``limit_m`` may meet.
 
         No longer ones are known after that. `track` and `bound` cut the cells of such corridors into ``parts`` a side.
+        False, and nothing is done, where that would be too many.
         """
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
         if close is None or self.closer > 1:
-            return
+            return False
+        wanted = close.away.between(close.left, limit)
+        rows, cols = (np.flatnonzero(wanted.any(axis=axis)) for axis in (1, 0))
+        if float(np.ptp(rows) + 1) * float(np.ptp(cols) + 1) * (self._ratio * parts) ** 2 > MOST_NODES:
+            return False
         if self._stride == 1:
             twin = self._lattice(self._detour, 1, self.parts * self._cut) if self._cut > 1 else self.plane
         else:
             twin = self._twin or self._lattice(self._detour, self._fine_stride)
-        wanted = close.away.between(close.left, limit)
         mesh = twin.mesh(
             self.top_m, True, 1, np.repeat(np.repeat(wanted, self._ratio, axis=0), self._ratio, axis=1), single=True
         )
@@ -230,8 +236,9 @@ class Leg:
             left = mesh.flood(b, a, limit, math.inf, close.away)[1]
             self._close = Close(limit, mesh.flood(a, b, limit, math.inf, left)[1], left)
         except Exhausted:
-            return
+            return False
         self.reach_m, self.closer = limit, parts
+        return True
 
     def corridor(self, limit_m: float) -> Corridor:
         """What tracks shorter than ``limit_m``, and than `reach_m`, may meet."""

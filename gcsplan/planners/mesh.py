@@ -44,7 +44,8 @@ class Way:
 
 @dataclass(eq=False, slots=True)
 class Mesh:
-    """Convex free pieces and their portals, see `_mesh`; ``row``, ``col``: the plane's cell that it begins at."""
+    """Convex free pieces and their portals, see `_mesh`; ``row``, ``col``: the plane's cell that it begins at;
+    ``named``: all names of portals' ends are less."""
 
     plane: Plane
     fineness: int
@@ -59,6 +60,7 @@ class Mesh:
     names: NDArray[np.int64]
     joins: Ints
     order: Ints
+    named: int
 
     def lowest(self) -> Floats:
         """(cells,) the lowest floor of each; -inf where a corner is not looked at."""
@@ -152,8 +154,7 @@ class Mesh:
         remaining = np.zeros(0) if guide is None else guide.over(self)
         room = max(1 << 19, 8 * len(self.start))  # what is not touched costs nothing
         while True:
-            names = 8 * (self.excess.size + 1)
-            best, origin = np.zeros(names), np.zeros(names, np.int64)  # cost nothing until they are touched
+            best, origin = np.zeros(self.named), np.zeros(self.named, np.int64)  # cost nothing until they are touched
             node, link, name = np.empty((room, 8)), np.empty((room, 6), np.int32), np.empty((room, 3), np.int64)
             portals = len(self.joins)
             first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))

@@ -29,6 +29,8 @@ from gcsplan.planners.shapes import SPARE_M, Shapes, make_shapes
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+MANY = 500_000
+"""Nodes of a mesh from which on its names are numbered one by one, for searches have room for every name."""
 HAIR_M = 0.07
 """Kept from the ground, upward and sideways, by paths: what the exact check spares, and what the lattice rounds."""
 
@@ -133,8 +135,13 @@ class Plane:
             room = n
         start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
         sort_portals(joins[:n], start, order)
+        names, named = names[:n], 8 * (excess.size + 1)
+        if excess.size > MANY:
+            corner = names >= 0
+            used, names[corner] = np.unique(names[corner], return_inverse=True)
+            named = len(used)
         return Mesh(
-            self, fineness, row, col, excess, floor, diagonal, piece, start, ends[:n], names[:n], joins[:n], order
+            self, fineness, row, col, excess, floor, diagonal, piece, start, ends[:n], names, joins[:n], order, named
         )
 
     def _steep(self, row: int, col: int, last_row: int, last_col: int) -> Floats:
