@@ -433,8 +433,8 @@ def test_the_report_is_written_whole_even_when_the_run_is_interrupted(
     assert (tmp_path / "terrain.png").read_bytes().startswith(b"\x89PNG")
     rows = (tmp_path / "terrain.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 3
-    assert set(gaps) == {0.05}
-    assert "certified gap of 0.05 % (gcsplan)" in (tmp_path / "terrain.md").read_text(encoding="utf-8")
+    assert set(gaps) == {terrain.GAP_PERCENT}
+    assert "certified gap of 0.1 % (gcsplan)" in (tmp_path / "terrain.md").read_text(encoding="utf-8")
     assert rows[0].startswith("key,name,kind,group,method,status")
     assert asked[1].split(",")[0] in rows[2]
     assert "| 0 zones | gcsplan | 1/1 |" in (tmp_path / "terrain.md").read_text(encoding="utf-8")
