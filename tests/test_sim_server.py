@@ -323,6 +323,15 @@ def _offset(kind: Any, name: str) -> int:
     raise LookupError(name)
 
 
+def test_half_a_frame_of_an_unknown_kind_does_not_swallow_the_next_datagram() -> None:
+    sequences = FrameWriter(GCS)
+    for _ in range(256):  # whatever the checksum's last byte is
+        hub = Hub([a_vehicle()])
+        hub.take("a", b"\xfe1\x00\x00\x00\x08" + bytes(7), 0.0)
+        sent = hub.take("a", sequences.pack(command(520)), 0.0)
+        assert len(sent) == 2
+
+
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.binary(max_size=300), max_size=10), st.booleans())
 def test_any_bytes_are_survived(pieces: list[bytes], datagram: bool) -> None:

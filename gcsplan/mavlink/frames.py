@@ -100,7 +100,7 @@ class FrameParser:
 
     def feed(self, data: bytes, *, datagram: bool = False) -> list[Any]:
         """Every message that ``data`` completes. A ``datagram`` ends with its last frame, a stream goes on."""
-        buffer = self._rest + data
+        buffer, carried = self._rest + data, len(self._rest)
         messages: list[Any] = []
         position, rest = 0, b""
         while found := _MARKERS.search(buffer, position):
@@ -117,6 +117,9 @@ class FrameParser:
                 continue
             end = start + length
             if _is_unknown_kind(buffer, start):
+                if datagram and start < carried:
+                    position = start + 1  # of two datagrams, and nobody can tell: the next one may be whole
+                    continue
                 if end == len(buffer) and not datagram:
                     rest = buffer[start:]  # what follows tells whether it is a frame
                     break
