@@ -65,6 +65,7 @@ class Below:
 
     def __init__(self, problem: Problem, begun_s: float) -> None:
         self.problem, self.begun_s = problem, begun_s
+        self.wanted = problem.gap_percent / 100.0
         self.judge = Judge(problem)
         self.best: Floats | None = None
         self.pinned: Bools | None = None
@@ -229,7 +230,7 @@ class Below:
 
     def tighten(self) -> None:
         """Improve path and bound until they are as near as wanted."""
-        if self.gap <= NEARER * self.problem.gap_percent / 100.0 or not self._in_time():
+        if self.gap <= NEARER * self.wanted or not self._in_time():
             return
         # Whatever is not longer than the best path must have been looked at.
         for leg in self.legs:
@@ -251,8 +252,7 @@ class Below:
                 if not self._done() and self._climbs() and self._in_time():
                     spare_m = part * (self.cost - self.bound)
                     self.try_below(self.top_m, fine=True, spare_m=(start * spare_m, goal * spare_m))
-        far = TWICE * self.problem.gap_percent / 100.0
-        if not self.in_space and far < self.gap <= NEAR and self._in_time():
+        if not self.in_space and TWICE * self.wanted < self.gap <= NEAR and self._in_time():
             closer = [leg.look_closer(self._limit(leg), FINER) for leg in self.legs]
             if any(closer):
                 self.try_below(self.top_m, fine=True)
@@ -262,7 +262,7 @@ class Below:
         """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""
         low, high, before, flat = self.bound, self.cost, 0.0, False
         for k in range(CLOSER):
-            nearer = self.cost / (1.0 + 0.01 * NEARER * self.problem.gap_percent)
+            nearer = self.cost / (1.0 + NEARER * self.wanted)
             enough = low >= nearer if k == 0 else self._done()
             if enough or high - low < max(2e-5 * low, LEFT * (self.cost - low)) or not self._in_time():
                 break
@@ -353,8 +353,7 @@ class Below:
                     self.try_below(cap, fine=True)
 
         layers = [Layer(max(self.known_m), self.top_m, sum(leg.length_m for leg in self.legs))]
-        part = self.problem.gap_percent / 100.0
-        return search_caps(layers, cost_of, track_m, lambda: self.cost, try_at, part, self._in_time)
+        return search_caps(layers, cost_of, track_m, lambda: self.cost, try_at, self.wanted, self._in_time)
 
     def bound_of_tracks(self) -> float:
         """The bound of tracks alone, for regimes in which paths are found elsewhere; inf: there is none, proved."""
@@ -386,7 +385,7 @@ class Below:
         return (self.cost - self.bound) / max(self.bound, 1e-9)
 
     def _done(self) -> bool:
-        return self.gap <= self.problem.gap_percent / 100.0
+        return self.gap <= self.wanted
 
     def _in_time(self) -> bool:
         self.timed_out = time.perf_counter() - self.begun_s > self.problem.budget_s

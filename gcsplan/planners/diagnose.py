@@ -89,21 +89,17 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
             f"{name} at {amsl:.1f} m AMSL is over the highest legal altitude there, {high:.1f} m "
             f"({_ceiling_words(limits, air, place)})"
         )
-    here = np.array([place])
+    here, reach = np.array([place]), air.beside_m(limits)
     for zone in air.zones:
-        if not near_zone(here, here, zone, _reach(problem), air.scale)[0]:
+        if not near_zone(here, here, zone, reach, air.scale)[0]:
             continue
         bottom, top = (float(x[0]) for x in zone_levels(air, limits, zone, here, here))
         at = amsl is not None and bottom + 1e-6 < amsl < top - 1e-6
         if at or (amsl is None and bottom < low and (top > high or math.isinf(top))):
             raise refuse(
-                f"{name} lies in no-fly zone {zone.name!r} or within {_reach(problem):.1f} m of it "
+                f"{name} lies in no-fly zone {zone.name!r} or within {reach:.1f} m of it "
                 f"(horizontal_clearance_m + track_error_m): move {name}, or shrink the zone"
             )
-
-
-def _reach(problem: Problem) -> float:
-    return (problem.limits.horizontal_clearance_m + problem.limits.track_error_m) * problem.airspace.scale
 
 
 def _floor_words(limits: Limits) -> str:
@@ -277,7 +273,7 @@ def _zones(problem: Problem) -> Reading:
 
 def _crossed(problem: Problem, way: Floats) -> list[int]:
     """Zones that a way comes near, at whatever height."""
-    air, reach = problem.airspace, _reach(problem)
+    air, reach = problem.airspace, problem.airspace.beside_m(problem.limits)
     return [k for k, zone in enumerate(air.zones) if near_zone(way[:-1], way[1:], zone, reach, air.scale).any()]
 
 

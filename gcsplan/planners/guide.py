@@ -118,7 +118,7 @@ class Guide:
                 unit,
                 float(energy),
                 PENALTY * unit,
-                _reach(p),
+                p.airspace.beside_m(p.limits),
             ]
         )
         count = _string.pull(
@@ -186,7 +186,9 @@ def make_guide(
         if not _passed(problem, zone, over.get(number), x, y, js, is_, floor, ceiling):
             if isinstance(zone.shape, Circle):
                 c = zone.shape
-                circles.append((c.east_m, c.north_m, c.radius_m * air.scale + _reach(problem)))
+                circles.append(
+                    (c.east_m, c.north_m, c.radius_m * air.scale + problem.airspace.beside_m(problem.limits))
+                )
             else:
                 v = zone.shape.vertices
                 edges.extend(np.hstack([v, np.roll(v, -1, axis=0)]).tolist())
@@ -196,21 +198,17 @@ def make_guide(
     )  # fmt: skip
 
 
-def _reach(problem: Problem) -> float:
-    return (problem.limits.horizontal_clearance_m + problem.limits.track_error_m) * problem.airspace.scale
-
-
 def _near(problem: Problem, zone: Zone, x: Floats, y: Floats, step: float) -> tuple[NDArray[np.intp], ...] | None:
     """Rows and columns of the nodes within reach of a zone and three quarters of a step; None where there are none."""
     w, s, e, n = zone.bounds
-    reach = _reach(problem) + 0.75 * step + 1.0
+    reach = problem.airspace.beside_m(problem.limits) + 0.75 * step + 1.0
     i = np.flatnonzero((x > w - reach) & (x < e + reach))
     j = np.flatnonzero((y > s - reach) & (y < n + reach))
     if not len(i) or not len(j):
         return None
     jj, ii = (a.ravel() for a in np.meshgrid(j, i, indexing="ij"))
     at = np.stack([x[ii], y[jj]], axis=-1)
-    close = near_zone(at, at, zone, _reach(problem) + 0.75 * step, problem.airspace.scale)
+    close = near_zone(at, at, zone, problem.airspace.beside_m(problem.limits) + 0.75 * step, problem.airspace.scale)
     return (jj[close], ii[close]) if close.any() else None
 
 

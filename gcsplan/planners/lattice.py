@@ -95,7 +95,7 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
     air, limits = problem.airspace, problem.limits
     floor[jj, ii] = air.floor_amsl(x[ii], y[jj], limits)
     ceiling[jj, ii] = air.ceiling_amsl(x[ii], y[jj], limits)
-    reach = (limits.horizontal_clearance_m + limits.track_error_m) * air.scale
+    reach = air.beside_m(limits)
     edges, lows, highs, zones = _edge_bands(air, limits, reach, west, south, step_m, nx, ny)
     at = np.zeros(nx * ny * 8 + 1, np.int64)
     np.cumsum(np.bincount(edges, minlength=nx * ny * 8), out=at[1:])

@@ -64,11 +64,17 @@ class Corridor:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Close:
-    """What tracks shorter than ``limit_m`` may meet, cell by cell, and how far that is from start and goal."""
+    """What tracks shorter than ``limit_m`` may meet, and how far that is from start and goal.
+
+    Of all cells of the guides' mesh (cells,) the lowest floor, and how long ways there and on are at least.
+    """
 
     limit_m: float
     away: Guide
     left: Guide
+    low_m: Floats
+    away_m: Floats
+    left_m: Floats
 
 
 class Leg:
@@ -165,8 +171,7 @@ class Leg:
             return self.plane.mesh(cap_m, low, self._cut * self.closer, within.cells, cones, under), within.guide
         if self._twin is None:
             self._twin = self._lattice(self._detour, self._fine_stride)
-        finer = np.repeat(np.repeat(within.cells, self._ratio, axis=0), self._ratio, axis=1)
-        return self._twin.mesh(cap_m, low, self.closer, finer, cones, under), within.guide
+        return self._twin.mesh(cap_m, low, self.closer, self._finer(within.cells), cones, under), within.guide
 
     def track(
         self, cap_m: float, within: Corridor | None, limit_m: float, under: Bools | None, spare_m: Spare = (0.0, 0.0)
@@ -218,7 +223,7 @@ class Leg:
         """
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
-        if close is None or self.closer > 1:
+        if close.left is self._guide or self.closer > 1:
             return False
         wanted = close.away.between(close.left, limit)
         rows, cols = (np.flatnonzero(wanted.any(axis=axis)) for axis in (1, 0))
@@ -228,24 +233,16 @@ class Leg:
             twin = self._lattice(self._detour, 1, self.parts * self._cut) if self._cut > 1 else self.plane
         else:
             twin = self._twin or self._lattice(self._detour, self._fine_stride)
-        mesh = twin.mesh(
-            self.top_m, True, 1, np.repeat(np.repeat(wanted, self._ratio, axis=0), self._ratio, axis=1), single=True
-        )
-        a, b = self.start.place, self.goal.place
-        try:
-            left = mesh.flood(b, a, limit, math.inf, close.away)[1]
-            self._close = Close(limit, mesh.flood(a, b, limit, math.inf, left)[1], left)
-        except Exhausted:
+        found = self._each_cell(twin, self._finer(wanted), limit, close.away)
+        if found is None:
             return False
-        self.reach_m, self.closer = limit, parts
+        self._close, self.reach_m, self.closer = found, limit, parts
         return True
 
     def corridor(self, limit_m: float) -> Corridor:
         """What tracks shorter than ``limit_m``, and than `reach_m`, may meet."""
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
-        if close is None:
-            return Corridor(self._from_start().between(self._guide, limit), self._guide)
         return Corridor(close.away.between(close.left, limit), close.left)
 
     def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats]:
@@ -253,27 +250,37 @@ class Leg:
         if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that the flood did not
             return np.full(1, -math.inf), np.zeros(1), np.zeros(1)  # of nothing it is known that it is high
         close = self._closer(min(limit_m, self.reach_m))
-        away, left = (self._from_start(), self._guide) if close is None else (close.away, close.left)
-        mesh = left.mesh
-        near = mesh.of_plane(away.between(left, limit_m)).ravel()
-        ways = away.cells()[near], left.cells()[near]
-        if close is None:
-            straight = mesh.straight_to(self.start.place)[near], mesh.straight_to(self.goal.place)[near]
-            ways = np.maximum(ways[0], straight[0]), np.maximum(ways[1], straight[1])
-        return mesh.lowest()[near], *ways
+        near = close.left.mesh.of_plane(close.away.between(close.left, limit_m)).ravel()
+        return close.low_m[near], close.away_m[near], close.left_m[near]
 
-    def _closer(self, limit_m: float) -> Close | None:
-        """A look at each cell alone, that of tracks shorter than ``limit_m``; None where that is too much."""
+    def _closer(self, limit_m: float) -> Close:
+        """A look at each cell alone, for tracks shorter than ``limit_m``; at whole pieces where that is too much."""
         if self._close is None or limit_m > self._close.limit_m:
-            wanted = self._from_start().between(self._guide, limit_m)
-            mesh = self.plane.mesh(self.top_m, True, 1, wanted, single=True)
-            a, b = self.start.place, self.goal.place
-            try:
-                left = mesh.flood(b, a, limit_m, math.inf, self._from_start())[1]
-                self._close = Close(limit_m, mesh.flood(a, b, limit_m, math.inf, left)[1], left)
-            except Exhausted:
-                return None
+            away, left = self._from_start(), self._guide
+            found = self._each_cell(self.plane, away.between(left, limit_m), limit_m, away)
+            if found is None:  # pieces are as near as their entrances
+                mesh = left.mesh
+                ends = (away, self.start), (left, self.goal)
+                ways = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
+                found = Close(limit_m, away, left, mesh.lowest(), *ways)
+            self._close = found
         return self._close
+
+    def _each_cell(self, plane: Plane, wanted: Bools, limit_m: float, ahead: Guide) -> Close | None:
+        """Each of the ``wanted`` cells of a lattice alone; None where that is too much to look at. ``ahead``: from the
+        start, over a mesh that leaves no less room."""
+        mesh = plane.mesh(self.top_m, True, 1, wanted, single=True)
+        a, b = self.start.place, self.goal.place
+        try:
+            left = mesh.flood(b, a, limit_m, math.inf, ahead)[1]
+            away = mesh.flood(a, b, limit_m, math.inf, left)[1]
+        except Exhausted:
+            return None
+        return Close(limit_m, away, left, mesh.lowest(), away.cells(), left.cells())
+
+    def _finer(self, cells: Bools) -> Bools:
+        """The same cells of the finer lattice."""
+        return np.repeat(np.repeat(cells, self._ratio, axis=0), self._ratio, axis=1)
 
     def _from_start(self) -> Guide:
         """Distances from the start over the coarse mesh, as far as the flood from the goal has seen."""

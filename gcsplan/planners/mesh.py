@@ -161,9 +161,8 @@ class Mesh:
             out = np.empty((1 << 14, 3))
             n = search(
                 self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span,
-                sources,
-                np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32), limit_m, slack,
-                MOST_OPENED, remaining, met,
+                sources, np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32),
+                limit_m, slack, MOST_OPENED, remaining, met,
                 node, link, name, np.empty(room), np.empty(room, np.int32), out,
             )  # fmt: skip
             if n != -1:

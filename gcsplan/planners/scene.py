@@ -239,7 +239,7 @@ def _zones(air: Airspace, limits: Limits) -> tuple[Floats, Floats]:
     """Zones (Z, ZONE_COLUMNS) and the corners of polygons."""
     zones = np.zeros((len(air.zones), k.ZONE_COLUMNS))
     corners: list[Floats] = []
-    reach = (limits.horizontal_clearance_m + limits.track_error_m) * air.scale
+    reach = air.beside_m(limits)
     first = 0
     for row, zone in zip(zones, air.zones, strict=True):
         vertices = getattr(zone.shape, "vertices", None)

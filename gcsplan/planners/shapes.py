@@ -58,7 +58,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats) -> Shapes:
     grown, with levels moved by so much.
     """
     air, limits = problem.airspace, problem.limits
-    reach = (limits.horizontal_clearance_m + limits.track_error_m) * air.scale
+    reach = air.beside_m(limits)
     box = float(x.min()), float(y.min()), float(x.max()), float(y.max())
     found: list[tuple[int, Zone, Floats | None]] = []
     moved: list[float] = []

@@ -248,15 +248,9 @@ def _saddles(problem: Problem, part: tuple[tuple[int, int], tuple[int, int]]) ->
     return grid.to_plane(c0 + col + u[row, col], r0 + row + v[row, col]).reshape(-1, 2)
 
 
-def _beside_m(problem: Problem) -> float:
-    """How far from zones paths keep."""
-    limits = problem.limits
-    return (limits.track_error_m + limits.horizontal_clearance_m) * problem.airspace.scale + HAIR_M
-
-
 def _rims(problem: Problem) -> list[Floats]:
     """(N, 2) places just outside of each zone: around circles, at the corners of polygons."""
-    more, out = _beside_m(problem), []
+    more, out = problem.airspace.beside_m(problem.limits) + HAIR_M, []
     turn = np.arange(SPOKES) * (2.0 * math.pi / SPOKES)
     around = np.stack([np.cos(turn), np.sin(turn)], axis=-1) / math.cos(math.pi / SPOKES)
     for zone in problem.airspace.zones:
@@ -278,7 +272,7 @@ def _slits(problem: Problem, widest_m: float) -> Floats:
     come first, for they are what nothing else finds."""
     circles = [z.shape for z in problem.airspace.zones if isinstance(z.shape, Circle)]
     middles = np.array([(c.east_m, c.north_m) for c in circles]).reshape(-1, 2)
-    radii = np.array([c.radius_m for c in circles]) * problem.airspace.scale + _beside_m(problem) - HAIR_M
+    radii = np.array([c.radius_m for c in circles]) * problem.airspace.scale + problem.airspace.beside_m(problem.limits)
     i, j = np.triu_indices(len(circles), 1)
     apart = np.hypot(*(middles[j] - middles[i]).T)
     gap = apart - radii[i] - radii[j]

@@ -88,14 +88,14 @@ def plan_vehicle(
     is on the mission file's own. ``options`` are for the planner, on top of the brief's.
     """
     source, vehicle = brief.source, request.vehicle
+    asked = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))
+    world = brief.world if searched is None else searched
+    told = {**brief.options, **(options or {})}
     if vehicle.turn_radius_m > 0.0:
         from gcsplan.steps.wings import plan_wing  # few missions have wings
 
-        return plan_wing(brief, request, progress, searched=searched, limits=limits, options=options)
-    asked = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))
-    world = brief.world if searched is None else searched
+        return plan_wing(brief, request, asked, world, told, progress)
     margins, failed = MARGINS, None
-    told = {**brief.options, **(options or {})}
     for _ in range(ATTEMPTS):
         problem, notes = make_problem(source, asked, world, brief.objective, brief.seed, margins, progress, told)
         solution = run_planner(brief.run, problem, vehicle, world)

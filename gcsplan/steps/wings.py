@@ -27,7 +27,6 @@ from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.steps.planning import Brief, VehiclePlan, built, make_problem, run_planner, unsafe
 from gcsplan.steps.wing_ends import FlightEnd, circle_m, goals, starts
-from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 
@@ -50,17 +49,16 @@ ACCEPTED_M, CHORDS_M = 1.0, 0.2
 def plan_wing(
     brief: Brief,
     request: VehicleRequest,
+    asked: VehicleRequest,
+    world: World,
+    told: Mapping[str, object],
     progress: Callable[[Progress], None] | None = None,
-    *,
-    searched: World | None = None,
-    limits: Limits | None = None,
-    options: Mapping[str, object] | None = None,
 ) -> VehiclePlan:
-    """One fixed wing's path, mission and verdict, as `planning.plan_vehicle`. Raises InputError, NoMission."""
+    """One fixed wing's path, mission and verdict, as `planning.plan_vehicle`. Raises InputError, NoMission.
+
+    ``asked``, ``world``, ``told``: the request under the limits, the world, and the planner's options of the search.
+    """
     source, vehicle = brief.source, request.vehicle
-    asked = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))
-    world = brief.world if searched is None else searched
-    told = {**brief.options, **(options or {})}
     margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
     sharp: Floats | None = None
     failed: VehiclePlan | None = None

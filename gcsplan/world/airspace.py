@@ -289,6 +289,10 @@ class Airspace:
             )
         )  # fmt: skip
 
+    def beside_m(self, limits: Limits) -> float:
+        """Metres in the plane that are kept from zones on every side: clearance, and what the track may be off."""
+        return (limits.horizontal_clearance_m + limits.track_error_m) * self.scale
+
     def _violations(
         self, legs: Legs, limits: Limits, climb_deg: Floats, worst: Floats, hit: NDArray[np.intp], hit_at: Floats
     ) -> tuple[Violation, ...]:
