@@ -1,8 +1,8 @@
 """The free part of a plane, cut into convex pieces and the portals between them.
 
 Nodes lie on a lattice, each with an *excess*: the plane is free where the excess is not above 0. A cell is two
-triangles, the excess is linear in each, so the free part of a triangle is a triangle or a quadrangle with straight
-edges. Cells that are free as a whole are joined along their row into one long piece, a *run*; runs end where the
+triangles, the excess is linear in each, and so are walls that a cell has of its own: what all of them leave free of a
+triangle is convex. Cells that are free as a whole are joined along their row into one long piece, a *run*; runs end where the
 lattice bends (every ``block`` columns), so that every piece is convex.
 
 Only the portals are kept, the parts of edges that two pieces share: walls are where none is.
@@ -24,30 +24,31 @@ Ints = NDArray[np.int32]
 OPEN = -1e-9
 """A node with less excess than this is free all around."""
 
-
-@device
-def _free(a: float, b: float, c: float, d: float, t: Floats) -> bool:
-    """The part of an edge where two linear functions, a to b and c to d over 0 to 1, are both not above 0."""
-    lo, hi = 0.0, 1.0
-    for k in range(2):
-        p, q = (a, b) if k == 0 else (c, d)
-        if p > 0.0:
-            if q > 0.0:
-                return False
-            lo = max(lo, p / (p - q))
-        elif q > 0.0:
-            hi = min(hi, p / (p - q))
-    t[0], t[1] = lo, hi
-    return hi >= lo
+NEXT, WALL = 4, 5
+"""Where a wall's row tells the number of the cell's next one (0 after its last), and how long rows are."""
 
 
 @device
-def _corner(excess: Floats, of: Ints, values: Floats, nx: int, j: int, i: int, k: int) -> float:
-    """Excess at corner ``k`` (0: this node, 1: next column, 2: next column and row, 3: next row) of cell (j, i)."""
-    n = of[j * (nx - 1) + i]
-    if n > 0:
-        return values[n - 1, k]
-    return excess[j + (k >> 1), i + ((k ^ (k >> 1)) & 1)]
+def _cut(p: float, q: float, t: Floats) -> bool:
+    """Leave that of the part ``t`` of an edge where a linear function, p to q over 0 to 1, is not above 0."""
+    if p > 0.0:
+        if q > 0.0:
+            return False
+        t[0] = max(t[0], p / (p - q))
+    elif q > 0.0:
+        t[1] = min(t[1], p / (p - q))
+    return t[1] >= t[0]
+
+
+@device
+def _cut_own(of: Ints, values: Floats, k: int, start: int, end: int, t: Floats) -> bool:
+    """Leave that of the part ``t`` of cell k's edge, from corner to corner, where none of its own walls stands."""
+    n = of[k]
+    while n > 0:
+        if not _cut(values[n - 1, start], values[n - 1, end], t):
+            return False
+        n = int(values[n - 1, NEXT])
+    return True
 
 
 @kernel("f8[,] i4[] f8[,] i1[] i4[,] i8")
@@ -56,7 +57,8 @@ def make_pieces(
 ) -> int:  # fmt: skip
     """Number the pieces: ``piece`` (cells, 2), the lower and the upper triangle's, -1 where nothing is free.
 
-    ``of`` (cells,) number from 1 of the row in ``values`` (K, 4) of a cell that has corner values of its own, or 0;
+    ``of`` (cells,) number from 1 of the row in ``values`` (K, 5) of a cell's first own wall, or 0: excess at this node,
+    the one in the next column, in the next column and row, and in the next row, and the number of its next wall;
     ``diagonal`` (cells,) 0 from this node to the opposite one, 1 the other.
     """
     ny, nx = excess.shape
@@ -65,25 +67,30 @@ def make_pieces(
         running = False
         for i in range(nx - 1):
             k = j * (nx - 1) + i
-            a = _corner(excess, of, values, nx, j, i, 0)
-            b = _corner(excess, of, values, nx, j, i, 1)
-            c = _corner(excess, of, values, nx, j, i, 2)
-            d = _corner(excess, of, values, nx, j, i, 3)
-            if a <= 0.0 and b <= 0.0 and c <= 0.0 and d <= 0.0:
+            a, b, c, d = excess[j, i], excess[j, i + 1], excess[j + 1, i + 1], excess[j + 1, i]
+            whole = lower = upper = True
+            n = of[k]
+            while True:
+                if not (a <= 0.0 and b <= 0.0 and c <= 0.0 and d <= 0.0):
+                    whole = False
+                    # Infinite excess, or none, is unknown ground: the whole cell is shut.
+                    known = a < np.inf and b < np.inf and c < np.inf and d < np.inf
+                    lower = lower and known and min(a, min(b, c if diagonal[k] == 0 else d)) < 0.0
+                    upper = upper and known and min(c, min(d, a if diagonal[k] == 0 else b)) < 0.0
+                if n == 0:
+                    break
+                a, b, c, d = values[n - 1, 0], values[n - 1, 1], values[n - 1, 2], values[n - 1, 3]
+                n = int(values[n - 1, NEXT])
+            if whole:
                 if not running or i % block == 0:
                     count += 1
                     running = True
                 piece[k, 0] = piece[k, 1] = count - 1
                 continue
             running = False
-            piece[k, 0] = piece[k, 1] = -1
-            # Infinite excess is unknown ground: the whole cell is shut.
-            if max(max(a, b), max(c, d)) == np.inf:
-                continue
-            low = min(a, min(b, c if diagonal[k] == 0 else d))
-            high = min(c, min(d, a if diagonal[k] == 0 else b))
             for half in range(2):
-                if (low if half == 0 else high) < 0.0:
+                piece[k, half] = -1
+                if lower if half == 0 else upper:
                     piece[k, half] = count
                     count += 1
     return count
@@ -113,15 +120,18 @@ def _is_corner(
     excess: Floats, of: Ints, values: Floats, piece: Ints, diagonal: NDArray[np.int8], nx: int, ny: int, j: int, i: int
 ) -> bool:
     """Whether a node may lie on a wall: something around it is not free."""
-    if i == 0 or j == 0 or i == nx - 1 or j == ny - 1:
+    if i == 0 or j == 0 or i == nx - 1 or j == ny - 1 or excess[j, i] > OPEN:
         return True
     for k in range(4):
         jj, ii = j - (k >> 1), i - ((k ^ (k >> 1)) & 1)
         c = jj * (nx - 1) + ii
         if piece[c, 0] < 0 and piece[c, 1] < 0:
             return True
-        if _corner(excess, of, values, nx, jj, ii, k) > OPEN:
-            return True
+        n = of[c]
+        while n > 0:
+            if values[n - 1, k] > OPEN:
+                return True
+            n = int(values[n - 1, NEXT])
     return False
 
 
@@ -150,10 +160,9 @@ def make_portals(
                 kb, ka = (j - 1) * (nx - 1) + i, j * (nx - 1) + i
                 below, above = piece[kb, 1], piece[ka, 0]
                 if below >= 0 and above >= 0:
-                    found = _free(
-                        _corner(excess, of, values, nx, j - 1, i, 3), _corner(excess, of, values, nx, j - 1, i, 2),
-                        _corner(excess, of, values, nx, j, i, 0), _corner(excess, of, values, nx, j, i, 1), t,
-                    )  # fmt: skip
+                    t[0], t[1] = 0.0, 1.0
+                    found = _cut(excess[j, i], excess[j, i + 1], t)
+                    found = found and _cut_own(of, values, kb, 3, 2, t) and _cut_own(of, values, ka, 0, 1, t)
             goes_on = found and whole and t[0] == 0.0 and below == was_below and above == was_above
             if was_below >= 0 and not goes_on:
                 n = _put(ends, names, joins, n, room, x0, y0, x1, y1, v0, v1, was_above, was_below)
@@ -181,12 +190,10 @@ def make_portals(
             k = j * (nx - 1) + i
             if i > 0:
                 left, right = _side(piece, diagonal, k - 1, True), _side(piece, diagonal, k, False)
+                t[0], t[1] = 0.0, 1.0
                 if (
-                    left >= 0 and right >= 0 and left != right
-                    and _free(
-                        _corner(excess, of, values, nx, j, i - 1, 1), _corner(excess, of, values, nx, j, i - 1, 2),
-                        _corner(excess, of, values, nx, j, i, 0), _corner(excess, of, values, nx, j, i, 3), t,
-                    )
+                    left >= 0 and right >= 0 and left != right and _cut(excess[j, i], excess[j + 1, i], t)
+                    and _cut_own(of, values, k - 1, 1, 2, t) and _cut_own(of, values, k, 0, 3, t)
                 ):  # fmt: skip
                     edge, beyond = 8 * (j * nx + i), 8 * ((j + 1) * nx + i)
                     v0, v1 = edge + 3, edge + 4
@@ -205,8 +212,8 @@ def make_portals(
                 # The lower triangle lies at the right of the diagonal, seen from the lower row.
                 i0, i1 = (i, i + 1) if diagonal[k] == 0 else (i + 1, i)
                 c0, c1 = (0, 2) if diagonal[k] == 0 else (1, 3)
-                p, q = _corner(excess, of, values, nx, j, i, c0), _corner(excess, of, values, nx, j, i, c1)
-                if _free(p, q, p, q, t):
+                t[0], t[1] = 0.0, 1.0
+                if _cut(excess[j, i0], excess[j + 1, i1], t) and _cut_own(of, values, k, c0, c1, t):
                     edge = 8 * (j * nx + i)
                     v0, v1 = edge + 5, edge + 6
                     if t[0] == 0.0:

@@ -1,4 +1,4 @@
-"""Zones laid on a lattice: cells that they shut get corner values of their own."""
+"""Zones laid on a lattice: cells that they shut, as a whole or in part, get walls of their own."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners._mesh import NEXT
 from gcsplan.planners.compiled import device, kernel
 
 Floats = NDArray[np.float64]
@@ -61,13 +62,13 @@ def stamp_zones(
     excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
     low: bool, of: Ints, values: Floats,
 ) -> int:  # fmt: skip
-    """Give cells that zones shut corner values of their own: how deep in the shape they lie. Returns how many.
+    """Give cells that zones shut walls of their own: how deep in the shape they lie. Returns how many walls.
 
-    ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells each may touch. ``low``: only
-    what is shut for certain (of several zones, and ground, the one that shuts most); else all that may be shut.
+    ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells each may touch; ``of``,
+    ``values`` as in `_mesh`. ``low``: only what is shut for certain; else all that may be shut.
     """
-    nx = excess.shape[1]
     count = 0
+    wall = values[len(values) - 1]
     for z in range(len(zones)):
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
             for i in range(boxes[z, 0], boxes[z, 1] + 1):
@@ -75,24 +76,28 @@ def stamp_zones(
                 ways = 0
                 for k in range(4):
                     jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
-                    g = depth(zones, edges, z, x[jj, ii], y[jj, ii])
-                    deepest, shallowest = max(deepest, g), min(shallowest, g)
+                    wall[k] = depth(zones, edges, z, x[jj, ii], y[jj, ii])
+                    deepest, shallowest = max(deepest, wall[k]), min(shallowest, wall[k])
                     if _open(zones, z, floor[jj, ii], floor[jj, ii] - excess[jj, ii], ground[jj, ii]):
                         ways += 1
                 if ways == 4:
                     continue
                 if shallowest > 0.0 and zones[z, PAIR] == 0.0 and zones[z, UNDER] == 0.0 and zones[z, TOP] < np.inf:
                     # The whole cell is under a lid, which is what must be flown over: bilinear, as ground is.
-                    count = _lid(excess, floor, ground, zones, z, low, of, values, j, i, count)
+                    twist = _twist(floor, ground, j, i) if zones[z, TOP_AGL] > 0.0 else 0.0
+                    for k in range(4):
+                        jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
+                        wall[k] = level(zones, z, TOP, ground[jj, ii]) - floor[jj, ii] + excess[jj, ii]
+                        wall[k] += -twist if low else twist
+                    count = _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
                     continue
                 if low and ways > 0:
                     if deepest > 0.0 and zones[z, PAIR] == 0.0:
-                        count = _in_part(excess, floor, ground, x, y, zones, edges, z, of, values, j, i, count)
+                        count = _in_part(excess, floor, ground, zones, z, of, values, wall, shallowest, j, i, count)
                     continue
-                dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
-                square = dx * dx + dy * dy
-                more = 0.0
                 if not low:
+                    dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
+                    square = dx * dx + dy * dy
                     # A linear function under a concave one: by so much it may be too low between the corners.
                     more = 0.02
                     if zones[z, RADIUS] >= 0.0:
@@ -101,115 +106,62 @@ def stamp_zones(
                         more += _kink(zones, edges, z, x, y, j, i)
                     if zones[z, RADIUS] >= 0.0 and deepest + more <= 0.0 and _meets(zones, z, x, y, j, i):
                         more = 0.02 - deepest  # a disc that no corner lies near
-                if deepest + more <= 0.0:
-                    continue
-                k = j * (nx - 1) + i
-                n = of[k]
-                if n == 0:
-                    count += 1
-                    n = of[k] = count
-                    for q in range(4):
-                        values[n - 1, q] = excess[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)]
-                was = now = 0.0
-                for q in range(4):
-                    g = more + depth(zones, edges, z, x[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)],
-                                      y[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)])  # fmt: skip
-                    if not low:
-                        values[n - 1, q] = max(values[n - 1, q], g)
-                    was += 1e6 if values[n - 1, q] > 0.0 else 0.0
-                    was += min(max(values[n - 1, q], -1e3), 1e3)
-                    now += (1e6 if g > 0.0 else 0.0) + min(max(g, -1e3), 1e3)
-                if low and now > was:
-                    for q in range(4):
-                        values[n - 1, q] = depth(zones, edges, z, x[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)],
-                                                  y[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)])  # fmt: skip
+                    for k in range(4):
+                        wall[k] += more
+                count = _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
     return count
 
 
 @device
-def _shut(excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, inside: float, j: int, i: int) -> float:
-    """Above 0 where a node is ``inside`` a zone, above its underside and below what must be flown over."""
-    g = ground[j, i]
-    out = min(inside, level(zones, z, TOP, g) - floor[j, i] + excess[j, i])
-    if zones[z, UNDER] > 0.0:
-        out = min(out, floor[j, i] - level(zones, z, BOTTOM, g))
-    return out
+def _put(of: Ints, values: Floats, cell: int, wall: Floats, count: int) -> int:
+    """Give a cell a wall (its corners' values come first), if it stands anywhere; returns how many walls there are."""
+    if max(max(wall[0], wall[1]), max(wall[2], wall[3])) <= 0.0:
+        return count
+    for k in range(4):
+        values[count, k] = wall[k]
+    values[count, NEXT] = of[cell]
+    of[cell] = count + 1
+    return count + 1
+
+
+@device
+def _twist(floor: Floats, ground: Floats, j: int, i: int) -> float:
+    """How far the ground's patch may lie from its triangles in a cell that is cut as the floor wants it; 0 where the
+    floor is as twisted."""
+    same = floor[j, i] - ground[j, i]
+    for q in range(1, 4):
+        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
+        if abs(floor[jj, ii] - ground[jj, ii] - same) > 1e-9 * (1.0 + abs(floor[jj, ii])):
+            return max(0.25 * abs(ground[j, i] + ground[j + 1, i + 1] - ground[j, i + 1] - ground[j + 1, i]), 1e-9)
+    return 0.0
 
 
 @device
 def _in_part(
-    excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, z: int,
-    of: Ints, values: Floats, j: int, i: int, count: int,
+    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, of: Ints, values: Floats, wall: Floats,
+    least: float, j: int, i: int, count: int,
 ) -> int:  # fmt: skip
     """Shut the part of a cell that certainly lies in a zone and can be passed neither over nor under it there.
 
-    What tells that is the least of functions that are concave, or linear and not above the bilinear ones, in either
-    triangle; a linear function between its corners lies nowhere above it. Where the ground is not what floors are
-    measured from, its patch may be cut the wrong way, by no more than a quarter of its twist, and nothing is said of
-    what is below a level over it. Returns how many cells have values of their own.
+    ``wall``: how deep its corners lie in the zone, ``least`` at least. What tells that is the least of functions that
+    are concave, or linear and not above the bilinear ones, in either triangle; a linear function between its corners
+    lies nowhere above it. Where the ground is not what floors are measured from, its patch may be cut the wrong way, and
+    nothing is said of what is below a level over it. Returns how many walls there are.
     """
-    same, even, spare = floor[j, i] - ground[j, i], True, 0.0
-    for q in range(1, 4):
-        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-        even = even and abs(floor[jj, ii] - ground[jj, ii] - same) <= 1e-9 * (1.0 + abs(floor[jj, ii]))
-    if not even and zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0:
-        return count
-    if not even and zones[z, TOP_AGL] > 0.0:
-        spare = 0.25 * abs(ground[j, i] + ground[j + 1, i + 1] - ground[j, i + 1] - ground[j + 1, i])
-    least, most = np.inf, -np.inf
-    for q in range(4):
-        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-        least = min(least, depth(zones, edges, z, x[jj, ii], y[jj, ii]))
-    inside = np.inf  # all of the cell is, if its corners are
-    was = now = 0.0
-    k = j * (excess.shape[1] - 1) + i
-    n = of[k]
-    for q in range(4):
-        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-        if least <= 0.0:
-            inside = depth(zones, edges, z, x[jj, ii], y[jj, ii])
-        g = _shut(excess, floor, ground, zones, z, inside, jj, ii) - spare
-        h = excess[jj, ii] if n == 0 else values[n - 1, q]
-        most = max(most, g)
-        was += (1e6 if h > 0.0 else 0.0) + min(max(h, -1e3), 1e3)
-        now += (1e6 if g > 0.0 else 0.0) + min(max(g, -1e3), 1e3)
-    if most <= 0.0 or now <= was:
-        return count
-    if n == 0:
-        count += 1
-        n = of[k] = count
-    for q in range(4):
-        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-        if least <= 0.0:
-            inside = depth(zones, edges, z, x[jj, ii], y[jj, ii])
-        values[n - 1, q] = _shut(excess, floor, ground, zones, z, inside, jj, ii) - spare
-    return count
-
-
-@device
-def _lid(
-    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, low: bool, of: Ints, values: Floats,
-    j: int, i: int, count: int,
-) -> int:  # fmt: skip
-    """Give a cell the excess of a zone's ceiling where that is above the floor; returns how many have their own."""
-    k = j * (excess.shape[1] - 1) + i
-    more = 0
-    for q in range(4):
-        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-        if level(zones, z, TOP, ground[jj, ii]) > floor[jj, ii]:
-            more += 1
-    n = of[k]
-    if more == 0 or (low and (more < 4 or n > 0)):
-        return count
-    if n == 0:
-        count += 1
-        n = of[k] = count
-        for q in range(4):
-            values[n - 1, q] = excess[j + (q >> 1), i + ((q ^ (q >> 1)) & 1)]
-    for q in range(4):
-        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-        values[n - 1, q] = max(values[n - 1, q], level(zones, z, TOP, ground[jj, ii]) - floor[jj, ii] + excess[jj, ii])
-    return count
+    spare = 0.0
+    if zones[z, TOP_AGL] > 0.0 or (zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0):
+        spare = _twist(floor, ground, j, i)
+        if spare > 0.0 and zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0:
+            return count
+    for k in range(4):
+        jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
+        g = ground[jj, ii]
+        shut = level(zones, z, TOP, g) - floor[jj, ii] + excess[jj, ii] - spare
+        if zones[z, UNDER] > 0.0:
+            shut = min(shut, floor[jj, ii] - level(zones, z, BOTTOM, g))
+        # All of the cell is inside, if its corners are.
+        wall[k] = shut if least > 0.0 else min(shut, wall[k])
+    return _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
 
 
 @device

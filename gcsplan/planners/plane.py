@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners._fill import fill, raise_cone
-from gcsplan.planners._mesh import make_pieces, make_portals, sort_portals
+from gcsplan.planners._mesh import WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners._stamp import UNDER, UNDER_2, stamp_zones
 from gcsplan.planners.ground_nodes import nodes, places, slopes
 from gcsplan.planners.mesh import BENT_M, Mesh
@@ -101,14 +101,14 @@ class Plane:
             diagonal,
         )  # fmt: skip
         x, y = fine_x, fine_y
-        of, values = np.zeros(cells, np.int32), np.zeros((1, 4))
+        of, values = np.zeros(cells, np.int32), np.zeros((1, WALL))
         if len(self.shapes.boxes):
             zones, edges = self.shapes.low if low else self.shapes.high
             if under is not None:
                 zones = zones.copy()
                 zones[:, UNDER] *= under[self.shapes.owner[:, 0]]
                 zones[:, UNDER_2] *= under[self.shapes.owner[:, 1]]
-            values = np.empty((1 + self.shapes.cells * fineness**2, 4))
+            values = np.empty((1 + self.shapes.cells * fineness**2, WALL))
             boxes = (self.shapes.boxes - np.array([col, col, row, row])) * fineness
             boxes = boxes + np.array([0, fineness - 1, 0, fineness - 1])
             boxes = boxes.clip([0, -1, 0, -1], [cols, cols - 2, rows, rows - 2]).astype(np.int32)
