@@ -149,7 +149,7 @@ def away_from_rim(plane: Plane, at: Floats) -> Bools:
     holes = np.argwhere(np.isnan(surface.ground_m))[:, ::-1]
     away = np.abs(cell[:, None] - holes).max(axis=2).min(axis=1, initial=np.inf)
     rim = np.abs(cell / (np.array(surface.ground_m.shape[::-1]) - 1.0) - 0.5).max(axis=1)
-    return np.asarray((rim < 0.44) & (away > 2.0))
+    return np.asarray((rim < 0.44) & (away > 1.6))
 
 
 LIMITS = {

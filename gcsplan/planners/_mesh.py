@@ -2,8 +2,8 @@
 
 Nodes lie on a lattice, each with an *excess*: the plane is free where the excess is not above 0. A cell is two
 triangles, the excess is linear in each, and so are walls that a cell has of its own: what all of them leave free of a
-triangle is convex. Cells that are free as a whole are joined along their row into one long piece, a *run*; runs end where the
-lattice bends (every ``block`` columns), so that every piece is convex.
+triangle is convex. Cells that are free as a whole are joined along their row into one long piece, a *run*; runs end
+where the lattice bends (every ``block`` columns), so that every piece is convex.
 
 Only the portals are kept, the parts of edges that two pieces share: walls are where none is.
 """

@@ -145,8 +145,8 @@ def _in_part(
 
     ``wall``: how deep its corners lie in the zone, ``least`` at least. What tells that is the least of functions that
     are concave, or linear and not above the bilinear ones, in either triangle; a linear function between its corners
-    lies nowhere above it. Where the ground is not what floors are measured from, its patch may be cut the wrong way, and
-    nothing is said of what is below a level over it. Returns how many walls there are.
+    lies nowhere above it. Where the ground is not what floors are measured from, its patch may be cut the wrong way,
+    and nothing is said of what is below a level over it. Returns how many walls there are.
     """
     spare = 0.0
     if zones[z, TOP_AGL] > 0.0 or (zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0):
