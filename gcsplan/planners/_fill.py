@@ -142,16 +142,17 @@ def _mix(z: Floats, j: int, i: int, a: float, b: float, c: float, d: float) -> f
     return out
 
 
-@kernel("f8[,] f8[,] i4[] f8[,] f8[,] f8 f8 f8 f8 f8 f8 f8 b1 i1[,] f8[,]")
+@kernel("f8[,] f8[,] f8[,] i4[] f8[,] f8[,] f8 f8 f8 f8 f8 f8 f8 b1 i1[,] f8[,]")
 def raise_cone(
-    excess: Floats, floor: Floats, of: Ints, x: Floats, y: Floats, at_x: float, at_y: float, col: float, row: float,
-    height: float, slope: float, cap: float, lone: bool, seen: NDArray[np.int8], away: Floats,
+    excess: Floats, floor: Floats, lift: Floats, of: Ints, x: Floats, y: Floats, at_x: float, at_y: float, col: float,
+    row: float, height: float, slope: float, cap: float, lone: bool, seen: NDArray[np.int8], away: Floats,
 ) -> None:  # fmt: skip
     """Hold nodes near an end to what can be climbed to from there, where a bound may.
 
     A node that the end sees over cells which are free as a whole is reached from it in a straight line, those next to
     it by little more, so no path short enough to matter is higher there than ``height`` plus ``slope`` times that way.
     A node counts only if the ways to all around it are known. ``lone``: no other end's cone comes near this one's.
+    ``lift``: what zones are higher than the floor that may have to be flown over, see `_stamp.lift_lids`.
     Room for the kernel, (rows, cols): ``seen`` (zeros) and ``away`` (inf).
     """
     ny, nx = excess.shape
@@ -168,26 +169,26 @@ def raise_cone(
     left, right = max(i0 - wide, 0), min(i0 + wide + 1, nx - 1)
     low, high = max(j0 - tall, 0), min(j0 + tall + 1, ny - 1)
     # Only where the cone could be a wall, and some nodes around that, anything needs to be known.
-    if not _mark(excess, floor, x, y, at_x, at_y, height, slope, left, right, low, high, seen):
+    if not _mark(excess, floor, lift, x, y, at_x, at_y, height, slope, left, right, low, high, seen):
         return
     for j in range(low, high + 1):
         for i in range(left, right + 1):
-            if seen[j, i] < 0 and excess[j, i] <= 0.0 and _sees(excess, of, col, row, i, j):
+            if seen[j, i] < 0 and _open(excess, lift, j, i) and _sees(excess, lift, of, col, row, i, j):
                 seen[j, i] = 1
                 away[j, i] = math.sqrt((x[j, i] - at_x) ** 2 + (y[j, i] - at_y) ** 2)
     for ring in range(2, 2 + RINGS):
         for j in range(low, high + 1):
             for i in range(left, right + 1):
-                if seen[j, i] < 0 and excess[j, i] <= 0.0:
-                    near = _beside(excess, of, x, y, seen, away, i, j, ring)
+                if seen[j, i] < 0 and _open(excess, lift, j, i):
+                    near = _beside(excess, lift, of, x, y, seen, away, i, j, ring)
                     if near < math.inf:
                         away[j, i] = near
                         seen[j, i] = ring
     # The wall's own nodes, as far away as the farthest of those beside them that are free says.
     for j in range(low, high + 1):
         for i in range(left, right + 1):
-            if seen[j, i] < 0 and 0.0 < excess[j, i] < math.inf:
-                away[j, i] = _behind(excess, x, y, away, i, j)
+            if seen[j, i] < 0 and not _open(excess, lift, j, i) and excess[j, i] < math.inf:
+                away[j, i] = _behind(excess, lift, x, y, away, i, j)
     diagonal = math.sqrt(step_x * step_x + step_y * step_y)
     spare = 0.25 * slope * diagonal
     for j in range(max(low, 1), min(high, ny - 2) + 1):
@@ -209,9 +210,15 @@ def raise_cone(
 
 
 @device
+def _open(excess: Floats, lift: Floats, j: int, i: int) -> bool:
+    """Whether a node may be flown over, and over zones that may have to be."""
+    return bool(excess[j, i] + lift[j, i] <= 0.0)
+
+
+@device
 def _mark(
-    excess: Floats, floor: Floats, x: Floats, y: Floats, at_x: float, at_y: float, height: float, slope: float,
-    left: int, right: int, low: int, high: int, seen: NDArray[np.int8],
+    excess: Floats, floor: Floats, lift: Floats, x: Floats, y: Floats, at_x: float, at_y: float, height: float,
+    slope: float, left: int, right: int, low: int, high: int, seen: NDArray[np.int8],
 ) -> bool:  # fmt: skip
     """Set ``seen`` to -1 at nodes over a cone, and `RINGS` + 2 around them; whether there are any."""
     wide, found = RINGS + 2, False
@@ -219,7 +226,7 @@ def _mark(
         last = -wide - 1
         for i in range(left, right + 1):
             cone = height + slope * math.sqrt((x[j, i] - at_x) ** 2 + (y[j, i] - at_y) ** 2)
-            if excess[j, i] < math.inf and floor[j, i] > cone:
+            if excess[j, i] < math.inf and floor[j, i] + lift[j, i] > cone:
                 for k in range(max(i - wide, left, last + 1), min(i + wide, right) + 1):
                     seen[j, k] = -1
                 last, found = min(i + wide, right), True
@@ -236,8 +243,9 @@ def _mark(
 
 @device
 def _beside(
-    excess: Floats, of: Ints, x: Floats, y: Floats, seen: NDArray[np.int8], away: Floats, i: int, j: int, ring: int
-) -> float:
+    excess: Floats, lift: Floats, of: Ints, x: Floats, y: Floats, seen: NDArray[np.int8], away: Floats, i: int, j: int,
+    ring: int,
+) -> float:  # fmt: skip
     """The way to a free node by the best of those around it that belong to an earlier ring."""
     ny, nx = excess.shape
     best = math.inf
@@ -252,8 +260,8 @@ def _beside(
             for cj in range(max(max(j, b) - 1, 0), min(min(j, b), ny - 2) + 1):
                 for ci in range(max(max(i, a) - 1, 0), min(min(i, a), nx - 2) + 1):
                     whole = p == 0 or q == 0 or (
-                        excess[cj, ci] <= 0.0 and excess[cj, ci + 1] <= 0.0
-                        and excess[cj + 1, ci] <= 0.0 and excess[cj + 1, ci + 1] <= 0.0
+                        _open(excess, lift, cj, ci) and _open(excess, lift, cj, ci + 1)
+                        and _open(excess, lift, cj + 1, ci) and _open(excess, lift, cj + 1, ci + 1)
                     )  # fmt: skip
                     free = free or (whole and of[cj * (nx - 1) + ci] == 0)
             if free:
@@ -262,20 +270,20 @@ def _beside(
 
 
 @device
-def _behind(excess: Floats, x: Floats, y: Floats, away: Floats, i: int, j: int) -> float:
+def _behind(excess: Floats, lift: Floats, x: Floats, y: Floats, away: Floats, i: int, j: int) -> float:
     """The way to a node of a wall by the farthest of the free nodes around it; inf where that is not known, 0 where
     none is free: nothing there can be flown anyway."""
     ny, nx = excess.shape
     most = 0.0
     for b in range(max(j - 1, 0), min(j + 1, ny - 1) + 1):
         for a in range(max(i - 1, 0), min(i + 1, nx - 1) + 1):
-            if excess[b, a] <= 0.0:
+            if _open(excess, lift, b, a):
                 most = max(most, away[b, a] + math.sqrt((x[b, a] - x[j, i]) ** 2 + (y[b, a] - y[j, i]) ** 2))
     return most
 
 
 @device
-def _sees(excess: Floats, of: Ints, col: float, row: float, i: int, j: int) -> bool:
+def _sees(excess: Floats, lift: Floats, of: Ints, col: float, row: float, i: int, j: int) -> bool:
     """Whether the straight line from a place (in cells) to a node meets only cells that are free as a whole."""
     nx = excess.shape[1]
     du, dv = i - col, j - row
@@ -290,9 +298,9 @@ def _sees(excess: Floats, of: Ints, col: float, row: float, i: int, j: int) -> b
         if of[cj * (nx - 1) + ci] > 0:
             return False
         # The end's own cell may be free in part: it lies on the floor more often than not.
-        if not (ci == int(math.floor(col)) and cj == int(math.floor(row))) and (
-            excess[cj, ci] > 0.0 or excess[cj, ci + 1] > 0.0
-            or excess[cj + 1, ci] > 0.0 or excess[cj + 1, ci + 1] > 0.0
+        if not (ci == int(math.floor(col)) and cj == int(math.floor(row))) and not (
+            _open(excess, lift, cj, ci) and _open(excess, lift, cj, ci + 1)
+            and _open(excess, lift, cj + 1, ci) and _open(excess, lift, cj + 1, ci + 1)
         ):  # fmt: skip
             return False
         if ci == end_i and cj == end_j:

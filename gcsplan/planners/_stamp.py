@@ -99,7 +99,7 @@ def stamp_zones(
                     dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
                     square = dx * dx + dy * dy
                     # A linear function under a concave one: by so much it may be too low between the corners.
-                    more = 0.02
+                    more = 0.0
                     if zones[z, RADIUS] >= 0.0:
                         more += square / (8.0 * max(zones[z, RADIUS] - math.sqrt(square), 0.5 * math.sqrt(square)))
                     elif zones[z, LAST] - zones[z, FIRST] > 1.0 and shallowest < 0.0:
@@ -110,6 +110,23 @@ def stamp_zones(
                         wall[k] += more
                 count = _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
     return count
+
+
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8[,]")
+def lift_lids(
+    floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, cap: float,
+    lift: Floats,
+) -> None:  # fmt: skip
+    """By how much the zones over each node (``lift``, zeros) are higher than its floor that can be flown over below
+    ``cap``."""
+    for z in range(len(zones)):
+        if zones[z, PAIR] > 0.0 or zones[z, TOP] == np.inf:
+            continue
+        for j in range(boxes[z, 2], boxes[z, 3] + 2):
+            for i in range(boxes[z, 0], boxes[z, 1] + 2):
+                more = level(zones, z, TOP, ground[j, i]) - floor[j, i]
+                if lift[j, i] < more <= cap - floor[j, i] and depth(zones, edges, z, x[j, i], y[j, i]) > 0.0:
+                    lift[j, i] = more
 
 
 @device

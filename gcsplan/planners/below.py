@@ -47,7 +47,7 @@ FAR = 5e-3
 """Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
 SMALL = 50.0
 """A world is small where the straight ways from stop to stop are so many cells of the terrain model long, at most."""
-TWICE, NEAR, FINER = 2.0, 1e-2, 4
+TWICE, NEAR, FINER = 2.0, 5e-2, 4
 """From so many times the wanted gap on, and up to which gap, as a part, cells are cut once more, and into how many
 parts a side: for walls and zones that the first lattice rounds off."""
 CLOSER, LEFT, FLAT = 8, 0.05, 0.12
@@ -133,6 +133,9 @@ class Below:
             if isinstance(flown, Flown):
                 found = self._exact(track, flown)
                 return found is not None and self._take_simpler(*found, fine=fine, longer=False)
+            if flown.kind == "pinched":  # room of a few centimetres, which a tube's bounds may not leave
+                drawn = settle(self.problem, self.judge, points, pinned, pin_m)
+                return not isinstance(drawn, Unsettled) and self._take_simpler(*drawn, fine=fine, longer=False)
             if not self._give_up(flown):
                 return False
         return False

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gcsplan.planners.mesh import Exhausted, Guide, Mesh, Way
 from gcsplan.planners.plane import Plane, make_plane
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.shapes import CLOSE, LOOSE, Fit
 from gcsplan.world.zones import Circle
 
 Floats = NDArray[np.float64]
@@ -63,7 +64,7 @@ class Corridor:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Close:
+class Nearby:
     """What tracks shorter than ``limit_m`` may meet, and how far that is from start and goal.
 
     Of all cells of the guides' mesh (cells,) the lowest floor, and how long ways there and on are at least.
@@ -92,7 +93,7 @@ class Leg:
         self._detour = 0.0
         self._guide: Guide
         self._ahead: Guide | None = None
-        self._close: Close | None = None
+        self._close: Nearby | None = None
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
         wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
         self.parts = max(1, round(cell_m / wanted_m))
@@ -230,10 +231,11 @@ class Leg:
         if float(np.ptp(rows) + 1) * float(np.ptp(cols) + 1) * (self._ratio * parts) ** 2 > MOST_NODES:
             return False
         if self._stride == 1:
-            twin = self._lattice(self._detour, 1, self.parts * self._cut) if self._cut > 1 else self.plane
+            twin = self._lattice(self._detour, 1, self.parts * self._cut, CLOSE)
         else:
-            twin = self._twin or self._lattice(self._detour, self._fine_stride)
-        found = self._each_cell(twin, self._finer(wanted), limit, close.away)
+            twin = self._lattice(self._detour, self._fine_stride, fit=CLOSE)
+        # Nodes lie elsewhere by as much as the other lattice is bent.
+        found = self._each_cell(twin, self._finer(wanted), limit + 2.0 * LOOSE.bent_m, close.away)
         if found is None:
             return False
         self._close, self.reach_m, self.closer = found, limit, parts
@@ -253,7 +255,7 @@ class Leg:
         near = close.left.mesh.of_plane(close.away.between(close.left, limit_m)).ravel()
         return close.low_m[near], close.away_m[near], close.left_m[near]
 
-    def _closer(self, limit_m: float) -> Close:
+    def _closer(self, limit_m: float) -> Nearby:
         """A look at each cell alone, for tracks shorter than ``limit_m``; at whole pieces where that is too much."""
         if self._close is None or limit_m > self._close.limit_m:
             away, left = self._from_start(), self._guide
@@ -262,11 +264,11 @@ class Leg:
                 mesh = left.mesh
                 ends = (away, self.start), (left, self.goal)
                 ways = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
-                found = Close(limit_m, away, left, mesh.lowest(), *ways)
+                found = Nearby(limit_m, away, left, mesh.lowest(), *ways)
             self._close = found
         return self._close
 
-    def _each_cell(self, plane: Plane, wanted: Bools, limit_m: float, ahead: Guide) -> Close | None:
+    def _each_cell(self, plane: Plane, wanted: Bools, limit_m: float, ahead: Guide) -> Nearby | None:
         """Each of the ``wanted`` cells of a lattice alone; None where that is too much to look at. ``ahead``: from the
         start, over a mesh that leaves no less room."""
         mesh = plane.mesh(self.top_m, True, 1, wanted, single=True)
@@ -276,7 +278,7 @@ class Leg:
             away = mesh.flood(a, b, limit_m, math.inf, left)[1]
         except Exhausted:
             return None
-        return Close(limit_m, away, left, mesh.lowest(), away.cells(), left.cells())
+        return Nearby(limit_m, away, left, mesh.lowest(), away.cells(), left.cells())
 
     def _finer(self, cells: Bools) -> Bools:
         """The same cells of the finer lattice."""
@@ -301,15 +303,15 @@ class Leg:
             if end.amsl_m is not None and math.isfinite(slope)
         ]
 
-    def _lattice(self, detour: float, stride: int, parts: int | None = None) -> Plane:
+    def _lattice(self, detour: float, stride: int, parts: int | None = None, fit: Fit = LOOSE) -> Plane:
         a, b, d = self.start.place, self.goal.place, self.straight_m
         parts = self.parts if parts is None else parts
         if math.isinf(detour):
             everywhere = (-math.inf, -math.inf, math.inf, math.inf)
-            return make_plane(self.problem, everywhere, parts, stride, self._stride)
+            return make_plane(self.problem, everywhere, parts, stride, self._stride, fit=fit)
         more = max(0.5 * d * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * d) + 1.0
         box = (min(a[0], b[0]) - more, min(a[1], b[1]) - more, max(a[0], b[0]) + more, max(a[1], b[1]) + more)
         cell = self._stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
 
         reach = a, b, detour * d + 4.0 * cell
-        return make_plane(self.problem, box, parts, stride, self._stride, reach)
+        return make_plane(self.problem, box, parts, stride, self._stride, reach, fit)

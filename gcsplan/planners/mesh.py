@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners._any_angle import search
 from gcsplan.planners._mesh import in_reach, least_of_cells, least_of_portals, within
+from gcsplan.planners.shapes import LOOSE
 
 if TYPE_CHECKING:
     from gcsplan.planners.plane import Plane
@@ -20,7 +21,7 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 Place = tuple[float, float]
 
-BENT_M = 0.03
+BENT_M = LOOSE.bent_m
 """Most that a raster's line may bow between the corners of a block."""
 MOST_OPENED = 3_000_000
 """Intervals that are looked at before a search is given up."""

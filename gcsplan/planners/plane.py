@@ -6,7 +6,7 @@ that never lies above it and one that never lies below it. So every question has
 every legal track (``low``: for bounds), and one in which every track is legal but for rounding (for paths).
 
 In the plane the raster's lines are not quite straight. Here they are, between the corners of blocks so short that
-nothing moves by more than a few centimetres, for which `SPARE_M` makes up.
+nothing moves by more than a few centimetres, or millimetres, for which a `Fit` makes up.
 """
 
 from __future__ import annotations
@@ -20,19 +20,17 @@ from numpy.typing import NDArray
 
 from gcsplan.planners._fill import fill, raise_cone
 from gcsplan.planners._mesh import WALL, make_pieces, make_portals, sort_portals
-from gcsplan.planners._stamp import UNDER, UNDER_2, stamp_zones
+from gcsplan.planners._stamp import UNDER, UNDER_2, lift_lids, stamp_zones
 from gcsplan.planners.ground_nodes import nodes, places, slopes
-from gcsplan.planners.mesh import BENT_M, Mesh
+from gcsplan.planners.mesh import Mesh
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.shapes import SPARE_M, Shapes, make_shapes
+from gcsplan.planners.shapes import LOOSE, Fit, Shapes, make_shapes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 MANY = 500_000
 """Nodes of a mesh from which on its names are numbered one by one, for searches have room for every name."""
-HAIR_M = 0.07
-"""Kept from the ground, upward and sideways, by paths: what the exact check spares, and what the lattice rounds."""
 
 
 @dataclass(eq=False, slots=True)
@@ -56,6 +54,7 @@ class Plane:
     grounds: tuple[Floats, Floats]
     inside: NDArray[np.bool_]
     shapes: Shapes
+    fit: Fit
     known: dict[tuple[float, float], tuple[float, float]] = field(default_factory=dict)
     """Places that were asked for, and where they lie on the lattice."""
 
@@ -91,37 +90,40 @@ class Plane:
         diagonal = np.zeros(cells, np.int8)
         climbs = np.array([] if low or cones is None else cones).reshape(-1, 4)
         more = limits.min_agl_m + limits.altitude_error_m
-        beside = near + HAIR_M
+        beside = near + self.fit.hair_m
         if limits.horizontal_clearance_m > limits.min_agl_m:
             # Beside cliffs it is the clearance that binds; this is more than both demand together.
             beside += limits.horizontal_clearance_m * scale
+        more += -self.fit.spare_m if low else self.fit.hair_m
         fill(
-            top, ground, steep, x, y, np.ascontiguousarray(wanted[part]), fineness,
-            more + (-SPARE_M if low else HAIR_M), beside, cap_m, climbs, low, excess, floor, under_m, fine_x, fine_y,
-            diagonal,
+            top, ground, steep, x, y, np.ascontiguousarray(wanted[part]), fineness, more, beside, cap_m, climbs, low,
+            excess, floor, under_m, fine_x, fine_y, diagonal,
         )  # fmt: skip
         x, y = fine_x, fine_y
         of, values = np.zeros(cells, np.int32), np.zeros((1, WALL))
-        if len(self.shapes.boxes):
-            zones, edges = self.shapes.low if low else self.shapes.high
-            if under is not None:
-                zones = zones.copy()
-                zones[:, UNDER] *= under[self.shapes.owner[:, 0]]
-                zones[:, UNDER_2] *= under[self.shapes.owner[:, 1]]
+        zones, edges = self.shapes.low if low else self.shapes.high
+        boxes = self._boxes(row, col, fineness, rows, cols)
+        if under is not None and len(boxes):
+            zones = zones.copy()
+            zones[:, UNDER] *= under[self.shapes.owner[:, 0]]
+            zones[:, UNDER_2] *= under[self.shapes.owner[:, 1]]
+        if len(boxes):
             values = np.empty((1 + self.shapes.cells * fineness**2, WALL))
-            boxes = (self.shapes.boxes - np.array([col, col, row, row])) * fineness
-            boxes = boxes + np.array([0, fineness - 1, 0, fineness - 1])
-            boxes = boxes.clip([0, -1, 0, -1], [cols, cols - 2, rows, rows - 2]).astype(np.int32)
             stamp_zones(excess, floor, under_m, x, y, zones, edges, boxes, low, of, values)
         if low and cones:
+            lift = np.zeros((rows, cols))
+            lift_lids(floor, under_m, x, y, zones, edges, boxes, cap_m, lift)
             cell_m = self.stride * float(self.problem.airspace.surface.grid.metres_per_cell(*cones[0][:2]).max())
             lone = _apart(cones, cap_m, 8.0 * cell_m)
             for east, north, height, slope in cones:
                 c, r = self.at((east, north))
                 raise_cone(
-                    excess, floor, of, x, y, east, north, (c - col) * fineness, (r - row) * fineness, height, slope,
-                    cap_m, lone, np.zeros((rows, cols), np.int8), np.full((rows, cols), np.inf),
+                    excess, floor, lift, of, x, y, east, north, (c - col) * fineness, (r - row) * fineness, height,
+                    slope, cap_m, lone, np.zeros((rows, cols), np.int8), np.full((rows, cols), np.inf),
                 )  # fmt: skip
+            if lift.any():  # what cannot be reached so soon is no way over a zone either
+                of[:] = 0
+                stamp_zones(excess, floor, under_m, x, y, zones, edges, boxes, low, of, values)
         piece = np.empty((cells, 2), np.int32)
         block = 1 if single else self.block * fineness
         count = make_pieces(excess, of, values, diagonal, piece, block)
@@ -143,6 +145,12 @@ class Plane:
         return Mesh(
             self, fineness, row, col, excess, floor, diagonal, piece, start, ends[:n], names, joins[:n], order, named
         )
+
+    def _boxes(self, row: int, col: int, fineness: int, rows: int, cols: int) -> Ints:
+        """The shapes' boxes on a part of the lattice, cut finer, of so many nodes."""
+        boxes = (self.shapes.boxes - np.array([col, col, row, row])) * fineness
+        boxes = boxes + np.array([0, fineness - 1, 0, fineness - 1])
+        return np.asarray(boxes.clip([0, -1, 0, -1], [cols, cols - 2, rows, rows - 2]), np.int32)
 
     def _steep(self, row: int, col: int, last_row: int, last_col: int) -> Floats:
         """The steepest slope of the cells around each node of a part of the lattice."""
@@ -167,6 +175,7 @@ def make_plane(
     stride: int = 1,
     whole: int = 1,
     reach: tuple[tuple[float, float], tuple[float, float], float] | None = None,
+    fit: Fit = LOOSE,
 ) -> Plane:
     """The lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
 
@@ -193,7 +202,7 @@ def make_plane(
     if surface.top_m is not surface.ground_m:
         tops = nodes(surface.top_m[part][::-1], parts, stride, whole)
     shape = tops[0].shape
-    block = max(problem.airspace.straight_cells(BENT_M) * parts // stride, 1)
+    block = max(problem.airspace.straight_cells(fit.bent_m) * parts // stride, 1)
     x, y, looked_at = places(grid, col0, row1, shape, parts / stride, block, reach)
     return Plane(
         problem,
@@ -207,7 +216,8 @@ def make_plane(
         tops,
         grounds,
         looked_at,
-        make_shapes(problem, x, y),
+        make_shapes(problem, x, y, fit),
+        fit,
     )
 
 

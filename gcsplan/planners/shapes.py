@@ -30,8 +30,20 @@ from gcsplan.world.zones import Circle, Zone
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-SPARE_M = 0.05
-"""Metres by which a bound's floors and zones are lower and smaller, and a path's zones larger, for rounding."""
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Metres: how far a lattice's nodes may lie beside the terrain model's (``bent_m``); and for this and for rounding,
+    by how much a bound's floors and zones are lower and smaller (``spare_m``), a path's higher and larger (``hair_m``).
+    """
+
+    bent_m: float
+    spare_m: float
+    hair_m: float
+
+
+LOOSE, CLOSE = Fit(0.03, 0.05, 0.07), Fit(0.003, 0.01, 0.03)
+"""As long as rows of cells may be pieces, and where slits a few centimetres wide count."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -50,7 +62,7 @@ class Shapes:
     cells: int
 
 
-def make_shapes(problem: Problem, x: Floats, y: Floats) -> Shapes:
+def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Shapes:
     """The zones that reach into a lattice of nodes ``x``, ``y`` (rows, cols).
 
     Levels over ground are those over the zone's own ground, which tells what may be flown beside it too. There, a level
@@ -75,18 +87,18 @@ def make_shapes(problem: Problem, x: Floats, y: Floats) -> Shapes:
         for more in (0.0, rise) if rise > 0.0 else (0.0,):
             found.extend((number, zone, part) for part in parts)
             moved.extend(more for _ in parts)
-    pairs = _crossing(found, reach)
+    pairs = _crossing(found, reach + max(fit.spare_m, fit.hair_m))
     both: list[tuple[Floats, Floats]] = []
     bounds = np.zeros((len(found) + len(pairs), 4))
-    for sign in (-1.0, 1.0):
+    for sign, off_m in ((-1.0, fit.spare_m), (1.0, fit.hair_m)):
         rows = np.zeros((len(found) + len(pairs), NUMBERS))
         forms: list[Floats] = []
         for k, (row, (_, zone, part)) in enumerate(zip(rows, found, strict=False)):
-            grow = (0.0 if moved[k] == 0.0 and _follows(zone) else reach) + sign * SPARE_M
+            grow = (0.0 if moved[k] == 0.0 and _follows(zone) else reach) + sign * off_m
             row[[BOTTOM, TOP]] = -np.inf, np.inf
             for level, at, more in ((zone.floor, BOTTOM, -1.0), (zone.ceiling, TOP, 1.0)):
                 if level is not None:
-                    row[at] = level.value_m + more * (limits.altitude_error_m + sign * SPARE_M)
+                    row[at] = level.value_m + more * (limits.altitude_error_m + sign * off_m)
                     row[at + 2] = level.datum == "agl"
                     if level.datum == "agl":
                         row[at] += more * sign * moved[k]
@@ -156,7 +168,7 @@ def _crossing(found: list[tuple[int, Zone, Floats | None]], reach: float) -> lis
             if found[a][0] == found[b][0] or one_way:
                 continue
             u, v = p.bounds, q.bounds
-            apart = 2.0 * (reach + SPARE_M)
+            apart = 2.0 * reach
             if u[0] - v[2] < apart and v[0] - u[2] < apart and u[1] - v[3] < apart and v[1] - u[3] < apart:
                 out.append((a, b))
     return out
