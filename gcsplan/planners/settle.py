@@ -19,6 +19,8 @@ Bools = NDArray[np.bool_]
 
 SAMPLE_M = 12.0
 """Between places at which floor and ceiling over a track are read; its profile bends at these alone."""
+TIGHT_M, TIGHT_SAMPLE_M = 1.0, 1.0
+"""Where so little room, or less, is left between them, and how close they are read there."""
 SPARE_M = 0.05
 """Kept from both where there is room: the exact check is quick where it need not cut hairs."""
 CORRECTIONS, CORRECTED_M = 24, 0.03
@@ -135,10 +137,17 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
         at.append(a + (b - a) * np.arange(1, n + 1) / n)
     s = np.concatenate(at)
     s[-1] = exact.tube.s_m[-1]
-    east, north = (np.interp(s, exact.s_m, exact.points[:, k]) for k in range(2))
-    floor = problem.airspace.floor_amsl(east, north, problem.limits)
-    ceiling = problem.airspace.ceiling_amsl(east, north, problem.limits)
+    floor, ceiling = _room(problem, exact, s)
     with np.errstate(invalid="ignore"):  # unknown ground: infinite on both sides
+        room = np.abs(ceiling - floor)
+    tight = np.minimum(room[:-1], room[1:]) < TIGHT_M
+    if tight.any():
+        parts = np.where(tight, np.ceil(np.diff(s) / TIGHT_SAMPLE_M), 1.0).astype(np.intp)
+        first = np.cumsum(parts) - parts
+        part = (np.arange(parts.sum()) - np.repeat(first, parts)) / np.repeat(parts, parts)
+        s = np.append(np.repeat(s[:-1], parts) + part * np.repeat(np.diff(s), parts), s[-1])
+        floor, ceiling = _room(problem, exact, s)
+    with np.errstate(invalid="ignore"):
         spare = np.clip(0.25 * (ceiling - floor), 0.0, SPARE_M)
     spare[[0, -1]] = 0.0
     spare = np.where(np.isfinite(floor), spare, 0.0)
@@ -147,6 +156,13 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
         s, np.stack([floor[:-1], floor[1:]], axis=-1), np.stack([ceiling[:-1], ceiling[1:]], axis=-1), exact.tube.bands
     )
     return Track(exact.points, exact.pinned, exact.pin_m, exact.s_m, tube)
+
+
+def _room(problem: Problem, track: Track, s_m: Floats) -> tuple[Floats, Floats]:
+    """Floor and ceiling at places along a track, zones left aside."""
+    east, north = (np.interp(s_m, track.s_m, track.points[:, k]) for k in range(2))
+    air, limits = problem.airspace, problem.limits
+    return np.asarray(air.floor_amsl(east, north, limits)), np.asarray(air.ceiling_amsl(east, north, limits))
 
 
 def thinned(problem: Problem, judge: Judge, points: Floats, pinned: Bools, worth: float) -> Floats:

@@ -42,7 +42,7 @@ class Fit:
     hair_m: float
 
 
-LOOSE, CLOSE = Fit(0.03, 0.05, 0.07), Fit(0.003, 0.01, 0.03)
+LOOSE, CLOSE = Fit(0.03, 0.05, 0.07), Fit(0.003, 0.01, 0.07)
 """As long as rows of cells may be pieces, and where slits a few centimetres wide count."""
 
 
