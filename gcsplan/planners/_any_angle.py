@@ -39,6 +39,7 @@ from gcsplan.planners._intervals import (
     ahead_of,
     beaten,
     join,
+    lies_on,
     off_of,
     place_on,
     pop,
@@ -61,25 +62,25 @@ MOST_TURNS = 8
 
 @kernel(
     "i4[] f8[,] i8[,] i4[,] i4[] f8[] i8[] i4[] i4[] f8[,] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[]"
-    " f8[,] i4[,] i8[,] f8[] i4[] f8[,]"
+    " f8[,] i4[,] i8[,] f8[] i4[] f8[,] b1"
 )
 def search(
     start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats, origin: Names, first: Ints,
     widest: Ints, span: Floats, sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float,
     slack: float, most: int, remaining: Floats, met: Floats,
-    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats,
+    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats, sheets: bool,
 ) -> int:  # fmt: skip
     """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
 
     ``order`` (start[p] : start[p + 1]) lists the portals of piece p. ``sources_at`` (K, 3) x, y, cost so far, each in
-    piece ``sources_piece`` (K,); a goal in any of ``goal_piece``. ``best``, ``origin`` (names,),
-    ``first`` (2 * portals,) and ``widest`` (portals,) zeros; ``span`` (portals, 2); ``node`` (room, 8), ``link``
-    (room, 6), ``name`` (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining``
-    (pieces,): no way on from a piece's entrance is shorter. ``slack`` >= 0: go on after the goal is reached, as far as
-    that much (as a part of the length) beyond it; ``met`` (portals,), inf, receives the least cost at which each is
-    met; both may be empty. Returns the number of corners, ends included, with ``out[0, 2]`` the source's
-    number and ``out[1, 2]`` the length; 0: no path of less than ``limit``; -1: no room left; -2: more than ``most``
-    nodes were opened, paths shorter than ``out[0, 0]`` all of them.
+    piece ``sources_piece`` (K,); a goal in any of ``goal_piece``. ``best``, ``origin`` (names,), ``first`` (2 *
+    portals,) and ``widest`` (portals,) zeros; ``span`` (portals, 2); ``node`` (room, 8), ``link`` (room, 6), ``name``
+    (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining`` (pieces,): no way on from a piece's entrance
+    is shorter. ``slack`` >= 0: go on after the goal is reached, as far as that much (as a part of the length) beyond
+    it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. ``sheets``: portals of
+    one piece may lie on each other, from sheet to sheet. Returns the number of corners, ends included, with ``out[0,
+    2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than ``limit``; -1: no room left; -2: more
+    than ``most`` nodes were opened, paths shorter than ``out[0, 0]`` all of them.
     """
     room = len(heap)
     gx, gy = goal[0], goal[1]
@@ -199,6 +200,9 @@ def search(
                                 along = -1
             if along >= 0:
                 t0, t1 = 1.0, 0.0
+            elif sheets and not all_round and not to_goal and lies_on(ax, ay, bx, by, qx, qy, lx, ly):
+                # Back to where one came from, on another sheet: round one end of what one came through.
+                t0, t1 = 2.0, -1.0
             elif not all_round:
                 # Signed distances off the two rays; beyond a ray is beyond what the root sees.
                 ra = ((qx - rx) * (ay - ry) - (qy - ry) * (ax - rx)) / width_r
@@ -271,10 +275,12 @@ def search(
                     if not forward:
                         s0, s1 = 1.0 - s1, 1.0 - s0
                     if widest[p] > 0 and span[p, 0] <= s0 and s1 <= span[p, 1]:
-                        if beaten(node, widest[p] - 1, nx, ny, ncost, off, x0, y0, x1, y1):
+                        other = widest[p] - 1
+                        if sheets and name[other, ROOT] == nroot and link[other, CAME] == piece:
+                            continue  # round a place from sheet to sheet
+                        if beaten(node, other, nx, ny, ncost, off, x0, y0, x1, y1):
                             continue
                         # As wide, and cheaper at its ends: what comes later is held to this one.
-                        other = widest[p] - 1
                         wider = s0 == span[p, 0] and s1 == span[p, 1] and ncost + off < node[other, COST]
                     else:
                         wider = widest[p] == 0 or s1 - s0 > span[p, 1] - span[p, 0]

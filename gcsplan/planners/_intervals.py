@@ -93,6 +93,19 @@ def off_of(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> 
 
 
 @device
+def lies_on(ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float) -> bool:
+    """Whether segments lie on one line, and on each other in more than a place."""
+    ex, ey = bx - ax, by - ay
+    long = math.sqrt(ex * ex + ey * ey)
+    if long <= SAME_M or abs(ex * (cy - ay) - ey * (cx - ax)) > SAME_M * long:
+        return False
+    if abs(ex * (dy - ay) - ey * (dx - ax)) > SAME_M * long:
+        return False
+    c, d = (ex * (cx - ax) + ey * (cy - ay)) / long, (ex * (dx - ax) + ey * (dy - ay)) / long
+    return bool(min(max(c, d), long) - max(min(c, d), 0.0) > SAME_M)
+
+
+@device
 def place_on(ends: Floats, p: int, x: float, y: float) -> float:
     """Where on a portal a place is, as a part of it."""
     ex, ey = ends[p, 2] - ends[p, 0], ends[p, 3] - ends[p, 1]

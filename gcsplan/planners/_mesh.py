@@ -6,6 +6,9 @@ triangle is convex. Cells that are free as a whole are joined along their row in
 where the lattice bends (every ``block`` columns), so that every piece is convex.
 
 Only the portals are kept, the parts of edges that two pieces share: walls are where none is.
+
+Where a zone may be passed over in one place and under in another, but not in all of it either way, its cells are there
+twice, on two *sheets*: to get from one to the other one must leave the zone.
 """
 
 from __future__ import annotations
@@ -41,9 +44,9 @@ def _cut(p: float, q: float, t: Floats) -> bool:
 
 
 @device
-def _cut_own(of: Ints, values: Floats, k: int, start: int, end: int, t: Floats) -> bool:
+def _cut_own(of: Ints, values: Floats, k: int, sheet: int, start: int, end: int, t: Floats) -> bool:
     """Leave that of the part ``t`` of cell k's edge, from corner to corner, where none of its own walls stands."""
-    n = of[k]
+    n = of[k, sheet]
     while n > 0:
         if not _cut(values[n - 1, start], values[n - 1, end], t):
             return False
@@ -51,25 +54,43 @@ def _cut_own(of: Ints, values: Floats, k: int, start: int, end: int, t: Floats) 
     return True
 
 
-@kernel("f8[,] i4[] f8[,] i1[] i4[,] i8")
+@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] i8")
 def make_pieces(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], piece: Ints, block: int,
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, piece: Ints, block: int,
 ) -> int:  # fmt: skip
-    """Number the pieces: ``piece`` (cells, 2), the lower and the upper triangle's, -1 where nothing is free.
+    """Number the pieces: ``piece`` (cells, 2 sheets), the lower and the upper triangle's, -1 where nothing is free.
 
-    ``of`` (cells,) number from 1 of the row in ``values`` (K, 5) of a cell's first own wall, or 0: excess at this node,
-    the one in the next column, in the next column and row, and in the next row, and the number of its next wall;
-    ``diagonal`` (cells,) 0 from this node to the opposite one, 1 the other.
+    ``of`` (cells, sheets) number from 1 of the row in ``values`` (K, 5) of a cell's first own wall, or 0: excess at
+    this node, the one in the next column, in the next column and row, and in the next row, and the number of its next
+    wall; ``diagonal`` (cells,) 0 from this node to the opposite one, 1 the other. ``owner`` (cells,) which cells are
+    there on the second sheet, too, and for which zone (0: they are not); empty where there is one sheet.
     """
-    ny, nx = excess.shape
     count = 0
+    for sheet in range(of.shape[1]):
+        count = _number(excess, of, values, diagonal, owner, piece, block, sheet, count)
+    return count
+
+
+@device
+def _number(
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, piece: Ints, block: int,
+    sheet: int, count: int,
+) -> int:  # fmt: skip
+    """Number the pieces of one sheet; returns how many there are by now."""
+    ny, nx = excess.shape
     for j in range(ny - 1):
         running = False
         for i in range(nx - 1):
             k = j * (nx - 1) + i
+            if sheet > 0 and owner[k] == 0:
+                running = False
+                piece[k, 2] = piece[k, 3] = -1
+                continue
+            if sheet > 0 and running and owner[k - 1] != owner[k]:
+                running = False
             a, b, c, d = excess[j, i], excess[j, i + 1], excess[j + 1, i + 1], excess[j + 1, i]
             whole = lower = upper = True
-            n = of[k]
+            n = of[k, sheet]
             while True:
                 if not (a <= 0.0 and b <= 0.0 and c <= 0.0 and d <= 0.0):
                     whole = False
@@ -85,21 +106,21 @@ def make_pieces(
                 if not running or i % block == 0:
                     count += 1
                     running = True
-                piece[k, 0] = piece[k, 1] = count - 1
+                piece[k, 2 * sheet] = piece[k, 2 * sheet + 1] = count - 1
                 continue
             running = False
             for half in range(2):
-                piece[k, half] = -1
+                piece[k, 2 * sheet + half] = -1
                 if lower if half == 0 else upper:
-                    piece[k, half] = count
+                    piece[k, 2 * sheet + half] = count
                     count += 1
     return count
 
 
 @device
-def _side(piece: Ints, diagonal: NDArray[np.int8], k: int, right: bool) -> int:
+def _side(piece: Ints, diagonal: NDArray[np.int8], k: int, sheet: int, right: bool) -> int:
     """The piece at the left or right side of a cell."""
-    return piece[k, 0 if (diagonal[k] == 0) == right else 1]
+    return piece[k, 2 * sheet + (0 if (diagonal[k] == 0) == right else 1)]
 
 
 @device
@@ -117,36 +138,66 @@ def _put(
 
 @device
 def _is_corner(
-    excess: Floats, of: Ints, values: Floats, piece: Ints, diagonal: NDArray[np.int8], nx: int, ny: int, j: int, i: int
+    excess: Floats, of: Ints, values: Floats, owner: Ints, piece: Ints, nx: int, ny: int, j: int, i: int
 ) -> bool:
-    """Whether a node may lie on a wall: something around it is not free."""
+    """Whether a node may lie on a wall, something around it is not free, or where sheets begin."""
     if i == 0 or j == 0 or i == nx - 1 or j == ny - 1 or excess[j, i] > OPEN:
         return True
     for k in range(4):
-        jj, ii = j - (k >> 1), i - ((k ^ (k >> 1)) & 1)
-        c = jj * (nx - 1) + ii
-        if piece[c, 0] < 0 and piece[c, 1] < 0:
+        c = (j - (k >> 1)) * (nx - 1) + i - ((k ^ (k >> 1)) & 1)
+        if len(owner) > 0 and owner[c] != owner[j * (nx - 1) + i]:
             return True
-        n = of[c]
-        while n > 0:
-            if values[n - 1, k] > OPEN:
+        for sheet in range(1 if len(owner) == 0 or owner[c] == 0 else 2):
+            if piece[c, 2 * sheet] < 0 and piece[c, 2 * sheet + 1] < 0:
                 return True
-            n = int(values[n - 1, NEXT])
+            n = of[c, sheet]
+            while n > 0:
+                if values[n - 1, k] > OPEN:
+                    return True
+                n = int(values[n - 1, NEXT])
     return False
 
 
-@kernel("f8[,] i4[] f8[,] i1[] i4[,] f8[,] f8[,] i8 f8[,] i8[,] i4[,] f8[]")
+@device
+def _name(
+    excess: Floats, of: Ints, values: Floats, owner: Ints, piece: Ints, j: int, i: int, more: int
+) -> int:  # fmt: skip
+    """A node's name; negative where no wall can stand."""
+    ny, nx = excess.shape
+    name = 8 * (j * nx + i) + more
+    return name if _is_corner(excess, of, values, owner, piece, nx, ny, j, i) else -1 - name
+
+
+@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] f8[,] f8[,] f8[,] i8[,] i4[,] f8[]")
 def make_portals(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], piece: Ints, x: Floats, y: Floats, block: int,
-    ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats,
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, piece: Ints, x: Floats,
+    y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats,
 ) -> int:  # fmt: skip
     """Every portal once: ``ends`` (room, 4) from x, y to x, y; ``names`` (room, 2) of its ends; ``joins`` (room, 2)
     the pieces at its left and right. Returns how many there are; room for fewer is filled.
 
-    A name is unique to a place; it is not negative if a wall may stand there, so that a path may turn.
+    A name is unique to a place, and to a sheet; it is not negative if a wall may stand there, so that a path may turn.
+    """
+    n = _join(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, t, 0, 0, 0)
+    if len(owner) > 0:
+        n = _join(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, t, 1, 1, n)
+        n = _join(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, t, 0, 1, n)
+        n = _join(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, t, 1, 0, n)
+    return n
+
+
+@device
+def _join(
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, piece: Ints, x: Floats,
+    y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats, sheet: int, next_sheet: int, n: int,
+) -> int:  # fmt: skip
+    """Find the portals between cells on a sheet and the next ones, upward and to the right, on one; from the n-th on.
+
+    Different sheets meet where a cell is not the same zone's as the next one.
     """
     ny, nx = excess.shape
-    room, n = len(ends), 0
+    room = len(ends)
+    more = 8 * (ny * nx + 1) if sheet + next_sheet > 0 else 0
     for j in range(ny):
         # Along the row: pieces below (row j - 1) and above (row j).
         x0 = y0 = x1 = y1 = 0.0
@@ -158,74 +209,68 @@ def make_portals(
             found = False
             if 0 < j < ny - 1 and i < nx - 1:
                 kb, ka = (j - 1) * (nx - 1) + i, j * (nx - 1) + i
-                below, above = piece[kb, 1], piece[ka, 0]
+                if sheet == next_sheet or owner[kb] != owner[ka]:
+                    below, above = piece[kb, 2 * sheet + 1], piece[ka, 2 * next_sheet]
                 if below >= 0 and above >= 0:
                     t[0], t[1] = 0.0, 1.0
                     found = _cut(excess[j, i], excess[j, i + 1], t)
-                    found = found and _cut_own(of, values, kb, 3, 2, t) and _cut_own(of, values, ka, 0, 1, t)
+                    found = found and _cut_own(of, values, kb, sheet, 3, 2, t)
+                    found = found and _cut_own(of, values, ka, next_sheet, 0, 1, t)
             goes_on = found and whole and t[0] == 0.0 and below == was_below and above == was_above
             if was_below >= 0 and not goes_on:
                 n = _put(ends, names, joins, n, room, x0, y0, x1, y1, v0, v1, was_above, was_below)
                 was_below = -1
             if found:
-                edge = 8 * (j * nx + i)
+                edge = 8 * (j * nx + i) + more
                 if not goes_on:
                     x0, y0 = x[j, i] + t[0] * (x[j, i + 1] - x[j, i]), y[j, i] + t[0] * (y[j, i + 1] - y[j, i])
                     v0 = edge + 1
                     if t[0] == 0.0:
-                        v0 = edge
-                        if not _is_corner(excess, of, values, piece, diagonal, nx, ny, j, i):
-                            v0 = -1 - v0
+                        v0 = _name(excess, of, values, owner, piece, j, i, more)
                 x1, y1 = x[j, i] + t[1] * (x[j, i + 1] - x[j, i]), y[j, i] + t[1] * (y[j, i + 1] - y[j, i])
                 v1 = edge + 2
                 if t[1] == 1.0:
-                    v1 = edge + 8
-                    if not _is_corner(excess, of, values, piece, diagonal, nx, ny, j, i + 1):
-                        v1 = -1 - v1
+                    v1 = _name(excess, of, values, owner, piece, j, i + 1, more)
                 was_below, was_above, whole = below, above, t[1] == 1.0
         if j == ny - 1:
             break
         # Within the row: sides and diagonals of its cells.
         for i in range(nx - 1):
             k = j * (nx - 1) + i
-            if i > 0:
-                left, right = _side(piece, diagonal, k - 1, True), _side(piece, diagonal, k, False)
+            if i > 0 and (sheet == next_sheet or owner[k - 1] != owner[k]):
+                left = _side(piece, diagonal, k - 1, sheet, True)
+                right = _side(piece, diagonal, k, next_sheet, False)
                 t[0], t[1] = 0.0, 1.0
                 if (
                     left >= 0 and right >= 0 and left != right and _cut(excess[j, i], excess[j + 1, i], t)
-                    and _cut_own(of, values, k - 1, 1, 2, t) and _cut_own(of, values, k, 0, 3, t)
+                    and _cut_own(of, values, k - 1, sheet, 1, 2, t) and _cut_own(of, values, k, next_sheet, 0, 3, t)
                 ):  # fmt: skip
-                    edge, beyond = 8 * (j * nx + i), 8 * ((j + 1) * nx + i)
+                    edge = 8 * (j * nx + i) + more
                     v0, v1 = edge + 3, edge + 4
                     if t[0] == 0.0:
-                        v0 = edge if _is_corner(excess, of, values, piece, diagonal, nx, ny, j, i) else -1 - edge
+                        v0 = _name(excess, of, values, owner, piece, j, i, more)
                     if t[1] == 1.0:
-                        v1 = beyond
-                        if not _is_corner(excess, of, values, piece, diagonal, nx, ny, j + 1, i):
-                            v1 = -1 - beyond
+                        v1 = _name(excess, of, values, owner, piece, j + 1, i, more)
                     dx, dy = x[j + 1, i] - x[j, i], y[j + 1, i] - y[j, i]
                     n = _put(
                         ends, names, joins, n, room, x[j, i] + t[0] * dx, y[j, i] + t[0] * dy,
                         x[j, i] + t[1] * dx, y[j, i] + t[1] * dy, v0, v1, left, right,
                     )  # fmt: skip
-            if piece[k, 0] >= 0 and piece[k, 1] >= 0 and piece[k, 0] != piece[k, 1]:
+            lower, upper = piece[k, 2 * sheet], piece[k, 2 * sheet + 1]
+            if sheet == next_sheet and lower >= 0 and upper >= 0 and lower != upper:
                 # The lower triangle lies at the right of the diagonal, seen from the lower row.
                 i0, i1 = (i, i + 1) if diagonal[k] == 0 else (i + 1, i)
                 c0, c1 = (0, 2) if diagonal[k] == 0 else (1, 3)
                 t[0], t[1] = 0.0, 1.0
-                if _cut(excess[j, i0], excess[j + 1, i1], t) and _cut_own(of, values, k, c0, c1, t):
-                    edge = 8 * (j * nx + i)
+                if _cut(excess[j, i0], excess[j + 1, i1], t) and _cut_own(of, values, k, sheet, c0, c1, t):
+                    edge = 8 * (j * nx + i) + more
                     v0, v1 = edge + 5, edge + 6
                     if t[0] == 0.0:
-                        v0 = 8 * (j * nx + i0)
-                        if not _is_corner(excess, of, values, piece, diagonal, nx, ny, j, i0):
-                            v0 = -1 - v0
+                        v0 = _name(excess, of, values, owner, piece, j, i0, more)
                     if t[1] == 1.0:
-                        v1 = 8 * ((j + 1) * nx + i1)
-                        if not _is_corner(excess, of, values, piece, diagonal, nx, ny, j + 1, i1):
-                            v1 = -1 - v1
+                        v1 = _name(excess, of, values, owner, piece, j + 1, i1, more)
                     dx, dy = x[j + 1, i1] - x[j, i0], y[j + 1, i1] - y[j, i0]
-                    left, right = (piece[k, 1], piece[k, 0]) if diagonal[k] == 0 else (piece[k, 0], piece[k, 1])
+                    left, right = (upper, lower) if diagonal[k] == 0 else (lower, upper)
                     n = _put(
                         ends, names, joins, n, room, x[j, i0] + t[0] * dx, y[j, i0] + t[0] * dy,
                         x[j, i0] + t[1] * dx, y[j, i0] + t[1] * dy, v0, v1, left, right,
@@ -266,16 +311,14 @@ def least_of_cells(
     ``cols``, ``fine_cols``: cells in a row; ``row``, ``col``: the coarse cell that the finer mesh begins at.
     """
     for k in range(len(fine_piece)):
-        if fine_piece[k, 0] < 0 and fine_piece[k, 1] < 0:
-            continue
         j, i = (k // fine_cols) // ratio + row, (k % fine_cols) // ratio + col
         if not (0 <= i < cols and 0 <= j < len(piece) // cols):
             continue
         least = np.inf
-        for half in range(2):
+        for half in range(piece.shape[1]):
             if piece[j * cols + i, half] >= 0:
                 least = min(least, value[piece[j * cols + i, half]])
-        for half in range(2):
+        for half in range(fine_piece.shape[1]):
             p = fine_piece[k, half]
             if p >= 0 and least < out[p]:
                 out[p] = least
@@ -302,7 +345,7 @@ def within(
         if from_start[n] + from_goal[n] <= limit:
             met[joins[n, 0]] = met[joins[n, 1]] = True
     for k in range(len(piece)):
-        for half in range(2):
+        for half in range(piece.shape[1]):
             if piece[k, half] >= 0 and met[piece[k, half]]:
                 out[k] = True
 
@@ -318,7 +361,7 @@ def in_reach(
         for i in range(nx - 1):
             k = j * (nx - 1) + i
             least = np.inf
-            for half in range(2):
+            for half in range(piece.shape[1]):
                 if piece[k, half] >= 0:
                     least = min(least, entered[piece[k, half]])
             if least < np.inf:

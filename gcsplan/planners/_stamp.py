@@ -43,13 +43,13 @@ def level(zones: Floats, z: int, level: int, ground: float) -> float:
 
 
 @device
-def _open(zones: Floats, z: int, floor: float, allowed: float, ground: float) -> bool:
+def _open(zones: Floats, z: int, floor: float, allowed: float, ground: float, over: bool, under: bool) -> bool:
     """Whether there is an altitude to fly at, over a zone, under it, or between the two of a pair."""
     bottom, top = level(zones, z, BOTTOM, ground), level(zones, z, TOP, ground)
     if zones[z, PAIR] == 0.0:
-        return top <= allowed or (zones[z, UNDER] > 0.0 and floor <= bottom)
+        return (over and top <= allowed) or (under and floor <= bottom)
     bottom_2, top_2 = level(zones, z, BOTTOM_2, ground), level(zones, z, TOP_2, ground)
-    under, under_2 = zones[z, UNDER] > 0.0, zones[z, UNDER_2] > 0.0
+    under_2 = zones[z, UNDER_2] > 0.0
     if max(top, top_2) <= allowed or (under and under_2 and floor <= min(bottom, bottom_2)):
         return True
     if under_2 and top <= min(bottom_2, allowed) and floor <= bottom_2:
@@ -57,43 +57,51 @@ def _open(zones: Floats, z: int, floor: float, allowed: float, ground: float) ->
     return under and top_2 <= min(bottom, allowed) and floor <= bottom
 
 
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] f8[,]")
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] i8 i4[,] f8[,] i8")
 def stamp_zones(
     excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
-    low: bool, of: Ints, values: Floats,
+    low: bool, owner: Ints, sheet: int, of: Ints, values: Floats, count: int,
 ) -> int:  # fmt: skip
-    """Give cells that zones shut walls of their own: how deep in the shape they lie. Returns how many walls.
+    """Give cells that zones shut walls of their own: how deep in the shape they lie. Returns how many walls there are.
 
-    ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells each may touch; ``of``,
-    ``values`` as in `_mesh`. ``low``: only what is shut for certain; else all that may be shut.
+    ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells each may touch; ``owner``,
+    ``of``, ``values`` as in `_mesh`, of the ``sheet``: a cell's owner is passed over on the first and under on the
+    second. ``low``: only what is shut for certain; else all that may be shut. ``count``: walls that there are.
     """
-    count = 0
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
             for i in range(boxes[z, 0], boxes[z, 1] + 1):
+                cell = j * (excess.shape[1] - 1) + i
+                if sheet > 0 and owner[cell] == 0:
+                    continue
+                mine = len(owner) > 0 and owner[cell] == z + 1
+                over, under = not mine or sheet == 0, zones[z, UNDER] > 0.0 and (not mine or sheet > 0)
                 deepest, shallowest = -np.inf, np.inf
                 ways = 0
                 for k in range(4):
                     jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
                     wall[k] = depth(zones, edges, z, x[jj, ii], y[jj, ii])
                     deepest, shallowest = max(deepest, wall[k]), min(shallowest, wall[k])
-                    if _open(zones, z, floor[jj, ii], floor[jj, ii] - excess[jj, ii], ground[jj, ii]):
+                    if _open(zones, z, floor[jj, ii], floor[jj, ii] - excess[jj, ii], ground[jj, ii], over, under):
                         ways += 1
                 if ways == 4:
                     continue
-                if shallowest > 0.0 and zones[z, PAIR] == 0.0 and zones[z, UNDER] == 0.0 and zones[z, TOP] < np.inf:
+                if shallowest > 0.0 and zones[z, PAIR] == 0.0 and not under and zones[z, TOP] < np.inf:
                     # The whole cell is under a lid, which is what must be flown over: bilinear, as ground is.
                     twist = _twist(floor, ground, j, i) if zones[z, TOP_AGL] > 0.0 else 0.0
                     for k in range(4):
                         jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
                         wall[k] = level(zones, z, TOP, ground[jj, ii]) - floor[jj, ii] + excess[jj, ii]
                         wall[k] += -twist if low else twist
-                    count = _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
+                    count = _put(of, sheet, values, cell, wall, count)
                     continue
                 if low and ways > 0:
                     if deepest > 0.0 and zones[z, PAIR] == 0.0:
-                        count = _in_part(excess, floor, ground, zones, z, of, values, wall, shallowest, j, i, count)
+                        count = _in_part(
+                            excess, floor, ground, zones, z, over, under, of, sheet, values, wall, shallowest, j, i,
+                            count,
+                        )  # fmt: skip
                     continue
                 if not low:
                     dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
@@ -108,7 +116,7 @@ def stamp_zones(
                         more = 0.02 - deepest  # a disc that no corner lies near
                     for k in range(4):
                         wall[k] += more
-                count = _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
+                count = _put(of, sheet, values, cell, wall, count)
     return count
 
 
@@ -129,15 +137,59 @@ def lift_lids(
                     lift[j, i] = more
 
 
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 i4[]")
+def own_zones(
+    excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
+    slope: float, owner: Ints,
+) -> int:  # fmt: skip
+    """Tell the cells that want two sheets (``owner``, zeros): the number from 1 of a shape that they lie in; how many.
+
+    Such a shape may be passed over in one place and not under, and the other way round in another. From under it to
+    over it is so far, at a climb of ``slope``, that turning in the wrong place of an edge of a cell does not matter.
+    """
+    nx, count = excess.shape[1], 0
+    for z in range(len(zones)):
+        if zones[z, PAIR] > 0.0 or zones[z, UNDER] == 0.0 or zones[z, TOP] == np.inf:
+            continue
+        over_alone = under_alone = 0
+        lowest_top, highest_bottom, long = np.inf, -np.inf, 0.0
+        for again in range(2):
+            for j in range(boxes[z, 2], boxes[z, 3] + 1):
+                for i in range(boxes[z, 0], boxes[z, 1] + 1):
+                    over = under = 0
+                    inside = True
+                    for k in range(4):
+                        jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
+                        inside = inside and excess[jj, ii] < np.inf
+                        inside = inside and depth(zones, edges, z, x[jj, ii], y[jj, ii]) > 0.0
+                        if not inside:
+                            break
+                        bottom, top = level(zones, z, BOTTOM, ground[jj, ii]), level(zones, z, TOP, ground[jj, ii])
+                        lowest_top, highest_bottom = min(lowest_top, top), max(highest_bottom, bottom)
+                        over += 1 if top <= floor[jj, ii] - excess[jj, ii] else 0
+                        under += 1 if floor[jj, ii] <= bottom else 0
+                    if not inside:
+                        continue
+                    if again > 0 and owner[j * (nx - 1) + i] == 0:
+                        owner[j * (nx - 1) + i] = z + 1
+                        count += 1
+                    over_alone += 1 if over > 0 and under < 4 else 0
+                    under_alone += 1 if under > 0 and over < 4 else 0
+                    long = max(long, math.sqrt((x[j + 1, i + 1] - x[j, i]) ** 2 + (y[j + 1, i + 1] - y[j, i]) ** 2))
+            if over_alone == 0 or under_alone == 0 or not lowest_top - highest_bottom >= 2.0 * slope * long:
+                break
+    return count
+
+
 @device
-def _put(of: Ints, values: Floats, cell: int, wall: Floats, count: int) -> int:
+def _put(of: Ints, sheet: int, values: Floats, cell: int, wall: Floats, count: int) -> int:
     """Give a cell a wall (its corners' values come first), if it stands anywhere; returns how many walls there are."""
     if max(max(wall[0], wall[1]), max(wall[2], wall[3])) <= 0.0:
         return count
     for k in range(4):
         values[count, k] = wall[k]
-    values[count, NEXT] = of[cell]
-    of[cell] = count + 1
+    values[count, NEXT] = of[cell, sheet]
+    of[cell, sheet] = count + 1
     return count + 1
 
 
@@ -155,8 +207,8 @@ def _twist(floor: Floats, ground: Floats, j: int, i: int) -> float:
 
 @device
 def _in_part(
-    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, of: Ints, values: Floats, wall: Floats,
-    least: float, j: int, i: int, count: int,
+    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, over: bool, under: bool, of: Ints, sheet: int,
+    values: Floats, wall: Floats, least: float, j: int, i: int, count: int,
 ) -> int:  # fmt: skip
     """Shut the part of a cell that certainly lies in a zone and can be passed neither over nor under it there.
 
@@ -166,19 +218,21 @@ def _in_part(
     and nothing is said of what is below a level over it. Returns how many walls there are.
     """
     spare = 0.0
-    if zones[z, TOP_AGL] > 0.0 or (zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0):
+    if zones[z, TOP_AGL] > 0.0 or (under and zones[z, BOTTOM_AGL] > 0.0):
         spare = _twist(floor, ground, j, i)
-        if spare > 0.0 and zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0:
+        if spare > 0.0 and under and zones[z, BOTTOM_AGL] > 0.0:
             return count
     for k in range(4):
         jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
         g = ground[jj, ii]
-        shut = level(zones, z, TOP, g) - floor[jj, ii] + excess[jj, ii] - spare
-        if zones[z, UNDER] > 0.0:
+        shut = np.inf
+        if over:
+            shut = level(zones, z, TOP, g) - floor[jj, ii] + excess[jj, ii] - spare
+        if under:
             shut = min(shut, floor[jj, ii] - level(zones, z, BOTTOM, g))
         # All of the cell is inside, if its corners are.
         wall[k] = shut if least > 0.0 else min(shut, wall[k])
-    return _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
+    return _put(of, sheet, values, j * (excess.shape[1] - 1) + i, wall, count)
 
 
 @device

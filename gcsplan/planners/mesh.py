@@ -106,9 +106,9 @@ class Mesh:
                     continue
                 u, v, k = c - i, r - j, j * (cols - 1) + i
                 lower = u >= v if self.diagonal[k] == 0 else u + v <= 1.0
-                p = int(self.piece[k, 0 if lower else 1])
-                if p >= 0 and p not in found:
-                    found.append(p)
+                for p in self.piece[k, 0 if lower else 1 :: 2].tolist():
+                    if p >= 0 and p not in found:
+                        found.append(p)
         return found
 
     def way(
@@ -164,7 +164,7 @@ class Mesh:
                 self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span,
                 sources, np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32),
                 limit_m, slack, MOST_OPENED, remaining, met,
-                node, link, name, np.empty(room), np.empty(room, np.int32), out,
+                node, link, name, np.empty(room), np.empty(room, np.int32), out, self.piece.shape[1] > 2,
             )  # fmt: skip
             if n != -1:
                 break

@@ -18,9 +18,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners._fill import fill, raise_cone
+from gcsplan.planners._fill import fill, hold_down, look_around, walk_around
 from gcsplan.planners._mesh import WALL, make_pieces, make_portals, sort_portals
-from gcsplan.planners._stamp import UNDER, UNDER_2, lift_lids, stamp_zones
+from gcsplan.planners._stamp import UNDER, UNDER_2, lift_lids, own_zones, stamp_zones
 from gcsplan.planners.ground_nodes import nodes, places, slopes
 from gcsplan.planners.mesh import Mesh
 from gcsplan.planners.problem import Problem
@@ -100,7 +100,7 @@ class Plane:
             excess, floor, under_m, fine_x, fine_y, diagonal,
         )  # fmt: skip
         x, y = fine_x, fine_y
-        of, values = np.zeros(cells, np.int32), np.zeros((1, WALL))
+        of, values, owner = np.zeros((cells, 1), np.int32), np.zeros((1, WALL)), np.zeros(0, np.int32)
         zones, edges = self.shapes.low if low else self.shapes.high
         boxes = self._boxes(row, col, fineness, rows, cols)
         if under is not None and len(boxes):
@@ -109,35 +109,49 @@ class Plane:
             zones[:, UNDER_2] *= under[self.shapes.owner[:, 1]]
         if len(boxes):
             values = np.empty((1 + self.shapes.cells * fineness**2, WALL))
-            stamp_zones(excess, floor, under_m, x, y, zones, edges, boxes, low, of, values)
+        laid = excess, floor, under_m, x, y, zones, edges, boxes
         if low and cones:
+            stamp_zones(*laid, low, owner, 0, of, values, 0)
             lift = np.zeros((rows, cols))
             lift_lids(floor, under_m, x, y, zones, edges, boxes, cap_m, lift)
             cell_m = self.stride * float(self.problem.airspace.surface.grid.metres_per_cell(*cones[0][:2]).max())
             lone = _apart(cones, cap_m, 8.0 * cell_m)
             for east, north, height, slope in cones:
                 c, r = self.at((east, north))
-                raise_cone(
-                    excess, floor, lift, of, x, y, east, north, (c - col) * fineness, (r - row) * fineness, height,
-                    slope, cap_m, lone, np.zeros((rows, cols), np.int8), np.full((rows, cols), np.inf),
-                )  # fmt: skip
-            if lift.any():  # what cannot be reached so soon is no way over a zone either
-                of[:] = 0
-                stamp_zones(excess, floor, under_m, x, y, zones, edges, boxes, low, of, values)
-        piece = np.empty((cells, 2), np.int32)
+                cone = np.array([east, north, (c - col) * fineness, (r - row) * fineness, height, slope, cap_m])
+                seen, away = np.zeros((rows, cols), np.int8), np.full((rows, cols), np.inf)
+                missing = look_around(excess, floor, lift, of, values, x, y, cone, seen, away)
+                if missing:
+                    way, root = np.empty((rows, cols)), np.empty((rows, cols), np.int32)
+                    done = np.zeros((rows, cols), np.int8)
+                    heap, ids = np.empty(8 * way.size), np.empty(8 * way.size, np.int32)
+                    walk_around(excess, lift, of, x, y, cone, seen, away, missing, way, root, done, heap, ids)
+                hold_down(excess, floor, lift, of, values, x, y, cone, lone, seen, away)
+            of[:] = 0  # what cannot be reached so soon is no way over a zone either
+        steepest = max(limits.max_climb_slope, limits.max_descent_slope)
+        if self.shapes.either and math.isfinite(steepest):
+            owner = np.zeros(cells, np.int32)
+            if own_zones(*laid, steepest, owner):
+                of, values = np.zeros((cells, 2), np.int32), np.empty((2 * len(values), WALL))
+            else:
+                owner = owner[:0]
+        walls = stamp_zones(*laid, low, owner, 0, of, values, 0)
+        if len(owner):
+            stamp_zones(*laid, low, owner, 1, of, values, walls)
+        piece = np.empty((cells, 2 * of.shape[1]), np.int32)
         block = 1 if single else self.block * fineness
-        count = make_pieces(excess, of, values, diagonal, piece, block)
+        count = make_pieces(excess, of, values, diagonal, owner, piece, block)
         room = 2 * count + 1024
         scratch = np.empty(2)
         while True:
             ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
-            n = make_portals(excess, of, values, diagonal, piece, x, y, block, ends, names, joins, scratch)
+            n = make_portals(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, scratch)
             if n <= room:
                 break
             room = n
         start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
         sort_portals(joins[:n], start, order)
-        names, named = names[:n], 8 * (excess.size + 1)
+        names, named = names[:n], 8 * (excess.size + 1) * of.shape[1]
         if excess.size > MANY:
             corner = names >= 0
             used, names[corner] = np.unique(names[corner], return_inverse=True)
