@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners._fill import fill, raise_cone
 from gcsplan.planners._mesh import make_pieces, make_portals, sort_portals
-from gcsplan.planners._stamp import UNDER, UNDER_2, stamp_zones
+from gcsplan.planners._stamp import PAIR, TOP, TOP_2, UNDER, UNDER_2, stamp_zones
 from gcsplan.planners.ground_nodes import nodes, places, slopes
 from gcsplan.planners.mesh import BENT_M, Mesh
 from gcsplan.planners.problem import Problem
@@ -67,13 +67,15 @@ class Plane:
         wanted: NDArray[np.bool_] | None = None,
         cones: list[tuple[float, float, float, float]] | None = None,
         under: NDArray[np.bool_] | None = None,
+        over: NDArray[np.bool_] | None = None,
         single: bool = False,
     ) -> Mesh:
         """What can be crossed at or below ``cap_m``: by a bound's way (``low``: all of it) or by a path's.
 
         ``wanted``: only these cells. ``cones`` (east_m, north_m, height, slope): where paths climb from, or, for a
-        bound, how high a path of a length that matters can be near its ends. ``under`` (zones,): which zones may be
-        passed below their floors; None for all. ``single``: each free cell is a piece of its own.
+        bound, how high a path of a length that matters can be near its ends. ``under``, ``over`` (zones,): which
+        zones may be passed below their floors, above their ceilings; None for all. ``single``: each free
+        cell is a piece of its own.
         """
         limits, scale = self.problem.limits, self.problem.airspace.scale
         near = limits.track_error_m * scale
@@ -108,6 +110,10 @@ class Plane:
                 zones = zones.copy()
                 zones[:, UNDER] *= under[self.shapes.owner[:, 0]]
                 zones[:, UNDER_2] *= under[self.shapes.owner[:, 1]]
+            if over is not None:
+                zones = zones.copy()
+                zones[~over[self.shapes.owner[:, 0]], TOP] = np.inf
+                zones[~over[self.shapes.owner[:, 1]] & (zones[:, PAIR] > 0.0), TOP_2] = np.inf
             values = np.empty((1 + self.shapes.cells * fineness**2, 4))
             boxes = (self.shapes.boxes - np.array([col, col, row, row])) * fineness
             boxes = boxes + np.array([0, fineness - 1, 0, fineness - 1])
