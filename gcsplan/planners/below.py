@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gcsplan.planners.band import straight_bound
 from gcsplan.planners.caps import Layer, above_all, search_caps
 from gcsplan.planners.climb import with_laps
-from gcsplan.planners.detours import Choice, Search, Stops
+from gcsplan.planners.detours import Choice, Search, Stops, joined
 from gcsplan.planners.finish import way_points
 from gcsplan.planners.lattice import terminals
 from gcsplan.planners.leg import End, Leg
@@ -38,8 +38,9 @@ ZONES_SHUT = 8
 """Tracks that are looked at below a cap where a zone can be passed neither over nor under on the first."""
 STEEP = 0.5
 """What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
-PAST, PAST_FINE = 12, 9
-"""Tracks past what is in the way that are looked at, on the lattice of the first look and on the finer one."""
+PAST, PAST_FINE, ROUNDS = 12, 9, 2
+"""Tracks past what is in the way that are looked at, on the lattice of the first look and on the finer one; and how
+often, on that one, if it helps."""
 FAR = 5e-3
 """Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
 SMALL = 50.0
@@ -108,7 +109,7 @@ class Below:
 
     def try_below(self, cap_m: float, *, fine: bool) -> bool:
         """Look for a path below a cap; True if it is the best so far."""
-        stops = self._stops(self.choice, cap_m, fine)
+        stops = self.stops(self.choice, cap_m, fine)
         if stops is None:
             return False
         track = make_track(self.problem, *stops)
@@ -116,9 +117,11 @@ class Below:
         if isinstance(flown, Flown):
             found = self._exact(track, flown)
             return found is not None and self._take_simpler(*found, fine=fine, longer=False)
-        return flown.kind == "zone" and self._past(ZONES_SHUT, fine=fine, cap_m=cap_m)
+        if flown.kind != "zone" and self.best is not None:
+            return False
+        return self._past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
 
-    def _stops(self, choice: Choice, cap_m: float, fine: bool) -> Stops | None:
+    def stops(self, choice: Choice, cap_m: float, fine: bool) -> Stops | None:
         """The shortest track of a choice below a cap, from stop to stop; see `Leg.track`."""
         ways = []
         for leg in self.legs:
@@ -128,44 +131,40 @@ class Below:
             if way is None:
                 return None
             ways.append(way.points)
-        points = np.vstack([ways[0], *(w[1:] for w in ways[1:])])
-        pinned, pin_m = np.zeros(len(points), np.bool_), np.full(len(points), math.nan)
-        pinned[0] = pinned[-1] = True
-        at = 0
-        for leg, part in zip(self.legs[:-1], ways[:-1], strict=True):
-            at += len(part) - 1
-            pinned[at] = True
-            pin_m[at] = math.nan if leg.goal.amsl_m is None else leg.goal.amsl_m
-        return points, pinned, pin_m
+        return joined(ways, [leg.goal.amsl_m for leg in self.legs[:-1]])
 
-    def _past(self, most: int, *, fine: bool, first: bool = False, cap_m: float | None = None) -> bool:
+    def _past(
+        self, most: int, *, fine: bool, first: bool = False, cap_m: float | None = None, given: Stops | None = None
+    ) -> bool:
         """Look for tracks past what is in the way, at ``most`` of them; True if a path over one is the best so far.
 
-        ``cap_m``: below that cap, the first, which needs no laps where a path is known; else, ``first``, the first, or
-        the best, with metres to spare for laps near the ends.
+        ``cap_m``: below that cap, the first, which needs no laps where a path is known, from a ``given`` track on;
+        else, ``first``, the first, or the best, with metres to spare for laps near the ends.
         """
         laps = self._climbs() and (cap_m is None or self.best is None)
         spare_m = self._longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
-        top_m = self.top_m if cap_m is None else cap_m
-        search = Search(
-            self.problem,
-            lambda choice: self._stops(choice, top_m, fine),
-            self._least,
-            lambda: self.cost,
-            lambda: self.bound,
-            lambda stops: self._take_longer(*stops, fine=fine),
-            lambda: self.best is None or (not self._done() and self._in_time()),
-        )
-        root = replace(self._open, most_m=(spare_m, spare_m)) if cap_m is None else self.choice
-        found = search.run(root, most, first=first or cap_m is not None, laps=laps)
+        search = Search(self, self.top_m if cap_m is None else cap_m, fine)
+        roots = [self.choice]
+        if cap_m is None:
+            roots = [replace(c, most_m=(spare_m, spare_m)) for c in dict.fromkeys([self._open, self.choice])]
+        found = search.run(roots, most, first=first or cap_m is not None, laps=laps, given=given)
         if found is not None:
             self.choice = replace(found, least_m=(0.0, 0.0), most_m=(0.0, 0.0))
         return found is not None
 
-    def _take_longer(self, points: Floats, pinned: Bools, pin_m: Floats, *, fine: bool) -> bool:
-        """Take a track (N, 2) with laps where its profile is too steep."""
-        found = with_laps(self.problem, points, pinned, pin_m, self._exact)
+    def take_longer(self, stops: Stops, fine: bool) -> bool:
+        """Look for a path over a track, with laps where it is too steep; True if it is the best so far."""
+        track = make_track(self.problem, *stops)
+        flown = fly(self.problem, track)
+        found = self._exact(track, flown) if isinstance(flown, Flown) else None
+        if found is not None:
+            return self._take_simpler(*found, fine=fine, longer=False)
+        found = with_laps(self.problem, *stops, self._exact)
         return found is not None and self._take_simpler(*found, fine=fine, longer=True)
+
+    def goes_on(self) -> bool:
+        """Whether a better path is wanted, and there is time, which a first one is worth in any case."""
+        return self.best is None or (not self._done() and self._in_time())
 
     def _take_simpler(self, points: Floats, pinned: Bools, *, fine: bool, longer: bool) -> bool:
         """Make a path simpler and keep it, if it is the best so far; not where there is no hope of that.
@@ -259,7 +258,9 @@ class Below:
         if not self._done() and (self.in_space or self._steep()):
             self._raise_bound(self._search_caps(lambda layer: math.hypot(layer.track_m, self._rise(layer.low_m))))
         self._halve()
-        if not self._done() and self._past(PAST_FINE, fine=True):
+        for _ in range(ROUNDS):
+            if self._done() or not self._past(PAST_FINE, fine=True):
+                break
             self._halve()
         if not self.in_space and TWICE * self.wanted < self.gap <= NEAR and self._in_time():
             closer = [leg.look_closer(self._limit(leg), FINER) for leg in self.legs]
@@ -375,9 +376,9 @@ class Below:
 
     def _raise_tracks(self) -> None:
         """What the shortest tracks alone tell of the cost."""
-        self._raise_bound(self._least(sum(leg.length_m for leg in self.legs)))
+        self._raise_bound(self.least(sum(leg.length_m for leg in self.legs)))
 
-    def _least(self, track_m: float) -> float:
+    def least(self, track_m: float) -> float:
         """What a path costs at least whose track is so long."""
         p = self.problem
         if p.objective == "energy":

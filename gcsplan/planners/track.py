@@ -29,6 +29,8 @@ KEEP_M = 1e-4
 CLOSE_M, CLOSE_STEP_M, CLOSE_ROOM_M = 60.0, 1.0, 0.03
 """Where a tube shuts an end in: so far from it the floor is read point by point, so often, with so much to spare."""
 
+DEARER = 2e-4
+"""What way over or under zones is dearer by, as a part, that is worth to look for one past them."""
 BESIDE_M = 1.0
 """A piece of a profile that ends so near a zone ends there because of it."""
 
@@ -80,7 +82,8 @@ class Lacking:
     """The profile over a track that would cost least if laps could be flown wherever it is too steep.
 
     ``cost``: of that path; ``laps_m``: metres of laps in it; ``steep``: where they would have to be, the one that lacks
-    most first; ``zones``: which make it climb or descend there.
+    most first; ``zones``: which make it climb or descend there, or else, where ways over or under zones are dearer than
+    no zones, the one that is met deepest.
     """
 
     profile: Profile
@@ -202,6 +205,7 @@ def lacking(problem: Problem, track: Track) -> Lacking | Shut:
     room = _rooms(problem, track, ())
     up, down = (min(slope, NO_LIMIT) + 1e-9 for slope in (limits.max_climb_slope, limits.max_descent_slope))
     shut = Shut(math.inf, ())
+    deepest_zone: tuple[int, ...] = ()
 
     def solve(over: Sides) -> tuple[float, Profile, Floats] | None:
         nonlocal shut
@@ -236,9 +240,12 @@ def lacking(problem: Problem, track: Track) -> Lacking | Shut:
                 for k in np.argsort(-missing, kind="stable")
                 if missing[k] > 0.0
             )
-            zones = room.zones(tube, over, steep[0].s0_m, steep[0].s1_m) if steep else ()
+            zones = deepest_zone if cost > root[0] * (1.0 + DEARER) else ()
+            if steep:
+                zones = room.zones(tube, over, steep[0].s0_m, steep[0].s1_m)
             return Lacking(profile, cost, float(more[missing > 0.0].sum()), steep, zones)
         deepest = max(hit, key=lambda h: h.depth_m)
+        deepest_zone = deepest_zone or (tube.bands[deepest.band].zone,)
         for side in (True, False):
             choice = (*over[: deepest.band], side, *over[deepest.band + 1 :])
             count += 1
