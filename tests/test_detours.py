@@ -164,12 +164,12 @@ def test_laps_lead_over_a_zone_that_cannot_be_passed_otherwise() -> None:
     assert best - 1.0 <= below.cost <= 1.01 * best
 
 
-@pytest.mark.parametrize(("half_m", "around"), [(150.0, True), (700.0, False)])
+@pytest.mark.parametrize(("half_m", "around"), [(150.0, True), (850.0, False)])
 def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_way(half_m: float, around: bool) -> None:
-    """Under its western half there is room, over its eastern half, which stands on a hill, there is none."""
+    """Under its western half there is room; its eastern half stands on a hill, over which one must be high by then."""
 
     def hill(east: Floats, north: Floats) -> Floats:
-        return np.where((east > 500.0) & (east < 700.0) & (np.abs(north - 1000.0) < half_m - 15.0), 60.0, 0.0)
+        return np.where((east > 500.0) & (east < 700.0) & (np.abs(north - 1000.0) <= half_m), 60.0, 0.0)
 
     zone = box(300.0, 1000.0 - half_m, 700.0, 1000.0 + half_m, 40.0, 100.0)
     p = replace(crossing(), airspace=Airspace(ground(hill, step_m=10.0), [zone]))
@@ -178,10 +178,10 @@ def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_w
     aside = float(np.abs(below.best[:, 1] - 1000.0).max())
     over = climbing_m(100.0, 90.0) + 400.0 + climbing_m(1100.0, 90.0)
     if around:
-        corners = [(200.0, 1000.0), (300.0, 1000.0 + half_m), (700.0, 1000.0 + half_m), (1800.0, 1000.0)]
+        corners = [(200.0, 1000.0), (500.0, 1000.0 + half_m), (700.0, 1000.0 + half_m), (1800.0, 1000.0)]
         plane_m = sum(math.dist(a, b) for a, b in pairwise(corners))
         assert plane_m < over
-        assert plane_m <= below.cost <= 1.005 * plane_m
+        assert plane_m <= below.cost <= 1.02 * plane_m
         assert aside >= half_m - 1.0
     else:
         assert below.cost <= 1.02 * over

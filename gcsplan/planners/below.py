@@ -59,10 +59,12 @@ as near is good enough."""
 
 
 class Below:
-    """One problem: its legs in the plane, the best path so far, and the best bound so far."""
+    """One problem: its legs in the plane, the best path so far, and the best bound so far.
 
-    def __init__(self, problem: Problem, begun_s: float) -> None:
-        self.problem, self.begun_s = problem, begun_s
+    ``laps``: whether a path with laps is looked for where one without is known."""
+
+    def __init__(self, problem: Problem, begun_s: float, laps: bool = True) -> None:
+        self.problem, self.begun_s, self.laps = problem, begun_s, laps
         self.wanted = problem.gap_percent / 100.0
         self.judge = Judge(problem)
         self.best: Floats | None = None
@@ -117,9 +119,8 @@ class Below:
         if isinstance(flown, Flown):
             found = self._exact(track, flown)
             return found is not None and self._take_simpler(*found, fine=fine, longer=False)
-        if flown.kind != "zone" and self.best is not None:
-            return False
-        return self._past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
+        past = flown.kind == "zone" or self.best is None
+        return past and self._past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
 
     def stops(self, choice: Choice, cap_m: float, fine: bool) -> Stops | None:
         """The shortest track of a choice below a cap, from stop to stop; see `Leg.track`."""
@@ -141,7 +142,7 @@ class Below:
         ``cap_m``: below that cap, the first, which needs no laps where a path is known, from a ``given`` track on;
         else, ``first``, the first, or the best, with metres to spare for laps near the ends.
         """
-        laps = self._climbs() and (cap_m is None or self.best is None)
+        laps = self._climbs() and (self.best is None or (self.laps and cap_m is None))
         spare_m = self._longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
         search = Search(self, self.top_m if cap_m is None else cap_m, fine)
         roots = [self.choice]
