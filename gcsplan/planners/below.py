@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.band import straight_bound
 from gcsplan.planners.caps import Layer, above_all, search_caps
-from gcsplan.planners.climb import extend
+from gcsplan.planners.climb import with_laps
+from gcsplan.planners.detours import Choice, Search, Stops, joined
 from gcsplan.planners.finish import way_points
 from gcsplan.planners.lattice import terminals
-from gcsplan.planners.leg import End, Leg, Spare
+from gcsplan.planners.leg import End, Leg
 from gcsplan.planners.polish import fewer, polished
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.planners.rising import rise_bound
 from gcsplan.planners.settle import Judge, Unsettled, settle
-from gcsplan.planners.track import Flown, Obstruction, Track, fly, make_track
+from gcsplan.planners.track import Flown, Track, fly, make_track
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -34,15 +35,12 @@ LITTLE, WORTH = 5e-6, 2e-5
 HOPE = 1.5
 """A path is made simpler if it would be the best so far by gaining that times what one of its kind has gained yet."""
 ZONES_SHUT = 8
-"""Zones whose underside is given up, one after the other, because no profile fits under them."""
+"""Tracks that are looked at below a cap where a zone can be passed neither over nor under on the first."""
 STEEP = 0.5
 """What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
-LAPS = (0.5, 0.25, 1.0)
-"""What part of the gap may be flown in laps near the ends, where a path without them was not good enough."""
-LAPS_AT = ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
-"""Near which ends."""
-GENTLER = (1.0, 0.98, 0.94)
-"""What part of the climb limit laps make use of: a profile that just holds may not hold over every metre of ground."""
+PAST, PAST_FINE, ROUNDS = 12, 9, 2
+"""Tracks past what is in the way that are looked at, on the lattice of the first look and on the finer one; and how
+often, on that one, if it helps."""
 FAR = 5e-3
 """Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
 SMALL = 50.0
@@ -61,10 +59,12 @@ as near is good enough."""
 
 
 class Below:
-    """One problem: its legs in the plane, the best path so far, and the best bound so far."""
+    """One problem: its legs in the plane, the best path so far, and the best bound so far.
 
-    def __init__(self, problem: Problem, begun_s: float) -> None:
-        self.problem, self.begun_s = problem, begun_s
+    ``laps``: whether a path with laps is looked for where one without is known."""
+
+    def __init__(self, problem: Problem, begun_s: float, laps: bool = True) -> None:
+        self.problem, self.begun_s, self.laps = problem, begun_s, laps
         self.wanted = problem.gap_percent / 100.0
         self.judge = Judge(problem)
         self.best: Floats | None = None
@@ -84,7 +84,10 @@ class Below:
         ends = [End(*place, z) for place, z in zip(stops, heights, strict=True)]
         self.legs = [Leg(problem, a, b, self.top_m) for a, b in pairwise(ends) if math.dist(a.place, b.place) > 1e-3]
         self.known_m = [z for z in heights if z is not None]
-        self.under = np.ones(len(problem.airspace.zones), np.bool_)
+        zones = len(problem.airspace.zones)
+        self._open = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
+        self.choice = self._open
+        """With what shut the last tracks were found that had to go past something."""
 
     def tell(self, phase: str, cost: float | None = None) -> None:
         """Report progress."""
@@ -103,55 +106,69 @@ class Below:
             self._raise_tracks()
             if self.try_below(self.top_m, fine=False) or self.try_below(self.top_m, fine=True):
                 return
+            if self._past(PAST, fine=False, first=True):
+                return
 
-    def try_below(self, cap_m: float, *, fine: bool, spare_m: Spare = (0.0, 0.0)) -> bool:
-        """Look for a path below a cap; True if it is the best so far.
+    def try_below(self, cap_m: float, *, fine: bool) -> bool:
+        """Look for a path below a cap; True if it is the best so far."""
+        stops = self.stops(self.choice, cap_m, fine)
+        if stops is None:
+            return False
+        track = make_track(self.problem, *stops)
+        flown = fly(self.problem, track)
+        if isinstance(flown, Flown):
+            found = self._exact(track, flown)
+            return found is not None and self._take_simpler(*found, fine=fine, longer=False)
+        if flown.kind == "pinched":  # room of a few centimetres, which a tube's bounds may not leave
+            drawn = settle(self.problem, self.judge, *stops)
+            if not isinstance(drawn, Unsettled):
+                return self._take_simpler(*drawn, fine=fine, longer=False)
+        past = flown.kind == "zone" or self.best is None
+        return past and self._past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
 
-        ``spare_m``: about how much longer than its track it may be made near start and goal, to climb.
+    def stops(self, choice: Choice, cap_m: float, fine: bool) -> Stops | None:
+        """The shortest track of a choice below a cap, from stop to stop; see `Leg.track`."""
+        ways = []
+        for leg in self.legs:
+            limit = self._limit(leg)
+            wanted = leg.corridor(limit) if fine and leg.has_fine else None
+            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, choice.most_m, choice.over)
+            if way is None:
+                return None
+            ways.append(way.points)
+        return joined(ways, [leg.goal.amsl_m for leg in self.legs[:-1]])
+
+    def _past(
+        self, most: int, *, fine: bool, first: bool = False, cap_m: float | None = None, given: Stops | None = None
+    ) -> bool:
+        """Look for tracks past what is in the way, at ``most`` of them; True if a path over one is the best so far.
+
+        ``cap_m``: below that cap, the first, which needs no laps where a path is known, from a ``given`` track on;
+        else, ``first``, the first, or the best, with metres to spare for laps near the ends.
         """
-        for _ in range(ZONES_SHUT):
-            ways = []
-            for leg in self.legs:
-                limit = self._limit(leg)
-                wanted = leg.corridor(limit) if fine and leg.has_fine else None
-                way = leg.track(cap_m, wanted, limit, self.under, spare_m)
-                if way is None:
-                    return False
-                ways.append(way.points)
-            points = np.vstack([ways[0], *(w[1:] for w in ways[1:])])
-            pinned, pin_m = np.zeros(len(points), np.bool_), np.full(len(points), math.nan)
-            pinned[0] = pinned[-1] = True
-            at = 0
-            for leg, part in zip(self.legs[:-1], ways[:-1], strict=True):
-                at += len(part) - 1
-                pinned[at] = True
-                pin_m[at] = math.nan if leg.goal.amsl_m is None else leg.goal.amsl_m
-            track = make_track(self.problem, points, pinned, pin_m)
-            flown = fly(self.problem, track)
-            if max(spare_m) > 0.0 and isinstance(flown, Obstruction):
-                return self._with_laps(points, pinned, pin_m)
-            if isinstance(flown, Flown):
-                found = self._exact(track, flown)
-                return found is not None and self._take_simpler(*found, fine=fine, longer=False)
-            if flown.kind == "pinched":  # room of a few centimetres, which a tube's bounds may not leave
-                drawn = settle(self.problem, self.judge, points, pinned, pin_m)
-                return not isinstance(drawn, Unsettled) and self._take_simpler(*drawn, fine=fine, longer=False)
-            if not self._give_up(flown):
-                return False
-        return False
+        laps = self._climbs() and (self.best is None or (self.laps and cap_m is None))
+        spare_m = self._longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
+        search = Search(self, self.top_m if cap_m is None else cap_m, fine)
+        roots = [self.choice]
+        if cap_m is None:
+            roots = [replace(c, most_m=(spare_m, spare_m)) for c in dict.fromkeys([self._open, self.choice])]
+        found = search.run(roots, most, first=first or cap_m is not None, laps=laps, given=given)
+        if found is not None:
+            self.choice = replace(found, least_m=(0.0, 0.0), most_m=(0.0, 0.0))
+        return found is not None
 
-    def _with_laps(self, points: Floats, pinned: Bools, pin_m: Floats) -> bool:
-        """Take a track (N, 2) with laps where its profile is too steep: some more where the exact check asks for it."""
-        limits = self.problem.limits
-        for part in GENTLER:
-            gentler = replace(
-                limits, max_climb_deg=part * limits.max_climb_deg, max_descent_deg=part * limits.max_descent_deg
-            )
-            longer = extend(replace(self.problem, limits=gentler), points, pinned, pin_m)
-            found = None if longer is None else self._exact(*longer)
-            if found is not None:
-                return self._take_simpler(*found, fine=True, longer=True)
-        return False
+    def take_longer(self, stops: Stops, fine: bool) -> bool:
+        """Look for a path over a track, with laps where it is too steep; True if it is the best so far."""
+        track = make_track(self.problem, *stops)
+        flown = fly(self.problem, track)
+        if isinstance(flown, Flown) and (found := self._exact(track, flown)) is not None:
+            return self._take_simpler(*found, fine=fine, longer=False)
+        found = with_laps(self.problem, *stops, self._exact)
+        return found is not None and self._take_simpler(*found, fine=fine, longer=True)
+
+    def goes_on(self) -> bool:
+        """Whether a better path is wanted, and there is time, which a first one is worth in any case."""
+        return self.best is None or (not self._done() and self._in_time())
 
     def _take_simpler(self, points: Floats, pinned: Bools, *, fine: bool, longer: bool) -> bool:
         """Make a path simpler and keep it, if it is the best so far; not where there is no hope of that.
@@ -180,13 +197,6 @@ class Below:
             return found
         careful = settle(self.problem, self.judge, track.points, track.pinned, track.pin_m)
         return None if isinstance(careful, Unsettled) else careful
-
-    def _give_up(self, why: Obstruction) -> bool:
-        """Keep out of a zone that could be neither over- nor underflown on the way; False if that was tried."""
-        if why.kind != "zone" or why.zone < 0 or not self.under[why.zone]:
-            return False
-        self.under[why.zone] = False
-        return True
 
     def search_space(self) -> bool:
         """Look for a path that is no cap's, where the best one climbs much; True if that is the best so far."""
@@ -247,14 +257,15 @@ class Below:
 
     def _tighten_length(self) -> None:
         self.try_below(self.top_m, fine=True)
+        if self.gap > FAR:
+            self._past(PAST, fine=False)
         if not self._done() and (self.in_space or self._steep()):
             self._raise_bound(self._search_caps(lambda layer: math.hypot(layer.track_m, self._rise(layer.low_m))))
         self._halve()
-        for part in LAPS:
-            for start, goal in LAPS_AT:
-                if not self._done() and self._climbs() and self._in_time():
-                    spare_m = part * (self.cost - self.bound)
-                    self.try_below(self.top_m, fine=True, spare_m=(start * spare_m, goal * spare_m))
+        for _ in range(ROUNDS):
+            if self._done() or not self._past(PAST_FINE, fine=True):
+                break
+            self._halve()
         if not self.in_space and TWICE * self.wanted < self.gap <= NEAR and self._in_time():
             closer = [leg.look_closer(self._limit(leg), FINER) for leg in self.legs]
             if any(closer):
@@ -369,12 +380,14 @@ class Below:
 
     def _raise_tracks(self) -> None:
         """What the shortest tracks alone tell of the cost."""
+        self._raise_bound(self.least(sum(leg.length_m for leg in self.legs)))
+
+    def least(self, track_m: float) -> float:
+        """What a path costs at least whose track is so long."""
         p = self.problem
-        metres = sum(leg.length_m for leg in self.legs)
         if p.objective == "energy":
-            self._raise_bound(p.horizontal_j_per_m * metres + p.vertical_j_per_m * self._rise(-math.inf))
-        else:
-            self._raise_bound(metres)
+            return p.horizontal_j_per_m * track_m + p.vertical_j_per_m * self._rise(-math.inf)
+        return track_m
 
     def _raise_bound(self, cost: float) -> None:
         """A new bound, in metres or joules by the objective."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from gcsplan.errors import NoMission
 from gcsplan.planners.lattice import ENDS_M
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.settle import Judge, Unsettled, sampled_track, settle, thinned
-from gcsplan.planners.track import Flown, Obstruction, Track, fly
+from gcsplan.planners.track import Flown, Lacking, Shut, Track, distances, fly, lacking
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -35,6 +35,13 @@ SIDES = 12
 """Of a circle's polygon; an arc of the turn radius fits into each of its corners."""
 ROUNDS = 6
 """Laps are added to one track so often."""
+TRIED, LOOKED_AT, FORGIVEN = 12, 9, 0.1
+"""Laps that a profile is drawn over, for one place that is too steep; points of each at which the ground is looked at
+before; and how much the ground may be too high there, as a part of what is to be climbed."""
+GENTLER = (1.0, 0.98, 0.94)
+"""What part of the climb limit laps make use of: a profile that just holds may not hold over every metre of ground."""
+FAR_M = 1e6
+"""Higher than everything."""
 SPARE = 1.02
 """Length beyond what the height takes."""
 
@@ -53,7 +60,7 @@ def ways_up(problem: Problem, place: tuple[float, float], from_amsl: float, to_a
     part = replace(problem, start=(*place, from_amsl), goal=(*place, to_amsl), via=())
     judge = Judge(problem)
     for one, count in laps(problem, length, None):
-        if not _has_room(problem, np.asarray(place), one):
+        if not _has_room(problem, np.vstack([place, np.asarray(place) + one, place])):
             continue
         points = np.vstack([place, np.asarray(place) + wound(one, count), place])
         pinned = np.zeros(len(points), bool)
@@ -145,17 +152,43 @@ def extend(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> tu
     laps comes back as it is.
     """
     track = sampled_track(problem, points, pinned, pin_m)
-    flown = fly(problem, track)
+    lack = lacking(problem, track)
     for _ in range(ROUNDS):
-        if isinstance(flown, Flown):
-            return track, flown
-        if flown.kind not in ("climb", "descent"):
+        if isinstance(lack, Shut):
             return None
-        better = _lengthened(problem, track, flown)
+        if not lack.steep:
+            flown = fly(problem, track)
+            return (track, flown) if isinstance(flown, Flown) else None
+        better = _lengthened(problem, track, lack)
         if better is None:
             return None
-        track, flown = better
-    return (track, flown) if isinstance(flown, Flown) else None
+        track, lack = better
+    return None
+
+
+def with_laps(
+    problem: Problem,
+    points: Floats,
+    pinned: Bools,
+    pin_m: Floats,
+    exact: Callable[[Track, Flown], tuple[Floats, Bools] | None],
+) -> tuple[Floats, Bools] | None:
+    """(M, 3) way points over a track (N, 2) with laps where it is too steep, and (M,) which of them must stay.
+
+    Some more laps where the ``exact`` check, which makes way points of a track and its profile, asks for it.
+    """
+    limits = problem.limits
+    for part in GENTLER:
+        gentler = replace(
+            limits, max_climb_deg=part * limits.max_climb_deg, max_descent_deg=part * limits.max_descent_deg
+        )
+        longer = extend(replace(problem, limits=gentler), points, pinned, pin_m)
+        if longer is None:
+            return None
+        found = exact(*longer)
+        if found is not None:
+            return found
+    return None
 
 
 def climb_needed_deg(problem: Problem, track: Track) -> float | None:
@@ -179,36 +212,86 @@ def climb_needed_deg(problem: Problem, track: Track) -> float | None:
     return math.ceil(10.0 * high - 1e-9) / 10.0
 
 
-def _lengthened(problem: Problem, track: Track, why: Obstruction) -> tuple[Track, Flown | Obstruction] | None:
-    """The track with laps somewhere along its steep piece: one that holds, or else the one that lacks least."""
-    limits = problem.limits
-    slope = limits.max_climb_slope if why.kind == "climb" else limits.max_descent_slope
-    length = SPARE * why.by / slope + 1.0
-    before = _missing(problem, track)
-    best: tuple[float, Track] | None = None
-    ends = (why.s0_m, why.s1_m) if why.kind == "climb" else (why.s1_m, why.s0_m)
-    for s in (*ends, 0.5 * (why.s0_m + why.s1_m)):
-        for one, count in laps(problem, length, _heading(track, s)):
-            if not _has_room(problem, track.place(s), one):
+def _lengthened(problem: Problem, track: Track, lack: Lacking) -> tuple[Track, Lacking] | None:
+    """The track with laps somewhere along its steepest piece: all that it takes, or else those that help most."""
+    why, limits = lack.steep[0], problem.limits
+    needed = why.by / (limits.max_climb_slope if why.kind == "climb" else limits.max_descent_slope)
+    best: tuple[Track, Lacking] | None = None
+    for detour in _promising(problem, track, lack, SPARE * needed + 1.0):
+        tried = _with_detour(problem, track, detour)
+        left = lacking(problem, tried)
+        if isinstance(left, Shut):
+            continue
+        if left.laps_m <= lack.laps_m - 0.8 * needed:
+            return tried, left
+        if left.laps_m < (lack.laps_m - 0.1 * needed if best is None else best[1].laps_m):
+            best = tried, left
+    return best
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Detour:
+    """``inner`` (K, 2) points to be flown instead of a track's from ``s0_m`` to ``s1_m``; ``shape`` (M, 2) what they
+    look like, with both ends, if all of it is flown once."""
+
+    s0_m: float
+    s1_m: float
+    inner: Floats
+    shape: Floats
+
+
+def _promising(problem: Problem, track: Track, lack: Lacking, length_m: float) -> list[_Detour]:
+    """Ways to lengthen a track along its steepest piece: at most `TRIED`, that rise least, of those that zones leave
+    room for."""
+    why, up = lack.steep[0], lack.steep[0].kind == "climb"
+    slope = problem.limits.max_climb_slope if up else problem.limits.max_descent_slope
+    low_s, high_s = (why.s0_m, why.s1_m) if up else (why.s1_m, why.s0_m)
+    low = float(lack.profile.at(np.array([low_s]))[0])
+    found = list(_detours(problem, track, low_s, high_s, length_m))
+    shapes = [d.shape if up else d.shape[::-1] for d in found]
+    part = np.linspace(0.0, 1.0, LOOKED_AT)
+    along = np.array([part * distances(shape)[-1] for shape in shapes])
+    east, north = (
+        np.array([np.interp(at, distances(way), way[:, k]) for at, way in zip(along, shapes, strict=True)])
+        for k in range(2)
+    )
+    floor = problem.airspace.floor_amsl(east.ravel(), north.ravel(), problem.limits).reshape(along.shape)
+    # As high as one has climbed to there, or must come down from.
+    amsl = np.array([low + slope * min(abs(d.s0_m - low_s), abs(d.s1_m - low_s)) for d in found])
+    above = (floor - amsl[:, None] - slope * along).max(axis=1) - FORGIVEN * why.by
+    out: list[_Detour] = []
+    for k in np.argsort(above.clip(0.0), kind="stable")[: 4 * TRIED]:
+        high = float(amsl[k]) + why.by
+        if np.isfinite(above[k]) and _has_room(problem, found[k].shape, float(amsl[k]), high):
+            out.append(found[k])
+            if len(out) == TRIED:
+                break
+    return out
+
+
+def _detours(problem: Problem, track: Track, low_s: float, high_s: float, length_m: float) -> Iterator[_Detour]:
+    """Ways to make a piece of a track, that climbs (or comes down) to ``high_s``, longer: bends, then laps."""
+    middle = 0.5 * (low_s + high_s)
+    if problem.turn_radius_m <= 0.0:
+        for s0, s1 in ((low_s, high_s), (low_s, middle), (middle, high_s)):
+            s0, s1 = min(s0, s1), max(s0, s1)
+            if track.pinned[(track.s_m > s0 + 1e-3) & (track.s_m < s1 - 1e-3)].any():
                 continue
-            tried = _with_lap(problem, track, s, wound(one, count))
-            left = _missing(problem, tried)
-            if left <= before - 0.8 * why.by:
-                return tried, fly(problem, tried)
-            if left < before - 0.1 * why.by and (best is None or left < best[0]):
-                best = (left, tried)
-    return None if best is None else (best[1], fly(problem, best[1]))
-
-
-def _missing(problem: Problem, track: Track) -> float:
-    """Metres that the pieces of the best profile over a track are too steep by, together; inf: there is none."""
-    limits = problem.limits
-    flown = fly(replace(problem, limits=replace(limits, max_climb_deg=90.0, max_descent_deg=90.0)), track)
-    if not isinstance(flown, Flown):
-        return math.inf
-    run, rise = np.diff(flown.profile.s_m), np.diff(flown.profile.amsl_m)
-    over = np.maximum(rise - limits.max_climb_slope * run, -rise - limits.max_descent_slope * run)
-    return float(over.clip(0.0).sum())
+            ends = np.stack([track.place(s0), track.place(s1)])
+            chord = ends[1] - ends[0]
+            straight = float(np.hypot(*chord))
+            if straight < SHORTEST_M:
+                continue
+            aside = 0.5 * math.sqrt((s1 - s0 + length_m) ** 2 - straight**2) / straight
+            for side in (1.0, -1.0):
+                tip = ends.mean(axis=0) + side * aside * np.array([-chord[1], chord[0]])
+                shape = np.stack([ends[0], tip, ends[1]])
+                yield _Detour(s0, s1, shape, shape)
+    for s in (low_s, high_s, middle):
+        place = track.place(s)
+        for one, count in laps(problem, length_m, _heading(track, s)):
+            inner = np.vstack([place, place + wound(one, count), place])
+            yield _Detour(s, s, inner, np.vstack([place, place + one, place]))
 
 
 def laps(problem: Problem, length_m: float, heading: float | None) -> Iterator[tuple[Floats, int]]:
@@ -251,12 +334,12 @@ def _circle(radius_m: float, turn: float, sense: float) -> Floats:
     return np.asarray(radius_m * (middle + np.stack([np.cos(angles), np.sin(angles)], axis=-1)))
 
 
-def _has_room(problem: Problem, place: Floats, one: Floats) -> bool:
-    """False where a lap meets a zone, or ground, past which there is no way at any altitude."""
-    tube = problem.airspace.tube(np.vstack([place, place + one, place]), problem.limits)
+def _has_room(problem: Problem, shape: Floats, low_m: float = -FAR_M, high_m: float = FAR_M) -> bool:
+    """False where a way (N, 2) meets a zone, or ground, past which there is none, at any altitude or between two."""
+    tube = problem.airspace.tube(shape, problem.limits)
     if not (tube.floor_m <= tube.ceiling_m + 2.0 * ENDS_M).all():
         return False
-    return not any((np.isinf(b.bottom_m) & np.isinf(b.top_m)).any() for b in tube.bands)
+    return not any(((b.bottom_m < low_m) & (b.top_m > high_m)).any() for b in tube.bands)
 
 
 def _heading(track: Track, s_m: float) -> float:
@@ -266,18 +349,15 @@ def _heading(track: Track, s_m: float) -> float:
     return math.atan2(d[1], d[0])
 
 
-def _with_lap(problem: Problem, track: Track, s_m: float, lap: Floats) -> Track:
-    """The track with a lap put in at a place along it."""
-    place = track.place(s_m)
-    before, after = track.s_m < s_m - 1e-3, track.s_m > s_m + 1e-3
+def _with_detour(problem: Problem, track: Track, detour: _Detour) -> Track:
+    """The track with a detour put in."""
+    before, after = track.s_m < detour.s0_m - 1e-3, track.s_m > detour.s1_m + 1e-3
     at = np.flatnonzero(~before & ~after)
-    pinned, pin_m = False, math.nan
-    if len(at):
-        pinned, pin_m = bool(track.pinned[at[0]]), float(track.pin_m[at[0]])
-    inner = np.vstack([place, place + lap, place])
+    inner = detour.inner
     pins, heights = np.zeros(len(inner), bool), np.full(len(inner), np.nan)
-    which = -1 if not after.any() else 0  # the goal comes last
-    pins[which], heights[which] = pinned, pin_m
+    for k in at[track.pinned[at]]:  # a place that stays is one end or the other; the goal comes last
+        last = track.s_m[k] - detour.s0_m > detour.s1_m - track.s_m[k] or not after.any()
+        pins[-int(last)], heights[-int(last)] = True, track.pin_m[k]
     return sampled_track(
         problem,
         np.vstack([track.points[before], inner, track.points[after]]),

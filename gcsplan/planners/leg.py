@@ -159,33 +159,40 @@ class Leg:
         limit_m: float,
         cones: list[Cone],
         under: Bools | None = None,
+        over: Bools | None = None,
     ) -> tuple[Mesh, Guide]:
         """The mesh, finer ``within`` a corridor, or else the first look's for tracks shorter than ``limit_m``; and how
         far the goal is."""
         if within is None:
             near = self._guide.reach(self.start.place, limit_m)
-            return self.plane.mesh(cap_m, low, 1, near, cones, under), self._guide
+            return self.plane.mesh(cap_m, low, 1, near, cones, under, over), self._guide
         plane = within.guide.mesh.plane
         if plane is not self.plane or not self.has_fine:
-            return plane.mesh(cap_m, low, self.closer, within.cells, cones, under), within.guide
+            return plane.mesh(cap_m, low, self.closer, within.cells, cones, under, over), within.guide
         if self._stride == 1:
-            return self.plane.mesh(cap_m, low, self._cut * self.closer, within.cells, cones, under), within.guide
+            return self.plane.mesh(cap_m, low, self._cut * self.closer, within.cells, cones, under, over), within.guide
         if self._twin is None:
             self._twin = self._lattice(self._detour, self._fine_stride)
-        return self._twin.mesh(cap_m, low, self.closer, self._finer(within.cells), cones, under), within.guide
+        return self._twin.mesh(cap_m, low, self.closer, self._finer(within.cells), cones, under, over), within.guide
 
     def track(
-        self, cap_m: float, within: Corridor | None, limit_m: float, under: Bools | None, spare_m: Spare = (0.0, 0.0)
+        self,
+        cap_m: float,
+        within: Corridor | None,
+        limit_m: float,
+        under: Bools | None,
+        spare_m: Spare = (0.0, 0.0),
+        over: Bools | None = None,
     ) -> Way | None:
         """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``, if it is shorter than
         ``limit_m``, and than `reach_m`.
 
         ``within``: on the finer lattice there; else on that of the first look. ``spare_m``: metres that may be added
-        near start and goal to climb.
+        near start and goal to climb. ``under``, ``over`` (zones,): which zones may be passed so; None for all.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
-        mesh, guide = self._mesh(cap_m, False, within, limit, cones, under)
+        mesh, guide = self._mesh(cap_m, False, within, limit, cones, under, over)
         try:
             return mesh.way(self.start.place, self.goal.place, limit, guide)
         except Exhausted:

@@ -61,9 +61,9 @@ def plan(problem: Problem) -> Solution:
     return _sharp(problem, begun)
 
 
-def _sharp(problem: Problem, begun: float) -> Solution:
+def _sharp(problem: Problem, begun: float, laps: bool = True) -> Solution:
     check_ends(problem)
-    below = Below(problem, begun)
+    below = Below(problem, begun, laps)
     tell = below.tell
     tell("search")
     if not below.legs:
@@ -110,12 +110,13 @@ def _turning(problem: Problem, begun: float) -> Solution:
     """A path with sharp corners, laid on arcs; with more room around it where that is needed."""
     from gcsplan.planners.turns import roomier, rounded  # few missions have wings
 
-    sharp = _sharp(replace(problem, turn_radius_m=0.0), begun)
+    # Laps are short and have sharp corners: what they gain is lost again on the arcs.
+    sharp = _sharp(replace(problem, turn_radius_m=0.0), begun, laps=False)
     points = sharp.path.points
 
     def replan(extra_m: float) -> tuple[Floats, NDArray[np.bool_]] | None:
         try:
-            again = _sharp(roomier(problem, extra_m), begun).path.points
+            again = _sharp(roomier(problem, extra_m), begun, laps=False).path.points
         except NoMission:
             return None
         return again, _stops(problem, again)

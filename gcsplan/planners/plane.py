@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners._fill import fill, hold_down, look_around, walk_around
 from gcsplan.planners._mesh import WALL, make_pieces, make_portals, sort_portals
-from gcsplan.planners._stamp import UNDER, UNDER_2, lift_lids, own_zones, stamp_zones
+from gcsplan.planners._stamp import PAIR, TOP, TOP_2, UNDER, UNDER_2, lift_lids, own_zones, stamp_zones
 from gcsplan.planners.ground_nodes import nodes, places, slopes
 from gcsplan.planners.mesh import Mesh
 from gcsplan.planners.problem import Problem
@@ -66,13 +66,15 @@ class Plane:
         wanted: NDArray[np.bool_] | None = None,
         cones: list[tuple[float, float, float, float]] | None = None,
         under: NDArray[np.bool_] | None = None,
+        over: NDArray[np.bool_] | None = None,
         single: bool = False,
     ) -> Mesh:
         """What can be crossed at or below ``cap_m``: by a bound's way (``low``: all of it) or by a path's.
 
         ``wanted``: only these cells. ``cones`` (east_m, north_m, height, slope): where paths climb from, or, for a
-        bound, how high a path of a length that matters can be near its ends. ``under`` (zones,): which zones may be
-        passed below their floors; None for all. ``single``: each free cell is a piece of its own.
+        bound, how high a path of a length that matters can be near its ends. ``under``, ``over`` (zones,): which
+        zones may be passed below their floors, above their ceilings; None for all. ``single``: each free
+        cell is a piece of its own.
         """
         limits, scale = self.problem.limits, self.problem.airspace.scale
         near = limits.track_error_m * scale
@@ -101,12 +103,8 @@ class Plane:
         )  # fmt: skip
         x, y = fine_x, fine_y
         of, values, owner = np.zeros((cells, 1), np.int32), np.zeros((1, WALL)), np.zeros(0, np.int32)
-        zones, edges = self.shapes.low if low else self.shapes.high
+        zones, edges = self._zones(low, under, over)
         boxes = self._boxes(row, col, fineness, rows, cols)
-        if under is not None and len(boxes):
-            zones = zones.copy()
-            zones[:, UNDER] *= under[self.shapes.owner[:, 0]]
-            zones[:, UNDER_2] *= under[self.shapes.owner[:, 1]]
         if len(boxes):
             values = np.empty((1 + self.shapes.cells * fineness**2, WALL))
         laid = excess, floor, under_m, x, y, zones, edges, boxes
@@ -159,6 +157,22 @@ class Plane:
         return Mesh(
             self, fineness, row, col, excess, floor, diagonal, piece, start, ends[:n], names, joins[:n], order, named
         )
+
+    def _zones(
+        self, low: bool, under: NDArray[np.bool_] | None, over: NDArray[np.bool_] | None
+    ) -> tuple[Floats, Floats]:
+        """The shapes' numbers and forms; zones that may not be passed ``under``, or ``over``, changed."""
+        zones, edges = self.shapes.low if low else self.shapes.high
+        first, other = self.shapes.owner.T
+        if under is not None or over is not None:
+            zones = zones.copy()
+        if under is not None:
+            zones[:, UNDER] *= under[first]
+            zones[:, UNDER_2] *= under[other]
+        if over is not None:
+            zones[~over[first], TOP] = np.inf
+            zones[~over[other] & (zones[:, PAIR] > 0.0), TOP_2] = np.inf
+        return zones, edges
 
     def _boxes(self, row: int, col: int, fineness: int, rows: int, cols: int) -> Ints:
         """The shapes' boxes on a part of the lattice, cut finer, of so many nodes."""

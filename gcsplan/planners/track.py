@@ -6,6 +6,7 @@ change of the track keeps the tube of what did not change: cut, join, and ask on
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from gcsplan.planners._taut import edge
 from gcsplan.planners.lattice import ENDS_M
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.taut_string import Blocked, Profile, taut_string
+from gcsplan.planners.taut_string import NO_LIMIT, Blocked, Profile, taut_string
 from gcsplan.world.airspace import Tube
 
 Floats = NDArray[np.float64]
@@ -27,6 +28,11 @@ KEEP_M = 1e-4
 
 CLOSE_M, CLOSE_STEP_M, CLOSE_ROOM_M = 60.0, 1.0, 0.03
 """Where a tube shuts an end in: so far from it the floor is read point by point, so often, with so much to spare."""
+
+DEARER = 2e-4
+"""What way over or under zones is dearer by, as a part, that is worth to look for one past them."""
+BESIDE_M = 1.0
+"""A piece of a profile that ends so near a zone ends there because of it."""
 
 BRANCHES = 64
 """Most over/under combinations that are tried for one track."""
@@ -69,6 +75,31 @@ class Track:
     def place(self, s_m: float) -> Floats:
         """(2,) the point ``s_m`` along the track."""
         return np.array([np.interp(s_m, self.s_m, self.points[:, 0]), np.interp(s_m, self.s_m, self.points[:, 1])])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Lacking:
+    """The profile over a track that would cost least if laps could be flown wherever it is too steep.
+
+    ``cost``: of that path; ``laps_m``: metres of laps in it; ``steep``: where they would have to be, the one that lacks
+    most first; ``zones``: which make it climb or descend there, or else, where ways over or under zones are dearer than
+    no zones, the one that is met deepest.
+    """
+
+    profile: Profile
+    cost: float
+    laps_m: float
+    steep: tuple[Obstruction, ...]
+    zones: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Shut:
+    """Why a track cannot be flown, however long: at the best of its worst places ``by`` metres of room are missing,
+    between what is passed there over and under; ``zones``: which of that are zones, as far as is known."""
+
+    by: float
+    zones: tuple[int, ...]
 
 
 def distances(points: Floats) -> Floats:
@@ -164,6 +195,66 @@ def fly(
     return first or Obstruction("zone", 0.0, horizontal, 0.0)
 
 
+def lacking(problem: Problem, track: Track) -> Lacking | Shut:
+    """What the track lacks in length to be flown, where length helps.
+
+    What climbs as steeply as allowed over pieces that are too short costs a convex function of the slope, like all
+    that a taut string makes least; so sides are searched as in `fly`.
+    """
+    tube, limits = track.tube, problem.limits
+    room = _rooms(problem, track, ())
+    up, down = (min(slope, NO_LIMIT) + 1e-9 for slope in (limits.max_climb_slope, limits.max_descent_slope))
+    shut = Shut(math.inf, ())
+    deepest_zone: tuple[int, ...] = ()
+
+    def solve(over: Sides) -> tuple[float, Profile, Floats] | None:
+        nonlocal shut
+        low, high = room.between(over)
+        found = taut_string(room.s_m, low, high, problem.start[2], problem.goal[2])
+        if isinstance(found, Blocked):
+            if found.by < shut.by or not shut.zones:
+                shut = Shut(found.by, room.zones(tube, over, found.s0_m, found.s1_m))
+            return None
+        run, rise = np.diff(found.s_m), np.diff(found.amsl_m)
+        needed = np.maximum(run, np.maximum(rise / up, -rise / down))
+        if problem.objective == "energy":
+            cost = problem.horizontal_j_per_m * float(needed.sum()) + problem.vertical_j_per_m * found.vertical_m
+        else:
+            cost = float(np.hypot(needed, rise).sum())
+        return cost, found, needed - run
+
+    none: Sides = (None,) * len(tube.bands)
+    root = solve(none)
+    if root is None:
+        return shut
+    open_set = [(root[0], 0, none, root)]
+    count = 0
+    while open_set and count < BRANCHES:
+        cost, _, over, (_, profile, more) = heappop(open_set)
+        hit = room.hits(profile, over)
+        if not hit:
+            s, rise = profile.s_m, np.diff(profile.amsl_m)
+            missing = more * np.where(rise > 0.0, up, down)
+            steep = tuple(
+                Obstruction("climb" if rise[k] > 0.0 else "descent", float(s[k]), float(s[k + 1]), float(missing[k]))
+                for k in np.argsort(-missing, kind="stable")
+                if missing[k] > 0.0
+            )
+            zones = deepest_zone if cost > root[0] * (1.0 + DEARER) else ()
+            if steep:
+                zones = room.zones(tube, over, steep[0].s0_m, steep[0].s1_m)
+            return Lacking(profile, cost, float(more[missing > 0.0].sum()), steep, zones)
+        deepest = max(hit, key=lambda h: h.depth_m)
+        deepest_zone = deepest_zone or (tube.bands[deepest.band].zone,)
+        for side in (True, False):
+            choice = (*over[: deepest.band], side, *over[deepest.band + 1 :])
+            count += 1
+            found = solve(choice)
+            if found is not None:
+                heappush(open_set, (found[0], count, choice, found))
+    return shut
+
+
 @dataclass(frozen=True, slots=True)
 class _Hit:
     """A band that a profile runs into, how deep, and whether over it is the nearer way out."""
@@ -196,6 +287,11 @@ class _Room:
                 np.minimum(high[i:j], self.bottoms[k], out=high[i:j])
         _narrow(low, high)
         return low, high
+
+    def zones(self, tube: Tube, over: Sides, s0_m: float, s1_m: float) -> tuple[int, ...]:
+        """Zones passed on a chosen side, from one place along the track to another or beside them."""
+        chosen = (b for b, side in zip(tube.bands, over, strict=True) if side is not None)
+        return tuple({b.zone: None for b in chosen if b.s0_m < s1_m + BESIDE_M and b.s1_m > s0_m - BESIDE_M})
 
     def hits(self, profile: Profile, over: Sides) -> list[_Hit]:
         """Bands without a side that ``profile`` does not clear."""

@@ -153,6 +153,8 @@ def _bands(
             around = halo(False, wide + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
             part = _between(track, length, s0, s1)
             ground = _pieces(grounds, around, around, around, part, (wide,) * 3)
+            if not len(ground):
+                continue  # touched at one place, as far from it as is spared
             s = np.concatenate([[s0], s0 + ground[:, 0]])
             low, high = ground[:, 1:3], ground[:, 3:5]
         else:
