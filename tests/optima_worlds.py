@@ -302,6 +302,24 @@ def climbs(rng: np.random.Generator) -> Case | None:
     return mission(rng, "climbs", ground, found, limits)
 
 
+def storeys(rng: np.random.Generator) -> Case | None:
+    """Zones in mid-air over hills, under which there is no way in some places, and over which there is none in others,
+    under climb and descent limits."""
+    ground = hills(rng, float(rng.uniform(60.0, 200.0)))
+    top = float(ground.heights.max())
+
+    def levels() -> tuple[Level | None, Level | None]:
+        datum: Literal["amsl", "agl"] = "amsl" if rng.random() < 0.75 else "agl"
+        low = float(rng.uniform(0.3, 0.9)) * top if datum == "amsl" else float(rng.uniform(20.0, 80.0))
+        return Level(low, datum), Level(low + float(rng.uniform(10.0, 100.0)), datum)
+
+    found = zones(rng, ground, int(rng.choice([1, 2, 4])), levels)
+    found = [replace(z, shape=replace(z.shape, radius_m=2.0 * z.shape.radius_m)) if isinstance(z.shape, Circle) else z
+             for z in found]  # fmt: skip
+    limits = Limits(15.0, max_amsl_m=15.0 + float(rng.uniform(0.7, 1.3)) * top, **angles(rng))
+    return mission(rng, "storeys", ground, found, limits)
+
+
 def bands(rng: np.random.Generator) -> Case | None:
     """A largest height over ground, with and without climb limits."""
     ground = hills(rng, float(rng.uniform(20.0, 150.0)))
@@ -431,7 +449,7 @@ def pockets(rng: np.random.Generator) -> Case | None:
 FAMILIES: dict[str, Callable[[np.random.Generator], Case | None]] = {
     f.__name__: f
     for f in (
-        discs, fences, cylinders, mountains, passes, climbs, bands, clearances, rasters, stops, borders,
+        discs, fences, cylinders, mountains, passes, climbs, storeys, bands, clearances, rasters, stops, borders,
         pockets,
     )
 }  # fmt: skip

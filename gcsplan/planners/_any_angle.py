@@ -38,6 +38,8 @@ from gcsplan.planners._intervals import (
     TURNS,
     ahead_of,
     beaten,
+    end_of,
+    held,
     join,
     lies_on,
     off_of,
@@ -62,13 +64,13 @@ MOST_TURNS = 8
 
 @kernel(
     "i4[] f8[,] i8[,] i4[,] i4[] f8[] i8[] i4[] i4[] f8[,] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[]"
-    " f8[,] i4[,] i8[,] f8[] i4[] f8[,] b1"
+    " f8[,] i4[,] i8[,] f8[] i4[] f8[,] f8[,]"
 )
 def search(
     start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats, origin: Names, first: Ints,
     widest: Ints, span: Floats, sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float,
     slack: float, most: int, remaining: Floats, met: Floats,
-    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats, sheets: bool,
+    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats, spokes: Floats,
 ) -> int:  # fmt: skip
     """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
 
@@ -77,16 +79,16 @@ def search(
     portals,) and ``widest`` (portals,) zeros; ``span`` (portals, 2); ``node`` (room, 8), ``link`` (room, 6), ``name``
     (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining`` (pieces,): no way on from a piece's entrance
     is shorter. ``slack`` >= 0: go on after the goal is reached, as far as that much (as a part of the length) beyond
-    it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. ``sheets``: portals of
-    one piece may lie on each other, from sheet to sheet. Returns the number of corners, ends included, with ``out[0,
-    2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than ``limit``; -1: no room left; -2: more
-    than ``most`` nodes were opened, paths shorter than ``out[0, 0]`` all of them.
+    it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. ``spokes`` (portals,
+    4), zeros, where portals of a piece may lie on each other, from sheet to sheet, or else empty. Returns the number of
+    corners, ends included, with ``out[0, 2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than
+    ``limit``; -1: no room left; -2: more than ``most`` nodes were opened, paths shorter than ``out[0, 0]`` all of them.
     """
     room = len(heap)
     gx, gy = goal[0], goal[1]
     count = size = opened = 0
     reached = -1
-    flood, guided = len(met) > 0, len(remaining) > 0
+    flood, guided, sheets = len(met) > 0, len(remaining) > 0, len(spokes) > 0
     far, shortest = limit, np.inf
     band = max(BAND * math.sqrt((gx - sources_at[0, 0]) ** 2 + (gy - sources_at[0, 1]) ** 2), 1e-3)
     # What a node pushes is listed here as from, to and root; sources push all portals of their piece.
@@ -149,6 +151,18 @@ def search(
             if turns >= MOST_TURNS:
                 continue
             turns += 1
+            if sheets and current >= 0:
+                # One may come round a place into a piece from several sheets: once is enough.
+                p = link[current, PORTAL]
+                k = end_of(ends, p, rx, ry)
+                k += 2 if joins[p, 1] == piece else 0
+                if 0.0 < spokes[p, 4 + k] <= cost + 1.0 + SAME_M:
+                    continue
+                for at in range(start[piece], start[piece + 1]):
+                    p = order[at]
+                    k = end_of(ends, p, rx, ry)
+                    if k >= 0:
+                        spokes[p, 4 + k + (2 if joins[p, 1] == piece else 0)] = cost + 1.0
         else:
             turns = 0
         is_goal = False
@@ -271,13 +285,21 @@ def search(
                     ahead = max(ahead, ahead_of(nx, ny, x1, y1, x0, y0, gx, gy))
                 if ncost + ahead >= limit:
                     continue
+                if sheets and not to_goal:
+                    # Round a place there are many ways from sheet to sheet: what meets there is passed once, each way.
+                    k = end_of(ends, p, nx, ny)
+                    if k >= 0:
+                        k += 2 if forward else 0
+                        if 0.0 < spokes[p, k] <= ncost + 1.0 + SAME_M:
+                            continue
+                        spokes[p, k] = ncost + 1.0
                 if not to_goal:
                     if not forward:
                         s0, s1 = 1.0 - s1, 1.0 - s0
+                    if sheets and held(node, link, name, ends, p, first[2 * p + (1 if forward else 0)], nroot, s0, s1):
+                        continue
                     if widest[p] > 0 and span[p, 0] <= s0 and s1 <= span[p, 1]:
                         other = widest[p] - 1
-                        if sheets and name[other, ROOT] == nroot and link[other, CAME] == piece:
-                            continue  # round a place from sheet to sheet
                         if beaten(node, other, nx, ny, ncost, off, x0, y0, x1, y1):
                             continue
                         # As wide, and cheaper at its ends: what comes later is held to this one.

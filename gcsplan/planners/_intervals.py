@@ -106,6 +106,15 @@ def lies_on(ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx
 
 
 @device
+def end_of(ends: Floats, p: int, x: float, y: float) -> int:
+    """Which end of a portal a place is, 0 or 1; -1 if neither."""
+    for k in range(2):
+        if (ends[p, 2 * k] - x) ** 2 + (ends[p, 2 * k + 1] - y) ** 2 <= SAME_M * SAME_M:
+            return k
+    return -1
+
+
+@device
 def place_on(ends: Floats, p: int, x: float, y: float) -> float:
     """Where on a portal a place is, as a part of it."""
     ex, ey = ends[p, 2] - ends[p, 0], ends[p, 3] - ends[p, 1]
@@ -114,6 +123,22 @@ def place_on(ends: Floats, p: int, x: float, y: float) -> float:
         return 0.0
     t = ((x - ends[p, 0]) * ex + (y - ends[p, 1]) * ey) / square
     return 0.0 if t < 1e-9 else 1.0 if t > 1.0 - 1e-9 else t
+
+
+@device
+def held(
+    node: Floats, link: Ints, name: Names, ends: Floats, p: int, first: int, root: np.int64, s0: float, s1: float
+) -> bool:
+    """Whether a node of a portal's list (numbers from 1) has a root that is this one, too, and holds the interval."""
+    k = first - 1
+    while k >= 0:
+        if link[k, PIECE] != GONE and name[k, ROOT] == root:
+            a = place_on(ends, p, node[k, RIGHT_X], node[k, RIGHT_Y])
+            b = place_on(ends, p, node[k, LEFT_X], node[k, LEFT_Y])
+            if min(a, b) <= s0 + 1e-9 and s1 - 1e-9 <= max(a, b):
+                return True
+        k = link[k, NEXT]
+    return False
 
 
 @device

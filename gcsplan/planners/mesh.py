@@ -164,7 +164,8 @@ class Mesh:
                 self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span,
                 sources, np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32),
                 limit_m, slack, MOST_OPENED, remaining, met,
-                node, link, name, np.empty(room), np.empty(room, np.int32), out, self.piece.shape[1] > 2,
+                node, link, name, np.empty(room), np.empty(room, np.int32), out,
+                np.zeros((portals if self.piece.shape[1] > 2 else 0, 8)),
             )  # fmt: skip
             if n != -1:
                 break
