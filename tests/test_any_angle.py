@@ -44,25 +44,30 @@ def mesh_of(
     form: Floats = PLAIN,
     own: dict[int, Floats] | None = None,
     block: int = 4,
+    owner: NDArray[np.int32] | None = None,
+    low: dict[int, Floats] | None = None,
 ) -> Mesh:
-    """The mesh of an excess lattice; ``own`` (W, 4) the walls of cells that have their own."""
+    """The mesh of an excess lattice; ``own`` (W, 4) the walls of cells that have their own, on the first sheet; ``low``
+    on the second, where ``owner`` tells which cells are there, too."""
     ny, nx = excess.shape
     cells = (ny - 1) * (nx - 1)
     excess = np.ascontiguousarray(excess, np.float64)
     diagonal = np.zeros(cells, np.int8) if diagonal is None else diagonal
-    of, rows = np.zeros(cells, np.int32), [np.zeros(5)]
-    for k, walls in (own or {}).items():
-        for wall in walls:
-            rows.append(np.array([*wall, of[k]]))
-            of[k] = len(rows)
+    of, rows = np.zeros((cells, 1 if owner is None else 2), np.int32), [np.zeros(5)]
+    for sheet, there in enumerate((own, low)):
+        for k, walls in (there or {}).items():
+            for wall in walls:
+                rows.append(np.array([*wall, of[k, sheet]]))
+                of[k, sheet] = len(rows)
+    owner = np.zeros(0, np.int32) if owner is None else owner
     values = np.array(rows)
     i, j = np.meshgrid(np.arange(nx), np.arange(ny))
     x, y = (form[0, 0] * i + form[0, 1] * j, form[1, 0] * i + form[1, 1] * j)
-    piece = np.empty((cells, 2), np.int32)
-    count = make_pieces(excess, of, values, diagonal, piece, block)
-    room = 8 * cells + 64
+    piece = np.empty((cells, 2 * of.shape[1]), np.int32)
+    count = make_pieces(excess, of, values, diagonal, owner, piece, block)
+    room = 32 * cells + 64
     ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
-    n = make_portals(excess, of, values, diagonal, piece, x, y, block, ends, names, joins, np.empty(2))
+    n = make_portals(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, np.empty(2))
     assert n <= room
     start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
     sort_portals(joins[:n], start, order)
@@ -73,9 +78,8 @@ def mesh_of(
         return float(c), float(r)
 
     plane = cast(Plane, SimpleNamespace(at=at, parts=1, stride=1, inside=np.ones((ny - 1, nx - 1), np.bool_)))
-    return Mesh(
-        plane, 1, 0, 0, excess, excess, diagonal, piece, start, ends[:n], names[:n], joins[:n], order, 8 * (nx * ny + 1)
-    )
+    named = 8 * (nx * ny + 1) * of.shape[1]
+    return Mesh(plane, 1, 0, 0, excess, excess, diagonal, piece, start, ends[:n], names[:n], joins[:n], order, named)
 
 
 def below_zero(corners: Floats, values: Floats) -> Floats:
@@ -226,6 +230,66 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
     assert bent > 15
     assert shut > 0
     assert exact > 0.8 * compared
+
+
+def on_two_sheets(areas: tuple[Free, Free], inside: shapely.Geometry, places: Floats, more: Floats) -> Floats:
+    """(places, places) shortest ways over two free areas that are one outside a shape; bent at corners and ``more``."""
+    nodes = np.vstack([places, *(area.corners for area in areas), more])
+    n = len(nodes)
+    deep = shapely.contains_properly(_wider(inside, -1e-6), shapely.points(nodes))
+    i, j = np.triu_indices(n, 1)
+    length = np.maximum(np.hypot(*(nodes[i] - nodes[j]).T), 1e-12)
+    rows, cols, cost = [], [], []
+    for sheet, area in enumerate(areas):
+        seen = area.sight(nodes[i], nodes[j])
+        # What is not deep inside is on both sheets, and known by the first one's numbers.
+        rows.append(np.where(deep[i], i + sheet * n, i)[seen])
+        cols.append(np.where(deep[j], j + sheet * n, j)[seen])
+        cost.append(length[seen])
+    edges = np.unique(np.stack([np.concatenate(rows), np.concatenate(cols)]), axis=1, return_index=True)
+    graph = csr_array((np.concatenate(cost)[edges[1]], tuple(edges[0])), shape=(2 * n, 2 * n))
+    found = dijkstra(graph, directed=False, indices=np.arange(len(places)))
+    return np.asarray(found[:, : len(places)])
+
+
+def test_ways_over_two_sheets_change_them_outside_alone() -> None:
+    rng = np.random.default_rng(5)
+    compared = changed = 0
+    for _ in range(12):
+        size = int(rng.integers(7, 10))
+        cells = (size - 1) ** 2
+        excess = np.where(rng.random((size, size)) < 0.12, 1.0, -1.0) * rng.uniform(0.3, 1.0, (size, size))
+        diagonal = rng.integers(0, 2, cells).astype(np.int8)
+        first, last = (2, 2), (size - 3, size - 3)
+        j, i = np.divmod(np.arange(cells), size - 1)
+        owned = (j >= first[0]) & (j < last[0]) & (i >= first[1]) & (i < last[1])
+        # Each of the cells is shut on one sheet, or on neither.
+        which = rng.integers(0, 3, cells)
+        shut = [{int(k): np.full((1, 4), 1.0) for k in np.flatnonzero(owned & (which == n))} for n in (0, 1)]
+        mesh = mesh_of(excess, diagonal, PLAIN, shut[0], owner=owned.astype(np.int32), low=shut[1])
+        one, other = (Free(excess, diagonal, PLAIN, walls) for walls in shut)
+        inside = shapely.box(*(PLAIN[0, 0] * np.array([first[1], first[0], last[1], last[0]], float)))
+        places = one.places(rng, 24, PLAIN, excess.shape)
+        places = places[~shapely.contains_xy(_wider(inside, 0.01), places)][:8]
+        i, j = np.meshgrid(np.arange(first[1], last[1] + 1), np.arange(first[0], last[0] + 1))
+        rim = PLAIN[0, 0] * np.stack([i.ravel(), j.ravel()], axis=-1)
+        t = np.linspace(0.0, 1.0, 60)[:, None]
+        box = shapely.get_coordinates(inside)
+        between = np.vstack([a + t * (b - a) for a, b in pairwise(box)])
+        least = on_two_sheets((one, other), inside, places, between)
+        most = on_two_sheets((one.narrowed(), other.narrowed()), inside, places, rim)
+        whole = Free(excess, diagonal, PLAIN).distances(places, len(places))
+        for a in range(len(places)):
+            for b in range(len(places)):
+                way = mesh.way(turned(places[a]), turned(places[b])) if a != b else None
+                if a == b or (way is None and math.isinf(most[a, b])):
+                    continue
+                assert way is not None
+                assert least[a, b] * (1.0 - 1e-3) <= way.length_m <= most[a, b] * (1.0 + 1e-6)
+                compared += 1
+                changed += way.length_m > whole[a, b] * (1.0 + 1e-6)
+    assert compared > 200
+    assert changed > 40
 
 
 @pytest.mark.parametrize("form", EACH_FORM)

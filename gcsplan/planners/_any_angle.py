@@ -59,7 +59,7 @@ BAND = 0.005
 BANDS = 1e8
 """In metres more than any way; what it leaves of a number's precision orders the nodes of a band."""
 MOST_TURNS = 8
-"""No more pieces than this meet at one place; who passes more of them turns in a circle around it."""
+"""No more pieces than this meet at one place of a sheet; who passes more of them turns in a circle around it."""
 
 
 @kernel(
@@ -148,7 +148,7 @@ def search(
         width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
         if width_l < SAME_M or width_r < SAME_M:
             all_round = True  # the root is a corner of this convex piece
-            if turns >= MOST_TURNS:
+            if turns >= (2 * MOST_TURNS if sheets else MOST_TURNS):
                 continue
             turns += 1
             if sheets and current >= 0:
@@ -296,7 +296,8 @@ def search(
                 if not to_goal:
                     if not forward:
                         s0, s1 = 1.0 - s1, 1.0 - s0
-                    if sheets and held(node, link, name, ends, p, first[2 * p + (1 if forward else 0)], nroot, s0, s1):
+                    here = first[2 * p + (1 if forward else 0)]
+                    if sheets and held(node, link, name, ends, p, here, nroot, ncost, s0, s1):
                         continue
                     if widest[p] > 0 and span[p, 0] <= s0 and s1 <= span[p, 1]:
                         other = widest[p] - 1

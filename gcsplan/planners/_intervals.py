@@ -127,12 +127,13 @@ def place_on(ends: Floats, p: int, x: float, y: float) -> float:
 
 @device
 def held(
-    node: Floats, link: Ints, name: Names, ends: Floats, p: int, first: int, root: np.int64, s0: float, s1: float
-) -> bool:
-    """Whether a node of a portal's list (numbers from 1) has a root that is this one, too, and holds the interval."""
+    node: Floats, link: Ints, name: Names, ends: Floats, p: int, first: int, root: np.int64, cost: float, s0: float,
+    s1: float,
+) -> bool:  # fmt: skip
+    """Whether a node of a portal's list (numbers from 1) has this root, too, for no more, and holds the interval."""
     k = first - 1
     while k >= 0:
-        if link[k, PIECE] != GONE and name[k, ROOT] == root:
+        if link[k, PIECE] != GONE and name[k, ROOT] == root and node[k, COST] <= cost + SAME_M:
             a = place_on(ends, p, node[k, RIGHT_X], node[k, RIGHT_Y])
             b = place_on(ends, p, node[k, LEFT_X], node[k, LEFT_Y])
             if min(a, b) <= s0 + 1e-9 and s1 - 1e-9 <= max(a, b):

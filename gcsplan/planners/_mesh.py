@@ -205,7 +205,7 @@ def _join(
         was_below = was_above = -1
         whole = False
         for i in range(nx):
-            below = above = -1
+            below = above = kb = ka = -1
             found = False
             if 0 < j < ny - 1 and i < nx - 1:
                 kb, ka = (j - 1) * (nx - 1) + i, j * (nx - 1) + i
@@ -217,6 +217,8 @@ def _join(
                     found = found and _cut_own(of, values, kb, sheet, 3, 2, t)
                     found = found and _cut_own(of, values, ka, next_sheet, 0, 1, t)
             goes_on = found and whole and t[0] == 0.0 and below == was_below and above == was_above
+            # Where sheets meet, one may have to turn at any corner of a cell.
+            goes_on = goes_on and (len(owner) == 0 or owner[kb] == owner[ka])
             if was_below >= 0 and not goes_on:
                 n = _put(ends, names, joins, n, room, x0, y0, x1, y1, v0, v1, was_above, was_below)
                 was_below = -1
