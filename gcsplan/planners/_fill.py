@@ -238,15 +238,16 @@ def walk_around(
                     size = push(heap, ids, size, new, q * nx + p)
 
 
-@kernel("f8[,] f8[,] f8[,] i4[,] f8[,] f8[,] f8[,] f8[] b1 i1[,] f8[,]")
+@kernel("f8[,] f8[,] f8[,] i1[,] i4[,] f8[,] f8[,] f8[,] f8[] b1 i1[,] f8[,]")
 def hold_down(
-    excess: Floats, floor: Floats, lift: Floats, of: Ints, values: Floats, x: Floats, y: Floats, cone: Floats,
-    lone: bool, seen: NDArray[np.int8], away: Floats,
+    excess: Floats, floor: Floats, lift: Floats, either: NDArray[np.int8], of: Ints, values: Floats, x: Floats,
+    y: Floats, cone: Floats, lone: bool, seen: NDArray[np.int8], away: Floats,
 ) -> None:  # fmt: skip
     """Hold nodes near an end to what can be climbed to from there, where a bound may.
 
     No path short enough to matter is higher at a node than the cone's height plus its slope times a way to it. A node
-    counts only if the ways to all around it are known. ``lone``: no other end's cone comes near this one's.
+    counts only if the ways to all around it are known. ``lone``: no other end's cone comes near this one's; ``lift``,
+    ``either``: see `_stamp.lift_lids`.
     """
     left, right, low, high = _box(x, y, cone)
     height, slope, cap = cone[4], cone[5], cone[6]
@@ -255,7 +256,9 @@ def hold_down(
     for j in range(low, high + 1):
         for i in range(left, right + 1):
             unknown = seen[j, i] < 0 and away[j, i] == math.inf and excess[j, i] < math.inf
-            if unknown and (not _open(excess, lift, j, i) or _walled(of, values, excess.shape, j, i)):
+            # Under a zone that is too high by now one may fly as before: how far that is, is not known.
+            over = not _open(excess, lift, j, i) and (either[j, i] == 0 or excess[j, i] > 0.0)
+            if unknown and (over or _walled(of, values, excess.shape, j, i)):
                 seen[j, i] = SHUT
     for j in range(low, high + 1):
         for i in range(left, right + 1):

@@ -110,8 +110,8 @@ class Plane:
         laid = excess, floor, under_m, x, y, zones, edges, boxes
         if low and cones:
             stamp_zones(*laid, low, owner, 0, of, values, 0)
-            lift = np.zeros((rows, cols))
-            lift_lids(floor, under_m, x, y, zones, edges, boxes, cap_m, lift)
+            lift, either = np.zeros((rows, cols)), np.zeros((rows, cols), np.int8)
+            lift_lids(floor, under_m, x, y, zones, edges, boxes, cap_m, lift, either)
             cell_m = self.stride * float(self.problem.airspace.surface.grid.metres_per_cell(*cones[0][:2]).max())
             lone = _apart(cones, cap_m, 8.0 * cell_m)
             for east, north, height, slope in cones:
@@ -124,7 +124,7 @@ class Plane:
                     done = np.zeros((rows, cols), np.int8)
                     heap, ids = np.empty(8 * way.size), np.empty(8 * way.size, np.int32)
                     walk_around(excess, lift, of, x, y, cone, seen, away, missing, way, root, done, heap, ids)
-                hold_down(excess, floor, lift, of, values, x, y, cone, lone, seen, away)
+                hold_down(excess, floor, lift, either, of, values, x, y, cone, lone, seen, away)
             of[:] = 0  # what cannot be reached so soon is no way over a zone either
         steepest = max(limits.max_climb_slope, limits.max_descent_slope)
         if self.shapes.either and math.isfinite(steepest):
