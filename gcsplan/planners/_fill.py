@@ -205,7 +205,9 @@ def walk_around(
         if key > way[j, i] or done[j, i] > 0:
             continue
         at = root[j, i]
-        if at >= 0 and not _sees(excess, lift, of, float(at % nx), float(at // nx), i, j, False):
+        from_end = at == FROM_END
+        col, row = (cone[2], cone[3]) if from_end else (float(at % nx), float(at // nx))
+        if not _sees(excess, lift, of, col, row, i, j, from_end):
             # Not straight from there, then: from the best of those around it.
             way[j, i] = np.inf
             for q in range(max(j - 1, low), min(j + 1, high) + 1):
