@@ -120,20 +120,21 @@ def stamp_zones(
     return count
 
 
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8[,] i1[,]")
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8 f8[,] i1[,]")
 def lift_lids(
     floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, cap: float,
-    lift: Floats, either: NDArray[np.int8],
+    rim: float, lift: Floats, either: NDArray[np.int8],
 ) -> None:  # fmt: skip
     """By how much the zones over each node (``lift``, zeros) are higher than its floor that can be flown over below
-    ``cap``; ``either`` (zeros): 1 where one of them can be flown under, too."""
+    ``cap``, no deeper in them than ``rim``: who does not get past that does not get farther in. ``either`` (zeros): 1
+    where one of them can be flown under, too."""
     for z in range(len(zones)):
         if zones[z, PAIR] > 0.0 or zones[z, TOP] == np.inf:
             continue
         for j in range(boxes[z, 2], boxes[z, 3] + 2):
             for i in range(boxes[z, 0], boxes[z, 1] + 2):
                 more = level(zones, z, TOP, ground[j, i]) - floor[j, i]
-                if not 0.0 < more <= cap - floor[j, i] or depth(zones, edges, z, x[j, i], y[j, i]) <= 0.0:
+                if not 0.0 < more <= cap - floor[j, i] or not 0.0 < depth(zones, edges, z, x[j, i], y[j, i]) <= rim:
                     continue
                 lift[j, i] = max(lift[j, i], more)
                 if zones[z, UNDER] > 0.0 and floor[j, i] <= level(zones, z, BOTTOM, ground[j, i]):

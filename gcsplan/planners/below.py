@@ -266,6 +266,11 @@ class Below:
             if self._done() or not self._past(PAST_FINE, fine=True):
                 break
             self._halve()
+        either = any(zone.floor is not None and zone.ceiling is not None for zone in self.problem.airspace.zones)
+        if either and self.gap > TWICE * self.wanted and self._climbs() and self._in_time():
+            parted = [leg.part_sheets(self._limit(leg)) for leg in self.legs]
+            if any(parted):
+                self._halve()
         if not self.in_space and TWICE * self.wanted < self.gap <= NEAR and self._in_time():
             closer = [leg.look_closer(self._limit(leg), FINER) for leg in self.legs]
             if any(closer):

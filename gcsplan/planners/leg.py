@@ -107,6 +107,8 @@ class Leg:
         self._cut = 1
         if self._stride == 1:
             self._ratio = self._cut = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
+        self.sheets = False
+        """Whether bounds hold tracks to pass each zone that has a floor and a ceiling over or under all of it."""
         self.closer = 1
         """Into how many parts a side the finer lattice's cells are cut once more, see `look_closer`."""
         self.has_fine = self._ratio > 1
@@ -160,20 +162,22 @@ class Leg:
         cones: list[Cone],
         under: Bools | None = None,
         over: Bools | None = None,
+        sheets: bool = False,
     ) -> tuple[Mesh, Guide]:
         """The mesh, finer ``within`` a corridor, or else the first look's for tracks shorter than ``limit_m``; and how
         far the goal is."""
         if within is None:
-            near = self._guide.reach(self.start.place, limit_m)
-            return self.plane.mesh(cap_m, low, 1, near, cones, under, over), self._guide
-        plane = within.guide.mesh.plane
-        if plane is not self.plane or not self.has_fine:
-            return plane.mesh(cap_m, low, self.closer, within.cells, cones, under, over), within.guide
-        if self._stride == 1:
-            return self.plane.mesh(cap_m, low, self._cut * self.closer, within.cells, cones, under, over), within.guide
-        if self._twin is None:
-            self._twin = self._lattice(self._detour, self._fine_stride)
-        return self._twin.mesh(cap_m, low, self.closer, self._finer(within.cells), cones, under, over), within.guide
+            plane, fineness, guide = self.plane, 1, self._guide
+            cells = guide.reach(self.start.place, limit_m)
+        else:
+            plane, fineness, guide, cells = within.guide.mesh.plane, self.closer, within.guide, within.cells
+            if plane is self.plane and self._stride == 1:
+                fineness *= self._cut
+            elif plane is self.plane and self.has_fine:
+                if self._twin is None:
+                    self._twin = self._lattice(self._detour, self._fine_stride)
+                plane, cells = self._twin, self._finer(cells)
+        return plane.mesh(cap_m, low, fineness, cells, cones, under, over, sheets=sheets), guide
 
     def track(
         self,
@@ -218,10 +222,32 @@ class Leg:
             if way is None:
                 return limit
             # Ways are longer between the walls that the cones raised, so there is less to spare for a climb: again.
-            if not cones or way.length_m < known + WORTHWHILE * spare:
-                return max(known, way.length_m)
-            known = way.length_m
-        return known
+            enough = not cones or way.length_m < known + WORTHWHILE * spare
+            known = max(known, way.length_m)
+            if enough:
+                break
+        return max(known, self._bound_of_sheets(cap_m, within, limit, cones)) if self.sheets else known
+
+    def _bound_of_sheets(self, cap_m: float, within: Corridor | None, limit_m: float, cones: list[Cone]) -> float:
+        """The same where none may get from under a zone to over it within the zone; ``cones`` hold in any case."""
+        mesh, guide = self._mesh(cap_m, True, within, limit_m, cones, sheets=True)
+        if mesh.sheets == 1:
+            return 0.0
+        try:
+            way = mesh.way(self.start.place, self.goal.place, limit_m, guide)
+        except Exhausted as given_up:
+            return min(limit_m, given_up.seen_m)
+        return limit_m if way is None else way.length_m
+
+    def part_sheets(self, limit_m: float) -> bool:
+        """Let `bound` tell over from under, if tracks shorter than ``limit_m`` may get from one to the other in a zone;
+        whether they may."""
+        limit, limits = min(limit_m, self.reach_m), self.problem.limits
+        spare = max(limit - self.length_m, 0.0)
+        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare)
+        mesh, _ = self._mesh(self.top_m, True, self.corridor(limit), limit, cones, sheets=True)
+        self.sheets = mesh.sheets > 1
+        return self.sheets
 
     def look_closer(self, limit_m: float, parts: int) -> bool:
         """Look anew, at each cell of the finer lattice alone, at what tracks shorter than ``limit_m`` may meet.

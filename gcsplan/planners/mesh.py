@@ -25,6 +25,8 @@ BENT_M = LOOSE.bent_m
 """Most that a raster's line may bow between the corners of a block."""
 MOST_OPENED = 3_000_000
 """Intervals that are looked at before a search is given up."""
+MOST_OF_SHEETS = 300_000
+"""The same where some cells are there twice."""
 
 
 class Exhausted(Exception):
@@ -62,6 +64,11 @@ class Mesh:
     joins: Ints
     order: Ints
     named: int
+
+    @property
+    def sheets(self) -> int:
+        """How many there are; some cells are on all of them."""
+        return int(self.piece.shape[1] // 2)
 
     def lowest(self) -> Floats:
         """(cells,) the lowest floor of each; -inf where a corner is not looked at."""
@@ -163,9 +170,9 @@ class Mesh:
             n = search(
                 self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span,
                 sources, np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32),
-                limit_m, slack, MOST_OPENED, remaining, met,
+                limit_m, slack, MOST_OPENED if self.sheets == 1 else MOST_OF_SHEETS, remaining, met,
                 node, link, name, np.empty(room), np.empty(room, np.int32), out,
-                np.zeros((portals if self.piece.shape[1] > 2 else 0, 8)),
+                np.zeros((portals if self.sheets > 1 else 0, 8)),
             )  # fmt: skip
             if n != -1:
                 break

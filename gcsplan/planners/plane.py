@@ -29,6 +29,8 @@ from gcsplan.planners.shapes import LOOSE, Fit, Shapes, make_shapes
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+RIM = 12.0
+"""How many cells deep zones are looked at that cannot be climbed over so near to an end."""
 MANY = 500_000
 """Nodes of a mesh from which on its names are numbered one by one, for searches have room for every name."""
 
@@ -68,13 +70,14 @@ class Plane:
         under: NDArray[np.bool_] | None = None,
         over: NDArray[np.bool_] | None = None,
         single: bool = False,
+        sheets: bool = False,
     ) -> Mesh:
         """What can be crossed at or below ``cap_m``: by a bound's way (``low``: all of it) or by a path's.
 
         ``wanted``: only these cells. ``cones`` (east_m, north_m, height, slope): where paths climb from, or, for a
         bound, how high a path of a length that matters can be near its ends. ``under``, ``over`` (zones,): which
         zones may be passed below their floors, above their ceilings; None for all. ``single``: each free
-        cell is a piece of its own.
+        cell is a piece of its own. ``sheets``: zones that are passed over here and under there lie on two.
         """
         limits, scale = self.problem.limits, self.problem.airspace.scale
         near = limits.track_error_m * scale
@@ -111,8 +114,9 @@ class Plane:
         if low and cones:
             stamp_zones(*laid, low, owner, 0, of, values, 0)
             lift, either = np.zeros((rows, cols)), np.zeros((rows, cols), np.int8)
-            lift_lids(floor, under_m, x, y, zones, edges, boxes, cap_m, lift, either)
             cell_m = self.stride * float(self.problem.airspace.surface.grid.metres_per_cell(*cones[0][:2]).max())
+            rim_m = RIM * cell_m / (self.parts * fineness)
+            lift_lids(floor, under_m, x, y, zones, edges, boxes, cap_m, rim_m, lift, either)
             lone = _apart(cones, cap_m, 8.0 * cell_m)
             for east, north, height, slope in cones:
                 c, r = self.at((east, north))
@@ -127,7 +131,7 @@ class Plane:
                 hold_down(excess, floor, lift, either, of, values, x, y, cone, lone, seen, away)
             of[:] = 0  # what cannot be reached so soon is no way over a zone either
         steepest = max(limits.max_climb_slope, limits.max_descent_slope)
-        if self.shapes.either and math.isfinite(steepest):
+        if sheets and self.shapes.either and math.isfinite(steepest):
             owner = np.zeros(cells, np.int32)
             if own_zones(*laid, steepest, owner):
                 of, values = np.zeros((cells, 2), np.int32), np.empty((2 * len(values), WALL))
