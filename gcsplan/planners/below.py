@@ -22,7 +22,7 @@ from gcsplan.planners.polish import fewer, polished
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.planners.rising import rise_bound
 from gcsplan.planners.settle import Judge, Unsettled, settle
-from gcsplan.planners.track import Flown, Track, fly, make_track
+from gcsplan.planners.track import Flown, Obstruction, Track, fly, make_track
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -31,7 +31,7 @@ Bools = NDArray[np.bool_]
 SLACKS = (0.008, 0.15, 0.6)
 """How much longer than the shortest the tracks are that are looked at, as a part of it, until a path is known."""
 LITTLE, WORTH = 5e-6, 2e-5
-"""What fewer way points may cost, as a part of the cost: on the way, and at last."""
+"""What fewer way points may cost, as a part: on the way, and at last."""
 HOPE = 1.5
 """A path is made simpler if it would be the best so far by gaining that times what one of its kind has gained yet."""
 ZONES_SHUT = 8
@@ -39,8 +39,7 @@ ZONES_SHUT = 8
 STEEP = 0.5
 """What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
 PAST, PAST_FINE, ROUNDS = 12, 9, 2
-"""Tracks past what is in the way that are looked at, on the lattice of the first look and on the finer one; and how
-often, on that one, if it helps."""
+"""Tracks past what is in the way that are looked at, at first and on the finer lattice; and there how often."""
 FAR = 5e-3
 """Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
 SMALL = 50.0
@@ -59,9 +58,7 @@ as near is good enough."""
 
 
 class Below:
-    """One problem: its legs in the plane, the best path so far, and the best bound so far.
-
-    ``laps``: whether a path with laps is looked for where one without is known."""
+    """One problem, its legs in the plane, the best path and bound yet; ``laps``: look for some where a path is known."""
 
     def __init__(self, problem: Problem, begun_s: float, laps: bool = True) -> None:
         self.problem, self.begun_s, self.laps = problem, begun_s, laps
@@ -116,13 +113,10 @@ class Below:
             return False
         track = make_track(self.problem, *stops)
         flown = fly(self.problem, track)
-        if isinstance(flown, Flown):
+        if isinstance(flown, Flown) or flown.kind == "pinched":  # by centimetres, or tracks would not lead there
             found = self._exact(track, flown)
-            return found is not None and self._take_simpler(*found, fine=fine, longer=False)
-        if flown.kind == "pinched":  # room of a few centimetres, which a tube's bounds may not leave
-            drawn = settle(self.problem, self.judge, *stops)
-            if not isinstance(drawn, Unsettled):
-                return self._take_simpler(*drawn, fine=fine, longer=False)
+            if found is not None or isinstance(flown, Flown):
+                return found is not None and self._take_simpler(*found, fine=fine, longer=False)
         past = flown.kind == "zone" or self.best is None
         return past and self._past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
 
@@ -190,11 +184,12 @@ class Below:
         self._gained[fine, longer] = max(self._gained.get((fine, longer), 0.0), gained)
         return self.take(points, pinned)
 
-    def _exact(self, track: Track, flown: Flown) -> tuple[Floats, Bools] | None:
+    def _exact(self, track: Track, flown: Flown | Obstruction) -> tuple[Floats, Bools] | None:
         """Way points over a track that the exact check passes: of this profile, or of one drawn with more care."""
-        found = way_points(self.problem, track, flown)
-        if not self.judge.violations(found[0]):
-            return found
+        if isinstance(flown, Flown):
+            found = way_points(self.problem, track, flown)
+            if not self.judge.violations(found[0]):
+                return found
         careful = settle(self.problem, self.judge, track.points, track.pinned, track.pin_m)
         return None if isinstance(careful, Unsettled) else careful
 
@@ -245,7 +240,6 @@ class Below:
         """Improve path and bound until they are as near as wanted."""
         if self.gap <= NEARER * self.wanted or not self._in_time():
             return
-        # Whatever is not longer than the best path must have been looked at.
         for leg in self.legs:
             limit = self._limit(leg)
             if limit > leg.reach_m:
@@ -266,16 +260,13 @@ class Below:
             if self._done() or not self._past(PAST_FINE, fine=True):
                 break
             self._halve()
-        either = any(zone.floor is not None and zone.ceiling is not None for zone in self.problem.airspace.zones)
-        if either and self.gap > TWICE * self.wanted and self._climbs() and self._in_time():
-            parted = [leg.part_sheets(self._limit(leg)) for leg in self.legs]
-            if any(parted):
-                self._halve()
-        if not self.in_space and TWICE * self.wanted < self.gap <= NEAR and self._in_time():
-            closer = [leg.look_closer(self._limit(leg), FINER) for leg in self.legs]
-            if any(closer):
-                self.try_below(self.top_m, fine=True)
-                self._halve()
+        far = self.gap > TWICE * self.wanted and self._in_time()
+        if far and sum(leg.part_sheets(self._limit(leg)) for leg in self.legs):
+            self._halve()
+        far = not self.in_space and TWICE * self.wanted < self.gap <= NEAR and self._in_time()
+        if far and sum(leg.look_closer(self._limit(leg), FINER) for leg in self.legs):
+            self.try_below(self.top_m, fine=True)
+            self._halve()
 
     def _halve(self) -> None:
         """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""

@@ -243,6 +243,8 @@ class Leg:
         """Let `bound` tell over from under, if tracks shorter than ``limit_m`` may get from one to the other in a zone;
         whether they may."""
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
+        if not self.plane.shapes.either or math.isinf(max(limits.max_climb_slope, limits.max_descent_slope)):
+            return False
         spare = max(limit - self.length_m, 0.0)
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare)
         mesh, _ = self._mesh(self.top_m, True, self.corridor(limit), limit, cones, sheets=True)
