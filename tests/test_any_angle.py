@@ -114,10 +114,11 @@ class Free:
             place = np.array([form @ np.array(n, float) for n in node])
             if np.isinf(walls).any():
                 continue
+            if (walls <= 0.0).all():
+                parts.append(shapely.Polygon(place))
+                continue
             for t in ((0, 1, 2), (0, 2, 3)) if diagonal[k] == 0 else ((0, 1, 3), (1, 2, 3)):
-                if (walls <= 0.0).all():
-                    parts.append(shapely.Polygon(place[list(t)]))
-                elif all(z[list(t)].min() < 0.0 or (z <= 0.0).all() for z in walls):
+                if all(z[list(t)].min() < 0.0 or (z <= 0.0).all() for z in walls):
                     below = [shapely.Polygon(below_zero(place[list(t)], z[list(t)])) for z in walls]
                     parts.append(shapely.intersection_all(below))
         self._hold(shapely.union_all(parts))

@@ -58,7 +58,7 @@ as near is good enough."""
 
 
 class Below:
-    """One problem, its legs in the plane, the best path and bound yet; ``laps``: look for some where a path is known."""
+    """One problem, its legs in the plane, the best path and bound yet; ``laps``: seek some where a path is known."""
 
     def __init__(self, problem: Problem, begun_s: float, laps: bool = True) -> None:
         self.problem, self.begun_s, self.laps = problem, begun_s, laps
