@@ -18,7 +18,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners._fill import fill, hold_down, look_around, walk_around
+from gcsplan.planners._cones import hold_down, look_around, walk_around
+from gcsplan.planners._fill import fill
 from gcsplan.planners._mesh import WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners._stamp import PAIR, TOP, TOP_2, UNDER, UNDER_2, lift_lids, own_zones, stamp_zones
 from gcsplan.planners.ground_nodes import nodes, places, slopes
