@@ -80,7 +80,7 @@ def search(
     (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining`` (pieces,): no way on from a piece's entrance
     is shorter. ``slack`` >= 0: go on after the goal is reached, as far as that much (as a part of the length) beyond
     it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. ``spokes`` (portals,
-    4), zeros, where portals of a piece may lie on each other, from sheet to sheet, or else empty. Returns the number of
+    8), zeros, where portals of a piece may lie on each other, from sheet to sheet, or else empty. Returns the number of
     corners, ends included, with ``out[0, 2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than
     ``limit``; -1: no room left; -2: more than ``most`` nodes were opened, paths shorter than ``out[0, 0]`` all of them.
     """
@@ -155,8 +155,7 @@ def search(
                 # One may come round a place into a piece from several sheets: once is enough.
                 p = link[current, PORTAL]
                 k = end_of(ends, p, rx, ry)
-                k += 2 if joins[p, 1] == piece else 0
-                if 0.0 < spokes[p, 4 + k] <= cost + 1.0 + SAME_M:
+                if k >= 0 and 0.0 < spokes[p, 4 + k + (2 if joins[p, 1] == piece else 0)] <= cost + 1.0 + SAME_M:
                     continue
                 for at in range(start[piece], start[piece + 1]):
                     p = order[at]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners._intervals import pop, push
-from gcsplan.planners._mesh import NEXT
+from gcsplan.planners._mesh import stands
 from gcsplan.planners.compiled import device, kernel
 
 Floats = NDArray[np.float64]
@@ -18,7 +18,6 @@ BESIDE = 5
 """How many nodes around those that a cone could hold down must be known, too."""
 FROM_END = -1
 """In place of the node that a node was reached from in a straight line."""
-NOT_YET = -2
 SHUT = 3
 """What is known of a node that lies in a wall."""
 
@@ -65,7 +64,7 @@ def walk_around(
     farthest = (cone[6] - cone[4]) / cone[5]
     for j in range(low, high + 1):
         for i in range(left, right + 1):
-            way[j, i], root[j, i] = np.inf, NOT_YET
+            way[j, i] = np.inf
     size = 0
     i0, j0 = int(math.floor(cone[2])), int(math.floor(cone[3]))
     for j in range(max(j0 - 1, low), min(j0 + 2, high) + 1):
@@ -232,13 +231,7 @@ def _walled(of: Ints, values: Floats, shape: tuple[int, int], j: int, i: int) ->
     ny, nx = shape
     for k in range(4):
         jj, ii = j - (k >> 1), i - ((k ^ (k >> 1)) & 1)
-        if not (0 <= jj < ny - 1 and 0 <= ii < nx - 1):
-            continue
-        n, stands = of[jj * (nx - 1) + ii, 0], False
-        while n > 0:
-            stands = stands or values[n - 1, k] > 0.0
-            n = int(values[n - 1, NEXT])
-        if not stands:
+        if 0 <= jj < ny - 1 and 0 <= ii < nx - 1 and not stands(of, values, jj * (nx - 1) + ii, 0, k, 0.0):
             return False
     return True
 

@@ -137,6 +137,17 @@ def _put(
 
 
 @device
+def stands(of: Ints, values: Floats, cell: int, sheet: int, corner: int, above: float) -> bool:
+    """Whether one of a cell's own walls is higher than ``above`` at a corner."""
+    n = of[cell, sheet]
+    while n > 0:
+        if values[n - 1, corner] > above:
+            return True
+        n = int(values[n - 1, NEXT])
+    return False
+
+
+@device
 def _is_corner(
     excess: Floats, of: Ints, values: Floats, owner: Ints, piece: Ints, nx: int, ny: int, j: int, i: int
 ) -> bool:
@@ -150,11 +161,8 @@ def _is_corner(
         for sheet in range(1 if len(owner) == 0 or owner[c] == 0 else 2):
             if piece[c, 2 * sheet] < 0 and piece[c, 2 * sheet + 1] < 0:
                 return True
-            n = of[c, sheet]
-            while n > 0:
-                if values[n - 1, k] > OPEN:
-                    return True
-                n = int(values[n - 1, NEXT])
+            if stands(of, values, c, sheet, k, OPEN):
+                return True
     return False
 
 

@@ -240,6 +240,7 @@ class Below:
         """Improve path and bound until they are as near as wanted."""
         if self.gap <= NEARER * self.wanted or not self._in_time():
             return
+        # Whatever is not longer than the best path must have been looked at.
         for leg in self.legs:
             limit = self._limit(leg)
             if limit > leg.reach_m:
