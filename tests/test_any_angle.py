@@ -63,11 +63,12 @@ def mesh_of(
     values = np.array(rows)
     i, j = np.meshgrid(np.arange(nx), np.arange(ny))
     x, y = (form[0, 0] * i + form[0, 1] * j, form[1, 0] * i + form[1, 1] * j)
-    piece = np.empty((cells, 2 * of.shape[1]), np.int32)
-    count = make_pieces(excess, of, values, diagonal, owner, piece, block)
+    piece = np.full((cells, 2 * of.shape[1]), -1, np.int32)
+    span = np.tile(np.array([0, nx - 1], np.int32), (ny - 1, 1))
+    count = make_pieces(excess, of, values, diagonal, owner, span, piece, block)
     room = 32 * cells + 64
     ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
-    n = make_portals(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, np.empty(2))
+    n = make_portals(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, np.empty(2))
     assert n <= room
     start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
     sort_portals(joins[:n], start, order)
@@ -79,7 +80,9 @@ def mesh_of(
 
     plane = cast(Plane, SimpleNamespace(at=at, parts=1, stride=1, inside=np.ones((ny - 1, nx - 1), np.bool_)))
     named = 8 * (nx * ny + 1) * of.shape[1]
-    return Mesh(plane, 1, 0, 0, excess, excess, diagonal, piece, start, ends[:n], names[:n], joins[:n], order, named)
+    return Mesh(
+        plane, 1, 0, 0, excess, excess, diagonal, span, piece, start, ends[:n], names[:n], joins[:n], order, named
+    )  # fmt: skip
 
 
 def below_zero(corners: Floats, values: Floats) -> Floats:

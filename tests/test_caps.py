@@ -20,6 +20,7 @@ from gcsplan.planners.caps import MOST_CAPS, Layer, search_caps
 from gcsplan.planners.leg import End, Leg
 from gcsplan.planners.problem import Objective, Problem, Via
 from gcsplan.planners.rising import _least, floors, rise_bound
+from gcsplan.planners.tighten import tighten
 from gcsplan.planners.track import Flown, fly, make_track
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -275,7 +276,7 @@ def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb
         below.look()
         assert not below.proved_shut
         if below.best is not None:
-            below.tighten()
+            tighten(below)
         assert 0.0 < below.bound <= below.cost
         costs = []
         for track in tracks(problem, rng, 25, 0.04):

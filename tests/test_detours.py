@@ -19,6 +19,7 @@ from gcsplan.planners.climb import extend
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.settle import sampled_track
 from gcsplan.planners.taut_string import Blocked, taut_string
+from gcsplan.planners.tighten import tighten
 from gcsplan.planners.track import Flown, Lacking, Shut, _rooms, fly, lacking
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
@@ -37,7 +38,7 @@ def box(west: float, south: float, east: float, north: float, low: float | None,
 
 def crossing(*zones: Zone, **changes: object) -> Problem:
     """From west to east over level ground, 10 m up."""
-    p = Problem(Airspace(ground(0.0), zones), TENTH, (200.0, 1000.0, 10.0), (1800.0, 1000.0, 10.0))
+    p = Problem(Airspace(ground(0.0), zones), TENTH, (200.0, 1000.0, 10.0), (1800.0, 1000.0, 10.0), budget_s=4.0)
     return replace(p, **changes)  # type: ignore[arg-type]
 
 
@@ -66,7 +67,7 @@ def looked(p: Problem) -> Below:
     below.look()
     for again in (False, True):
         if again:
-            below.tighten()
+            tighten(below)
         assert below.best is not None
         assert faults(replace(p, airspace=Airspace(p.airspace.surface)), Path(below.best)) == []
         assert met(p, below.best) == []

@@ -18,6 +18,8 @@ BESIDE = 5
 """How many nodes around those that a cone could hold down must be known, too."""
 FROM_END = -1
 """In place of the node that a node was reached from in a straight line."""
+LONG = 40.0
+"""Cells from where on a straight way goes on from the node that it has come to: most of the work is to look along it."""
 SHUT = 3
 """What is known of a node that lies in a wall."""
 
@@ -98,17 +100,19 @@ def walk_around(
             away[j, i] = way[j, i]
             seen[j, i] = 2
             missing -= 1
+        back, from_x, from_y, known = root[j, i], cone[0], cone[1], 0.0
+        col, row = (cone[2], cone[3]) if back == FROM_END else (float(back % nx), float(back // nx))
+        if max(abs(i - col), abs(j - row)) > LONG:
+            back = j * nx + i
+        if back != FROM_END:
+            from_x, from_y = x[back // nx, back % nx], y[back // nx, back % nx]
+            known = way[back // nx, back % nx]
         for q in range(max(j - 1, low), min(j + 1, high) + 1):
             for p in range(max(i - 1, left), min(i + 1, right) + 1):
-                if done[q, p] > 0 or not _steps(excess, lift, of, i, j, p, q):
+                if done[q, p] > 0:
                     continue
-                back = root[j, i]
-                from_x, from_y, known = cone[0], cone[1], 0.0
-                if back >= 0:
-                    from_x, from_y = x[back // nx, back % nx], y[back // nx, back % nx]
-                    known = way[back // nx, back % nx]
                 new = known + math.sqrt((x[q, p] - from_x) ** 2 + (y[q, p] - from_y) ** 2)
-                if new < way[q, p] - 1e-9 and size < len(heap):
+                if new < way[q, p] - 1e-9 and size < len(heap) and _steps(excess, lift, of, i, j, p, q):
                     way[q, p], root[q, p] = new, back
                     size = push(heap, ids, size, new, q * nx + p)
 

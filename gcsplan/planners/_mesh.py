@@ -54,12 +54,15 @@ def _cut_own(of: Ints, values: Floats, k: int, sheet: int, start: int, end: int,
     return True
 
 
-@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] i8")
+@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] i4[,] i8")
 def make_pieces(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, piece: Ints, block: int,
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, span: Ints, piece: Ints,
+    block: int,
 ) -> int:  # fmt: skip
-    """Number the pieces: ``piece`` (cells, 2 sheets), the lower and the upper triangle's, -1 where nothing is free.
+    """Number the pieces: ``piece`` (cells, 2 sheets), the lower and the upper triangle's, -1 where nothing is free,
+    and before.
 
+    ``span`` (rows - 1, 2) the first column, and that after the last, of the cells of a row that may be free;
     ``of`` (cells, sheets) number from 1 of the row in ``values`` (K, 5) of a cell's first own wall, or 0: excess at
     this node, the one in the next column, in the next column and row, and in the next row, and the number of its next
     wall; ``diagonal`` (cells,) 0 from this node to the opposite one, 1 the other. ``owner`` (cells,) which cells are
@@ -67,24 +70,23 @@ def make_pieces(
     """
     count = 0
     for sheet in range(of.shape[1]):
-        count = _number(excess, of, values, diagonal, owner, piece, block, sheet, count)
+        count = _number(excess, of, values, diagonal, owner, span, piece, block, sheet, count)
     return count
 
 
 @device
 def _number(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, piece: Ints, block: int,
-    sheet: int, count: int,
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, span: Ints, piece: Ints,
+    block: int, sheet: int, count: int,
 ) -> int:  # fmt: skip
     """Number the pieces of one sheet; returns how many there are by now."""
     ny, nx = excess.shape
     for j in range(ny - 1):
         running = False
-        for i in range(nx - 1):
+        for i in range(span[j, 0], span[j, 1]):
             k = j * (nx - 1) + i
             if sheet > 0 and owner[k] == 0:
                 running = False
-                piece[k, 2] = piece[k, 3] = -1
                 continue
             if sheet > 0 and running and owner[k - 1] != owner[k]:
                 running = False
@@ -110,7 +112,6 @@ def _number(
                 continue
             running = False
             for half in range(2):
-                piece[k, 2 * sheet + half] = -1
                 if lower if half == 0 else upper:
                     piece[k, 2 * sheet + half] = count
                     count += 1
@@ -176,28 +177,29 @@ def _name(
     return name if _is_corner(excess, of, values, owner, piece, nx, ny, j, i) else -1 - name
 
 
-@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] f8[,] f8[,] f8[,] i8[,] i4[,] f8[]")
+@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] i4[,] f8[,] f8[,] f8[,] i8[,] i4[,] f8[]")
 def make_portals(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, piece: Ints, x: Floats,
-    y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats,
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, span: Ints, piece: Ints,
+    x: Floats, y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats,
 ) -> int:  # fmt: skip
     """Every portal once: ``ends`` (room, 4) from x, y to x, y; ``names`` (room, 2) of its ends; ``joins`` (room, 2)
     the pieces at its left and right. Returns how many there are; room for fewer is filled.
 
     A name is unique to a place, and to a sheet; it is not negative if a wall may stand there, so that a path may turn.
     """
-    n = _join(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, t, 0, 0, 0)
+    n = _join(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, t, 0, 0, 0)
     if len(owner) > 0:
-        n = _join(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, t, 1, 1, n)
-        n = _join(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, t, 0, 1, n)
-        n = _join(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, t, 1, 0, n)
+        n = _join(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, t, 1, 1, n)
+        n = _join(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, t, 0, 1, n)
+        n = _join(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, t, 1, 0, n)
     return n
 
 
 @device
 def _join(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, piece: Ints, x: Floats,
-    y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats, sheet: int, next_sheet: int, n: int,
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, span: Ints, piece: Ints,
+    x: Floats, y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats, sheet: int, next_sheet: int,
+    n: int,
 ) -> int:  # fmt: skip
     """Find the portals between cells on a sheet and the next ones, upward and to the right, on one; from the n-th on.
 
@@ -212,10 +214,13 @@ def _join(
         v0 = v1 = 0
         was_below = was_above = -1
         whole = False
-        for i in range(nx):
+        first = last = 0
+        if 0 < j < ny - 1:
+            first, last = max(span[j - 1, 0], span[j, 0]), min(span[j - 1, 1], span[j, 1])
+        for i in range(first, last + 1):
             below = above = kb = ka = -1
             found = False
-            if 0 < j < ny - 1 and i < nx - 1:
+            if i < last:
                 kb, ka = (j - 1) * (nx - 1) + i, j * (nx - 1) + i
                 if sheet == next_sheet or owner[kb] != owner[ka]:
                     below, above = piece[kb, 2 * sheet + 1], piece[ka, 2 * next_sheet]
@@ -245,7 +250,7 @@ def _join(
         if j == ny - 1:
             break
         # Within the row: sides and diagonals of its cells.
-        for i in range(nx - 1):
+        for i in range(span[j, 0], span[j, 1]):
             k = j * (nx - 1) + i
             if i > 0 and (sheet == next_sheet or owner[k - 1] != owner[k]):
                 left = _side(piece, diagonal, k - 1, sheet, True)
@@ -311,27 +316,33 @@ def sort_portals(
             order[start[p]] = n
 
 
-@kernel("i4[,] f8[] i8 i4[,] i8 i8 i8 i8 f8[]")
+@kernel("i4[,] f8[] i8 i4[,] i4[,] i8 i8 i8 i8 f8[]")
 def least_of_cells(
-    piece: Ints, value: Floats, cols: int, fine_piece: Ints, fine_cols: int, ratio: int, row: int, col: int,
-    out: Floats,
+    piece: Ints, value: Floats, cols: int, fine_piece: Ints, fine_span: Ints, fine_cols: int, ratio: int, row: int,
+    col: int, out: Floats,
 ) -> None:  # fmt: skip
     """For each piece of a finer mesh (``out``, inf before) the least value of the coarse pieces in its cells.
 
     ``cols``, ``fine_cols``: cells in a row; ``row``, ``col``: the coarse cell that the finer mesh begins at.
     """
-    for k in range(len(fine_piece)):
-        j, i = (k // fine_cols) // ratio + row, (k % fine_cols) // ratio + col
-        if not (0 <= i < cols and 0 <= j < len(piece) // cols):
+    for q in range(len(fine_span)):
+        j = q // ratio + row
+        if not 0 <= j < len(piece) // cols:
             continue
-        least = np.inf
-        for half in range(piece.shape[1]):
-            if piece[j * cols + i, half] >= 0:
-                least = min(least, value[piece[j * cols + i, half]])
-        for half in range(fine_piece.shape[1]):
-            p = fine_piece[k, half]
-            if p >= 0 and least < out[p]:
-                out[p] = least
+        least, known = np.inf, -1
+        for p in range(fine_span[q, 0], fine_span[q, 1]):
+            i = p // ratio + col
+            if not 0 <= i < cols:
+                continue
+            if i != known:
+                least, known = np.inf, i
+                for half in range(piece.shape[1]):
+                    if piece[j * cols + i, half] >= 0:
+                        least = min(least, value[piece[j * cols + i, half]])
+            for half in range(fine_piece.shape[1]):
+                n = fine_piece[q * fine_cols + p, half]
+                if n >= 0 and least < out[n]:
+                    out[n] = least
 
 
 @kernel("i4[,] f8[] f8[]")

@@ -75,6 +75,8 @@ def stamp_zones(
                 cell = j * (excess.shape[1] - 1) + i
                 if sheet > 0 and owner[cell] == 0:
                     continue
+                if min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0:
+                    continue  # nothing there is free anyway
                 mine = len(owner) > 0 and owner[cell] == z + 1
                 over, under = not mine or sheet == 0, zones[z, UNDER] > 0.0 and (not mine or sheet > 0)
                 deepest, shallowest = -np.inf, np.inf

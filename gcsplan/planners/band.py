@@ -17,14 +17,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.climb import ways_up, with_climbs
+from gcsplan.planners.climb import pins_of, ways_up, with_climbs
 from gcsplan.planners.diagnose import Refusal, explain
 from gcsplan.planners.guide import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice import terminals
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.routes import LEVELS, Level, Router
 from gcsplan.planners.settle import Judge, Unsettled, settle, thinned
-from gcsplan.planners.track import Flown, Obstruction, fly, make_track
+from gcsplan.planners.track import Flown, Obstruction, distances, fly, make_track
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -175,6 +175,33 @@ def _flat(points: Floats) -> float:
     return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
 
 
+def pulled(problem: Problem, points: Floats, level: Level, deadline_s: float) -> Floats | None:
+    """Way points of a better line than a path's, at best: of the one that is pulled from it, and of others around it.
+
+    Zones are passed over, or under, as that path (N, 3) passes them.
+    """
+    way = sum(math.dist(a, b) for a, b in pairwise(terminals(problem)))
+    work = _Work.at(problem, level, way)
+    pinned, pin_m = pins_of(problem, points)
+    work.over = _sides(problem, points, pinned, pin_m)
+    flat = np.ascontiguousarray(points[:, :2])
+    work.guide = work._guide([flat])
+    work.line = work.guide.pull(line_of(flat, pinned, pin_m), work._steps(FINE_STEPS), FINE_GAIN * way)
+    return work.improve(deadline_s, lambda _phase, _cost: None)[0]
+
+
+def _sides(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> dict[int, bool]:
+    """Of the zones that a path meets, whether it passes over them."""
+    track = make_track(problem, points[:, :2], pinned, pin_m)
+    s = distances(track.points)
+    over: dict[int, bool] = {}
+    for band in track.tube.bands:
+        at = 0.5 * (band.s_m[:-1] + band.s_m[1:])
+        height = np.interp(at, s, points[:, 2])
+        over[band.zone] = bool((height >= band.top_m.mean(axis=1)).mean() > 0.5)
+    return over
+
+
 class _Work:
     """One lattice, the ways found on it, and the lines pulled from them."""
 
@@ -185,6 +212,8 @@ class _Work:
         self.guide: Guide | None = None
         self.line: Line | None = None
         self.judge = Judge(problem)
+        self.over: dict[int, bool] = {}
+        """Zones that are known to be passed over, or under."""
 
     @classmethod
     def at(cls, problem: Problem, level: Level, way_m: float) -> _Work:
@@ -257,7 +286,7 @@ class _Work:
 
     def _guide(self, ways: list[Floats]) -> Guide:
         radius = max(CORRIDOR * self.way_m, CORRIDOR_STEPS * self.router.lattice.step_m)
-        return make_guide(self.problem, ways, radius, {})
+        return make_guide(self.problem, ways, radius, self.over)
 
     def _steps(self, parts: tuple[float, ...]) -> Floats:
         return np.array(parts) * self.way_m
@@ -265,7 +294,7 @@ class _Work:
     def _mend(self, line: Line) -> tuple[tuple[Floats, NDArray[np.bool_]] | Unsettled, Line]:
         """Settle a line; where the exact check refuses, tell the guide, and pull it into what is left of the room."""
         found: tuple[Floats, NDArray[np.bool_]] | Unsettled
-        guide = make_guide(self.problem, [line.points], NARROW * self.way_m, {}, FINE_M)
+        guide = make_guide(self.problem, [line.points], NARROW * self.way_m, self.over, FINE_M)
         line = guide.pull(line, self._steps(FINE_STEPS), FINE_GAIN * self.way_m, rounds=3)
         for attempt in range(MENDS):
             found = settle(self.problem, self.judge, line.points, line.pinned, line.pin_m)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.band import straight_bound
-from gcsplan.planners.caps import Layer, above_all, search_caps
+from gcsplan.planners.caps import above_all
 from gcsplan.planners.climb import with_laps
 from gcsplan.planners.detours import Choice, Search, Stops, joined
 from gcsplan.planners.finish import way_points
@@ -20,7 +19,6 @@ from gcsplan.planners.lattice import terminals
 from gcsplan.planners.leg import End, Leg
 from gcsplan.planners.polish import fewer, polished
 from gcsplan.planners.problem import Problem, Progress, Solution
-from gcsplan.planners.rising import rise_bound
 from gcsplan.planners.settle import Judge, Unsettled, settle
 from gcsplan.planners.track import Flown, Obstruction, Track, fly, make_track
 from gcsplan.world.path import Path
@@ -36,25 +34,14 @@ HOPE = 1.5
 """A path is made simpler if it would be the best so far by gaining that times what one of its kind has gained yet."""
 ZONES_SHUT = 8
 """Tracks that are looked at below a cap where a zone can be passed neither over nor under on the first."""
+PAST = 12
+"""Tracks past what is in the way that are looked at."""
 STEEP = 0.5
 """What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
-PAST, PAST_FINE, ROUNDS = 12, 9, 2
-"""Tracks past what is in the way that are looked at, at first and on the finer lattice; and there how often."""
 FAR = 5e-3
 """Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
 SMALL = 50.0
 """A world is small where the straight ways from stop to stop are so many cells of the terrain model long, at most."""
-TWICE, NEAR, FINER = 2.0, 5e-2, 4
-"""From so many times the wanted gap on, and up to which gap, as a part, cells are cut once more, and into how many
-parts a side: for walls and zones that the first lattice rounds off."""
-CLOSER, LEFT, FLAT = 8, 0.05, 0.12
-"""Times that what lies between path and bound is halved, at most, and what part of the gap is not worth it: close to
-the ends a shorter path has less way to climb. How little shorter paths' bounds rise that are taken to rise no more."""
-CLIMBED = (0.98, 0.9, 0.75, 0.5)
-"""What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
-NEARER = 0.45
-"""What part of the wanted gap is tried first, and worth a look even where the gap is small enough; a first path that is
-as near is good enough."""
 
 
 class Below:
@@ -103,7 +90,7 @@ class Below:
             self._raise_tracks()
             if self.try_below(self.top_m, fine=False) or self.try_below(self.top_m, fine=True):
                 return
-            if self._past(PAST, fine=False, first=True):
+            if self.past(PAST, fine=False, first=True):
                 return
 
     def try_below(self, cap_m: float, *, fine: bool) -> bool:
@@ -116,15 +103,15 @@ class Below:
         if isinstance(flown, Flown) or flown.kind == "pinched":  # by centimetres, or tracks would not lead there
             found = self._exact(track, flown)
             if found is not None or isinstance(flown, Flown):
-                return found is not None and self._take_simpler(*found, fine=fine, longer=False)
+                return found is not None and self.take_simpler(*found, fine=fine, longer=False)
         past = flown.kind == "zone" or self.best is None
-        return past and self._past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
+        return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
 
     def stops(self, choice: Choice, cap_m: float, fine: bool) -> Stops | None:
         """The shortest track of a choice below a cap, from stop to stop; see `Leg.track`."""
         ways = []
         for leg in self.legs:
-            limit = self._limit(leg)
+            limit = self.limit(leg)
             wanted = leg.corridor(limit) if fine and leg.has_fine else None
             way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, choice.most_m, choice.over)
             if way is None:
@@ -132,7 +119,7 @@ class Below:
             ways.append(way.points)
         return joined(ways, [leg.goal.amsl_m for leg in self.legs[:-1]])
 
-    def _past(
+    def past(
         self, most: int, *, fine: bool, first: bool = False, cap_m: float | None = None, given: Stops | None = None
     ) -> bool:
         """Look for tracks past what is in the way, at ``most`` of them; True if a path over one is the best so far.
@@ -140,8 +127,8 @@ class Below:
         ``cap_m``: below that cap, the first, which needs no laps where a path is known, from a ``given`` track on;
         else, ``first``, the first, or the best, with metres to spare for laps near the ends.
         """
-        laps = self._climbs() and (self.best is None or (self.laps and cap_m is None))
-        spare_m = self._longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
+        laps = self.climbs() and (self.best is None or (self.laps and cap_m is None))
+        spare_m = self.longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
         search = Search(self, self.top_m if cap_m is None else cap_m, fine)
         roots = [self.choice]
         if cap_m is None:
@@ -156,15 +143,15 @@ class Below:
         track = make_track(self.problem, *stops)
         flown = fly(self.problem, track)
         if isinstance(flown, Flown) and (found := self._exact(track, flown)) is not None:
-            return self._take_simpler(*found, fine=fine, longer=False)
+            return self.take_simpler(*found, fine=fine, longer=False)
         found = with_laps(self.problem, *stops, self._exact)
-        return found is not None and self._take_simpler(*found, fine=fine, longer=True)
+        return found is not None and self.take_simpler(*found, fine=fine, longer=True)
 
     def goes_on(self) -> bool:
         """Whether a better path is wanted, and there is time, which a first one is worth in any case."""
-        return self.best is None or (not self._done() and self._in_time())
+        return self.best is None or (not self.done() and self.in_time())
 
-    def _take_simpler(self, points: Floats, pinned: Bools, *, fine: bool, longer: bool) -> bool:
+    def take_simpler(self, points: Floats, pinned: Bools, *, fine: bool, longer: bool) -> bool:
         """Make a path simpler and keep it, if it is the best so far; not where there is no hope of that.
 
         ``fine``, ``longer``: its kind, whether its track is of the fine lattice, and whether it was made longer.
@@ -196,12 +183,12 @@ class Below:
     def search_space(self) -> bool:
         """Look for a path that is no cap's, where the best one climbs much; True if that is the best so far."""
         p, best = self.problem, self.best
-        if best is None or self.gap <= FAR or not self._in_time() or (p.objective == "length" and not self._steep()):
+        if best is None or self.gap <= FAR or not self.in_time() or (p.objective == "length" and not self.is_steep()):
             return False
         from gcsplan.planners.steep import is_steep, steep_path  # few worlds are as high as wide
 
         self.in_space = is_steep(p, best)
-        found = steep_path(p, best, self._in_time) if self.in_space else None
+        found = steep_path(p, best, self.in_time) if self.in_space else None
         return found is not None and not self.judge.violations(found[0]) and self.take(*found)
 
     @property
@@ -215,14 +202,14 @@ class Below:
         """Look for a path between few places, in small worlds where the best is farther than ``wanted`` (a part) from
         the bound; True if that is the best so far."""
         missing = self.best is None
-        enough = not missing and (self._done() or self.gap <= wanted or not self._in_time())
+        enough = not missing and (self.done() or self.gap <= wanted or not self.in_time())
         if self.searched or enough or not self.is_small:
             return False
         from gcsplan.planners.small import small_path  # most missions are longer
 
         self.searched = True
         # A first path is worth more than the time it takes.
-        found = small_path(self.problem, self.best, (lambda: True) if missing else self._in_time)
+        found = small_path(self.problem, self.best, (lambda: True) if missing else self.in_time)
         return found is not None and not self.judge.violations(found[0]) and self.take(*found)
 
     def take(self, points: Floats, pinned: Bools | None = None) -> bool:
@@ -236,135 +223,35 @@ class Below:
         self.tell("improve")
         return True
 
-    def tighten(self) -> None:
-        """Improve path and bound until they are as near as wanted."""
-        if self.gap <= NEARER * self.wanted or not self._in_time():
-            return
-        # Whatever is not longer than the best path must have been looked at.
-        for leg in self.legs:
-            limit = self._limit(leg)
-            if limit > leg.reach_m:
-                leg.flood((limit / leg.length_m - 1.0) * (1.0 + 1e-9))
-        if self.problem.objective == "energy":
-            self._tighten_energy()
-        else:
-            self._tighten_length()
-
-    def _tighten_length(self) -> None:
-        self.try_below(self.top_m, fine=True)
-        if self.gap > FAR:
-            self._past(PAST, fine=False)
-        if not self._done() and (self.in_space or self._steep()):
-            self._raise_bound(self._search_caps(lambda layer: math.hypot(layer.track_m, self._rise(layer.low_m))))
-        self._halve()
-        for _ in range(ROUNDS):
-            if self._done() or not self._past(PAST_FINE, fine=True):
-                break
-            self._halve()
-        far = self.gap > TWICE * self.wanted and self._in_time()
-        if far and sum(leg.part_sheets(self._limit(leg)) for leg in self.legs):
-            self._halve()
-        far = not self.in_space and TWICE * self.wanted < self.gap <= NEAR and self._in_time()
-        if far and sum(leg.look_closer(self._limit(leg), FINER) for leg in self.legs):
-            self.try_below(self.top_m, fine=True)
-            self._halve()
-
-    def _halve(self) -> None:
-        """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""
-        low, high, before, flat = self.bound, self.cost, 0.0, False
-        for k in range(CLOSER):
-            nearer = self.cost / (1.0 + NEARER * self.wanted)
-            enough = low >= nearer if k == 0 else self._done()
-            if enough or high - low < max(2e-5 * low, LEFT * (self.cost - low)) or not self._in_time():
-                break
-            # No path is shorter than `low`; is any shorter than `middle`?
-            middle = max(low + (FLAT if flat else 0.5) * (high - low), nearer if k == 0 else 0.0)
-            found = self._bound_shorter(middle)
-            flat = k > 0 and found < min(middle, before + FLAT * (high - middle))
-            if found < middle:
-                high, before = middle, found  # the bound of shorter paths is higher; where it hardly is, they are close
-            low = max(low, min(found, middle))
-            self._raise_bound(low)
-
-    def _steep(self) -> bool:
+    def is_steep(self) -> bool:
         """Whether what the best path climbs is more than half of what it lacks: a longer track may climb less."""
         assert self.best is not None
         track_m = float(np.hypot(*np.diff(self.best[:, :2], axis=0).T).sum())
-        return self.cost - math.hypot(track_m, self._rise(-math.inf)) > STEEP * (self.cost - self.bound)
+        return self.cost - math.hypot(track_m, self.rise(-math.inf)) > STEEP * (self.cost - self.bound)
 
-    def _climbs(self) -> bool:
+    def climbs(self) -> bool:
         """Whether there is a climb limit."""
         limits = self.problem.limits
         return math.isfinite(limits.max_climb_slope) or math.isfinite(limits.max_descent_slope)
 
-    def _bound_shorter(self, longest_m: float) -> float:
-        """A bound of all paths shorter than ``longest_m``: their tracks on the fine lattice, then what they climb."""
-        most_m = self._longest_track(longest_m)
-        spare = most_m - sum(leg.length_m for leg in self.legs)
-        tracks = []
-        for leg in self.legs:
-            limit = leg.length_m + spare
-            wanted = leg.corridor(limit)
-            tracks.append(leg.bound(self.top_m, wanted, limit, True))
-        # Each leg's limit is what the others leave, which is less now that they are known better.
-        spare = max(most_m - sum(tracks), 0.0)
-        return rise_bound(self.legs, tracks, [track + spare for track in tracks])
-
-    def _longest_track(self, longest_m: float) -> float:
-        """No track of a path shorter than ``longest_m`` is longer than this, for it must climb as well."""
-        if len(self.legs) > 1:
-            return longest_m
-        climbing = rise_bound(self.legs, [longest_m], [longest_m]) - longest_m
-        for part in CLIMBED:
-            shorter = max(longest_m - part * climbing, self.legs[0].length_m)
-            if rise_bound(self.legs, [shorter], [longest_m]) >= longest_m:
-                return shorter
-        return longest_m
-
-    def _longest(self) -> float:
+    def longest(self) -> float:
         """No track of a path that is better than the best is longer."""
         p = self.problem
         free = p.objective == "energy" and p.horizontal_j_per_m == 0.0
         if self.best is None or free:
             return sum(leg.reach_m for leg in self.legs)
         if p.objective == "energy":
-            return (self.cost - p.vertical_j_per_m * self._rise(-math.inf)) / p.horizontal_j_per_m
+            return (self.cost - p.vertical_j_per_m * self.rise(-math.inf)) / p.horizontal_j_per_m
         return self.cost
 
-    def _limit(self, leg: Leg) -> float:
+    def limit(self, leg: Leg) -> float:
         """The same for one leg, the others as short as they can be."""
-        return self._longest() - sum(other.length_m for other in self.legs if other is not leg)
+        return self.longest() - sum(other.length_m for other in self.legs if other is not leg)
 
-    def _rise(self, touched_m: float) -> float:
+    def rise(self, touched_m: float) -> float:
         """Metres climbed and descended in all, at least, by a path that touches a height."""
         least = sum(abs(b - a) for a, b in pairwise(self.known_m))
         return least + 2.0 * max(touched_m - max(self.known_m), 0.0)
-
-    def _tighten_energy(self) -> None:
-        p = self.problem
-        self.try_below(self.top_m, fine=True)
-        self._raise_bound(
-            self._search_caps(lambda layer: layer.cost(self._rise, p.vertical_j_per_m, p.horizontal_j_per_m))
-        )
-
-    def _search_caps(self, cost_of: Callable[[Layer], float]) -> float:
-        """Look below lower caps for what climbs less; the bound of all caps, given that of a layer."""
-        tried: set[float] = set()
-
-        def track_m(cap: float, care: int) -> float:
-            limits = [self._limit(leg) for leg in self.legs]
-            wanted = [leg.corridor(limit) if care else None for leg, limit in zip(self.legs, limits, strict=True)]
-            looked_at = zip(self.legs, wanted, limits, strict=True)
-            return sum(leg.bound(cap, cells, limit, care > 0) for leg, cells, limit in looked_at)
-
-        def try_at(cap: float) -> None:
-            if round(cap, 1) not in tried:
-                tried.add(round(cap, 1))
-                if self.try_below(cap, fine=False):
-                    self.try_below(cap, fine=True)
-
-        layers = [Layer(max(self.known_m), self.top_m, sum(leg.length_m for leg in self.legs))]
-        return search_caps(layers, cost_of, track_m, lambda: self.cost, try_at, self.wanted, self._in_time)
 
     def bound_of_tracks(self) -> float:
         """The bound of tracks alone, for regimes in which paths are found elsewhere; inf: there is none, proved."""
@@ -377,16 +264,16 @@ class Below:
 
     def _raise_tracks(self) -> None:
         """What the shortest tracks alone tell of the cost."""
-        self._raise_bound(self.least(sum(leg.length_m for leg in self.legs)))
+        self.raise_bound(self.least(sum(leg.length_m for leg in self.legs)))
 
     def least(self, track_m: float) -> float:
         """What a path costs at least whose track is so long."""
         p = self.problem
         if p.objective == "energy":
-            return p.horizontal_j_per_m * track_m + p.vertical_j_per_m * self._rise(-math.inf)
+            return p.horizontal_j_per_m * track_m + p.vertical_j_per_m * self.rise(-math.inf)
         return track_m
 
-    def _raise_bound(self, cost: float) -> None:
+    def raise_bound(self, cost: float) -> None:
         """A new bound, in metres or joules by the objective."""
         # The bound's own arithmetic is rounded.
         self.bound = max(self.bound, min(cost * (1.0 - 1e-9), self.cost))
@@ -397,10 +284,10 @@ class Below:
         """How far the best path is above the bound, as a part of it."""
         return (self.cost - self.bound) / max(self.bound, 1e-9)
 
-    def _done(self) -> bool:
+    def done(self) -> bool:
         return self.gap <= self.wanted
 
-    def _in_time(self) -> bool:
+    def in_time(self) -> bool:
         self.timed_out = time.perf_counter() - self.begun_s > self.problem.budget_s
         return not self.timed_out
 
@@ -414,7 +301,7 @@ class Below:
         return Solution(
             path=Path(self.best),
             lower_bound=self.bound,
-            stopped_by="gap" if self._done() else "time" if self.timed_out else "exhausted",
+            stopped_by="gap" if self.done() else "time" if self.timed_out else "exhausted",
             planning_s=time.perf_counter() - self.begun_s,
             first_path_s=self.first_s,
         )

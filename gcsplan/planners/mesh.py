@@ -57,6 +57,7 @@ class Mesh:
     excess: Floats
     floor: Floats
     diagonal: NDArray[np.int8]
+    span: Ints
     piece: Ints
     start: Ints
     ends: Floats
@@ -206,7 +207,9 @@ class Guide:
         out = np.full(len(finer.start) - 1, np.inf)
         cols, fine_cols = self.mesh.excess.shape[1] - 1, finer.excess.shape[1] - 1
         row, col = finer.row // share - self.mesh.row, finer.col // share - self.mesh.col
-        least_of_cells(self.mesh.piece, self.entered, cols, finer.piece, fine_cols, ratio, row, col, out)
+        least_of_cells(
+            self.mesh.piece, self.entered, cols, finer.piece, finer.span, fine_cols, ratio, row, col, out
+        )  # fmt: skip
         return out
 
     def reach(self, place: Place, limit_m: float) -> Bools:

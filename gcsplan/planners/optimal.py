@@ -32,17 +32,15 @@ from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.band import plan_band
-from gcsplan.planners.below import FAR, Below
+from gcsplan.planners.below import Below
 from gcsplan.planners.diagnose import Refusal, check_ends, explain
 from gcsplan.planners.lattice import terminals
 from gcsplan.planners.problem import Problem, Solution
+from gcsplan.planners.tighten import tighten
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
 
-MOST_NODES = 1_500_000
-"""The lattice of reachable altitudes is asked for a better path, too, on terrain of so many nodes at most, for its
-rasters are as fine as the terrain."""
 MUCH = 0.05
 """Gap, as a part, beyond which small worlds are searched for a better path before time is spent on a closer bound."""
 
@@ -96,17 +94,9 @@ def _sharp(problem: Problem, begun: float, laps: bool = True) -> Solution:
                 raise
     below.search_space()
     below.search_small(MUCH)
-    below.tighten()
-    if not asked and below.gap > FAR and problem.airspace.surface.ground_m.size <= MOST_NODES:
-        # Over or under, or a climb on the way: other regimes know more about those.
-        try:
-            better = below.take(plan_band(problem, tell, begun).path.points)
-        except Refusal:
-            better = False
-        if better:
-            below.tighten()
+    tighten(below)
     if below.search_small():
-        below.tighten()
+        tighten(below)
     return below.solution()
 
 

@@ -93,6 +93,7 @@ class Plane:
         excess = np.full((rows, cols), np.inf)
         floor, under_m, fine_x, fine_y = (np.empty((rows, cols)) for _ in range(4))
         cells = (rows - 1) * (cols - 1)
+        span = _spans(wanted[part], fineness)
         diagonal = np.zeros(cells, np.int8)
         climbs = np.array([] if low or cones is None else cones).reshape(-1, 4)
         more = limits.min_agl_m + limits.altitude_error_m
@@ -141,14 +142,14 @@ class Plane:
         walls = stamp_zones(*laid, low, owner, 0, of, values, 0)
         if len(owner):
             stamp_zones(*laid, low, owner, 1, of, values, walls)
-        piece = np.empty((cells, 2 * of.shape[1]), np.int32)
+        piece = np.full((cells, 2 * of.shape[1]), -1, np.int32)
         block = 1 if single else self.block * fineness
-        count = make_pieces(excess, of, values, diagonal, owner, piece, block)
+        count = make_pieces(excess, of, values, diagonal, owner, span, piece, block)
         room = 2 * count + 1024
         scratch = np.empty(2)
         while True:
             ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
-            n = make_portals(excess, of, values, diagonal, owner, piece, x, y, ends, names, joins, scratch)
+            n = make_portals(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, scratch)
             if n <= room:
                 break
             room = n
@@ -160,8 +161,9 @@ class Plane:
             used, names[corner] = np.unique(names[corner], return_inverse=True)
             named = len(used)
         return Mesh(
-            self, fineness, row, col, excess, floor, diagonal, piece, start, ends[:n], names, joins[:n], order, named
-        )
+            self, fineness, row, col, excess, floor, diagonal, span, piece, start, ends[:n], names, joins[:n], order,
+            named,
+        )  # fmt: skip
 
     def _zones(
         self, low: bool, under: NDArray[np.bool_] | None, over: NDArray[np.bool_] | None
@@ -269,3 +271,10 @@ def _box_of(wanted: NDArray[np.bool_]) -> tuple[int, int, int, int]:
     if not len(rows):
         return 0, 0, 1, 1
     return int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1
+
+
+def _spans(wanted: NDArray[np.bool_], fineness: int) -> Ints:
+    """(rows, 2) of cells cut so many times finer: of each row the first that is wanted, and that after the last."""
+    first, last = wanted.argmax(axis=1), wanted.shape[1] - wanted[:, ::-1].argmax(axis=1)
+    spans = np.stack([first, np.where(wanted.any(axis=1), last, first)], axis=-1) * fineness
+    return np.ascontiguousarray(np.repeat(spans, fineness, axis=0), np.int32)

@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 
 from gcsplan.planners.below import Below
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.tighten import tighten
 
 WALL, ROOM = "#b04a3a", "#2c7fb8"
 
@@ -23,7 +24,7 @@ def draw(problem: Problem) -> Figure:
     """The plane of a problem's first leg: walls below the cap, the path, and the cells that a shorter one may meet."""
     below = Below(problem, time.perf_counter())
     below.look()
-    below.tighten()
+    tighten(below)
     solution = below.solution()
     leg = below.legs[0]
     plane = leg.plane

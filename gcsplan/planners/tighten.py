@@ -1,0 +1,165 @@
+"""Path and bound of a problem brought together: closer looks at what is between them, the cheap ones first.
+
+The bound is raised by asking whether any path is shorter than some length between the two: the tracks that short are
+few, near their ends they can have climbed only so far, and on their way they must climb so much. What is answered with
+no is a bound; else the bound of those that are shorter halves what is left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from gcsplan.planners.below import FAR, PAST, Below
+from gcsplan.planners.caps import Layer, search_caps
+from gcsplan.planners.rising import rise_bound
+
+PAST_FINE, ROUNDS = 9, 2
+"""Tracks past what is in the way that are looked at on the finer lattice; and how often, there and aslant."""
+TWICE, NEAR, FINER = 2.0, 5e-2, 4
+"""From so many times the wanted gap on, and up to which gap, as a part, cells are cut once more, and into how many
+parts a side: for walls and zones that the first lattice rounds off."""
+CLOSER, LEFT, FLAT = 8, 0.05, 0.12
+"""Times that what lies between path and bound is halved, at most, and what part of the gap is not worth it: close to
+the ends a shorter path has less way to climb. How little shorter paths' bounds rise that are taken to rise no more."""
+CLIMBED = (0.98, 0.9, 0.75, 0.5)
+"""What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
+NEARLY = 0.9
+"""What part of what lay between path and bound is left, at most, where a better path makes another bound worth it."""
+NEARER = 0.45
+"""What part of the wanted gap is tried first, and worth a look even where the gap is small enough; a first path that is
+as near is good enough."""
+
+
+def tighten(below: Below) -> None:
+    """Improve path and bound until they are as near as wanted."""
+    if below.gap <= NEARER * below.wanted or not below.in_time():
+        return
+    # Whatever is not longer than the best path must have been looked at.
+    for leg in below.legs:
+        limit = below.limit(leg)
+        if limit > leg.reach_m:
+            leg.flood((limit / leg.length_m - 1.0) * (1.0 + 1e-9))
+    if below.problem.objective == "energy":
+        _tighten_energy(below)
+    else:
+        _tighten_length(below)
+
+
+def _tighten_length(below: Below) -> None:
+    below.try_below(below.top_m, fine=True)
+    if below.gap > FAR:
+        below.past(PAST, fine=False)
+    if not below.done() and (below.in_space or below.is_steep()):
+        below.raise_bound(_search_caps(below, lambda layer: math.hypot(layer.track_m, below.rise(layer.low_m))))
+    _halve(below)
+    for _ in range(ROUNDS):
+        before = below.cost - below.bound
+        if below.done() or not below.past(PAST_FINE, fine=True):
+            break
+        if below.cost - below.bound < NEARLY * before:
+            _halve(below)
+    for _ in range(ROUNDS):
+        if not _traverse(below):
+            break
+        _halve(below)
+    far = below.gap > TWICE * below.wanted and below.in_time()
+    if far and sum(leg.part_sheets(below.limit(leg)) for leg in below.legs):
+        _halve(below)
+    far = not below.in_space and TWICE * below.wanted < below.gap <= NEAR and below.in_time()
+    if far and sum(leg.look_closer(below.limit(leg), FINER) for leg in below.legs):
+        below.try_below(below.top_m, fine=True)
+        _halve(below)
+
+
+def _tighten_energy(below: Below) -> None:
+    p = below.problem
+
+    def least(layer: Layer) -> float:
+        return layer.cost(below.rise, p.vertical_j_per_m, p.horizontal_j_per_m)
+
+    below.try_below(below.top_m, fine=True)
+    below.raise_bound(_search_caps(below, least))
+    for _ in range(ROUNDS):
+        if not _traverse(below):
+            break
+        below.raise_bound(_search_caps(below, least))
+
+
+def _traverse(below: Below) -> bool:
+    """Look for a path that climbs slopes aslant, if path and bound are far apart; True if it is the best so far."""
+    if below.best is None or below.gap <= FAR or not below.climbs() or not below.in_time():
+        return False
+    from gcsplan.planners.traverse import pulled_tight, traverse  # few missions need it
+
+    before, found = below.cost, traverse(below.problem, below.longest())
+    if found is not None:
+        below.take_longer(found, fine=True)
+    tight = pulled_tight(below.problem, below.best, below.begun_s + below.problem.budget_s)
+    if tight is not None:
+        below.take_simpler(*tight, fine=True, longer=True)
+    return below.cost < before
+
+
+def _halve(below: Below) -> None:
+    """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""
+    low, high, before, flat = below.bound, below.cost, 0.0, False
+    for k in range(CLOSER):
+        nearer = below.cost / (1.0 + NEARER * below.wanted)
+        enough = low >= nearer if k == 0 else below.done()
+        if enough or high - low < max(2e-5 * low, LEFT * (below.cost - low)) or not below.in_time():
+            break
+        # No path is shorter than `low`; is any shorter than `middle`?
+        middle = max(low + (FLAT if flat else 0.5) * (high - low), nearer if k == 0 else 0.0)
+        found = _bound_shorter(below, middle)
+        flat = k > 0 and found < min(middle, before + FLAT * (high - middle))
+        if found < middle:
+            high, before = middle, found  # the bound of shorter paths is higher; where it hardly is, they are close
+        low = max(low, min(found, middle))
+        below.raise_bound(low)
+
+
+def _bound_shorter(below: Below, longest_m: float) -> float:
+    """A bound of all paths shorter than ``longest_m``: their tracks on the fine lattice, then what they climb."""
+    most_m = _longest_track(below, longest_m)
+    spare = most_m - sum(leg.length_m for leg in below.legs)
+    tracks = []
+    for leg in below.legs:
+        limit = leg.length_m + spare
+        wanted = leg.corridor(limit)
+        tracks.append(leg.bound(below.top_m, wanted, limit, True))
+    # Each leg's limit is what the others leave, which is less now that they are known better.
+    spare = max(most_m - sum(tracks), 0.0)
+    return rise_bound(below.legs, tracks, [track + spare for track in tracks])
+
+
+def _longest_track(below: Below, longest_m: float) -> float:
+    """No track of a path shorter than ``longest_m`` is longer than this, for it must climb as well."""
+    if len(below.legs) > 1:
+        return longest_m
+    climbing = rise_bound(below.legs, [longest_m], [longest_m]) - longest_m
+    for part in CLIMBED:
+        shorter = max(longest_m - part * climbing, below.legs[0].length_m)
+        if rise_bound(below.legs, [shorter], [longest_m]) >= longest_m:
+            return shorter
+    return longest_m
+
+
+def _search_caps(below: Below, cost_of: Callable[[Layer], float]) -> float:
+    """Look below lower caps for what climbs less; the bound of all caps, given that of a layer."""
+    tried: set[float] = set()
+
+    def track_m(cap: float, care: int) -> float:
+        limits = [below.limit(leg) for leg in below.legs]
+        wanted = [leg.corridor(limit) if care else None for leg, limit in zip(below.legs, limits, strict=True)]
+        looked_at = zip(below.legs, wanted, limits, strict=True)
+        return sum(leg.bound(cap, cells, limit, care > 0) for leg, cells, limit in looked_at)
+
+    def try_at(cap: float) -> None:
+        if round(cap, 1) not in tried:
+            tried.add(round(cap, 1))
+            if below.try_below(cap, fine=False):
+                below.try_below(cap, fine=True)
+
+    layers = [Layer(max(below.known_m), below.top_m, sum(leg.length_m for leg in below.legs))]
+    return search_caps(layers, cost_of, track_m, lambda: below.cost, try_at, below.wanted, below.in_time)

@@ -1,0 +1,94 @@
+"""Slopes that are climbed aslant, because a zone a few metres up lets nobody do it otherwise."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcsplan.planners import optimal
+from gcsplan.planners.band import _sides, pulled
+from gcsplan.planners.below import Below
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.routes import LEVELS
+from gcsplan.planners.traverse import traverse
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.path import Path
+from gcsplan.world.zones import Circle, Level, Zone
+from tests.planner_worlds import Floats, faults, ground
+
+SLOPE, ROOM_M = 0.35, 15.0
+LIMIT = Limits(10.0, max_climb_deg=math.degrees(math.atan(0.2)), max_descent_deg=math.degrees(math.atan(0.2)))
+LID = Zone("lid", Circle(1000.0, 1000.0, 3000.0), Level(10.0 + ROOM_M, "agl"))
+
+
+def hill(east_m: Floats, _north_m: Floats) -> Floats:
+    """Level, then steeper than the climb limit from 700 to 1100 m, then level."""
+    return SLOPE * np.clip(east_m - 700.0, 0.0, 400.0)
+
+
+def under_a_lid() -> Problem:
+    """From west to east, no more than 15 m over the lowest that may be flown."""
+    return Problem(
+        Airspace(ground(hill), [LID]),
+        LIMIT,
+        (200.0, 1000.0, 15.0),
+        (1800.0, 1000.0, SLOPE * 400.0 + 15.0),
+        budget_s=5.0,
+    )
+
+
+@pytest.mark.parametrize("objective", ["length", "energy"])
+def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
+    p = under_a_lid()
+    p = replace(p, objective="energy" if objective == "energy" else "length")
+    solution = optimal.plan(p)
+    points = solution.path.points
+    assert faults(p, solution.path) == []
+    # What is climbed between the foot and the top of the slope takes five times as much way.
+    rise_m = SLOPE * 400.0 - ROOM_M
+    track_m = float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
+    least_m = 1200.0 + 5.0 * rise_m
+    assert least_m <= track_m <= 1.05 * least_m
+    assert solution.lower_bound is not None
+    assert solution.lower_bound <= p.cost(solution.path)
+
+
+def test_no_track_is_given_where_none_is_as_short() -> None:
+    assert traverse(under_a_lid(), 1605.0) is None
+    assert traverse(under_a_lid(), 2200.0) is not None
+
+
+def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> None:
+    # More room over the zone than under it; a path that dives under it all the same.
+    gentle = Limits(10.0, max_amsl_m=400.0, max_climb_deg=45.0, max_descent_deg=45.0)
+    zone = Zone("storey", Circle(1000.0, 1000.0, 250.0), Level(40.0, "amsl"), Level(100.0, "amsl"))
+    p = Problem(Airspace(ground(0.0), [zone]), gentle, (200.0, 1000.0, 80.0), (1800.0, 1000.0, 80.0))
+    under = np.array([[200.0, 1000.0, 80.0], [600.0, 1100.0, 30.0], [1400.0, 1100.0, 30.0], [1800.0, 1000.0, 80.0]])
+    over = under.copy()
+    over[1:3, 2] = 120.0
+    ends, free = np.array([True, False, False, True]), np.full(4, np.nan)
+    for path, side in ((under, False), (over, True)):
+        assert faults(p, Path(path)) == []
+        assert _sides(p, path, ends, free) == {0: side}
+        better = pulled(p, path, LEVELS[0], time.perf_counter() + 5.0)
+        assert better is not None
+        assert faults(p, Path(better)) == []
+        assert p.cost(Path(better)) < p.cost(Path(path))
+        middle_m = np.interp(1000.0, better[:, 0], better[:, 2])
+        assert (middle_m >= 100.0) == side
+
+
+def test_tracks_that_are_flown_aslant_are_looked_for_where_the_bound_is_far() -> None:
+    p = under_a_lid()
+    below = Below(p, time.perf_counter())
+    below.look()
+    found = traverse(p, 2200.0)
+    assert found is not None
+    below.take_longer(found, fine=True)
+    assert below.best is not None
+    assert faults(p, Path(below.best)) == []
