@@ -12,11 +12,9 @@ from gcsplan.planners.lattice import LINK_DOORS, STEPS, Lattice, Links, gaps, ma
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.search import Label, search
 from gcsplan.planners.taut_string import Profile, taut_string
-from gcsplan.planners.tubes import cut, join
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Level, Zone
-from tests.planner_worlds import FIELD, Floats, ground, jacksboro
+from tests.planner_worlds import Floats, ground
 
 STEP_M = 10.0
 SIDE = 3
@@ -25,14 +23,17 @@ Doors = list[tuple[float, float, float]]  # run since the last door, low, high
 
 
 def small_lattice(seed: int) -> Lattice:
-    """Three by three nodes, rough ground, a wandering ceiling, some edges with a forbidden band."""
+    """Three by three nodes, rough ground, a wandering ceiling, some edges with forbidden bands."""
     rng = np.random.default_rng(seed)
     n = 2 * SIDE - 1
     floor = rng.uniform(0.0, 12.0, (n, n))
     ceiling = floor + rng.uniform(1.0, 12.0, (n, n))
     floor[rng.random((n, n)) < 0.05] = np.inf
-    edges = np.sort(rng.choice(NODES * 8, 20, replace=False))
-    low = rng.uniform(0.0, 15.0, 20)
+    ground_m = rng.uniform(-4.0, 4.0, (n, n))
+    edges, low, agl = rng.integers(0, NODES * 8, 24), rng.uniform(0.0, 15.0, 24), rng.random((24, 2)) < 0.3
+    j, i = np.divmod(edges // 8, SIDE)
+    order = np.lexsort((low + agl[:, 0] * ground_m[2 * j, 2 * i], edges))
+    edges, low, agl = edges[order], low[order], agl[order]
     at = np.zeros(NODES * 8 + 1, np.int64)
     np.cumsum(np.bincount(edges, minlength=NODES * 8), out=at[1:])
     return Lattice(
@@ -43,10 +44,11 @@ def small_lattice(seed: int) -> Lattice:
         ny=SIDE,
         floor_m=floor,
         ceiling_m=ceiling,
+        ground_m=ground_m,
         band_at=at,
         band_low=low,
-        band_high=low + rng.uniform(0.5, 10.0, 20),
-        band_zone=np.zeros(20, np.int64),
+        band_high=low + rng.uniform(0.5, 10.0, 24),
+        band_agl=agl,
         reach_m=0.0,
     )
 
@@ -57,7 +59,10 @@ def link(node: int) -> Links:
     return Links(np.array([node]), np.array([1.0]), np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
-def edges_from(lattice: Lattice, node: int) -> list[tuple[int, float, Doors, list[tuple[float, float]]]]:
+Gap = tuple[Floats, Floats]  # low and high at each door
+
+
+def edges_from(lattice: Lattice, node: int) -> list[tuple[int, float, Doors, list[Gap]]]:
     """(to, length, doors, gaps) of every edge, written out from the lattice's own description."""
     x, y = node % SIDE, node // SIDE
     out = []
@@ -68,7 +73,7 @@ def edges_from(lattice: Lattice, node: int) -> list[tuple[int, float, Doors, lis
         to = (y + dy) * SIDE + x + dx
         length = STEP_M * math.hypot(dx, dy)
         fractions = (0.0, 0.5, 1.0) if k < 4 else (0.0, 0.25, 0.5, 0.75, 1.0)
-        doors = []
+        doors, grounds = [], []
         for f, g in zip(fractions, (0.0, *fractions), strict=False):
             # Half-lattice places are whole numbers, or lie in the middle of two side by side.
             px, py = 2 * x + 2 * dx * f, 2 * y + 2 * dy * f
@@ -76,21 +81,31 @@ def edges_from(lattice: Lattice, node: int) -> list[tuple[int, float, Doors, lis
             low = sum(lattice.floor_m[j, i] for i, j in corners) / len(corners)
             high = sum(lattice.ceiling_m[j, i] for i, j in corners) / len(corners)
             doors.append(((f - g) * length, low, high))
+            grounds.append(sum(lattice.ground_m[j, i] for i, j in corners) / len(corners))
         edge = (node if sign > 0 else to) * 8 + k
         span = slice(lattice.band_at[edge], lattice.band_at[edge + 1])
-        bands = list(zip(lattice.band_low[span].tolist(), lattice.band_high[span].tolist(), strict=True))
-        out.append((to, length, doors, gaps(bands)))
+        under = np.array(grounds[::sign])  # bands are in order where the edge begins
+        bands = [
+            (low + agl[0] * under, high + agl[1] * under)
+            for low, high, agl in zip(
+                lattice.band_low[span], lattice.band_high[span], lattice.band_agl[span], strict=True
+            )
+        ]
+        ways = (
+            [(low[::sign], high[::sign]) for low, high in gaps(bands)] if bands else [(under - np.inf, under + np.inf)]
+        )
+        out.append((to, length, doors, ways))
     return out
 
 
-def legal(parts: list[tuple[Doors, tuple[float, float]]], z0: float, z1: float, slope: float) -> bool:
+def legal(parts: list[tuple[Doors, Gap]], z0: float, z1: float, slope: float) -> bool:
     """Is there a profile through all doors, edge after edge, each within its gap?"""
     s, low, high = [0.0], [z0], [z0]
     at = 1.0
     for doors, (under, over) in parts:
-        for run, lo, hi in doors:
+        for (run, lo, hi), least, most in zip(doors, under.tolist(), over.tolist(), strict=True):
             at += run
-            lo, hi = max(lo, under), min(hi, over)
+            lo, hi = max(lo, least), min(hi, most)
             if at == s[-1]:
                 low[-1], high[-1] = max(low[-1], lo), min(high[-1], hi)
             else:
@@ -106,11 +121,9 @@ def legal(parts: list[tuple[Doors, tuple[float, float]]], z0: float, z1: float, 
 def cheapest(lattice: Lattice, z0: float, z1: float, slope: float) -> float:
     """Length of the shortest legal simple path from node 0 to the last, by trying all of them, shortest first."""
     around = [edges_from(lattice, k) for k in range(NODES)]
-    paths: list[tuple[float, list[tuple[Doors, list[tuple[float, float]]]]]] = []
+    paths: list[tuple[float, list[tuple[Doors, list[Gap]]]]] = []
 
-    def walk(
-        node: int, seen: frozenset[int], length: float, parts: list[tuple[Doors, list[tuple[float, float]]]]
-    ) -> None:
+    def walk(node: int, seen: frozenset[int], length: float, parts: list[tuple[Doors, list[Gap]]]) -> None:
         if node == NODES - 1:
             paths.append((length, parts))
             return
@@ -206,39 +219,19 @@ def test_cap_keeps_the_way_under_it() -> None:
 
 
 def test_gaps_between_bands() -> None:
-    assert gaps([]) == [(-math.inf, math.inf)]
-    assert gaps([(5.0, 9.0), (2.0, 6.0)]) == [(-math.inf, 2.0), (9.0, math.inf)]
-    assert gaps([(-math.inf, 9.0)]) == [(9.0, math.inf)]
-    assert gaps([(-math.inf, math.inf)]) == []
-    assert gaps([(1.0, 4.0), (4.0, 6.0)]) == [(-math.inf, 1.0), (4.0, 4.0), (6.0, math.inf)]
+    def left(*bands: tuple[float, float]) -> list[tuple[float, float]]:
+        found = gaps([(np.full(2, low), np.full(2, high)) for low, high in bands])
+        return [(float(low[0]), float(high[0])) for low, high in found]
+
+    assert left() == [(-math.inf, math.inf)]
+    assert left((5.0, 9.0), (2.0, 6.0)) == [(-math.inf, 2.0), (9.0, math.inf)]
+    assert left((-math.inf, 9.0)) == [(9.0, math.inf)]
+    assert left((-math.inf, math.inf)) == []
+    assert left((1.0, 4.0), (4.0, 6.0)) == [(-math.inf, 1.0), (4.0, 4.0), (6.0, math.inf)]
 
 
-def test_cut_and_joined_tube_is_the_tube() -> None:
-    zones = (
-        Zone("over", Circle(500.0, 0.0, 400.0), None, Level(100.0, "agl")),
-        Zone("under", Circle(1200.0, 0.0, 500.0), Level(90.0, "amsl"), None),
-    )
-    air = Airspace(jacksboro(), zones)
-    whole = air.tube(np.array([[-800.0, 100.0], [700.0, -50.0], [2500.0, 300.0]]), FIELD)
-    length = float(whole.s_m[-1])
-    rng = np.random.default_rng(3)
-    for _ in range(50):
-        places = np.concatenate([[0.0], np.sort(rng.uniform(0.0, length, 3)), [length]])
-        parts = [cut(whole, a, b) for a, b in pairwise(places)]
-        again = join([p for p in parts if p is not None])
-        assert again.s_m[-1] == pytest.approx(length)
-        for s in rng.uniform(0.0, length, 20):
-            for name in ("floor_m", "ceiling_m"):
-                assert _at(again.s_m, getattr(again, name), s) == pytest.approx(_at(whole.s_m, getattr(whole, name), s))
-        assert [b.zone for b in again.bands] == [b.zone for b in whole.bands]
-        for a, b in zip(again.bands, whole.bands, strict=True):
-            assert (a.s0_m, a.s1_m) == pytest.approx((b.s0_m, b.s1_m))
-            s = rng.uniform(b.s0_m, b.s1_m)
-            assert _at(a.s_m, a.top_m, s) == pytest.approx(_at(b.s_m, b.top_m, s))
-            assert _at(a.s_m, a.bottom_m, s) == pytest.approx(_at(b.s_m, b.bottom_m, s))
-
-
-def _at(s_m: Floats, value: Floats, s: float) -> float:
-    k = int(np.clip(np.searchsorted(s_m, s, "right") - 1, 0, len(value) - 1))
-    a, b = value[k]
-    return float(a) if a == b else float(a + (b - a) * (s - s_m[k]) / (s_m[k + 1] - s_m[k]))
+def test_a_gap_must_be_open_at_every_door() -> None:
+    level, falling = (np.array([5.0, 5.0]), np.array([8.0, 8.0])), (np.array([9.0, 2.0]), np.array([12.0, 7.0]))
+    (under, low), (above, over) = gaps([falling, level])
+    assert (under.tolist(), low.tolist()) == ([-math.inf, -math.inf], [5.0, 2.0])
+    assert (above.tolist(), over.tolist()) == ([12.0, 8.0], [math.inf, math.inf])

@@ -12,6 +12,7 @@ import pytest
 from gcsplan.planners import optimal
 from gcsplan.planners.band import _sides, pulled
 from gcsplan.planners.below import Below
+from gcsplan.planners.guide import make_guide
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.routes import LEVELS
 from gcsplan.planners.traverse import traverse
@@ -58,9 +59,11 @@ def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
     assert solution.lower_bound <= p.cost(solution.path)
 
 
-def test_no_track_is_given_where_none_is_as_short() -> None:
-    assert traverse(under_a_lid(), 1605.0) is None
-    assert traverse(under_a_lid(), 2200.0) is not None
+def test_the_track_over_the_lattice_has_way_enough_to_climb() -> None:
+    found = traverse(under_a_lid(), 2200.0)
+    assert found is not None
+    track_m = float(np.hypot(*np.diff(found[0], axis=0).T).sum())
+    assert 1200.0 + 5.0 * (SLOPE * 400.0 - ROOM_M) <= track_m <= 2200.0
 
 
 def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> None:
@@ -79,8 +82,10 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
         assert better is not None
         assert faults(p, Path(better)) == []
         assert p.cost(Path(better)) < p.cost(Path(path))
-        middle_m = np.interp(1000.0, better[:, 0], better[:, 2])
-        assert (middle_m >= 100.0) == side
+        guide = make_guide(p, [path[:, :2]], 300.0, {0: side})
+        row, col = round((1000.0 - guide.south_m) / guide.step_m), round((1000.0 - guide.west_m) / guide.step_m)
+        room = guide.floor_m[row, col], guide.ceiling_m[row, col]
+        assert room == pytest.approx((100.0, 400.0) if side else (10.0, 40.0))
 
 
 def test_tracks_that_are_flown_aslant_are_looked_for_where_the_bound_is_far() -> None:

@@ -19,7 +19,7 @@ BESIDE = 5
 FROM_END = -1
 """In place of the node that a node was reached from in a straight line."""
 LONG = 40.0
-"""Cells from where on a straight way goes on from the node that it has come to: most of the work is to look along it."""
+"""Cells after which a straight way goes on from the node it has come to: most of the work is to look along it."""
 SHUT = 3
 """What is known of a node that lies in a wall."""
 

@@ -89,8 +89,8 @@ def farther(a, b, low, high):  # type: ignore[no-untyped-def]
 
 
 @device
-def doors_of(x, y, dx, dy, k, floor, ceiling, step, door):  # type: ignore[no-untyped-def]
-    """Doors (run, low, high) of the edge from node (x, y) by (dx, dy), kind ``k``; their number."""
+def doors_of(x, y, dx, dy, k, floor, ceiling, ground, step, door):  # type: ignore[no-untyped-def]
+    """Doors (run, low, high, ground) of the edge from node (x, y) by (dx, dy), kind ``k``; their number."""
     hx, hy = 2 * x, 2 * y
     flat = math.sqrt(float(dx * dx + dy * dy)) * step
     count = 3 if k < 4 else 5
@@ -99,7 +99,7 @@ def doors_of(x, y, dx, dy, k, floor, ceiling, step, door):  # type: ignore[no-un
         if count == 3 or q % 2 == 0:
             part = q if count == 3 else q // 2
             j, i = hy + part * dy, hx + part * dx
-            door[q, 1], door[q, 2] = floor[j, i], ceiling[j, i]
+            door[q, 1], door[q, 2], door[q, 3] = floor[j, i], ceiling[j, i], ground[j, i]
         else:
             # A quarter of the way lies between two half-lattice points, side by side across the short step.
             px, py = hx + (q // 2) * dx, hy + (q // 2) * dy
@@ -109,6 +109,7 @@ def doors_of(x, y, dx, dy, k, floor, ceiling, step, door):  # type: ignore[no-un
                 ax, ay, bx, by = px, py + dy // 2, px + dx, py + dy // 2
             door[q, 1] = 0.5 * (floor[ay, ax] + floor[by, bx])
             door[q, 2] = 0.5 * (ceiling[ay, ax] + ceiling[by, bx])
+            door[q, 3] = 0.5 * (ground[ay, ax] + ground[by, bx])
     return count
 
 
@@ -146,19 +147,19 @@ def admit(to, v, value, name, first, held, most, told):  # type: ignore[no-untyp
 
 
 @kernel(
-    "f8[,] f8[,] i8[,] i8[] f8[] f8[] i8[] i8[] f8[] f8[,] f8[,] f8[] i8 i8 i8 i8[] i8[,] f8[,] f8[] i8[] i8[] i8[]"
-    " i8[] f8[] f8[,]"
+    "f8[,] f8[,] f8[,] i8[,] i8[] f8[] f8[] b1[,] i8[] i8[] f8[] f8[,] f8[,] f8[] i8 i8 i8 i8[] i8[,] f8[,] f8[] i8[]"
+    " i8[] i8[] i8[] f8[] f8[,]"
 )
 def reach(  # type: ignore[no-untyped-def]
-    floor, ceiling, steps, band_at, band_low, band_high, link_at, link_to, link_length, link_low, link_high,
-    told, want, most_opened, most_held, state, name, value, keys, ids, first, held, goals, v, door,
+    floor, ceiling, ground, steps, band_at, band_low, band_high, band_agl, link_at, link_to, link_length, link_low,
+    link_high, told, want, most_opened, most_held, state, name, value, keys, ids, first, held, goals, v, door,
 ):  # fmt: skip
     """Search until ``want`` labels have reached the goal; `DONE`, or `SHORT` where there must be more room to go on.
 
-    ``floor``, ``ceiling`` (2·ny - 1, 2·nx - 1) on the half lattice; ``steps`` (8, 2); ``band_*``, see `Lattice`;
-    ``link_*``: of the terminals, by source (nodes, start, goal). ``told``, ``state``: by the names above. ``name``
-    (room, 4) and ``value`` (room, 5): the labels; ``keys``, ``ids`` (room,): the heap; ``first``, ``held``
-    (nodes + 2,): each node's labels; ``goals`` (want,). ``v`` (5,) and ``door`` (16, 3): room to work in.
+    ``floor``, ``ceiling``, ``ground`` (2·ny - 1, 2·nx - 1) on the half lattice; ``steps`` (8, 2); ``band_*``: see
+    `Lattice`; ``link_*``: of the terminals, by source (nodes, start, goal). ``told``, ``state``: by the names above.
+    ``name`` (room, 4) and ``value`` (room, 5): the labels; ``keys``, ``ids`` (room,): the heap; ``first``, ``held``
+    (nodes + 2,): each node's labels; ``goals`` (want,). ``v`` (5,) and ``door`` (16, 4): room to work in.
     """
     nx, ny = (floor.shape[1] + 1) // 2, (floor.shape[0] + 1) // 2
     nodes = nx * ny
@@ -198,7 +199,7 @@ def reach(  # type: ignore[no-untyped-def]
                 to = j * nx + i
                 edge = (node if sign > 0 else to) * 8 + k
                 b0, b1 = band_at[edge], band_at[edge + 1]
-                doors = doors_of(x, y, dx, dy, k, floor, ceiling, told[STEP], door)
+                doors = doors_of(x, y, dx, dy, k, floor, ceiling, ground, told[STEP], door)
                 length = math.sqrt(float(dx * dx + dy * dy)) * told[STEP]
             else:
                 link = link_at[node] + m - moves
@@ -215,22 +216,21 @@ def reach(  # type: ignore[no-untyped-def]
             else:
                 door[doors, 0], door[doors, 1], door[doors, 2] = 0.0, told[GOAL_LOW], told[GOAL_HIGH]
                 doors += 1
-            # Each gap between the edge's bands is a way of its own.
-            under = -math.inf
+            # Over some of the edge's bands and under the others is a way of its own.
             for b in range(b0, b1 + 1):
-                over = band_low[b] if b < b1 else math.inf
-                is_open = over >= under and under < math.inf and over > -math.inf
-                top = over if over < told[CAP] else told[CAP]
                 for q in range(5):
                     v[q] = value[item, q]
                 v[COST] += length
+                is_open = True
                 for q in range(doors):
-                    if is_open:
-                        low = under if under > door[q, 1] else door[q, 1]
-                        high = top if top < door[q, 2] else door[q, 2]
-                        is_open = through(v, door[q, 0], low, high, told)
-                if b < b1 and band_high[b] > under:
-                    under = band_high[b]
+                    low, high = door[q, 1], told[CAP] if told[CAP] < door[q, 2] else door[q, 2]
+                    for c in range(b0, b):
+                        top = band_high[c] + (door[q, 3] if band_agl[c, 1] else 0.0)
+                        low = top if top > low else low
+                    for c in range(b, b1):
+                        bottom = band_low[c] + (door[q, 3] if band_agl[c, 0] else 0.0)
+                        high = bottom if bottom < high else high
+                    is_open = is_open and through(v, door[q, 0], low, high, told)
                 if not is_open:
                     continue
                 stays = admit(to, v, value, name, first, held, most_held, told) if count < len(keys) else -1

@@ -38,8 +38,9 @@ LINK_DOORS = 9
 class Lattice:
     """Node (i, j) lies at (west_m + i·step_m, south_m + j·step_m) and has the number ``j·nx + i``.
 
-    ``floor_m``, ``ceiling_m`` (2·ny − 1, 2·nx − 1): AMSL on the half lattice. Bands (altitudes that a zone forbids
-    on an edge, from ``band_low`` to ``band_high``) of edge e stand at ``band_at[e] : band_at[e + 1]``, low first.
+    ``floor_m``, ``ceiling_m``, ``ground_m`` (2·ny − 1, 2·nx − 1): AMSL on the half lattice, the ground only where a
+    zone asks for it. Bands (altitudes that a zone forbids on an edge, from ``band_low`` to ``band_high``; ``band_agl``
+    (B, 2) which of the two are over ground) of edge e stand at ``band_at[e] : band_at[e + 1]``, low first.
     """
 
     west_m: float
@@ -49,10 +50,11 @@ class Lattice:
     ny: int
     floor_m: Floats
     ceiling_m: Floats
+    ground_m: Floats
     band_at: Ints
     band_low: Floats
     band_high: Floats
-    band_zone: Ints
+    band_agl: NDArray[np.bool_]
     reach_m: float
 
     def node_places(self, nodes: Ints) -> Floats:
@@ -96,10 +98,27 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
     floor[jj, ii] = air.floor_amsl(x[ii], y[jj], limits)
     ceiling[jj, ii] = air.ceiling_amsl(x[ii], y[jj], limits)
     reach = air.beside_m(limits)
-    edges, lows, highs, zones = _edge_bands(air, limits, reach, west, south, step_m, nx, ny)
+    ground = _ground_of_zones(problem, x, y, wanted, reach + 2.0 * step_m)
+    edges, low, high, agl = _edge_bands(air, limits, reach, west, south, step_m, ground)
     at = np.zeros(nx * ny * 8 + 1, np.int64)
     np.cumsum(np.bincount(edges, minlength=nx * ny * 8), out=at[1:])
-    return Lattice(west, south, step_m, nx, ny, floor, ceiling, at, lows, highs, zones, reach)
+    return Lattice(west, south, step_m, nx, ny, floor, ceiling, ground, at, low, high, agl, reach)
+
+
+def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: NDArray[np.bool_], beside_m: float) -> Floats:
+    """The ground where it is ``wanted`` and a zone with a level over ground may come near; 0 elsewhere."""
+    asked = np.zeros(wanted.shape, np.bool_)
+    for zone in problem.airspace.zones:
+        if any(isinstance(level, Level) and level.datum == "agl" for level in (zone.floor, zone.ceiling)):
+            w, s, e, n = zone.bounds
+            cols = slice(*np.searchsorted(x, (w - beside_m, e + beside_m)))
+            rows = slice(*np.searchsorted(y, (s - beside_m, n + beside_m)))
+            asked[rows, cols] = wanted[rows, cols]
+    ground = np.zeros(wanted.shape)
+    jj, ii = np.nonzero(asked)
+    # Where the ground is unknown nobody flies, whatever zones there are.
+    ground[jj, ii] = _known(problem.airspace.surface.ground_at(x[ii], y[jj]), 0.0)
+    return ground
 
 
 def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_m: float) -> NDArray[np.bool_]:
@@ -119,11 +138,13 @@ def terminals(problem: Problem) -> list[tuple[float, float]]:
 
 
 def _edge_bands(
-    air: Airspace, limits: Limits, reach: float, west: float, south: float, step: float, nx: int, ny: int
-) -> tuple[Ints, Floats, Floats, Ints]:
-    """Every (edge, low, high, zone) of every zone, by edge and then by low."""
-    edges, lows, highs, zones = [], [], [], []
-    for number, zone in enumerate(air.zones):
+    air: Airspace, limits: Limits, reach: float, west: float, south: float, step: float, ground: Floats
+) -> tuple[Ints, Floats, Floats, NDArray[np.bool_]]:
+    """Every (edge, low, high, which of them are over ground) of every zone, by edge and then by low."""
+    ny, nx = (ground.shape[0] + 1) // 2, (ground.shape[1] + 1) // 2
+    edges: list[Ints] = []
+    levels: list[Floats] = []
+    for zone in air.zones:
         w, s, e, n = zone.bounds
         far = reach + 2.0 * step
         i0, i1 = max(0, math.floor((w - far - west) / step)), min(nx - 1, math.ceil((e + far - west) / step))
@@ -136,17 +157,26 @@ def _edge_bands(
         a = np.stack([west + i * step, south + j * step], axis=-1)
         b = np.stack([west + ends_i * step, south + ends_j * step], axis=-1)
         hit = np.flatnonzero(inside & near_zone(a, b, zone, reach, air.scale))
-        if len(hit):
-            low, high = zone_levels(air, limits, zone, a[hit], b[hit])
-            edges.append((j[hit] * nx + i[hit]) * 8 + k[hit])
-            lows.append(low)
-            highs.append(high)
-            zones.append(np.full(len(hit), number))
+        edges.append((j[hit] * nx + i[hit]) * 8 + k[hit])
+        levels.append(np.repeat(_levels(limits, zone)[None], len(hit), axis=0))
     if not edges:
-        return np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0, np.int64)
-    edge, low, high = np.concatenate(edges), np.concatenate(lows), np.concatenate(highs)
-    order = np.lexsort((low, edge))
-    return edge[order], low[order], high[order], np.concatenate(zones)[order]
+        return np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros((0, 2), np.bool_)
+    edge, level = np.concatenate(edges), np.concatenate(levels)
+    row, col = np.divmod(edge // 8, nx)
+    order = np.lexsort((level[:, 0] + level[:, 2] * ground[2 * row, 2 * col], edge))
+    low, high, agl = (np.ascontiguousarray(level[order, c]) for c in (0, 1, slice(2, 4)))
+    return edge[order], low, high, agl > 0.0
+
+
+def _levels(limits: Limits, zone: Zone) -> Floats:
+    """(4,) lowest and highest altitude that a zone forbids, errors added; and of each 1 if it is over ground."""
+    out = np.array([-np.inf, np.inf, 0.0, 0.0])
+    for k, (level, error) in enumerate(
+        ((zone.floor, -limits.altitude_error_m), (zone.ceiling, limits.altitude_error_m))
+    ):
+        if level is not None:
+            out[k], out[k + 2] = level.value_m + error, level.datum == "agl"
+    return out
 
 
 def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) -> NDArray[np.bool_]:
@@ -218,13 +248,18 @@ def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float], a
     air, limits = problem.airspace, problem.limits
     low = np.asarray(air.floor_amsl(at[..., 0], at[..., 1], limits))
     high = np.asarray(air.ceiling_amsl(at[..., 0], at[..., 1], limits))
-    bands: list[list[tuple[float, float]]] = [[] for _ in node]
+    bands: list[list[tuple[Floats, Floats]]] = [[] for _ in node]
+    ground: Floats | None = None
     for zone in air.zones:
         hit = np.flatnonzero(near_zone(a, b, zone, lattice.reach_m, air.scale))
-        if len(hit):
-            bottom, top = zone_levels(air, limits, zone, a[hit], b[hit])
-            for row, lo, hi in zip(hit, bottom, top, strict=True):
-                bands[row].append((float(lo), float(hi)))
+        if not len(hit):
+            continue
+        bottom, top, *agl = _levels(limits, zone)
+        if any(agl) and ground is None:
+            ground = _known(air.surface.ground_at(at[..., 0], at[..., 1]), 0.0)
+        for row in hit:
+            under = ground[row] if ground is not None else np.zeros(LINK_DOORS)
+            bands[row].append((bottom + under * agl[0], top + under * agl[1]))
     rows, lows, highs = [], [], []
     for k, found in enumerate(bands):
         for gap_low, gap_high in gaps(found):
@@ -242,13 +277,19 @@ def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float], a
     )
 
 
-def gaps(bands: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """What closed altitude intervals are left between open forbidden ``bands``, from below."""
-    out, low = [], -math.inf
-    for bottom, top in sorted(bands):
-        if bottom > low or (bottom == low and math.isfinite(low)):
-            out.append((low, bottom))
-        low = max(low, top)
-    if low < math.inf:
-        out.append((low, math.inf))
-    return out
+def gaps(bands: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
+    """What closed altitude intervals are left at all of several doors (D,) over some of the forbidden ``bands`` and
+    under the others, from below; the bands in the order in which they begin at the first door."""
+    shape = np.shape(bands[0][0]) if bands else (LINK_DOORS,)
+    order = sorted(bands, key=lambda band: float(np.ravel(band[0])[0]))
+    lows = [np.full(shape, -np.inf)]
+    for _, top in order:
+        lows.append(np.maximum(lows[-1], top))
+    highs = [np.full(shape, np.inf)]
+    for bottom, _ in order[::-1]:
+        highs.append(np.minimum(highs[-1], bottom))
+    return [
+        (low, high)
+        for low, high in zip(lows, highs[::-1], strict=True)
+        if (low <= high).all() and (low < np.inf).all() and (high > -np.inf).all()
+    ]

@@ -136,11 +136,12 @@ def _run(
     state = np.array([n, n, 0, 0, 1], np.int64)
     first, held = np.full(nodes + 2, -1), np.zeros(nodes + 2, np.int64)
     goals = np.zeros(want, np.int64)
-    v, door = np.empty(5), np.empty((LINK_DOORS + 1, 3))
+    v, door = np.empty(5), np.empty((LINK_DOORS + 1, 4))
     while True:
         status = _reach.reach(
-            lattice.floor_m, lattice.ceiling_m, STEPS, lattice.band_at, lattice.band_low, lattice.band_high, *links,
-            told, want, most_opened, LABELS_A_NODE, state, name, value, keys, ids, first, held, goals, v, door,
+            lattice.floor_m, lattice.ceiling_m, lattice.ground_m, STEPS, lattice.band_at, lattice.band_low,
+            lattice.band_high, lattice.band_agl, *links, told, want, most_opened, LABELS_A_NODE, state, name, value,
+            keys, ids, first, held, goals, v, door,
         )  # fmt: skip
         if status == _reach.DONE:
             break

@@ -23,7 +23,7 @@ from gcsplan.planners.routes import LEVELS, Level, Router
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-NODES = 150_000
+NODES = 60_000
 """Of the lattice, about."""
 LARGEST = 1_500_000
 """Nodes of the terrain model, at most: the floor over all of it is worked out, so that it can be read anywhere."""
