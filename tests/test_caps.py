@@ -19,7 +19,7 @@ from gcsplan.planners.below import Below
 from gcsplan.planners.caps import MOST_CAPS, Layer, search_caps
 from gcsplan.planners.leg import End, Leg
 from gcsplan.planners.problem import Objective, Problem, Via
-from gcsplan.planners.rising import _least, floors, rise_bound
+from gcsplan.planners.rising import _least, climb_bound, rise_bound, rooms
 from gcsplan.planners.tighten import tighten
 from gcsplan.planners.track import Flown, fly, make_track
 from gcsplan.world.airspace import Airspace, Legs
@@ -208,7 +208,7 @@ def test_floors_are_never_above_the_ground_that_a_short_track_sees(seed: int) ->
     compared = binding = 0
     for part in (1.001, 1.02, 1.1):
         limit = least * part
-        at, low = floors(leg, least, limit)
+        at, low, _ = rooms(leg, least, limit)
         assert (np.diff(at) > 0.0).all()
         lowest = np.full(len(at), np.inf)
         for track in tracks(problem, rng, 150, 0.1 * math.sqrt(part - 1.0) + 0.02):
@@ -227,9 +227,24 @@ def test_floors_are_never_above_the_ground_that_a_short_track_sees(seed: int) ->
     assert binding >= 1
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_no_path_over_a_short_track_is_shorter_than_the_bound_of_what_it_climbs(seed: int) -> None:
+def storeys(problem: Problem, seed: int, count: int) -> list[Zone]:
+    """Zones one after the other on the straight way, each to be passed over alone, under alone, or both."""
+    rng = np.random.default_rng([seed, 7])
+    a, b = np.array(problem.start[:2]), np.array(problem.goal[:2])
+    out = []
+    for k in range(count):
+        place = a + (k + 1) / (count + 1) * (b - a)
+        ground_m = float(problem.airspace.surface.ground_at(*place[:, None])[0])
+        low, high = Level(rng.uniform(40.0, 90.0), "agl"), Level(ground_m + rng.uniform(100.0, 160.0), "amsl")
+        sides = [(None, high), (low, None), (low, high)][k % 3]
+        out.append(Zone(f"storey {k}", Circle(*place.tolist(), 0.4 * math.dist(a, b) / (count + 1)), *sides))
+    return out
+
+
+@pytest.mark.parametrize(("seed", "zones"), [(0, 0), (1, 0), (2, 0), (0, 2), (1, 2), (2, 2), (0, 5), (1, 5)])
+def test_no_path_over_a_short_track_is_shorter_than_the_bound_of_what_it_climbs(seed: int, zones: int) -> None:
     problem = hills(seed, BARE)
+    problem = replace(problem, airspace=Airspace(problem.airspace.surface, storeys(problem, seed, zones)))
     leg = Leg(problem, End(*problem.start), End(*problem.goal), 700.0)
     leg.flood(0.15)
     rng = np.random.default_rng(seed)
@@ -238,12 +253,13 @@ def test_no_path_over_a_short_track_is_shorter_than_the_bound_of_what_it_climbs(
     assert len(paths) > 20
     climbs = 0
     for part in (1.002, 1.02, 1.12):
-        bound = rise_bound([leg], [least], [least * part])
+        bound, climbed_m = (f([leg], [least], [least * part]) for f in (rise_bound, climb_bound))
         assert bound >= least - 1e-6
         climbs += bound > least * (1.0 + 1e-4)
         for path in paths:
             if path.leg_horizontal_m.sum() <= least * part:
                 assert bound <= path.length_m * (1.0 + 1e-9)
+                assert climbed_m <= np.abs(np.diff(path.points[:, 2])).sum() + 1e-6
     assert climbs >= 1
 
 

@@ -187,6 +187,43 @@ def own_zones(
     return count
 
 
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8[,] f8[,]")
+def narrow_rooms(
+    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, exact: bool, low: Floats,
+    high: Floats,
+) -> None:  # fmt: skip
+    """Raise the lowest, and lower the highest, altitude that can be flown at somewhere in each cell (rows - 1,
+    cols - 1), where zones leave one way past them alone. Where they leave none both are infinite, the wrong way round.
+
+    ``exact``: whether the ground's nodes are the terrain model's own, or a part of its cells'; levels over others are
+    not known.
+    """
+    for _ in range(2):  # what one zone leaves may shut another's way
+        for z in range(len(zones)):
+            under_agl = zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0
+            over_agl = zones[z, TOP] < np.inf and zones[z, TOP_AGL] > 0.0
+            if zones[z, PAIR] > 0.0 or (not exact and (under_agl or over_agl)):
+                continue
+            for j in range(boxes[z, 2], boxes[z, 3] + 1):
+                for i in range(boxes[z, 0], boxes[z, 1] + 1):
+                    bottom, top, inside = -np.inf, np.inf, low[j, i] <= high[j, i]
+                    for k in range(4):
+                        jj, ii = j + (k >> 1), i + (k & 1)
+                        inside = inside and depth(zones, edges, z, x[jj, ii], y[jj, ii]) > 0.0
+                        if not inside:
+                            break
+                        top = min(top, level(zones, z, TOP, ground[jj, ii]))
+                        if zones[z, UNDER] > 0.0:
+                            bottom = max(bottom, level(zones, z, BOTTOM, ground[jj, ii]))
+                    if not inside:
+                        continue
+                    under, over = bottom >= low[j, i], top <= high[j, i]
+                    if not under:
+                        low[j, i] = top if over else np.inf
+                    if not over:
+                        high[j, i] = bottom if under else -np.inf
+
+
 @device
 def _put(of: Ints, sheet: int, values: Floats, cell: int, wall: Floats, count: int) -> int:
     """Give a cell a wall (its corners' values come first), if it stands anywhere; returns how many walls there are."""

@@ -67,13 +67,15 @@ class Corridor:
 class Nearby:
     """What tracks shorter than ``limit_m`` may meet, and how far that is from start and goal.
 
-    Of all cells of the guides' mesh (cells,) the lowest floor, and how long ways there and on are at least.
+    Of all cells of the guides' mesh (cells,) the lowest and the highest altitude that can be flown at, and how long
+    ways there and on are at least.
     """
 
     limit_m: float
     away: Guide
     left: Guide
     low_m: Floats
+    high_m: Floats
     away_m: Floats
     left_m: Floats
 
@@ -282,13 +284,14 @@ class Leg:
         close = self._closer(limit)
         return Corridor(close.away.between(close.left, limit), close.left)
 
-    def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats]:
-        """Of the cells that tracks shorter than ``limit_m`` may meet (and more): lowest floor, ways there and on."""
+    def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Of the cells that tracks shorter than ``limit_m`` may meet (and more): the lowest and the highest altitude
+        that can be flown at, ways there and on."""
         if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that the flood did not
-            return np.full(1, -math.inf), np.zeros(1), np.zeros(1)  # of nothing it is known that it is high
+            return np.full(1, -math.inf), np.full(1, math.inf), np.zeros(1), np.zeros(1)  # of those nothing is known
         close = self._closer(min(limit_m, self.reach_m))
         near = close.left.mesh.of_plane(close.away.between(close.left, limit_m)).ravel()
-        return close.low_m[near], close.away_m[near], close.left_m[near]
+        return close.low_m[near], close.high_m[near], close.away_m[near], close.left_m[near]
 
     def _closer(self, limit_m: float) -> Nearby:
         """A look at each cell alone, for tracks shorter than ``limit_m``; at whole pieces where that is too much."""
@@ -299,7 +302,7 @@ class Leg:
                 mesh = left.mesh
                 ends = (away, self.start), (left, self.goal)
                 ways = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
-                found = Nearby(limit_m, away, left, mesh.lowest(), *ways)
+                found = Nearby(limit_m, away, left, *mesh.plane.rooms(mesh, self.top_m), *ways)
             self._close = found
         return self._close
 
@@ -313,7 +316,7 @@ class Leg:
             away = mesh.flood(a, b, limit_m, math.inf, left)[1]
         except Exhausted:
             return None
-        return Nearby(limit_m, away, left, mesh.lowest(), away.cells(), left.cells())
+        return Nearby(limit_m, away, left, *plane.rooms(mesh, self.top_m), away.cells(), left.cells())
 
     def _finer(self, cells: Bools) -> Bools:
         """The same cells of the finer lattice."""

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gcsplan.planners._cones import hold_down, look_around, walk_around
 from gcsplan.planners._fill import fill
 from gcsplan.planners._mesh import WALL, make_pieces, make_portals, sort_portals
-from gcsplan.planners._stamp import PAIR, TOP, TOP_2, UNDER, UNDER_2, lift_lids, own_zones, stamp_zones
+from gcsplan.planners._stamp import PAIR, TOP, TOP_2, UNDER, UNDER_2, lift_lids, narrow_rooms, own_zones, stamp_zones
 from gcsplan.planners.ground_nodes import nodes, places, slopes
 from gcsplan.planners.mesh import Mesh
 from gcsplan.planners.problem import Problem
@@ -164,6 +164,18 @@ class Plane:
             self, fineness, row, col, excess, floor, diagonal, span, piece, start, ends[:n], names, joins[:n], order,
             named,
         )  # fmt: skip
+
+    def rooms(self, mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
+        """(cells,) the lowest and the highest altitude, ``top_m`` at most, that can be flown at in each cell of a mesh
+        for bounds that is as fine as its plane; the wrong way round where there is none."""
+        rows, cols = mesh.excess.shape
+        low = mesh.lowest().reshape(rows - 1, cols - 1)
+        high = np.full(low.shape, top_m)
+        x, y = mesh.places()
+        ground = np.ascontiguousarray(self.grounds[0][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols])
+        boxes = self._boxes(mesh.row, mesh.col, 1, rows, cols)
+        narrow_rooms(ground, x, y, *self.shapes.low, boxes, self.stride == 1, low, high)
+        return low.ravel(), high.ravel()
 
     def _zones(
         self, low: bool, under: NDArray[np.bool_] | None, over: NDArray[np.bool_] | None

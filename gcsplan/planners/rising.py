@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.leg import Leg
-from gcsplan.planners.taut_string import Profile, taut_string
+from gcsplan.planners.taut_string import Blocked, Profile, taut_string
 
 Floats = NDArray[np.float64]
 
@@ -21,21 +21,21 @@ STEPS = 400
 """Places along a leg at which the floor is looked up."""
 
 
-def floors(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats]:
-    """Places along a leg (M,) and the floor there (M,), for tracks as long as ``track_m`` at least.
+def rooms(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats, Floats]:
+    """Places along a leg (M,), the floor and the ceiling there (M,), for tracks as long as ``track_m`` at least.
 
     Tracks of more than ``limit_m`` are not asked about. A longer track is squeezed into ``track_m`` by moving its
-    points towards its start by what it is longer at most; the floor is the least within that.
+    points towards its start by what it is longer at most; the floor is the least, the ceiling the greatest within that.
     """
-    low, away, left = leg.cells(limit_m)
-    met = np.isfinite(away) & np.isfinite(left)
-    low, away, left = low[met], away[met], left[met]
+    low, high, away, left = leg.cells(limit_m)
+    met = np.isfinite(away) & np.isfinite(left) & (low <= high)
+    low, high, away, left = low[met], high[met], away[met], left[met]
     at = np.linspace(0.0, track_m, STEPS + 1)[1:-1]
     slack = max(limit_m - track_m, 0.0)
     # Place k is in a cell's range from its nearest to its farthest, moved by the slack.
     first = np.searchsorted(at, away - slack, "left")
     last = np.searchsorted(at, limit_m - left, "right")
-    return at, _least(low, first, last, len(at))
+    return at, _least(low, first, last, len(at)), -_least(-high, first, last, len(at))
 
 
 def _least(value: Floats, first: NDArray[np.intp], last: NDArray[np.intp], size: int) -> Floats:
@@ -60,15 +60,26 @@ def rise_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) ->
 
     Climb limits are not in it: they only make paths longer.
     """
+    found = _string(legs, tracks_m, limits_m)
+    return found.length_m if isinstance(found, Profile) else sum(tracks_m)
+
+
+def climb_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> float:
+    """No path over such tracks climbs and descends less in all."""
+    found = _string(legs, tracks_m, limits_m)
+    return found.vertical_m if isinstance(found, Profile) else 0.0
+
+
+def _string(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> Profile | Blocked:
+    """The tautest profile between what is known of such tracks' floors and ceilings."""
     places, lows, highs = [np.zeros(1)], [np.full(1, -np.inf)], [np.full(1, np.inf)]
     begin = 0.0
     for k, (leg, track_m, limit_m) in enumerate(zip(legs, tracks_m, limits_m, strict=True)):
-        at, low = floors(leg, track_m, limit_m)
-        low = np.where(np.isfinite(low), low, -np.inf)
+        at, low, high = rooms(leg, track_m, limit_m)
         end = leg.goal.amsl_m if k < len(legs) - 1 else None
         places += [begin + at, np.array([begin + track_m])]
-        lows += [low, np.array([-np.inf if end is None else end])]
-        highs += [np.full(len(at), np.inf), np.array([np.inf if end is None else end])]
+        lows += [np.where(np.isfinite(low), low, -np.inf), np.array([-np.inf if end is None else end])]
+        highs += [np.where(np.isfinite(high), high, np.inf), np.array([np.inf if end is None else end])]
         begin += track_m
     s = np.concatenate(places)
     keep = np.concatenate([[True], np.diff(s) > 1e-9])
@@ -77,5 +88,5 @@ def rise_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) ->
     assert z0 is not None
     assert z1 is not None
     low[0] = low[-1] = -math.inf
-    found = taut_string(s[keep], np.minimum(low, high), high, z0, z1)
-    return found.length_m if isinstance(found, Profile) else begin
+    high[0] = high[-1] = math.inf
+    return taut_string(s[keep], np.minimum(low, high), high, z0, z1)

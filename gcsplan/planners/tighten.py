@@ -8,11 +8,11 @@ no is a bound; else the bound of those that are shorter halves what is left.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from gcsplan.planners.below import FAR, PAST, Below
 from gcsplan.planners.caps import Layer, search_caps
-from gcsplan.planners.rising import rise_bound
+from gcsplan.planners.rising import climb_bound, rise_bound
 
 PAST_FINE, ROUNDS = 9, 2
 """Tracks past what is in the way that are looked at on the finer lattice; and how often, there and aslant."""
@@ -24,6 +24,8 @@ CLOSER, LEFT, FLAT = 8, 0.05, 0.12
 the ends a shorter path has less way to climb. How little shorter paths' bounds rise that are taken to rise no more."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
+PIECES = 4
+"""Into how many pieces the lengths of tracks that matter are cut, each of which must climb no less than a bound."""
 NEARLY = 0.9
 """What part of what lay between path and bound is left, at most, where a better path makes another bound worth it."""
 NEARER = 0.45
@@ -80,10 +82,39 @@ def _tighten_energy(below: Below) -> None:
 
     below.try_below(below.top_m, fine=True)
     below.raise_bound(_search_caps(below, least))
+    _raise_climb(below)
     for _ in range(ROUNDS):
         if not _traverse(below):
             break
         below.raise_bound(_search_caps(below, least))
+        _raise_climb(below)
+
+
+def _raise_climb(below: Below) -> None:
+    """Raise a bound of energy by what tracks that are short enough must climb and descend, a few lengths at a time."""
+    p = below.problem
+    if below.done() or not below.in_time():
+        return
+    limits = [below.limit(leg) for leg in below.legs]
+    known = [leg.bound(below.top_m, leg.corridor(m), m, True) for leg, m in zip(below.legs, limits, strict=True)]
+    spare = max(below.longest() - sum(known), 0.0)
+    found = math.inf
+    for least, most in _pieces(known, spare):
+        if below.least(sum(least)) >= found:
+            break
+        climbed_m = climb_bound(below.legs, least, most)
+        found = min(found, p.horizontal_j_per_m * sum(least) + p.vertical_j_per_m * climbed_m)
+    below.raise_bound(found)
+
+
+def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float], list[float]]]:
+    """The least and the greatest lengths of tracks that are longer by no more than ``spare_m``, cut into pieces: the
+    less lengths differ, the better it is known where on its way a track is. Of several legs that is not known."""
+    if len(tracks_m) > 1:
+        yield tracks_m, [track + spare_m for track in tracks_m]
+        return
+    for k in range(PIECES):
+        yield [tracks_m[0] + spare_m * k / PIECES], [tracks_m[0] + spare_m * (k + 1) / PIECES]
 
 
 def _traverse(below: Below) -> bool:
@@ -130,7 +161,12 @@ def _bound_shorter(below: Below, longest_m: float) -> float:
         tracks.append(leg.bound(below.top_m, wanted, limit, True))
     # Each leg's limit is what the others leave, which is less now that they are known better.
     spare = max(most_m - sum(tracks), 0.0)
-    return rise_bound(below.legs, tracks, [track + spare for track in tracks])
+    found = math.inf
+    for least, most in _pieces(tracks, spare):
+        if sum(least) >= found:
+            break  # longer tracks cost no less
+        found = min(found, rise_bound(below.legs, least, most))
+    return found
 
 
 def _longest_track(below: Below, longest_m: float) -> float:
