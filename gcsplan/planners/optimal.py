@@ -32,11 +32,12 @@ from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.band import plan_band
-from gcsplan.planners.below import Below
+from gcsplan.planners.below import FAR, Below
 from gcsplan.planners.diagnose import Refusal, check_ends, explain
 from gcsplan.planners.lattice import terminals
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.tighten import tighten
+from gcsplan.planners.traverse import affordable
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -95,6 +96,14 @@ def _sharp(problem: Problem, begun: float, laps: bool = True) -> Solution:
     below.search_space()
     below.search_small(MUCH)
     tighten(below)
+    if not asked and problem.objective == "energy" and below.gap > FAR and affordable(problem):
+        # Where climbing is dear the best track is not the shortest below any cap.
+        try:
+            better = below.take(plan_band(problem, tell, begun).path.points)
+        except Refusal:
+            better = False
+        if better:
+            tighten(below)
     if below.search_small():
         tighten(below)
     return below.solution()

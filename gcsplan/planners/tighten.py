@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from gcsplan.planners.below import FAR, PAST, Below
 from gcsplan.planners.caps import Layer, search_caps
 from gcsplan.planners.rising import climb_bound, rise_bound
+from gcsplan.planners.traverse import pulled_tight, traverse
 
 PAST_FINE, ROUNDS = 9, 2
 """Tracks past what is in the way that are looked at on the finer lattice; and how often, there and aslant."""
@@ -121,8 +122,6 @@ def _traverse(below: Below) -> bool:
     """Look for a path that climbs slopes aslant, if path and bound are far apart; True if it is the best so far."""
     if below.best is None or below.gap <= FAR or not below.climbs() or not below.in_time():
         return False
-    from gcsplan.planners.traverse import pulled_tight, traverse  # few missions need it
-
     before, found = below.cost, traverse(below.problem, below.longest())
     if found is not None:
         below.take_longer(found, fine=True)

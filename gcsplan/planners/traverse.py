@@ -29,9 +29,14 @@ LARGEST = 1_500_000
 """Nodes of the terrain model, at most: the floor over all of it is worked out, so that it can be read anywhere."""
 
 
+def affordable(problem: Problem) -> bool:
+    """Whether the terrain model is not so large that its floor would take longer than what it may be good for."""
+    return problem.airspace.surface.ground_m.size <= LARGEST
+
+
 def traverse(problem: Problem, longest_m: float) -> Stops | None:
     """The best track on a lattice of reachable altitudes among those about as long as ``longest_m`` at most."""
-    if problem.airspace.surface.ground_m.size > LARGEST:
+    if not affordable(problem):
         return None
     straight_m = sum(math.dist(a, b) for a, b in pairwise(terminals(problem)))
     energy = problem.objective == "energy"
@@ -45,7 +50,7 @@ def traverse(problem: Problem, longest_m: float) -> Stops | None:
 
 def pulled_tight(problem: Problem, points: Floats, deadline_s: float) -> tuple[Floats, Bools] | None:
     """Way points of a better line than a path's, and which are stops, if one is found before ``deadline_s``."""
-    if problem.airspace.surface.ground_m.size > LARGEST:
+    if not affordable(problem):
         return None
     found = pulled(problem, points, LEVELS[0], deadline_s)
     return None if found is None else (found, pins_of(problem, found)[0])
