@@ -133,6 +133,8 @@ class Below:
         roots = [self.choice]
         if cap_m is None:
             roots = [replace(c, most_m=(spare_m, spare_m)) for c in dict.fromkeys([self._open, self.choice])]
+            if laps:
+                roots.append(self.choice)  # a climb far from the ends takes laps there, and none near them
         found = search.run(roots, most, first=first or cap_m is not None, laps=laps, given=given)
         if found is not None:
             self.choice = replace(found, least_m=(0.0, 0.0), most_m=(0.0, 0.0))

@@ -100,7 +100,8 @@ class Leg:
         wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
         self.parts = max(1, round(cell_m / wanted_m))
         """Parts a side that the terrain model's cells are cut into, where they are large beside leg or zones."""
-        self._fine_stride = max(1, round(finest_m / cell_m)) if self.parts == 1 else 1
+        # Between nodes that are left out heights are guessed, so few are better kept.
+        self._fine_stride = 1 if self.parts > 1 or finest_m < 2.0 * cell_m else round(finest_m / cell_m)
         self._stride = self._fine_stride * max(1, round(wanted_m / cell_m / self._fine_stride))
         if self.parts > 1 or self._stride < 3:
             self._stride = self._fine_stride = 1

@@ -25,7 +25,7 @@ Bools = NDArray[np.bool_]
 
 NODES = 60_000
 """Of the lattice, about."""
-LARGEST = 1_500_000
+LARGEST = 1e9
 """Nodes of the terrain model, at most: the floor over all of it is worked out, so that it can be read anywhere."""
 
 
