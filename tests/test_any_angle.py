@@ -259,7 +259,7 @@ def on_two_sheets(areas: tuple[Free, Free], inside: shapely.Geometry, places: Fl
 def test_ways_over_two_sheets_change_them_outside_alone() -> None:
     rng = np.random.default_rng(5)
     compared = changed = 0
-    for _ in range(12):
+    for _ in range(6):
         size = int(rng.integers(7, 10))
         cells = (size - 1) ** 2
         excess = np.where(rng.random((size, size)) < 0.12, 1.0, -1.0) * rng.uniform(0.3, 1.0, (size, size))
@@ -292,8 +292,8 @@ def test_ways_over_two_sheets_change_them_outside_alone() -> None:
                 assert least[a, b] * (1.0 - 1e-3) <= way.length_m <= most[a, b] * (1.0 + 1e-6)
                 compared += 1
                 changed += way.length_m > whole[a, b] * (1.0 + 1e-6)
-    assert compared > 200
-    assert changed > 40
+    assert compared > 100
+    assert changed > 20
 
 
 @pytest.mark.parametrize("form", EACH_FORM)

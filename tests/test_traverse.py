@@ -39,7 +39,7 @@ def under_a_lid() -> Problem:
         LIMIT,
         (200.0, 1000.0, 15.0),
         (1800.0, 1000.0, SLOPE * 400.0 + 15.0),
-        budget_s=5.0,
+        budget_s=2.0,
     )
 
 

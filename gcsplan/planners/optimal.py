@@ -96,10 +96,11 @@ def _sharp(problem: Problem, begun: float, laps: bool = True) -> Solution:
     below.search_space()
     below.search_small(MUCH)
     tighten(below)
-    if not asked and problem.objective == "energy" and below.gap > FAR and affordable(problem):
+    dear = not asked and problem.objective == "energy" and below.gap > FAR and below.in_time()
+    if dear and affordable(problem):
         # Where climbing is dear the best track is not the shortest below any cap.
         try:
-            better = below.take(plan_band(problem, tell, begun).path.points)
+            better = below.take(plan_band(problem, tell, begun, climbs=False).path.points)
         except Refusal:
             better = False
         if better:
