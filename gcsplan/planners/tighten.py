@@ -84,6 +84,8 @@ def _tighten_energy(below: Below) -> None:
     below.try_below(below.top_m, fine=True)
     below.raise_bound(_search_caps(below, least))
     _raise_climb(below)
+    if below.gap > FAR and below.past(PAST_FINE, fine=True):
+        below.raise_bound(_search_caps(below, least))
     for _ in range(ROUNDS):
         if not _traverse(below):
             break
