@@ -187,6 +187,18 @@ def test_climb_limit_is_kept_by_climbing_early_and_by_a_longer_way() -> None:
     assert s.path.length_m > 1150.0
 
 
+@pytest.mark.parametrize("error_m", [0.0, 2.0])
+def test_a_zone_as_high_as_the_ceiling_is_passed_over_at_just_that_height(error_m: float) -> None:
+    lid = Zone("lid", Circle(1000.0, 1000.0, 300.0), None, Level(100.0, "amsl"))
+    limits = Limits(10.0, max_amsl_m=100.0 + 2.0 * error_m, altitude_error_m=error_m)
+    p = problem(ground(0.0), (lid,), limits, start=(200.0, 1000.0, 60.0), goal=(1800.0, 1000.0, 60.0))
+    s = solve(p)
+    assert s.path.points[:, 2].max() == pytest.approx(100.0 + error_m, abs=1e-6)
+    assert s.path.length_m == pytest.approx(2.0 * math.hypot(500.0, 40.0 + error_m) + 600.0, rel=1e-5)
+    around = solve(replace(p, limits=replace(limits, max_amsl_m=99.99 + 2.0 * error_m)))
+    assert around.path.length_m > s.path.length_m + 30.0
+
+
 def test_same_question_same_bytes() -> None:
     p = random_mission(5)
     a, b = plan(p), plan(random_mission(5))

@@ -42,6 +42,9 @@ class Fit:
     hair_m: float
 
 
+TOUCH_M = 1e-6
+"""By so little too high is not too high, where nothing but the arithmetic is inexact."""
+
 LOOSE, CLOSE = Fit(0.03, 0.05, 0.07), Fit(0.003, 0.01, 0.07)
 """As long as rows of cells may be pieces, and where slits a few centimetres wide count."""
 
@@ -100,9 +103,12 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
             row[[BOTTOM, TOP]] = -np.inf, np.inf
             for level, at, more in ((zone.floor, BOTTOM, -1.0), (zone.ceiling, TOP, 1.0)):
                 if level is not None:
-                    row[at] = level.value_m + more * (limits.altitude_error_m + sign * off_m)
-                    row[at + 2] = level.datum == "agl"
-                    if level.datum == "agl":
+                    over_ground = level.datum == "agl"
+                    # What is told in AMSL is not rounded: a zone may be as high as the ceiling.
+                    off = sign * off_m if over_ground or sign < 0.0 else -TOUCH_M
+                    row[at] = level.value_m + more * (limits.altitude_error_m + off)
+                    row[at + 2] = over_ground
+                    if over_ground:
                         row[at] += more * sign * moved[k]
             row[UNDER] = zone.floor is not None
             row[RADIUS] = -1.0

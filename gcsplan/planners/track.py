@@ -294,7 +294,7 @@ class _Room:
         return tuple({b.zone: None for b in chosen if b.s0_m < s1_m + BESIDE_M and b.s1_m > s0_m - BESIDE_M})
 
     def hits(self, profile: Profile, over: Sides) -> list[_Hit]:
-        """Bands without a side that ``profile`` does not clear."""
+        """Bands without a side that ``profile`` does not clear by `KEEP_M`."""
         out = []
         if any(side is None for side in over):
             z = profile.at(self.s_m)
@@ -302,7 +302,7 @@ class _Room:
                 if side is None:
                     i, j = self.spans[k]
                     up, down = float((self.tops[k] - z[i:j]).max()), float((z[i:j] - self.bottoms[k]).max())
-                    if up > 0.0 and down > 0.0:
+                    if up > -KEEP_M and down > -KEEP_M:
                         out.append(_Hit(k, min(up, down), up < down))
         return out
 
@@ -343,8 +343,8 @@ def _rooms(problem: Problem, track: Track, known: Sequence[tuple[float, float, f
         i = int(np.searchsorted(s, b.s_m[0] - 1e-9))
         j = int(np.searchsorted(s, b.s_m[-1] + 1e-9))
         spans.append((i, j))
-        bottom = _edge(s[i:j], b.s_m, b.bottom_m, False) - KEEP_M
-        top = _edge(s[i:j], b.s_m, b.top_m, True) + KEEP_M
+        bottom = _edge(s[i:j], b.s_m, b.bottom_m, False)
+        top = _edge(s[i:j], b.s_m, b.top_m, True)
         if i == 0:
             _forgive(top, bottom, 0, z0)
         if j == len(s):
