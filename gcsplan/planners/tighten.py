@@ -127,9 +127,11 @@ def _traverse(below: Below) -> bool:
     before, found = below.cost, traverse(below.problem, below.longest())
     if found is not None:
         below.take_longer(found, fine=True)
-    tight = pulled_tight(below.problem, below.best, below.begun_s + below.problem.budget_s)
-    if tight is not None:
-        below.take_simpler(*tight, fine=True, longer=True)
+    for level in (0, 1):  # which lattice gives the better lines is a matter of luck
+        if below.gap > FAR:
+            tight = pulled_tight(below.problem, below.best, level, below.begun_s + below.problem.budget_s)
+            if tight is not None:
+                below.take_simpler(*tight, fine=True, longer=True)
     return below.cost < before
 
 

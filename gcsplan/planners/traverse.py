@@ -48,9 +48,10 @@ def traverse(problem: Problem, longest_m: float) -> Stops | None:
     return track.points, track.pinned, track.pin_m
 
 
-def pulled_tight(problem: Problem, points: Floats, deadline_s: float) -> tuple[Floats, Bools] | None:
-    """Way points of a better line than a path's, and which are stops, if one is found before ``deadline_s``."""
+def pulled_tight(problem: Problem, points: Floats, level: int, deadline_s: float) -> tuple[Floats, Bools] | None:
+    """Way points of a better line than a path's, and which are stops, if one is found before ``deadline_s``; the lines
+    around it are those of a ``level`` of lattices."""
     if not affordable(problem):
         return None
-    found = pulled(problem, points, LEVELS[0], deadline_s)
+    found = pulled(problem, points, LEVELS[level], deadline_s)
     return None if found is None else (found, pins_of(problem, found)[0])
