@@ -34,8 +34,9 @@ COARSE_M = 100.0
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 """Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
 
-MOST_NODES = 16e6
-"""Nodes of the finest lattice, at most, in the box around a corridor."""
+MOST_NODES, MOST_BESIDE, LARGE = 16e6, 6e6, 4e6
+"""Nodes of the finest lattice, at most, in the box around a corridor: so many, and fewer beside a terrain model of more
+nodes than that, to need no more than half a gigabyte besides."""
 RAISED, WORTHWHILE = 4, 0.05
 """Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
 
@@ -266,7 +267,8 @@ class Leg:
             return False
         wanted = close.away.between(close.left, limit)
         rows, cols = (np.flatnonzero(wanted.any(axis=axis)) for axis in (1, 0))
-        if float(np.ptp(rows) + 1) * float(np.ptp(cols) + 1) * (self._ratio * parts) ** 2 > MOST_NODES:
+        most = MOST_NODES if self.problem.airspace.surface.ground_m.size < LARGE else MOST_BESIDE
+        if float(np.ptp(rows) + 1) * float(np.ptp(cols) + 1) * (self._ratio * parts) ** 2 > most:
             return False
         if self._stride == 1:
             twin = self._lattice(self._detour, 1, self.parts * self._cut, CLOSE)
