@@ -99,11 +99,12 @@ def _sharp(problem: Problem, begun: float, laps: bool = True) -> Solution:
     below.search_space()
     below.search_small(MUCH)
     tighten(below)
-    dear = not asked and problem.objective == "energy" and below.gap > FAR and below.in_time()
-    if dear and affordable(problem):
-        # Where climbing is dear the best track is not the shortest below any cap.
+    apart = not asked and below.gap > FAR and affordable(problem)
+    if apart and (problem.objective == "energy" or below.in_space or below.timed_out):
+        # Where climbing is dear, or the world is as high as wide, the best track may not be the shortest below any cap;
+        # and who ran out of time may not have looked at slopes.
         try:
-            better = below.take(plan_band(problem, tell, begun, climbs=False).path.points)
+            better = below.take(plan_band(problem, tell, begun).path.points)
         except Refusal:
             better = False
         if better:

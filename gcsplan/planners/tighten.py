@@ -128,7 +128,7 @@ def _traverse(below: Below) -> bool:
     if found is not None:
         below.take_longer(found, fine=True)
     for level in (0, 1):  # which lattice gives the better lines is a matter of luck
-        if below.gap > FAR:
+        if below.gap > TWICE * below.wanted:
             tight = pulled_tight(below.problem, below.best, level, below.begun_s + below.problem.budget_s)
             if tight is not None:
                 below.take_simpler(*tight, fine=True, longer=True)
