@@ -88,12 +88,12 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
         assert room == pytest.approx((100.0, 400.0) if side else (10.0, 40.0))
 
 
-def test_tracks_that_are_flown_aslant_are_looked_for_where_the_bound_is_far() -> None:
+def test_a_path_over_such_a_track_is_better_than_one_with_laps() -> None:
     p = under_a_lid()
     below = Below(p, time.perf_counter())
     below.look()
     found = traverse(p, 2200.0)
     assert found is not None
-    below.take_longer(found, fine=True)
+    assert below.take_longer(found, fine=True)
     assert below.best is not None
     assert faults(p, Path(below.best)) == []

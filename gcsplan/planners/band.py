@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from gcsplan.planners.climb import pins_of, ways_up, with_climbs
 from gcsplan.planners.diagnose import Refusal, explain
 from gcsplan.planners.guide import Guide, Line, line_of, make_guide
-from gcsplan.planners.lattice import terminals
+from gcsplan.planners.lattice import straight_way_m, terminals
 from gcsplan.planners.problem import Problem, Solution
-from gcsplan.planners.routes import LEVELS, Level, Router
+from gcsplan.planners.routes import LEVELS, Level, Router, climbing_weight
 from gcsplan.planners.settle import Judge, Unsettled, settle, thinned
 from gcsplan.planners.track import Flown, Obstruction, distances, fly, make_track
 from gcsplan.world.path import Path
@@ -63,7 +63,7 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     stops = terminals(problem)
     if all(math.dist(stops[0], x) < 1e-3 for x in stops):
         return _solution(problem, _on_the_spot(problem), bound, begun, time.perf_counter() - begun, False)
-    way = sum(math.dist(a, b) for a, b in pairwise(terminals(problem)))
+    way = straight_way_m(problem)
     best = straight(problem, way)
     if best is not None and problem.cost(Path(best)) <= bound * (1.0 + 1e-9):
         return _solution(problem, best, bound, begun, time.perf_counter() - begun, False)
@@ -180,7 +180,7 @@ def pulled(problem: Problem, points: Floats, level: Level, deadline_s: float) ->
 
     Zones are passed over, or under, as that path (N, 3) passes them.
     """
-    way = sum(math.dist(a, b) for a, b in pairwise(terminals(problem)))
+    way = straight_way_m(problem)
     work = _Work.at(problem, level, way)
     pinned, pin_m = pins_of(problem, points)
     work.over = _sides(problem, points, pinned, pin_m)
@@ -318,7 +318,7 @@ class _Work:
         router, p = self.router, self.problem
         if router.opened > MOST_OPENED // 4:
             return []
-        prices = [p.vertical_j_per_m / max(p.horizontal_j_per_m, 1e-9)] if p.objective == "energy" else []
+        prices = [climbing_weight(p)] if p.objective == "energy" else []
         ways = [way for way in (router.way(weight=w) for w in prices) if way is not None]
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])
         floor = router.lattice.floor_m

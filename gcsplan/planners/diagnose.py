@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission, NoMissionReason
-from gcsplan.planners.lattice import near_zone, terminals, zone_levels
+from gcsplan.planners.lattice import levels_of, near_zone, terminals
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.routes import Level, Router
 from gcsplan.planners.track import Obstruction
@@ -93,7 +93,13 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
     for zone in air.zones:
         if not near_zone(here, here, zone, reach, air.scale)[0]:
             continue
-        bottom, top = (float(x[0]) for x in zone_levels(air, limits, zone, here, here))
+        bottom, top, *over_ground = levels_of(limits, zone).tolist()
+        ground = float(air.surface.ground_at(*place)) if any(over_ground) else 0.0
+        # Where the ground is unknown a level over it is no way past.
+        if over_ground[0]:
+            bottom = -math.inf if math.isnan(ground) else bottom + ground
+        if over_ground[1]:
+            top = math.inf if math.isnan(ground) else top + ground
         at = amsl is not None and bottom + 1e-6 < amsl < top - 1e-6
         if at or (amsl is None and bottom < low and (top > high or math.isinf(top))):
             raise refuse(

@@ -105,6 +105,11 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
     return Lattice(west, south, step_m, nx, ny, floor, ceiling, ground, at, low, high, agl, reach)
 
 
+def straight_way_m(problem: Problem) -> float:
+    """How long the straight way from stop to stop is."""
+    return sum(math.dist(a, b) for a, b in pairwise(terminals(problem)))
+
+
 def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: NDArray[np.bool_], beside_m: float) -> Floats:
     """The ground where it is ``wanted`` and a zone with a level over ground may come near; 0 elsewhere."""
     asked = np.zeros(wanted.shape, np.bool_)
@@ -158,7 +163,7 @@ def _edge_bands(
         b = np.stack([west + ends_i * step, south + ends_j * step], axis=-1)
         hit = np.flatnonzero(inside & near_zone(a, b, zone, reach, air.scale))
         edges.append((j[hit] * nx + i[hit]) * 8 + k[hit])
-        levels.append(np.repeat(_levels(limits, zone)[None], len(hit), axis=0))
+        levels.append(np.repeat(levels_of(limits, zone)[None], len(hit), axis=0))
     if not edges:
         return np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros((0, 2), np.bool_)
     edge, level = np.concatenate(edges), np.concatenate(levels)
@@ -168,7 +173,7 @@ def _edge_bands(
     return edge[order], low, high, agl > 0.0
 
 
-def _levels(limits: Limits, zone: Zone) -> Floats:
+def levels_of(limits: Limits, zone: Zone) -> Floats:
     """(4,) lowest and highest altitude that a zone forbids, errors added; and of each 1 if it is over ground."""
     out = np.array([-np.inf, np.inf, 0.0, 0.0])
     for k, (level, error) in enumerate(
@@ -198,24 +203,6 @@ def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) ->
     # A line without length is near nothing to shapely: a micrometre makes it one.
     far = np.where((a == b).all(axis=1, keepdims=True), b + 1e-6, b)
     return np.asarray(shapely.dwithin(polygon, shapely.linestrings(np.stack([a, far], axis=1)), reach_m))
-
-
-def zone_levels(air: Airspace, limits: Limits, zone: Zone, a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """(K,) lowest and highest altitude that ``zone`` forbids over each segment ``a``–``b``, errors added."""
-    low, high = np.full(len(a), -np.inf), np.full(len(a), np.inf)
-    ground: Floats | None = None
-    if any(isinstance(x, Level) and x.datum == "agl" for x in (zone.floor, zone.ceiling)):
-        f = np.linspace(0.0, 1.0, 5)[:, None, None]
-        at = a + f * (b - a)
-        ground = air.surface.ground_at(at[..., 0], at[..., 1])
-    under: float | Floats
-    if zone.floor is not None:
-        under = 0.0 if zone.floor.datum == "amsl" or ground is None else _known(ground, -np.inf).min(axis=0)
-        low = np.broadcast_to(under + zone.floor.value_m, low.shape) - limits.altitude_error_m
-    if zone.ceiling is not None:
-        under = 0.0 if zone.ceiling.datum == "amsl" or ground is None else _known(ground, np.inf).max(axis=0)
-        high = np.broadcast_to(under + zone.ceiling.value_m, high.shape) + limits.altitude_error_m
-    return np.asarray(low), np.asarray(high)
 
 
 def _known(ground: Floats, unknown: float) -> Floats:
@@ -254,7 +241,7 @@ def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float], a
         hit = np.flatnonzero(near_zone(a, b, zone, lattice.reach_m, air.scale))
         if not len(hit):
             continue
-        bottom, top, *agl = _levels(limits, zone)
+        bottom, top, *agl = levels_of(limits, zone)
         if any(agl) and ground is None:
             ground = _known(air.surface.ground_at(at[..., 0], at[..., 1]), 0.0)
         for row in hit:

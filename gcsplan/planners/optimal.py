@@ -40,7 +40,6 @@ from gcsplan.planners.diagnose import Refusal, check_ends, explain
 from gcsplan.planners.lattice import terminals
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.tighten import tighten
-from gcsplan.planners.traverse import affordable
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -99,7 +98,7 @@ def _sharp(problem: Problem, begun: float, laps: bool = True) -> Solution:
     below.search_space()
     below.search_small(MUCH)
     tighten(below)
-    apart = not asked and below.gap > FAR and affordable(problem)
+    apart = not asked and below.gap > FAR
     if apart and (problem.objective == "energy" or below.in_space or below.timed_out):
         # Where climbing is dear, or the world is as high as wide, the best track may not be the shortest below any cap;
         # and who ran out of time may not have looked at slopes.

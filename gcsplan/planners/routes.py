@@ -61,6 +61,11 @@ def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float,
     return box, step
 
 
+def climbing_weight(problem: Problem) -> float:
+    """Metres of track that cost as much energy as a metre of height."""
+    return problem.vertical_j_per_m / max(problem.horizontal_j_per_m, 1e-9)
+
+
 @dataclass(eq=False, slots=True)
 class Router:
     """A lattice with its terminals, and what the exact test last found on it."""

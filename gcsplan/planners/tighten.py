@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from gcsplan.planners.below import FAR, PAST, Below
 from gcsplan.planners.caps import Layer, search_caps
@@ -101,13 +102,24 @@ def _raise_climb(below: Below) -> None:
     limits = [below.limit(leg) for leg in below.legs]
     known = [leg.bound(below.top_m, leg.corridor(m), m, True) for leg, m in zip(below.legs, limits, strict=True)]
     spare = max(below.longest() - sum(known), 0.0)
+
+    def least_j(least: list[float], most: list[float]) -> float:
+        return p.horizontal_j_per_m * sum(least) + p.vertical_j_per_m * climb_bound(below.legs, least, most)
+
+    below.raise_bound(_least_of_pieces(below, known, spare, least_j))
+
+
+def _least_of_pieces(
+    below: Below, tracks_m: list[float], spare_m: float, cost: Callable[[list[float], list[float]], float]
+) -> float:
+    """The least ``cost`` of paths whose tracks are longer than ``tracks_m`` by no more than ``spare_m`` in all, given
+    that of those between least and greatest lengths."""
     found = math.inf
-    for least, most in _pieces(known, spare):
+    for least, most in _pieces(tracks_m, spare_m):
         if below.least(sum(least)) >= found:
-            break
-        climbed_m = climb_bound(below.legs, least, most)
-        found = min(found, p.horizontal_j_per_m * sum(least) + p.vertical_j_per_m * climbed_m)
-    below.raise_bound(found)
+            break  # longer tracks cost no less
+        found = min(found, cost(least, most))
+    return found
 
 
 def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float], list[float]]]:
@@ -164,12 +176,7 @@ def _bound_shorter(below: Below, longest_m: float) -> float:
         tracks.append(leg.bound(below.top_m, wanted, limit, True))
     # Each leg's limit is what the others leave, which is less now that they are known better.
     spare = max(most_m - sum(tracks), 0.0)
-    found = math.inf
-    for least, most in _pieces(tracks, spare):
-        if sum(least) >= found:
-            break  # longer tracks cost no less
-        found = min(found, rise_bound(below.legs, least, most))
-    return found
+    return _least_of_pieces(below, tracks, spare, partial(rise_bound, below.legs))
 
 
 def _longest_track(below: Below, longest_m: float) -> float:
