@@ -63,9 +63,10 @@ def mesh_of(
     values = np.array(rows)
     i, j = np.meshgrid(np.arange(nx), np.arange(ny))
     x, y = (form[0, 0] * i + form[0, 1] * j, form[1, 0] * i + form[1, 1] * j)
-    piece = np.full((cells, 2 * of.shape[1]), -1, np.int32)
+    piece = np.empty((cells, 2 * of.shape[1]), np.int32)
     span = np.tile(np.array([0, nx - 1], np.int32), (ny - 1, 1))
-    count = make_pieces(excess, of, values, diagonal, owner, span, piece, block)
+    around = np.tile(np.array([0, nx], np.int32), (ny, 1))
+    count = make_pieces(excess, of, values, diagonal, owner, around, span, piece, block)
     room = 32 * cells + 64
     ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
     n = make_portals(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, np.empty(2))

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners._fill import blank
 from gcsplan.planners._intervals import pop, push
 from gcsplan.planners._mesh import stands
 from gcsplan.planners.compiled import device, kernel
@@ -24,24 +25,26 @@ SHUT = 3
 """What is known of a node that lies in a wall."""
 
 
-@kernel("f8[,] f8[,] f8[,] i4[,] f8[,] f8[,] f8[,] f8[] i1[,] f8[,]")
+@kernel("i4[,] f8[,] f8[,] f8[,] i4[,] f8[,] f8[,] f8[,] f8[] i1[,] f8[,]")
 def look_around(
-    excess: Floats, floor: Floats, lift: Floats, of: Ints, values: Floats, x: Floats, y: Floats, cone: Floats,
-    seen: NDArray[np.int8], away: Floats,
+    around: Ints, excess: Floats, floor: Floats, lift: Floats, of: Ints, values: Floats, x: Floats, y: Floats,
+    cone: Floats, seen: NDArray[np.int8], away: Floats,
 ) -> int:  # fmt: skip
     """Find the nodes near an end that are too high for what can be climbed to from there, and those around them.
 
     ``cone``: x, y, column, row, height, slope, cap. ``seen`` (rows, cols, zeros) is 1 at nodes that the end sees over
-    cells which are free as a whole; ``away`` (inf) how far they are; -1 or -2 at others that want to be known. Returns
-    how many of those are free. ``lift``: what zones are higher than the floor that may have to be flown over.
+    cells which are free as a whole; ``away`` how far they are; -1 or -2 at others that want to be known. Returns
+    how many of those are free. ``around``: see `_fill.blank`; ``lift``: what zones are higher than the floor that may
+    have to be flown over.
     """
     left, right, low, high = _box(x, y, cone)
     missing = 0
+    blank(away, around, math.inf)
     # Only where the cone could be a wall, and some nodes around that, anything needs to be known.
-    if right < left or not _mark(excess, floor, lift, x, y, cone, left, right, low, high, seen):
+    if right < left or not _mark(around, excess, floor, lift, x, y, cone, left, right, low, high, seen):
         return 0
     for j in range(low, high + 1):
-        for i in range(left, right + 1):
+        for i in range(max(left, around[j, 0]), min(right + 1, around[j, 1])):
             if seen[j, i] < 0 and _open(excess, lift, j, i):
                 if _sees(excess, lift, of, cone[2], cone[3], i, j, True):
                     seen[j, i] = 1
@@ -51,10 +54,10 @@ def look_around(
     return missing
 
 
-@kernel("f8[,] f8[,] i4[,] f8[,] f8[,] f8[] i1[,] f8[,] i8 f8[,] i4[,] i1[,] f8[] i4[]")
+@kernel("i4[,] f8[,] f8[,] i4[,] f8[,] f8[,] f8[] i1[,] f8[,] i8 f8[,] i4[,] i1[,] f8[] i4[]")
 def walk_around(
-    excess: Floats, lift: Floats, of: Ints, x: Floats, y: Floats, cone: Floats, seen: NDArray[np.int8], away: Floats,
-    missing: int, way: Floats, root: Ints, done: NDArray[np.int8], heap: Floats, ids: Ints,
+    around: Ints, excess: Floats, lift: Floats, of: Ints, x: Floats, y: Floats, cone: Floats, seen: NDArray[np.int8],
+    away: Floats, missing: int, way: Floats, root: Ints, done: NDArray[np.int8], heap: Floats, ids: Ints,
 ) -> None:  # fmt: skip
     """Ways to the nodes that are ``missing`` after `look_around`: from node to node, straight from farther back where
     that is free (lazy Theta*: Nash, Koenig and Tovey, AAAI 2010). They are somewhat longer than the shortest.
@@ -64,9 +67,7 @@ def walk_around(
     left, right, low, high = _box(x, y, cone)
     nx = excess.shape[1]
     farthest = (cone[6] - cone[4]) / cone[5]
-    for j in range(low, high + 1):
-        for i in range(left, right + 1):
-            way[j, i] = np.inf
+    blank(way, around, math.inf)
     size = 0
     i0, j0 = int(math.floor(cone[2])), int(math.floor(cone[3]))
     for j in range(max(j0 - 1, low), min(j0 + 2, high) + 1):
@@ -117,10 +118,10 @@ def walk_around(
                     size = push(heap, ids, size, new, q * nx + p)
 
 
-@kernel("f8[,] f8[,] f8[,] i1[,] i4[,] f8[,] f8[,] f8[,] f8[] b1 i1[,] f8[,]")
+@kernel("i4[,] f8[,] f8[,] f8[,] i1[,] i4[,] f8[,] f8[,] f8[,] f8[] b1 i1[,] f8[,]")
 def hold_down(
-    excess: Floats, floor: Floats, lift: Floats, either: NDArray[np.int8], of: Ints, values: Floats, x: Floats,
-    y: Floats, cone: Floats, lone: bool, seen: NDArray[np.int8], away: Floats,
+    around: Ints, excess: Floats, floor: Floats, lift: Floats, either: NDArray[np.int8], of: Ints, values: Floats,
+    x: Floats, y: Floats, cone: Floats, lone: bool, seen: NDArray[np.int8], away: Floats,
 ) -> None:  # fmt: skip
     """Hold nodes near an end to what can be climbed to from there, where a bound may.
 
@@ -133,14 +134,14 @@ def hold_down(
     ny, nx = excess.shape
     # The wall's own nodes, as far away as the farthest of those beside them that are free says.
     for j in range(low, high + 1):
-        for i in range(left, right + 1):
+        for i in range(max(left, around[j, 0]), min(right + 1, around[j, 1])):
             unknown = seen[j, i] < 0 and away[j, i] == math.inf and excess[j, i] < math.inf
             # Under a zone that is too high by now one may fly as before: how far that is, is not known.
             over = not _open(excess, lift, j, i) and (either[j, i] == 0 or excess[j, i] > 0.0)
             if unknown and (over or _walled(of, values, excess.shape, j, i)):
                 seen[j, i] = SHUT
     for j in range(low, high + 1):
-        for i in range(left, right + 1):
+        for i in range(max(left, around[j, 0]), min(right + 1, around[j, 1])):
             if seen[j, i] == SHUT:
                 away[j, i] = _behind(excess, lift, of, values, x, y, seen, away, i, j)
     i0, j0 = min(max(int(cone[2]), 0), nx - 2), min(max(int(cone[3]), 0), ny - 2)
@@ -149,8 +150,8 @@ def hold_down(
     diagonal = max(diagonal, other)
     spare = 0.25 * slope * diagonal
     for j in range(max(low, 1), min(high, ny - 2) + 1):
-        for i in range(max(left, 1), min(right, nx - 2) + 1):
-            known, straight = True, True
+        for i in range(max(left, around[j, 0], 1), min(right + 1, around[j, 1], nx - 1)):
+            known, straight = seen[j, i] > 0, True
             for q in range(-1, 2):
                 for p in range(-1, 2):
                     known = known and away[j + q, i + p] < math.inf
@@ -188,14 +189,14 @@ def _open(excess: Floats, lift: Floats, j: int, i: int) -> bool:
 
 @device
 def _mark(
-    excess: Floats, floor: Floats, lift: Floats, x: Floats, y: Floats, cone: Floats, left: int, right: int, low: int,
-    high: int, seen: NDArray[np.int8],
+    around: Ints, excess: Floats, floor: Floats, lift: Floats, x: Floats, y: Floats, cone: Floats, left: int,
+    right: int, low: int, high: int, seen: NDArray[np.int8],
 ) -> bool:  # fmt: skip
     """Set ``seen`` to -1 at nodes over a cone, and to that or -2 at `BESIDE` around them; whether there are any."""
     wide, found = BESIDE, False
     for j in range(low, high + 1):
         last = -wide - 1
-        for i in range(left, right + 1):
+        for i in range(max(left, around[j, 0]), min(right + 1, around[j, 1])):
             top = cone[4] + cone[5] * math.sqrt((x[j, i] - cone[0]) ** 2 + (y[j, i] - cone[1]) ** 2)
             if excess[j, i] < math.inf and floor[j, i] + lift[j, i] > top:
                 for k in range(max(i - wide, left, last + 1), min(i + wide, right) + 1):
@@ -203,8 +204,8 @@ def _mark(
                 last, found = min(i + wide, right), True
     if not found:
         return False
-    for i in range(left, right + 1):
-        for j in range(low, high + 1):
+    for j in range(low, high + 1):
+        for i in range(max(left, around[j, 0]), min(right + 1, around[j, 1])):
             if seen[j, i] == -1:
                 for k in range(max(j - wide, low), min(j + wide, high) + 1):
                     if seen[k, i] == 0:

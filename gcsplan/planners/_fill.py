@@ -13,21 +13,22 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] b1[,] i8 f8 f8 f8 f8[,] b1 f8[,] f8[,] f8[,] f8[,] f8[,] i1[]")
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] b1[,] i8 f8 f8 f8 f8[,] b1 i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i1[]")
 def fill(
     top: Floats, ground: Floats, steep: Floats, x: Floats, y: Floats, wanted: NDArray[np.bool_], fineness: int,
-    more: float, beside: float, cap: float, cones: Floats, low: bool, excess: Floats, floor: Floats, under: Floats,
-    fine_x: Floats, fine_y: Floats, diagonal: NDArray[np.int8],
+    more: float, beside: float, cap: float, cones: Floats, low: bool, around: Ints, excess: Floats, floor: Floats,
+    under: Floats, fine_x: Floats, fine_y: Floats, diagonal: NDArray[np.int8],
 ) -> None:  # fmt: skip
     """Cut each ``wanted`` (rows - 1, cols - 1) cell into ``fineness`` parts a side and give their nodes values.
 
-    ``floor`` is ``top`` + ``more`` + ``beside`` times ``steep`` (empty: 0); ``excess`` (inf before) what it is over
-    ``cap`` and over ``cones`` (K, 4: x, y, height, slope), which are too low rather than too high between nodes;
-    ``under`` the ground. ``diagonal``: the way to cut a cell so that triangles never lie above (``low``), or never
-    below, the bilinear patch.
+    ``floor`` is ``top`` + ``more`` + ``beside`` times ``steep`` (empty: 0); ``excess`` what it is over ``cap`` and over
+    ``cones`` (K, 4: x, y, height, slope), which are too low rather than too high between nodes, inf at the other nodes
+    of ``around`` (see `blank`); ``under`` the ground. ``diagonal``: the way to cut a cell so that triangles never lie
+    above (``low``), or never below, the bilinear patch.
     """
     rows, cols = wanted.shape
     fine_cols = cols * fineness
+    blank(excess, around, math.inf)
     for j in range(rows):
         for i in range(cols):
             if not wanted[j, i]:
@@ -85,6 +86,15 @@ def lay(
                     jj, ii = j - (k >> 1), i - (k & 1)
                     if 0 <= jj < rows - 1 and 0 <= ii < cols - 1:
                         inside[jj, ii] = False
+
+
+@device
+def blank(value: Floats, around: Ints, at_first: float) -> None:
+    """Set ``value`` (rows, cols) at the nodes that are looked at: ``around`` (rows, 2) of each row the first, and that
+    after the last. Others are never read, and memory that is never touched costs nothing."""
+    for j in range(len(around)):
+        for i in range(around[j, 0], around[j, 1]):
+            value[j, i] = at_first
 
 
 @kernel("f8[,] i8 f8[,] f8[,]")

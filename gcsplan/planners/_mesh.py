@@ -54,21 +54,25 @@ def _cut_own(of: Ints, values: Floats, k: int, sheet: int, start: int, end: int,
     return True
 
 
-@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] i4[,] i8")
+@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] i4[,] i4[,] i8")
 def make_pieces(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, span: Ints, piece: Ints,
-    block: int,
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, around: Ints, span: Ints,
+    piece: Ints, block: int,
 ) -> int:  # fmt: skip
-    """Number the pieces: ``piece`` (cells, 2 sheets), the lower and the upper triangle's, -1 where nothing is free,
-    and before.
+    """Number the pieces: ``piece`` (cells, 2 sheets), the lower and the upper triangle's, -1 where nothing is free.
 
-    ``span`` (rows - 1, 2) the first column, and that after the last, of the cells of a row that may be free;
+    ``span`` (rows - 1, 2) the first column, and that after the last, of the cells of a row that may be free; ``around``
+    see `_fill.blank`;
     ``of`` (cells, sheets) number from 1 of the row in ``values`` (K, 5) of a cell's first own wall, or 0: excess at
     this node, the one in the next column, in the next column and row, and in the next row, and the number of its next
     wall; ``diagonal`` (cells,) 0 from this node to the opposite one, 1 the other. ``owner`` (cells,) which cells are
     there on the second sheet, too, and for which zone (0: they are not); empty where there is one sheet.
     """
-    count = 0
+    count, nx = 0, excess.shape[1]
+    for j in range(len(span)):
+        for i in range(around[j, 0], min(around[j, 1], nx - 1)):
+            for half in range(piece.shape[1]):
+                piece[j * (nx - 1) + i, half] = -1
     for sheet in range(of.shape[1]):
         count = _number(excess, of, values, diagonal, owner, span, piece, block, sheet, count)
     return count

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners._fill import blank
 from gcsplan.planners._mesh import NEXT
 from gcsplan.planners.compiled import device, kernel
 
@@ -57,21 +58,25 @@ def _open(zones: Floats, z: int, floor: float, allowed: float, ground: float, ov
     return under and top_2 <= min(bottom, allowed) and floor <= bottom
 
 
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] i8 i4[,] f8[,] i8")
+@kernel("i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] i8 i4[,] f8[,] i8")
 def stamp_zones(
-    excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
-    low: bool, owner: Ints, sheet: int, of: Ints, values: Floats, count: int,
+    around: Ints, span: Ints, excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats,
+    edges: Floats, boxes: Ints, low: bool, owner: Ints, sheet: int, of: Ints, values: Floats, count: int,
 ) -> int:  # fmt: skip
     """Give cells that zones shut walls of their own: how deep in the shape they lie. Returns how many walls there are.
 
-    ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells each may touch; ``owner``,
-    ``of``, ``values`` as in `_mesh`, of the ``sheet``: a cell's owner is passed over on the first and under on the
-    second. ``low``: only what is shut for certain; else all that may be shut. ``count``: walls that there are.
+    ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells each may touch; ``around``,
+    ``span``, ``owner``, ``of``, ``values`` as in `_mesh`, of the ``sheet``, which has none yet: a cell's owner is
+    passed over on the first and under on the second. ``low``: only what is shut for certain; else all that may be shut.
+    ``count``: walls that there are.
     """
+    for j in range(len(span)):
+        for i in range(around[j, 0], min(around[j, 1], excess.shape[1] - 1)):
+            of[j * (excess.shape[1] - 1) + i, sheet] = 0
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
-            for i in range(boxes[z, 0], boxes[z, 1] + 1):
+            for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
                 cell = j * (excess.shape[1] - 1) + i
                 if sheet > 0 and owner[cell] == 0:
                     continue
@@ -122,19 +127,20 @@ def stamp_zones(
     return count
 
 
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8 f8[,] i1[,]")
+@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8 f8[,] i1[,]")
 def lift_lids(
-    floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, cap: float,
-    rim: float, lift: Floats, either: NDArray[np.int8],
+    around: Ints, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
+    cap: float, rim: float, lift: Floats, either: NDArray[np.int8],
 ) -> None:  # fmt: skip
-    """By how much the zones over each node (``lift``, zeros) are higher than its floor that can be flown over below
-    ``cap``, no deeper in them than ``rim``: who does not get past that does not get farther in. ``either`` (zeros): 1
-    where one of them can be flown under, too."""
+    """By how much the zones over each node of ``around`` (``lift``) are higher than its floor that can be flown over
+    below ``cap``, no deeper in them than ``rim``: who does not get past that does not get farther in. ``either``
+    (zeros): 1 where one of them can be flown under, too."""
+    blank(lift, around, 0.0)
     for z in range(len(zones)):
         if zones[z, PAIR] > 0.0 or zones[z, TOP] == np.inf:
             continue
         for j in range(boxes[z, 2], boxes[z, 3] + 2):
-            for i in range(boxes[z, 0], boxes[z, 1] + 2):
+            for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
                 more = level(zones, z, TOP, ground[j, i]) - floor[j, i]
                 if not 0.0 < more <= cap - floor[j, i] or not 0.0 < depth(zones, edges, z, x[j, i], y[j, i]) <= rim:
                     continue
@@ -143,10 +149,10 @@ def lift_lids(
                     either[j, i] = 1
 
 
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 i4[]")
+@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 i4[]")
 def own_zones(
-    excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
-    slope: float, owner: Ints,
+    span: Ints, excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats,
+    boxes: Ints, slope: float, owner: Ints,
 ) -> int:  # fmt: skip
     """Tell the cells that want two sheets (``owner``, zeros): the number from 1 of a shape that they lie in; how many.
 
@@ -161,7 +167,7 @@ def own_zones(
         lowest_top, highest_bottom, long = np.inf, -np.inf, 0.0
         for again in range(2):
             for j in range(boxes[z, 2], boxes[z, 3] + 1):
-                for i in range(boxes[z, 0], boxes[z, 1] + 1):
+                for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
                     over = under = 0
                     inside = True
                     for k in range(4):

@@ -25,15 +25,18 @@ from gcsplan.planners._stamp import PAIR, TOP, TOP_2, UNDER, UNDER_2, lift_lids,
 from gcsplan.planners.ground_nodes import nodes, places, slopes
 from gcsplan.planners.mesh import Mesh
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.scratch import Scratch
 from gcsplan.planners.shapes import LOOSE, Fit, Shapes, make_shapes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+AROUND = 8
+"""How many nodes beside those of cells that are wanted are looked at, at most: more than `_cones.BESIDE`."""
 RIM = 12.0
 """How many cells deep zones are looked at that cannot be climbed over so near to an end."""
-MANY = 500_000
-"""Nodes of a mesh from which on its names are numbered one by one, for searches have room for every name."""
+MANY = 8
+"""Names a portal from which on a mesh's are numbered one by one, for searches have room for every name."""
 
 
 @dataclass(eq=False, slots=True)
@@ -60,6 +63,8 @@ class Plane:
     fit: Fit
     known: dict[tuple[float, float], tuple[float, float]] = field(default_factory=dict)
     """Places that were asked for, and where they lie on the lattice."""
+    scratch: Scratch = field(default_factory=Scratch)
+    """Room for meshes that are no longer needed when the next one is made."""
 
     def mesh(
         self,
@@ -82,6 +87,7 @@ class Plane:
         """
         limits, scale = self.problem.limits, self.problem.airspace.scale
         near = limits.track_error_m * scale
+        whole = wanted is None or single  # such meshes are asked for places all over them
         wanted = self.inside if wanted is None else wanted
         row, col, last_row, last_col = _box_of(wanted)
         part, corners = np.s_[row:last_row, col:last_col], np.s_[row : last_row + 1, col : last_col + 1]
@@ -90,10 +96,13 @@ class Plane:
         )
         steep = np.empty((0, 0)) if low else self._steep(row, col, last_row + 1, last_col + 1)
         rows, cols = ((n - 1) * fineness + 1 for n in top.shape)
-        excess = np.full((rows, cols), np.inf)
-        floor, under_m, fine_x, fine_y = (np.empty((rows, cols)) for _ in range(4))
+        array = Scratch().array if whole else self.scratch.array
+        excess, floor, under_m, fine_x, fine_y = (array(f"{k}", (rows, cols)) for k in range(5))
         cells = (rows - 1) * (cols - 1)
         span = _spans(wanted[part], fineness)
+        places = [self.at((east, north)) for east, north, _, _ in cones or []]
+        own = [((r - row) * fineness, (c - col) * fineness) for c, r in places]
+        around = np.tile(np.array([0, cols], np.int32), (rows, 1)) if whole else _around(span, own, cols)
         diagonal = np.zeros(cells, np.int8)
         climbs = np.array([] if low or cones is None else cones).reshape(-1, 4)
         more = limits.min_agl_m + limits.altitude_error_m
@@ -104,47 +113,47 @@ class Plane:
         more += -self.fit.spare_m if low else self.fit.hair_m
         fill(
             top, ground, steep, x, y, np.ascontiguousarray(wanted[part]), fineness, more, beside, cap_m, climbs, low,
-            excess, floor, under_m, fine_x, fine_y, diagonal,
+            around, excess, floor, under_m, fine_x, fine_y, diagonal,
         )  # fmt: skip
         x, y = fine_x, fine_y
-        of, values, owner = np.zeros((cells, 1), np.int32), np.zeros((1, WALL)), np.zeros(0, np.int32)
+        of, values, owner = array("of", (cells, 1), np.int32), np.zeros((1, WALL)), np.zeros(0, np.int32)
         zones, edges = self._zones(low, under, over)
         boxes = self._boxes(row, col, fineness, rows, cols)
         if len(boxes):
             values = np.empty((1 + self.shapes.cells * fineness**2, WALL))
         laid = excess, floor, under_m, x, y, zones, edges, boxes
         if low and cones:
-            stamp_zones(*laid, low, owner, 0, of, values, 0)
-            lift, either = np.zeros((rows, cols)), np.zeros((rows, cols), np.int8)
+            stamp_zones(around, span, *laid, low, owner, 0, of, values, 0)
+            lift, either = array("lift", (rows, cols)), np.zeros((rows, cols), np.int8)
             cell_m = self.stride * float(self.problem.airspace.surface.grid.metres_per_cell(*cones[0][:2]).max())
             rim_m = RIM * cell_m / (self.parts * fineness)
-            lift_lids(floor, under_m, x, y, zones, edges, boxes, cap_m, rim_m, lift, either)
+            lift_lids(around, floor, under_m, x, y, zones, edges, boxes, cap_m, rim_m, lift, either)
             lone = _apart(cones, cap_m, 8.0 * cell_m)
             for east, north, height, slope in cones:
                 c, r = self.at((east, north))
                 cone = np.array([east, north, (c - col) * fineness, (r - row) * fineness, height, slope, cap_m])
-                seen, away = np.zeros((rows, cols), np.int8), np.full((rows, cols), np.inf)
-                missing = look_around(excess, floor, lift, of, values, x, y, cone, seen, away)
+                seen, away = np.zeros((rows, cols), np.int8), array("away", (rows, cols))
+                missing = look_around(around, excess, floor, lift, of, values, x, y, cone, seen, away)
                 if missing:
-                    way, root = np.empty((rows, cols)), np.empty((rows, cols), np.int32)
+                    way, root = array("way", (rows, cols)), array("root", (rows, cols), np.int32)
                     done = np.zeros((rows, cols), np.int8)
-                    heap, ids = np.empty(8 * way.size), np.empty(8 * way.size, np.int32)
-                    walk_around(excess, lift, of, x, y, cone, seen, away, missing, way, root, done, heap, ids)
-                hold_down(excess, floor, lift, either, of, values, x, y, cone, lone, seen, away)
-            of[:] = 0  # what cannot be reached so soon is no way over a zone either
+                    heap, ids = array("heap", (8 * way.size,)), array("ids", (8 * way.size,), np.int32)
+                    walk_around(around, excess, lift, of, x, y, cone, seen, away, missing, way, root, done, heap, ids)
+                hold_down(around, excess, floor, lift, either, of, values, x, y, cone, lone, seen, away)
+            # What cannot be reached so soon is no way over a zone either: they are laid anew.
         steepest = max(limits.max_climb_slope, limits.max_descent_slope)
         if sheets and self.shapes.either and math.isfinite(steepest):
             owner = np.zeros(cells, np.int32)
-            if own_zones(*laid, steepest, owner):
-                of, values = np.zeros((cells, 2), np.int32), np.empty((2 * len(values), WALL))
+            if own_zones(span, *laid, steepest, owner):
+                of, values = array("of", (cells, 2), np.int32), np.empty((2 * len(values), WALL))
             else:
                 owner = owner[:0]
-        walls = stamp_zones(*laid, low, owner, 0, of, values, 0)
+        walls = stamp_zones(around, span, *laid, low, owner, 0, of, values, 0)
         if len(owner):
-            stamp_zones(*laid, low, owner, 1, of, values, walls)
-        piece = np.full((cells, 2 * of.shape[1]), -1, np.int32)
+            stamp_zones(around, span, *laid, low, owner, 1, of, values, walls)
+        piece = array("piece", (cells, 2 * of.shape[1]), np.int32)
         block = 1 if single else self.block * fineness
-        count = make_pieces(excess, of, values, diagonal, owner, span, piece, block)
+        count = make_pieces(excess, of, values, diagonal, owner, around, span, piece, block)
         room = 2 * count + 1024
         scratch = np.empty(2)
         while True:
@@ -156,7 +165,7 @@ class Plane:
         start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
         sort_portals(joins[:n], start, order)
         names, named = names[:n], 8 * (excess.size + 1) * of.shape[1]
-        if excess.size > MANY:
+        if named > MANY * n:
             corner = names >= 0
             used, names[corner] = np.unique(names[corner], return_inverse=True)
             named = len(used)
@@ -290,3 +299,23 @@ def _spans(wanted: NDArray[np.bool_], fineness: int) -> Ints:
     first, last = wanted.argmax(axis=1), wanted.shape[1] - wanted[:, ::-1].argmax(axis=1)
     spans = np.stack([first, np.where(wanted.any(axis=1), last, first)], axis=-1) * fineness
     return np.ascontiguousarray(np.repeat(spans, fineness, axis=0), np.int32)
+
+
+def _around(span: Ints, places: list[tuple[float, float]], cols: int) -> Ints:
+    """(rows + 1, 2) of nodes: of each row the first that is no farther than `AROUND` from cells of the ``span``, or
+    from ``places`` (row, column), and that after the last."""
+    first, last = np.full(len(span) + 1, cols), np.zeros(len(span) + 1, np.int64)
+
+    def widen(low: int, high: int, left: Ints | int, right: Ints | int) -> None:
+        np.minimum(first[low:high], left, out=first[low:high])
+        np.maximum(last[low:high], right, out=last[low:high])
+
+    some = span[:, 1] > span[:, 0]
+    left, right = np.where(some, span[:, 0] - AROUND, cols), np.where(some, span[:, 1] + AROUND + 1, 0)
+    for k in range(-AROUND, AROUND + 2):
+        low, high = max(k, 0), min(len(span) + k, len(first))
+        widen(low, high, left[low - k : high - k], right[low - k : high - k])
+    for r, c in places:
+        low, high = (min(max(math.floor(r) + k, 0), len(first)) for k in (-AROUND, AROUND + 1))
+        widen(low, high, math.floor(c) - AROUND, math.floor(c) + AROUND + 1)
+    return np.ascontiguousarray(np.stack([first.clip(0, cols), last.clip(0, cols)], axis=-1), np.int32)
