@@ -14,16 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.mesh import Exhausted, Guide, Mesh, Way
+from gcsplan.planners.mesh import Exhausted, Guide, Way
 from gcsplan.planners.plane import Plane, make_plane
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.relief import Cone, Relief
 from gcsplan.planners.shapes import CLOSE, LOOSE, Fit
 from gcsplan.world.zones import Circle
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Cone = tuple[float, float, float, float]
-"""Where it stands (east_m, north_m), its height there, and its slope."""
 Spare = tuple[float, float]
 """Metres that a path may fly in laps near its start and near its goal."""
 
@@ -157,19 +156,18 @@ class Leg:
                 self.reach_m = min(within, way.length_m * (1.0 + slack))
                 return
 
-    def _mesh(
+    def _relief(
         self,
         cap_m: float,
         low: bool,
         within: Corridor | None,
         limit_m: float,
-        cones: list[Cone],
+        ends: list[Cone] | None = None,
         under: Bools | None = None,
         over: Bools | None = None,
-        sheets: bool = False,
-    ) -> tuple[Mesh, Guide]:
-        """The mesh, finer ``within`` a corridor, or else the first look's for tracks shorter than ``limit_m``; and how
-        far the goal is."""
+    ) -> tuple[Relief, Guide]:
+        """What to make a mesh of, finer ``within`` a corridor, or else the first look's for tracks shorter than
+        ``limit_m``; and how far the goal is."""
         if within is None:
             plane, fineness, guide = self.plane, 1, self._guide
             cells = guide.reach(self.start.place, limit_m)
@@ -181,7 +179,7 @@ class Leg:
                 if self._twin is None:
                     self._twin = self._lattice(self._detour, self._fine_stride)
                 plane, cells = self._twin, self._finer(cells)
-        return plane.mesh(cap_m, low, fineness, cells, cones, under, over, sheets=sheets), guide
+        return Relief(plane, cap_m, low, fineness, cells, ends, under, over), guide
 
     def track(
         self,
@@ -200,9 +198,9 @@ class Leg:
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
-        mesh, guide = self._mesh(cap_m, False, within, limit, cones, under, over)
+        relief, guide = self._relief(cap_m, False, within, limit, cones, under, over)
         try:
-            return mesh.way(self.start.place, self.goal.place, limit, guide)
+            return relief.mesh().way(self.start.place, self.goal.place, limit, guide)
         except Exhausted:
             return None
 
@@ -212,15 +210,14 @@ class Leg:
         ``climbs``: near the ends hold tracks to what they can climb to, if they are shorter than ``limit_m``.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
-        cones: list[Cone] = []
+        relief, guide = self._relief(cap_m, True, within, limit)
         known = self.length_m
         for _ in range(RAISED):
             spare = max(limit - known, 0.0)
-            if climbs:
-                cones += self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare)
-            mesh, guide = self._mesh(cap_m, True, within, limit, cones)
+            cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare) if climbs else []
+            relief.hold(cones)
             try:
-                way = mesh.way(self.start.place, self.goal.place, limit, guide)
+                way = relief.mesh().way(self.start.place, self.goal.place, limit, guide)
             except Exhausted as given_up:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:
@@ -230,11 +227,11 @@ class Leg:
             known = max(known, way.length_m)
             if enough:
                 break
-        return max(known, self._bound_of_sheets(cap_m, within, limit, cones)) if self.sheets else known
+        return max(known, self._bound_of_sheets(relief, guide, limit)) if self.sheets else known
 
-    def _bound_of_sheets(self, cap_m: float, within: Corridor | None, limit_m: float, cones: list[Cone]) -> float:
-        """The same where none may get from under a zone to over it within the zone; ``cones`` hold in any case."""
-        mesh, guide = self._mesh(cap_m, True, within, limit_m, cones, sheets=True)
+    def _bound_of_sheets(self, relief: Relief, guide: Guide, limit_m: float) -> float:
+        """The same where none may get from under a zone to over it within the zone."""
+        mesh = relief.mesh(sheets=True)
         if mesh.sheets == 1:
             return 0.0
         try:
@@ -251,8 +248,9 @@ class Leg:
             return False
         spare = max(limit - self.length_m, 0.0)
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare)
-        mesh, _ = self._mesh(self.top_m, True, self.corridor(limit), limit, cones, sheets=True)
-        self.sheets = mesh.sheets > 1
+        relief, _ = self._relief(self.top_m, True, self.corridor(limit), limit)
+        relief.hold(cones)
+        self.sheets = relief.mesh(sheets=True).sheets > 1
         return self.sheets
 
     def look_closer(self, limit_m: float, parts: int) -> bool:

@@ -54,9 +54,9 @@ def _tighten_length(below: Below) -> None:
     below.try_below(below.top_m, fine=True)
     if below.gap > FAR:
         below.past(PAST, fine=False)
-    if not below.done() and (below.in_space or below.is_steep()):
-        below.raise_bound(_search_caps(below, lambda layer: math.hypot(layer.track_m, below.rise(layer.low_m))))
     _halve(below)
+    if not below.done() and below.in_space:
+        below.raise_bound(_search_caps(below, lambda layer: math.hypot(layer.track_m, below.rise(layer.low_m))))
     for _ in range(ROUNDS):
         before = below.cost - below.bound
         if below.done() or not below.past(PAST_FINE, fine=True):
