@@ -59,6 +59,8 @@ class Below:
         self._gained: dict[tuple[bool, bool], float] = {}
         self._simplified: set[tuple[bool, bytes]] = set()
         self.proved_shut = False
+        self.by_storeys = False
+        """Whether bounds ask where tracks can get to by what they climb and descend on their way."""
         self.timed_out = self.in_space = self.searched = False
         limits = problem.limits
         top_m = limits.max_amsl_m

@@ -10,7 +10,7 @@ UNIT = Unit(
     "planners",
     Path(__file__).parent,
     "gcsplan.planners",
-    ("_any_angle", "_cones", "_fill", "_intervals", "_mesh", "_reach", "_stamp", "_string", "_taut"),
+    ("_any_angle", "_cones", "_fill", "_intervals", "_mesh", "_reach", "_stamp", "_storeys", "_string", "_taut"),
 )
 
 device = UNIT.device

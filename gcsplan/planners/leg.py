@@ -19,6 +19,7 @@ from gcsplan.planners.plane import Plane, make_plane
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.relief import Cone, Relief
 from gcsplan.planners.shapes import CLOSE, LOOSE, Fit
+from gcsplan.planners.storeys import MOST, SPARE_M, Reached, Stop, Storeys
 from gcsplan.world.zones import Circle
 
 Floats = NDArray[np.float64]
@@ -62,6 +63,10 @@ class Corridor:
     cells: Bools
     guide: Guide
 
+    def within(self, cells: Bools) -> Corridor:
+        """That part of it which lies in some of the guide's mesh's cells."""
+        return Corridor(self.cells & self.guide.mesh.over_plane(cells), self.guide)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Nearby:
@@ -96,6 +101,7 @@ class Leg:
         self._guide: Guide
         self._ahead: Guide | None = None
         self._close: Nearby | None = None
+        self._reached: tuple[Nearby, Reached] | None = None
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
         wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
         self.parts = max(1, round(cell_m / wanted_m))
@@ -133,7 +139,7 @@ class Leg:
 
         Widens the lattice until that way lies within it.
         """
-        self._ahead = self._close = None
+        self._ahead = self._close = self._reached = None
         self.closer = 1
         for detour in DETOURS:
             if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
@@ -291,8 +297,40 @@ class Leg:
         if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that the flood did not
             return np.full(1, -math.inf), np.full(1, math.inf), np.zeros(1), np.zeros(1)  # of those nothing is known
         close = self._closer(min(limit_m, self.reach_m))
-        near = close.left.mesh.of_plane(close.away.between(close.left, limit_m)).ravel()
+        near = self._near(close, limit_m)
+        if self._reached is not None and self._reached[0] is close and limit_m <= close.limit_m:
+            of = self._reached[1].known(limit_m, near)
+            return of.low_m, of.high_m, of.away_m, of.left_m
         return close.low_m[near], close.high_m[near], close.away_m[near], close.left_m[near]
+
+    def storeys(self, limit_m: float) -> Storeys:
+        """Those that tracks shorter than ``limit_m``, and than `reach_m`, may enter by what they climb and descend."""
+        limit = min(limit_m, self.reach_m)
+        close = self._closer(limit)
+        if self._reached is None or self._reached[0] is not close:
+            mesh, a, b = close.left.mesh, self.start, self.goal
+            near = self._near(close, close.limit_m)
+            count, low, high = mesh.plane.storeys(mesh, close.low_m, close.high_m, MOST, SPARE_M)
+            cell, nth = np.nonzero((np.arange(MOST) < count[:, None]) & near[:, None])
+            every = Storeys(
+                (mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1),
+                cell,
+                low[cell, nth],
+                high[cell, nth],
+                close.away_m[cell],
+                close.left_m[cell],
+                mesh.middles_from(a.place)[cell],
+                mesh.middles_from(b.place)[cell],
+                mesh.half_m(),
+                Stop(mesh.cells_at(a.place), a.amsl_m),
+                Stop(mesh.cells_at(b.place), b.amsl_m),
+            )
+            self._reached = close, Reached(every, self.problem.limits, close.limit_m)
+        return self._reached[1].within(limit, self._near(close, limit))
+
+    def _near(self, close: Nearby, limit_m: float) -> Bools:
+        """(cells,) what tracks no longer than ``limit_m`` may meet."""
+        return close.left.mesh.of_plane(close.away.between(close.left, limit_m)).ravel()
 
     def _closer(self, limit_m: float) -> Nearby:
         """A look at each cell alone, for tracks shorter than ``limit_m``; at whole pieces where that is too much."""

@@ -23,6 +23,8 @@ Place = tuple[float, float]
 
 BENT_M = LOOSE.bent_m
 """Most that a raster's line may bow between the corners of a block."""
+ASIDE = 0.25
+"""How far beside where it is said to be a place may lie on a lattice, in cells, at most."""
 MOST_OPENED = 3_000_000
 """Intervals that are looked at before a search is given up."""
 MOST_OF_SHEETS = 300_000
@@ -78,11 +80,24 @@ class Mesh:
 
     def straight_to(self, place: Place) -> Floats:
         """(cells,) metres that no way from a place to each is shorter than; of meshes as fine as their plane."""
+        return self.middles_from(place) - 0.5 * self._widths().ravel() - BENT_M
+
+    def middles_from(self, place: Place) -> Floats:
+        """(cells,) metres straight from a place to the middle of each; of meshes as fine as their plane."""
         x, y = (at - own for at, own in zip(self.places(), place, strict=True))
         middle = (0.25 * (z[:-1, :-1] + z[:-1, 1:] + z[1:, :-1] + z[1:, 1:]) for z in (x, y))
+        return np.asarray(np.hypot(*middle).ravel())
+
+    def half_m(self) -> float:
+        """No place of any cell is farther from its middle; of meshes as fine as their plane."""
+        return 0.5 * float(self._widths().max()) + BENT_M
+
+    def _widths(self) -> Floats:
+        """(rows - 1, cols - 1) metres between opposite corners."""
+        x, y = self.places()
         across = np.hypot(x[1:, 1:] - x[:-1, :-1], y[1:, 1:] - y[:-1, :-1])
         other = np.hypot(x[1:, :-1] - x[:-1, 1:], y[1:, :-1] - y[:-1, 1:])
-        return np.asarray((np.hypot(*middle) - 0.5 * np.maximum(across, other) - BENT_M).ravel())
+        return np.asarray(np.maximum(across, other))
 
     def places(self) -> tuple[Floats, Floats]:
         """(rows, cols) x and y of the plane's nodes that the mesh is over; of meshes as fine as their plane."""
@@ -100,6 +115,16 @@ class Mesh:
         """That part of all the plane's cells that the mesh is over."""
         rows, cols = self.excess.shape
         return cells[self.row : self.row + rows - 1, self.col : self.col + cols - 1]
+
+    def cells_at(self, place: Place) -> NDArray[np.int64]:
+        """The cells that a place may lie in; of meshes as fine as their plane."""
+        rows, cols = self.excess.shape
+        c, r = self.plane.at(place)
+        i, j = (
+            {math.floor(at - first + off) for off in (-ASIDE, ASIDE)} for at, first in ((c, self.col), (r, self.row))
+        )
+        found = {q * (cols - 1) + p for q in j for p in i if 0 <= q < rows - 1 and 0 <= p < cols - 1}
+        return np.array(sorted(found), np.int64)
 
     def pieces_at(self, place: Place) -> list[int]:
         """The free pieces that a place lies in, or next to where its own is not free."""

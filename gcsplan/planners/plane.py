@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners._stamp import PAIR, TOP, TOP_2, UNDER, UNDER_2, narrow_rooms
+from gcsplan.planners._storeys import cut_storeys
 from gcsplan.planners.ground_nodes import nodes, places, slopes
 from gcsplan.planners.mesh import Mesh
 from gcsplan.planners.problem import Problem
@@ -68,14 +69,29 @@ class Plane:
     def rooms(self, mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
         """(cells,) the lowest and the highest altitude, ``top_m`` at most, that can be flown at in each cell of a mesh
         for bounds that is as fine as its plane; the wrong way round where there is none."""
-        rows, cols = mesh.excess.shape
-        low = mesh.lowest().reshape(rows - 1, cols - 1)
+        low = mesh.lowest().reshape(mesh.excess.shape[0] - 1, -1)
         high = np.full(low.shape, top_m)
-        x, y = mesh.places()
+        narrow_rooms(*self._laid(mesh), low, high)
+        return low.ravel(), high.ravel()
+
+    def storeys(
+        self, mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: float
+    ) -> tuple[Ints, Floats, Floats]:
+        """How many storeys each cell of such a mesh has (cells,), ``most`` at most, by what zones leave of what `rooms`
+        tells of it, and (cells, most) from where to where they go, ``spare_m`` wider."""
+        low, high = np.empty((len(low_m), most)), np.empty((len(low_m), most))
+        low[:, 0], high[:, 0] = low_m - spare_m, high_m + spare_m
+        count = (low_m <= high_m).astype(np.int32)
+        cut_storeys(*self._laid(mesh), spare_m, count, low, high)
+        return count, low, high
+
+    def _laid(self, mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Ints, bool]:
+        """Ground and places of such a mesh's nodes, the shapes that are shut for certain and their boxes there, and
+        whether the ground is the terrain model's own."""
+        rows, cols = mesh.excess.shape
         ground = np.ascontiguousarray(self.grounds[0][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols])
         boxes = self.boxes(mesh.row, mesh.col, 1, rows, cols)
-        narrow_rooms(ground, x, y, *self.shapes.low, boxes, self.stride == 1, low, high)
-        return low.ravel(), high.ravel()
+        return ground, *mesh.places(), *self.shapes.low, boxes, self.stride == 1
 
     def zones(
         self, low: bool, under: NDArray[np.bool_] | None, over: NDArray[np.bool_] | None

@@ -70,6 +70,9 @@ def _tighten_length(below: Below) -> None:
     far = below.gap > TWICE * below.wanted and below.in_time()
     if far and sum(leg.part_sheets(below.limit(leg)) for leg in below.legs):
         _halve(below)
+    if below.gap > TWICE * below.wanted and below.climbs() and below.in_time():
+        below.by_storeys = True
+        _halve(below)
     far = not below.in_space and TWICE * below.wanted < below.gap <= NEAR and below.in_time()
     if far and sum(leg.look_closer(below.limit(leg), FINER) for leg in below.legs):
         below.try_below(below.top_m, fine=True)
@@ -173,7 +176,15 @@ def _bound_shorter(below: Below, longest_m: float) -> float:
     for leg in below.legs:
         limit = leg.length_m + spare
         wanted = leg.corridor(limit)
+        if below.by_storeys:
+            storeys = leg.storeys(limit)
+            if not len(storeys.cell):
+                tracks.append(min(limit, leg.reach_m))
+                continue
+            wanted = wanted.within(storeys.cells)
         tracks.append(leg.bound(below.top_m, wanted, limit, True))
+    if sum(tracks) >= most_m * (1.0 - 1e-12):
+        return longest_m
     # Each leg's limit is what the others leave, which is less now that they are known better.
     spare = max(most_m - sum(tracks), 0.0)
     return _least_of_pieces(below, tracks, spare, partial(rise_bound, below.legs))
