@@ -214,10 +214,9 @@ def _join(
     more = 8 * (ny * nx + 1) if sheet + next_sheet > 0 else 0
     for j in range(ny):
         # Along the row: pieces below (row j - 1) and above (row j).
-        x0 = y0 = x1 = y1 = 0.0
-        v0 = v1 = 0
+        x0 = y0 = was_t = 0.0
+        v0 = was = 0
         was_below = was_above = -1
-        whole = False
         first = last = 0
         if 0 < j < ny - 1:
             first, last = max(span[j - 1, 0], span[j, 0]), min(span[j - 1, 1], span[j, 1])
@@ -233,24 +232,24 @@ def _join(
                     found = _cut(excess[j, i], excess[j, i + 1], t)
                     found = found and _cut_own(of, values, kb, sheet, 3, 2, t)
                     found = found and _cut_own(of, values, ka, next_sheet, 0, 1, t)
-            goes_on = found and whole and t[0] == 0.0 and below == was_below and above == was_above
+            goes_on = found and was_t == 1.0 and t[0] == 0.0 and below == was_below and above == was_above
             # Where sheets meet, one may have to turn at any corner of a cell.
             goes_on = goes_on and (len(owner) == 0 or owner[kb] == owner[ka])
             if was_below >= 0 and not goes_on:
+                x1 = x[j, was] + was_t * (x[j, was + 1] - x[j, was])
+                y1 = y[j, was] + was_t * (y[j, was + 1] - y[j, was])
+                v1 = 8 * (j * nx + was) + more + 2
+                if was_t == 1.0:
+                    v1 = _name(excess, of, values, owner, piece, j, was + 1, more)
                 n = _put(ends, names, joins, n, room, x0, y0, x1, y1, v0, v1, was_above, was_below)
                 was_below = -1
             if found:
-                edge = 8 * (j * nx + i) + more
                 if not goes_on:
                     x0, y0 = x[j, i] + t[0] * (x[j, i + 1] - x[j, i]), y[j, i] + t[0] * (y[j, i + 1] - y[j, i])
-                    v0 = edge + 1
+                    v0 = 8 * (j * nx + i) + more + 1
                     if t[0] == 0.0:
                         v0 = _name(excess, of, values, owner, piece, j, i, more)
-                x1, y1 = x[j, i] + t[1] * (x[j, i + 1] - x[j, i]), y[j, i] + t[1] * (y[j, i + 1] - y[j, i])
-                v1 = edge + 2
-                if t[1] == 1.0:
-                    v1 = _name(excess, of, values, owner, piece, j, i + 1, more)
-                was_below, was_above, whole = below, above, t[1] == 1.0
+                was, was_below, was_above, was_t = i, below, above, t[1]
         if j == ny - 1:
             break
         # Within the row: sides and diagonals of its cells.
