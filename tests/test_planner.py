@@ -183,7 +183,7 @@ def test_climb_limit_is_kept_by_climbing_early_and_by_a_longer_way() -> None:
 
     far = problem(ground(step), limits=climbing(12.0), goal=(1800.0, 1000.0, 165.0))
     assert solve(far).path.length_m < 1620.0
-    s = solve(replace(far, start=(700.0, 1000.0, 20.0), budget_s=2.0))
+    s = solve(replace(far, start=(700.0, 1000.0, 20.0), gap_percent=5.0))
     assert s.path.length_m > 1150.0
 
 
