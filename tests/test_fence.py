@@ -334,6 +334,7 @@ no_fly:
   - {name: shed, center: [36.5975, -84.373], radius_m: 60, ceiling_agl_m: 40}
 vehicles:
   - {name: uav1, sysid: 1, autopilot: arducopter, start: [36.600, -84.380], goal: [36.596, -84.355], max_climb_deg: 15}
+planner: {gap_percent: 5}
 """
 
 

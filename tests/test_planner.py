@@ -140,7 +140,9 @@ def test_zone_with_a_low_ceiling_is_flown_over_and_one_with_a_high_floor_under()
 def test_zones_one_over_the_other_are_passed_in_between() -> None:
     low = Zone("low", Circle(1000.0, 1000.0, 900.0), None, Level(60.0, "amsl"))
     high = Zone("high", Circle(1000.0, 1000.0, 900.0), Level(90.0, "amsl"), None)
-    s = solve(problem(ground(0.0), (low, high), start=(50.0, 1000.0, 20.0), goal=(1950.0, 1000.0, 20.0)))
+    s = solve(
+        problem(ground(0.0), (low, high), start=(50.0, 1000.0, 20.0), goal=(1950.0, 1000.0, 20.0), gap_percent=2.0)
+    )
     assert 60.0 <= np.interp(1000.0, s.path.points[:, 0], s.path.points[:, 2]) <= 90.0
     assert s.path.length_m == pytest.approx(1800.0 + 2.0 * math.hypot(50.0, 40.0), abs=0.01)
 
@@ -348,9 +350,10 @@ def test_search_in_space_among_needles(
     below.look()
     assert below.best is not None
     assert below.bound - 1e-6 <= p.cost(FlownPath(points)) <= 1.003 * below.cost
-    again = steep_path(p, known, lambda: True)
-    assert again is not None
-    assert again[0].tobytes() == points.tobytes()
+    if objective == "length":
+        again = steep_path(p, known, lambda: True)
+        assert again is not None
+        assert again[0].tobytes() == points.tobytes()
 
 
 def test_search_in_space_is_given_up_when_time_is_over_and_not_begun_over_real_terrain() -> None:
