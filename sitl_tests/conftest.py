@@ -1,7 +1,8 @@
 """The real autopilot has one console: whatever talks to it runs in one worker.
 
-So do the quick tests of a file, which share what they read, import and work out first. Slow ones and those of other
-people's programs, which are few and long, go where there is room. (`xdist_group` would say the same, but pytest-xdist 3.8 does not see it under pytest 9.2.)
+So do the quick tests of a file, which share what they import, read and work out first; slow ones, and those of other
+people's programs, are few and long, and go where there is room. (`xdist_group` would say the same, but pytest-xdist
+3.8 does not see it under pytest 9.2.)
 """
 
 from __future__ import annotations
