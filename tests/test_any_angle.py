@@ -197,7 +197,7 @@ def turned(place: Floats) -> Place:
 
 
 @pytest.mark.parametrize("form", EACH_FORM)
-@pytest.mark.parametrize("holes", [0, 5])
+@pytest.mark.parametrize("holes", [pytest.param(0, marks=pytest.mark.slow), 5])
 @pytest.mark.parametrize("zones", [0, 12])
 def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str, holes: int, zones: int) -> None:
     rng = np.random.default_rng([holes, zones, *form.encode()])
@@ -436,7 +436,7 @@ def test_a_flood_says_of_no_piece_that_it_is_farther_than_it_is(slack: float, fo
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("block", [1, 4])
+@pytest.mark.parametrize("block", [pytest.param(1, marks=pytest.mark.slow), 4])
 def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block: int) -> None:
     """Ways by a third place are about as long as one likes; whatever they cross belongs to the corridor."""
     rng = np.random.default_rng([17, block, *form.encode()])

@@ -39,7 +39,7 @@ def box(west: float, south: float, east: float, north: float, low: float | None,
 
 def crossing(*zones: Zone, **changes: object) -> Problem:
     """From west to east over level ground, 10 m up."""
-    p = Problem(Airspace(ground(0.0), zones), TENTH, (200.0, 1000.0, 10.0), (1800.0, 1000.0, 10.0), budget_s=60.0)
+    p = Problem(Airspace(ground(0.0), zones), TENTH, (200.0, 1000.0, 10.0), (1800.0, 1000.0, 10.0), budget_s=600.0)
     return replace(p, **changes)  # type: ignore[arg-type]
 
 

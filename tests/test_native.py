@@ -134,7 +134,10 @@ def test_a_change_of_the_source_is_never_answered_with_older_code(room: Path) ->
     value(kernels(room), 3.0)
 
 
-@pytest.mark.parametrize("spoilt", [b"", b"{}\n", b"not json\nx", None])
+@pytest.mark.parametrize(
+    "spoilt",
+    [pytest.param(b"", marks=pytest.mark.slow), b"{}\n", pytest.param(b"not json\nx", marks=pytest.mark.slow), None],
+)
 def test_what_is_shipped_may_be_missing_or_spoilt(room: Path, spoilt: bytes | None) -> None:
     of = kernels(room)
     if spoilt is not None:

@@ -251,7 +251,7 @@ def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
     _is_solved(random_mission(seed))
 
 
-@pytest.mark.parametrize("seed", range(20, 23))
+@pytest.mark.parametrize("seed", [20, pytest.param(21, marks=pytest.mark.slow), 22])
 def test_random_missions_under_the_120_m_rule(seed: int) -> None:
     _is_solved(random_mission(seed, replace(FIELD, min_agl_m=50.0, max_agl_m=120.0), zones=6))
 

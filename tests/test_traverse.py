@@ -40,7 +40,7 @@ def under_a_lid() -> Problem:
         (200.0, 1000.0, 15.0),
         (1800.0, 1000.0, SLOPE * 400.0 + 15.0),
         gap_percent=15.0,
-        budget_s=60.0,
+        budget_s=600.0,
     )
 
 
