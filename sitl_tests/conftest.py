@@ -1,6 +1,8 @@
 """The real autopilot has one console: whatever talks to it runs in one worker.
 
-(`xdist_group` would say the same, but pytest-xdist 3.8 does not see it under pytest 9.2.)
+So do the quick tests of a file, which share what they import, read and work out first; slow ones, and those of other
+people's programs, are few and long, and go where there is room. (`xdist_group` would say the same, but pytest-xdist
+3.8 does not see it under pytest 9.2.)
 """
 
 from __future__ import annotations
@@ -15,8 +17,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """The scheduler that pyproject.toml asks for, with one group more."""
     from xdist.scheduler import LoadGroupScheduling
 
-    class OneConsole(LoadGroupScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            return "sitl" if "test_sitl.py::" in nodeid else str(super()._split_scope(nodeid))
+    quick = config.getoption("markexpr") == "not slow"
 
-    return OneConsole(config, log) if config.getoption("dist") == "loadgroup" else None
+    class Together(LoadGroupScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file, _, _ = nodeid.partition("::")
+            if file.endswith("test_sitl.py"):
+                return "sitl"
+            return file if quick and file.startswith("tests/") else str(super()._split_scope(nodeid))
+
+    return Together(config, log) if config.getoption("dist") == "loadgroup" else None

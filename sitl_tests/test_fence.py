@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gcsplan.mavlink import steps
 from gcsplan.mavlink.compare import compare, faults
 from gcsplan.mavlink.fence import Fence, areas_of, fence_of
 from gcsplan.mavlink.files import write_plan
@@ -40,7 +41,10 @@ def a_fence(autopilot: Autopilot) -> Fence:
 
 
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
-def test_a_fence_arrives_at_a_mavsdk_vehicle_and_reads_back(autopilot: Autopilot) -> None:
+def test_a_fence_arrives_at_a_mavsdk_vehicle_and_reads_back(
+    autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(steps, "_ASK_AGAIN_S", 0.05)  # it never says what it can, nor where it is
     fence = a_fence(autopilot)
     with MavsdkVehicle(sysid=4) as vehicle, Link(vehicle.url) as link:
         result = upload_items(link, 4, fence.items, autopilot, FENCE, options=QUICK)

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from gcsplan.mavlink import steps
 from gcsplan.mavlink.files import write_plan, write_waypoints
 from gcsplan.mavlink.link import Link
 from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, TERRAIN, Mission, MissionItem
@@ -37,6 +38,12 @@ def some_rally_points(n: int) -> list[MissionItem]:
     return [MissionItem(5100, 3, x=366_000_000 + i, y=-843_800_000, z=60.0 + i) for i in range(n)]
 
 
+@pytest.fixture
+def asked_in_haste(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Little time for a vehicle to say what it can and where it is: one of MAVSDK's never does."""
+    monkeypatch.setattr(steps, "_ASK_AGAIN_S", 0.05)
+
+
 def wires(rows: list[Row]) -> list[bytes]:
     """The wire numbers of each row, NaN equal to NaN."""
     assert [row[0] for row in rows] == list(range(len(rows)))
@@ -58,6 +65,7 @@ def test_every_item_arrives_at_a_mavsdk_vehicle_with_the_same_numbers(autopilot:
         assert any("could not be checked" in warning for warning in result.warnings)  # it calls itself generic
 
 
+@pytest.mark.usefixtures("asked_in_haste")
 def test_odd_numbers_arrive_at_a_mavsdk_vehicle_bit_by_bit() -> None:
     odd = (
         MissionItem(16, 3, (math.nan, -0.0, 1e-45, 3.4e38), -(2**31), 2**31 - 1, 0.1),
@@ -71,6 +79,7 @@ def test_odd_numbers_arrive_at_a_mavsdk_vehicle_bit_by_bit() -> None:
         assert wires(vehicle.received()) == [item.wire for item in mission.wire_items()]
 
 
+@pytest.mark.usefixtures("asked_in_haste")
 def test_all_three_lists_of_a_mavsdk_vehicle_are_kept_apart() -> None:
     mission = a_mission(PX4, 12)
     with MavsdkVehicle() as vehicle, Link(vehicle.url) as link:

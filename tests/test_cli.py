@@ -14,8 +14,8 @@ from gcsplan.mavlink.files import read_mission_file
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.steps import delivery
 from gcsplan.vehicle import Autopilot
+from tests.impatient import be_impatient
 
 CROSSING = Path(__file__).parent / "data" / "crossing.yaml"
 OUTPUTS = {"uav1.waypoints", "uav1.plan", "mission.kml", "mission.geojson", "profile.csv", "summary.json"}
@@ -25,7 +25,7 @@ OUTPUTS = {"uav1.waypoints", "uav1.plan", "mission.kml", "mission.geojson", "pro
 def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
     """Call ``gcsplan ARGUMENTS`` in an empty directory; gives (exit code, standard output, standard error)."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)  # nobody else is on these links
+    be_impatient(monkeypatch)
 
     def call(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])
@@ -162,7 +162,7 @@ def test_what_cannot_be_judged_is_exit_4_unless_allowed(run: Any, tmp_path: Path
 
 def test_files_are_uploaded_verified_downloaded_and_cleared(run: Any, tmp_path: Path) -> None:
     assert run("plan", CROSSING, "-o", "out")[0] == 0
-    with SimServer([vehicle()], "udpin:127.0.0.1:0") as server:
+    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
         url = server.url_for_gcs
         assert run("verify", "out/uav1.waypoints", "--to", url)[0] == 7
         assert run("upload", "out/uav1.plan", "--to", url, "--mission", CROSSING)[0] == 0
@@ -179,7 +179,7 @@ def test_files_are_uploaded_verified_downloaded_and_cleared(run: Any, tmp_path: 
 def test_an_unsafe_file_is_not_sent_unless_unchecked(run: Any, tmp_path: Path) -> None:
     assert run("plan", CROSSING, "-o", "out")[0] == 0
     higher = changed(tmp_path, "min_agl_m: 60", "min_agl_m: 70")
-    with SimServer([vehicle()], "udpin:127.0.0.1:0") as server:
+    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
         assert run("upload", "out/uav1.plan", "--to", server.url_for_gcs, "--mission", higher)[0] == 4
         assert server.vehicles[0].items()[1:] == ()
         assert run("upload", "out/uav1.waypoints", "--to", server.url_for_gcs, "--unchecked")[0] == 0
@@ -198,7 +198,7 @@ def test_an_unsafe_file_is_not_sent_unless_unchecked(run: Any, tmp_path: Path) -
 def test_each_kind_of_trouble_has_its_exit_code_and_is_named(
     run: Any, trouble: dict[str, Any], code: int, word: str
 ) -> None:
-    with SimServer([vehicle(**trouble)], "udpin:127.0.0.1:0") as server:
+    with SimServer([vehicle(**trouble)], "udpin:127.0.0.1:0", speedup=10.0) as server:
         got, _, err = run("plan", CROSSING, "--upload", server.url_for_gcs)
     assert got == code, err
     assert word in err
@@ -206,13 +206,13 @@ def test_each_kind_of_trouble_has_its_exit_code_and_is_named(
 
 
 def test_a_vehicle_that_stands_elsewhere_is_refused_unless_that_is_ignored(run: Any) -> None:
-    with SimServer([vehicle(amsl_m=900.0)], "udpin:127.0.0.1:0") as server:
+    with SimServer([vehicle(amsl_m=900.0)], "udpin:127.0.0.1:0", speedup=10.0) as server:
         assert run("plan", CROSSING, "--upload", server.url_for_gcs)[0] == 5
         assert run("plan", CROSSING, "--upload", server.url_for_gcs, "--ignore-position")[0] == 0
 
 
 def test_the_wrong_autopilot_is_refused(run: Any) -> None:
-    with SimServer([vehicle(Autopilot.PX4)], "udpin:127.0.0.1:0") as server:
+    with SimServer([vehicle(Autopilot.PX4)], "udpin:127.0.0.1:0", speedup=10.0) as server:
         code, _, err = run("plan", CROSSING, "--upload", server.url_for_gcs)
     assert code == 5
     assert "PX4" in err

@@ -14,8 +14,8 @@ from gcsplan import cli
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.steps import delivery
 from gcsplan.vehicle import Autopilot
+from tests.impatient import be_impatient
 from tests.test_fleeting import CROSS
 
 LIMITS = CROSS["limits"] | {"track_error_m": 3, "altitude_error_m": 3}
@@ -26,7 +26,7 @@ ARRIVAL = {"mode": "sequence", "order": ["west", "south"], "interval_s": 20, "se
 def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
     """Call ``gcsplan ARGUMENTS`` in an empty directory; gives (exit code, standard output, standard error)."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)
+    be_impatient(monkeypatch)
 
     def call(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])
@@ -57,7 +57,7 @@ def boards(**trouble: Any) -> list[LoopbackVehicle]:
 
 
 def test_one_line_plans_uploads_verifies_and_tells_when_to_start_whom(run: Any, tmp_path: Path) -> None:
-    with SimServer(boards(), "udpin:127.0.0.1:0") as server:
+    with SimServer(boards(), "udpin:127.0.0.1:0", speedup=10.0) as server:
         code, _, err = run("plan", write(tmp_path), "--upload", server.url_for_gcs, "--atomic")
     assert code == 0, err
     assert "arrival: sequence, 20 s apart; order west, south" in err
@@ -70,7 +70,7 @@ def test_one_line_plans_uploads_verifies_and_tells_when_to_start_whom(run: Any, 
 
 
 def test_json_names_who_refused_and_whose_mission_was_withdrawn(run: Any, tmp_path: Path) -> None:
-    with SimServer(boards(south={"refuse": 2}), "udpin:127.0.0.1:0") as server:
+    with SimServer(boards(south={"refuse": 2}), "udpin:127.0.0.1:0", speedup=10.0) as server:
         code, out, _ = run("plan", write(tmp_path), "--upload", server.url_for_gcs, "--atomic", "--json")
         assert server.vehicles[0].items()[1:] == ()
     told = json.loads(out)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise, product
 
@@ -14,12 +15,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.bench.terrain_problems import problems
-from gcsplan.planners.below import Below
+from gcsplan.planners.below import PAST, Below
 from gcsplan.planners.climb import extend
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.settle import sampled_track
 from gcsplan.planners.taut_string import Blocked, taut_string
-from gcsplan.planners.tighten import tighten
+from gcsplan.planners.tighten import PAST_FINE, tighten
 from gcsplan.planners.track import Flown, Lacking, Shut, _rooms, fly, lacking
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
@@ -38,7 +39,7 @@ def box(west: float, south: float, east: float, north: float, low: float | None,
 
 def crossing(*zones: Zone, **changes: object) -> Problem:
     """From west to east over level ground, 10 m up."""
-    p = Problem(Airspace(ground(0.0), zones), TENTH, (200.0, 1000.0, 10.0), (1800.0, 1000.0, 10.0), budget_s=2.0)
+    p = Problem(Airspace(ground(0.0), zones), TENTH, (200.0, 1000.0, 10.0), (1800.0, 1000.0, 10.0), budget_s=600.0)
     return replace(p, **changes)  # type: ignore[arg-type]
 
 
@@ -61,16 +62,26 @@ def met(p: Problem, points: Floats) -> list[int]:
     return out
 
 
-def looked(p: Problem) -> Below:
+def past(below: Below) -> None:
+    """Past what is in the way, more closely: `tighten` without the bound, and without the lattice for slopes."""
+    for leg in below.legs:
+        leg.flood(max(below.limit(leg), leg.reach_m) / leg.length_m - 1.0)
+    below.try_below(below.top_m, fine=True)
+    below.past(PAST, fine=False)
+    below.past(PAST_FINE, fine=True)
+
+
+def looked(p: Problem, closer: Callable[[Below], None] = past) -> Below:
     """What is found below the ceiling alone."""
     below = Below(p, time.perf_counter())
     below.look()
     for again in (False, True):
         if again:
-            tighten(below)
+            closer(below)
         assert below.best is not None
         assert faults(replace(p, airspace=Airspace(p.airspace.surface)), Path(below.best)) == []
         assert met(p, below.best) == []
+    assert not below.timed_out
     assert below.bound <= below.cost
     return below
 
@@ -162,7 +173,15 @@ def test_laps_lead_over_a_zone_that_cannot_be_passed_otherwise() -> None:
     p = crossing(box(400.0, 0.0, 600.0, 2000.0, None, 90.0))
     below = looked(p)
     best = climbing_m(200.0, 80.0) + 200.0 + climbing_m(1200.0, 80.0)
-    assert best - 1.0 <= below.cost <= 1.01 * best
+    assert best - 1.0 <= below.cost <= 1.005 * best
+
+
+@pytest.mark.slow
+def test_with_laps_the_bound_rises_and_stays_below_the_best_path() -> None:
+    below = looked(crossing(box(400.0, 0.0, 600.0, 2000.0, None, 90.0)), tighten)
+    best = climbing_m(200.0, 80.0) + 200.0 + climbing_m(1200.0, 80.0)
+    assert best - 1.0 <= below.cost <= 1.005 * best
+    assert 1700.0 < below.bound <= best
 
 
 @pytest.mark.parametrize(("half_m", "around"), [(150.0, True), (850.0, False)])
@@ -185,7 +204,7 @@ def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_w
         assert plane_m <= below.cost <= 1.02 * plane_m
         assert aside >= half_m - 1.0
     else:
-        assert below.cost <= 1.02 * over
+        assert below.cost <= 1.005 * over
         assert np.interp(500.0, below.best[:, 0], below.best[:, 2]) > 90.0
 
 
@@ -194,19 +213,19 @@ def test_laps_are_flown_under_one_zone_to_get_over_another() -> None:
     roof, wall = box(100.0, 0.0, 450.0, 2000.0, 80.0, None), box(500.0, 0.0, 600.0, 2000.0, None, 78.0)
     below = looked(crossing(roof, wall))
     best = climbing_m(300.0, 68.0) + 100.0 + climbing_m(1200.0, 68.0)
-    assert best - 1.0 <= below.cost <= 1.02 * best
+    assert best - 1.0 <= below.cost <= 1.005 * best
 
 
 def test_what_is_shut_for_one_cap_is_looked_at_again_for_the_best_path() -> None:
     # Around both is shorter than over either, but over one of them, with laps, is shorter than that.
     p = crossing(box(300.0, 0.0, 400.0, 1900.0, None, 40.0), box(1500.0, 300.0, 1600.0, 2000.0, None, 70.0))
     below = looked(p)
-    assert below.cost <= 1.02 * (climbing_m(100.0, 30.0) + 1100.0 + climbing_m(200.0, 60.0) + 200.0)
+    assert below.cost <= 1.005 * (climbing_m(100.0, 30.0) + 1100.0 + climbing_m(200.0, 60.0) + 200.0)
 
 
 def test_a_track_a_hand_too_high_is_looked_at_again_a_hand_lower() -> None:
     # Over real ground: the ceiling leaves no more than a saddle over the lid of a zone.
-    p = problems("main", 201)[42].problem
+    (p,) = (named.problem for named in problems("main", 201, count=4) if named.name == "main 201/02, 40 zones")
     below = Below(p, time.perf_counter())
     below.look()
     assert below.cost < 1.02 * below.bound

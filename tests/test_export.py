@@ -144,7 +144,7 @@ def test_zones_stand_in_the_kml_from_floor_to_ceiling() -> None:
     assert "from 50 m AGL to 900.5 m AMSL" in str(zones["airfield"].findtext(KML + "description"))
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.text())
 def test_no_name_breaks_the_kml(name: str) -> None:
     zone = Zone(name, Circle(0.0, 0.0, 10.0))

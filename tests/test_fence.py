@@ -40,6 +40,7 @@ from gcsplan.world.path import Path as FlightPath
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests import lossy
+from tests.impatient import be_impatient
 from tests.lossy import Weather
 from tests.worlds import vehicle, world
 
@@ -240,7 +241,7 @@ MIXED = [Zone("a", Circle(500, 500, 120.5)), square(3000, -900, 200), Zone("b", 
 def test_a_fence_is_uploaded_read_back_and_compared(autopilot: Autopilot) -> None:
     fence = fence_of(MIXED, FRAME, autopilot)
     craft = LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0)
-    with SimServer([craft], "udpin:127.0.0.1:0") as server, Link(server.url_for_gcs) as link:
+    with SimServer([craft], "udpin:127.0.0.1:0", speedup=10.0) as server, Link(server.url_for_gcs) as link:
         options = session.Options(listen_s=0.1, discover_s=5.0)
         result = session.upload_items(link, 1, fence.items, autopilot, FENCE, options=options, name="uav1")
         assert result.outcome == "accepted"
@@ -281,14 +282,14 @@ def job_of(name: str, sysid: int, url: str, mission: Mission, craft: Vehicle, wh
 def test_fences_go_before_the_missions_and_a_vehicle_that_is_not_there_stops_nobody_else(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)
+    be_impatient(monkeypatch)
     where, craft = world(zones=MIXED), vehicle()
     mission = mission_in(where, craft)
     boards = [
         LoopbackVehicle(1, COPTER, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0),
         LoopbackVehicle(2, COPTER, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0, misbehave=Misbehaviour(no_space=True)),
     ]
-    with SimServer(boards, "udpin:127.0.0.1:0") as server:
+    with SimServer(boards, "udpin:127.0.0.1:0", speedup=10.0) as server:
         plain = [job_of(f"uav{n}", n, server.url_for_gcs, mission, craft, where) for n in (1, 2)]
         jobs, notes = fencing.with_fences(plain)
         assert notes == []
@@ -305,7 +306,7 @@ def test_fences_go_before_the_missions_and_a_vehicle_that_is_not_there_stops_nob
 
 
 def test_vehicles_without_zones_keep_their_fence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)
+    be_impatient(monkeypatch)
     where, craft = world(), vehicle()
     jobs, notes = fencing.with_fences([job_of("uav1", 1, delivery.SIM, mission_in(where, craft), craft, where)])
     assert "left as it is" in notes[0][1]
@@ -333,13 +334,14 @@ no_fly:
   - {name: shed, center: [36.5975, -84.373], radius_m: 60, ceiling_agl_m: 40}
 vehicles:
   - {name: uav1, sysid: 1, autopilot: arducopter, start: [36.600, -84.380], goal: [36.596, -84.355], max_climb_deg: 15}
+planner: {gap_percent: 5}
 """
 
 
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)
+    be_impatient(monkeypatch)
     (tmp_path / "m.yaml").write_text(MISSION)
 
     def call(*arguments: str) -> tuple[int, str, str]:
@@ -359,7 +361,7 @@ def test_plan_and_upload_send_the_fence_where_that_is_asked_for(run: Any) -> Non
     assert "'shed' is left out" in err
     assert "a fence of 1 item(s) is on board too" in err
     board = LoopbackVehicle(1, COPTER, lat_deg=36.6, lon_deg=-84.38, amsl_m=471.0)
-    with SimServer([board], "udpin:127.0.0.1:0") as server:
+    with SimServer([board], "udpin:127.0.0.1:0", speedup=10.0) as server:
         to = ("--to", server.url_for_gcs)
         code, out, _ = run("upload", "out/uav1.plan", *to, "--mission", "m.yaml", "--fence", "--json")
         assert code == 0

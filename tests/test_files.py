@@ -105,7 +105,7 @@ def missions(draw: st.DrawFn, *, nan: bool = False) -> Mission:
     return Mission(autopilot, Home(draw(lat_e7), draw(lon_e7), amsl), tuple(items))
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=80, deadline=None, derandomize=True)
 @given(missions())
 def test_a_waypoints_file_reads_back_as_the_same_mission(mission: Mission) -> None:
     text = write_waypoints(mission)
@@ -113,7 +113,7 @@ def test_a_waypoints_file_reads_back_as_the_same_mission(mission: Mission) -> No
     assert write_waypoints(mission) == text
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=80, deadline=None, derandomize=True)
 @given(missions(nan=True))
 def test_a_plan_file_reads_back_as_the_same_mission(mission: Mission) -> None:
     text = write_plan(mission)
@@ -644,7 +644,7 @@ json_values = st.recursive(
 )
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.data())
 def test_no_json_makes_the_plan_reader_stumble(data: st.DataObject) -> None:
     plan = plan_of()

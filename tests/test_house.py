@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -97,9 +98,10 @@ def imported(tree: ast.AST, package: tuple[str, ...]) -> Iterator[str]:
             yield from (".".join([*base, alias.name]) for alias in node.names)
 
 
-def imports_of(path: Path) -> set[str]:
+@cache
+def imports_of(path: Path) -> frozenset[str]:
     package = ("gcsplan", *path.relative_to(ROOT).parts[:-1])
-    return set(imported(ast.parse(path.read_text(encoding="utf-8")), package))
+    return frozenset(imported(ast.parse(path.read_text(encoding="utf-8")), package))
 
 
 def own(module: str) -> str | None:

@@ -189,7 +189,7 @@ def cost_of(name: str, p: Problem, points: int = 6) -> Cost:
 def test_terms_are_those_of_the_equations(name: str) -> None:
     p = problem()
     cost = cost_of(name, p)
-    controls = cost.code.controls(np.random.default_rng(5).random((12, cost.dim)))
+    controls = cost.code.controls(np.random.default_rng(5).random((7, cost.dim)))
     controls[0, 2:4, 2] += 1500.0  # steeper than the volume allows, and out of it
     samples = cost.curve.samples(controls)
     measured = cost.terms(controls)

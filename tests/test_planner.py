@@ -140,7 +140,9 @@ def test_zone_with_a_low_ceiling_is_flown_over_and_one_with_a_high_floor_under()
 def test_zones_one_over_the_other_are_passed_in_between() -> None:
     low = Zone("low", Circle(1000.0, 1000.0, 900.0), None, Level(60.0, "amsl"))
     high = Zone("high", Circle(1000.0, 1000.0, 900.0), Level(90.0, "amsl"), None)
-    s = solve(problem(ground(0.0), (low, high), start=(50.0, 1000.0, 20.0), goal=(1950.0, 1000.0, 20.0)))
+    s = solve(
+        problem(ground(0.0), (low, high), start=(50.0, 1000.0, 20.0), goal=(1950.0, 1000.0, 20.0), gap_percent=2.0)
+    )
     assert 60.0 <= np.interp(1000.0, s.path.points[:, 0], s.path.points[:, 2]) <= 90.0
     assert s.path.length_m == pytest.approx(1800.0 + 2.0 * math.hypot(50.0, 40.0), abs=0.01)
 
@@ -183,7 +185,7 @@ def test_climb_limit_is_kept_by_climbing_early_and_by_a_longer_way() -> None:
 
     far = problem(ground(step), limits=climbing(12.0), goal=(1800.0, 1000.0, 165.0))
     assert solve(far).path.length_m < 1620.0
-    s = solve(replace(far, start=(700.0, 1000.0, 20.0), budget_s=2.0))
+    s = solve(replace(far, start=(700.0, 1000.0, 20.0), gap_percent=5.0))
     assert s.path.length_m > 1150.0
 
 
@@ -249,7 +251,7 @@ def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
     _is_solved(random_mission(seed))
 
 
-@pytest.mark.parametrize("seed", range(20, 23))
+@pytest.mark.parametrize("seed", [20, pytest.param(21, marks=pytest.mark.slow), 22])
 def test_random_missions_under_the_120_m_rule(seed: int) -> None:
     _is_solved(random_mission(seed, replace(FIELD, min_agl_m=50.0, max_agl_m=120.0), zones=6))
 
@@ -348,9 +350,10 @@ def test_search_in_space_among_needles(
     below.look()
     assert below.best is not None
     assert below.bound - 1e-6 <= p.cost(FlownPath(points)) <= 1.003 * below.cost
-    again = steep_path(p, known, lambda: True)
-    assert again is not None
-    assert again[0].tobytes() == points.tobytes()
+    if objective == "length":
+        again = steep_path(p, known, lambda: True)
+        assert again is not None
+        assert again[0].tobytes() == points.tobytes()
 
 
 def test_search_in_space_is_given_up_when_time_is_over_and_not_begun_over_real_terrain() -> None:

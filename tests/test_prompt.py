@@ -72,7 +72,7 @@ def taught(
 # -- the bytes ----------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(
     st.lists(WIRE_ITEMS, min_size=1, max_size=4), st.sampled_from([0, 1, 2]), st.integers(0, 1), st.integers(0, 255),
     st.tuples(st.integers(1, 255), st.integers(0, 255)), st.tuples(st.integers(1, 255), st.integers(0, 255)),

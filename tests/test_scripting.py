@@ -21,6 +21,7 @@ from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.steps import delivery
 from gcsplan.vehicle import Autopilot
+from tests.impatient import be_impatient
 from tests.test_fleeting import CROSS
 
 EXAMPLE = Path(__file__).parents[1] / "missions" / "upload_fleet.py"
@@ -35,7 +36,7 @@ TEXT = yaml.safe_dump(
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)  # nobody else is on these links
+    be_impatient(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -67,12 +68,15 @@ def test_the_four_functions_are_at_the_front_door_and_cost_nothing_until_used() 
 
 
 def test_a_plan_is_uploaded_to_one_port_to_a_link_each_and_to_simulated_vehicles(cross: Plan) -> None:
-    with SimServer(boards(cross), "udpin:127.0.0.1:0") as server:
+    with SimServer(boards(cross), "udpin:127.0.0.1:0", speedup=10.0) as server:
         done = upload(cross, server.url_for_gcs)
         assert [(d.vehicle, d.verified, d.simulated) for d in done] == [("west", True, False), ("south", True, False)]
         assert all(len(v.items()) > 3 for v in server.vehicles)
     west, south = boards(cross)
-    with SimServer([west], "udpin:127.0.0.1:0") as one, SimServer([south], "udpin:127.0.0.1:0") as other:
+    with (
+        SimServer([west], "udpin:127.0.0.1:0", speedup=10.0) as one,
+        SimServer([south], "udpin:127.0.0.1:0", speedup=10.0) as other,
+    ):
         each = upload(cross, {"west": one.url_for_gcs, "south": other.url_for_gcs})
         assert [d.verified for d in each] == [True, True]
         assert each[0].url != each[1].url
@@ -83,7 +87,7 @@ def test_a_plan_is_uploaded_to_one_port_to_a_link_each_and_to_simulated_vehicles
 
 
 def test_a_failure_raises_nothing_and_is_told_and_all_or_nothing_takes_back(cross: Plan) -> None:
-    with SimServer(boards(cross, south={"refuse": 2}), "udpin:127.0.0.1:0") as server:
+    with SimServer(boards(cross, south={"refuse": 2}), "udpin:127.0.0.1:0", speedup=10.0) as server:
         west, south = upload(cross, server.url_for_gcs)
         assert (west.verified, south.verified, south.outcome) == (True, False, "refused")
         assert delivery.exit_code([west, south]) == 5
@@ -125,12 +129,12 @@ def test_the_example_uploads_a_fleet(cross: Plan, tmp_path: Path, capsys: pytest
     file = tmp_path / "cross.yaml"
     file.write_text(TEXT)
     main = runpy.run_path(str(EXAMPLE))["main"]
-    with SimServer(boards(cross), "udpin:127.0.0.1:0") as server:
+    with SimServer(boards(cross), "udpin:127.0.0.1:0", speedup=10.0) as server:
         assert main(str(file), server.url_for_gcs) == 0
         out = capsys.readouterr().out
         assert out.count("verified") == 2
         assert "south: start at T+" in out
-    with SimServer(boards(cross, west={"refuse": 2}), "udpin:127.0.0.1:0") as server:
+    with SimServer(boards(cross, west={"refuse": 2}), "udpin:127.0.0.1:0", speedup=10.0) as server:
         assert main(str(file), server.url_for_gcs) == 5
         assert "withdrawn" in capsys.readouterr().out
     assert main(str(tmp_path / "none.yaml"), "sim") == 2

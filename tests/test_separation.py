@@ -147,7 +147,7 @@ def sampled_window(a: TimedPath, b: TimedPath, window_s: float, until_s: float) 
 
 def test_with_a_window_the_least_distance_is_that_over_all_shifts() -> None:
     met = 0
-    for seed in range(90):
+    for seed in range(45):
         fleet = random_fleet(seed)[:2]
         window = float(np.random.default_rng(seed).choice([0.05, 0.4, 1.5, 6.0]))
         until = max(p.end_s for p in fleet) + 2.0 * window
@@ -157,7 +157,7 @@ def test_with_a_window_the_least_distance_is_that_over_all_shifts() -> None:
         if brute < math.inf:
             assert exact >= brute - between - 1e-6, f"seed {seed}: {exact}, sampled {brute}"
             met += 1
-    assert met > 60
+    assert met > 30
 
 
 @settings(max_examples=40, deadline=None)

@@ -13,6 +13,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
 from gcsplan.errors import CheckFailed, GcsplanError, InputError, LinkError, ReadBackDiffers, VehicleRefused
+from gcsplan.mavlink import steps
 from gcsplan.mavlink.autopilots import altitude_of_cm
 from gcsplan.mavlink.compare import compare, faults
 from gcsplan.mavlink.frames import SigningKey
@@ -367,7 +368,10 @@ def test_thirty_metres_aside_and_fifteen_in_height_are_allowed(north_m: float, u
 
 
 @pytest.mark.parametrize("autopilot", list(Autopilot))
-def test_return_and_failsafe_parameters_are_read_and_their_difference_reported(autopilot: Autopilot) -> None:
+def test_return_and_failsafe_parameters_are_read_and_their_difference_reported(
+    autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(steps, "_PARAMETER_S", 0.5)  # an old ArduPlane says nothing of one that it does not have
     board = vehicle(autopilot)
     with air(board) as link:
         options = replace(OPTIONS, read_parameters=True, rtl_rel_home_m=333.0, expected_parameters={"NO_SUCH": 1.0})

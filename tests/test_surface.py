@@ -41,7 +41,7 @@ RASTERS = [
 ]
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=14, deadline=None, derandomize=True)
 @given(st.data())
 def test_the_fitted_grid_is_nowhere_farther_from_the_exact_one_than_it_says(data: st.DataObject) -> None:
     epsg, cell, lats, lons = data.draw(st.sampled_from(RASTERS))
@@ -63,7 +63,7 @@ def test_the_fitted_grid_is_nowhere_farther_from_the_exact_one_than_it_says(data
     assert fitted.error_m < limit_m
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=12, deadline=None, derandomize=True)
 @given(st.data())
 def test_the_way_back_from_the_grid_closes(data: st.DataObject) -> None:
     epsg, cell, lats, lons = data.draw(st.sampled_from(RASTERS))

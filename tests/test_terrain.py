@@ -516,7 +516,7 @@ def test_gridded_peaks_are_never_below_the_true_ones(
         assert above.max() <= 0.02
 
 
-@settings(deadline=None, derandomize=True, max_examples=40)
+@settings(deadline=None, derandomize=True, max_examples=24)
 @given(
     st.lists(
         st.builds(
@@ -644,9 +644,7 @@ def good_tif(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-@settings(
-    deadline=None, derandomize=True, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(deadline=None, derandomize=True, max_examples=90, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_corrupted_geotiff_is_read_or_refused(good_tif: bytes, tmp_path: Path, data: st.DataObject) -> None:
     broken = bytearray(good_tif)

@@ -39,14 +39,14 @@ def under_a_lid() -> Problem:
         LIMIT,
         (200.0, 1000.0, 15.0),
         (1800.0, 1000.0, SLOPE * 400.0 + 15.0),
-        budget_s=2.0,
+        gap_percent=15.0,
+        budget_s=600.0,
     )
 
 
-@pytest.mark.parametrize("objective", ["length", "energy"])
+@pytest.mark.parametrize("objective", ["length", pytest.param("energy", marks=pytest.mark.slow)])
 def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
-    p = under_a_lid()
-    p = replace(p, objective="energy" if objective == "energy" else "length")
+    p = replace(under_a_lid(), objective="energy" if objective == "energy" else "length")
     solution = optimal.plan(p)
     points = solution.path.points
     assert faults(p, solution.path) == []
@@ -59,11 +59,12 @@ def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
     assert solution.lower_bound <= p.cost(solution.path)
 
 
-def test_the_track_over_the_lattice_has_way_enough_to_climb() -> None:
-    found = traverse(under_a_lid(), 2200.0)
+@pytest.mark.parametrize("objective", ["length", "energy"])
+def test_the_track_over_the_lattice_has_way_enough_to_climb(objective: str) -> None:
+    found = traverse(replace(under_a_lid(), objective="energy" if objective == "energy" else "length"), 2200.0)
     assert found is not None
     track_m = float(np.hypot(*np.diff(found[0], axis=0).T).sum())
-    assert 1200.0 + 5.0 * (SLOPE * 400.0 - ROOM_M) <= track_m <= 2200.0
+    assert 1200.0 + 5.0 * (SLOPE * 400.0 - ROOM_M) - 1.0 <= track_m <= 2200.0
 
 
 def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> None:

@@ -94,7 +94,7 @@ def test_nothing_demanded_still_means_not_within() -> None:
 def test_distances_of_hulls_are_those_of_their_points_mixed() -> None:
     rng = np.random.default_rng(2)
     mix = rng.dirichlet(np.full(5, 0.25), 4000)
-    for _ in range(40):
+    for _ in range(20):
         regions = rng.normal(0.0, 60.0, (6, 5, 2)) * rng.choice([0.02, 1.0], (6, 1, 1)) + rng.normal(0, 60, (6, 1, 2))
         regions[0, 2:] = regions[0, 1]  # a segment
         regions[1, 1:] = regions[1, 0]  # a point

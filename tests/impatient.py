@@ -1,0 +1,19 @@
+"""Uploads of the command line on links where answers come at once or never, so that nobody need wait long for one."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+
+from gcsplan.mavlink import session
+from gcsplan.mavlink.transfer import Timers
+from gcsplan.steps import delivery
+
+_OPTIONS = session.Options
+
+
+def be_impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Listen for rivals, of whom there are none, and wait for answers of vehicles in this process, but shortly."""
+    monkeypatch.setattr(delivery, "LISTEN_S", 0.1)
+    monkeypatch.setattr(session, "Options", partial(_OPTIONS, timers=Timers(response_s=0.3)))
