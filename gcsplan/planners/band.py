@@ -51,12 +51,13 @@ KICK_PARTS = (0.02, 0.05)
 BOUND_NOTE = "the lower bound is the straight line from stop to stop: true, but not tight"
 
 
-def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True) -> Solution:
+def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True, known: bool = False) -> Solution:
     """A path under a maximum AGL and the climb limit that `Airspace.examine` passes.
 
     Start, goal and vias are known to be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
-    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s``, for improving the first path,
-    is a backstop. ``climbs``: may climb on the spot over start and goal. Raises Refusal where no path is found.
+    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s``, for all that comes after the
+    first path, is a backstop. ``climbs``: may climb on the spot over start and goal; ``known``: there is a path
+    already. Raises Refusal where no path is found.
     """
     tell("search", None)
     bound = straight_bound(problem)
@@ -70,7 +71,10 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     first_s = math.inf if best is None else time.perf_counter() - begun
     router: Router | None = None
     timed_out = False
+    deadline_s = begun + problem.budget_s
     for level in LEVELS if climbs else LEVELS[:2]:
+        if known and time.perf_counter() > deadline_s:
+            break
         work = _Work.at(problem, level, way)
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
@@ -84,14 +88,13 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
         if best is not None and (work.line is None or _flat(best) <= level.detour * way):
             first_s = min(first_s, time.perf_counter() - begun)
             tell("pull", problem.cost(Path(best)))
-            timed_out = False
             if work.line is not None:
-                better, timed_out = work.improve(time.perf_counter() + problem.budget_s, tell)
+                better, timed_out = work.improve(deadline_s, tell)
                 if better is not None and problem.cost(Path(better)) < problem.cost(Path(best)):
                     best = better
             break
     if best is None:
-        raise explain(problem, router) if climbs else Refusal("no way was found", reason="not_found")
+        raise explain(problem, router) if climbs and not known else Refusal("no way was found", reason="not_found")
     tell("done", problem.cost(Path(best)))
     return _solution(problem, best, bound, begun, first_s, timed_out)
 
@@ -249,7 +252,7 @@ class _Work:
         """Way points of the best line found from several ways and kicks, and whether time ran out."""
         assert self.line is not None
         assert self.guide is not None
-        ways = self._others()
+        ways = self._others(deadline_s)
         if ways:
             self.guide = self._guide([self.line.points, *ways])
         guide = self.guide
@@ -312,7 +315,7 @@ class _Work:
             line = guide.pull(line, self._steps(steps), COARSE_GAIN * self.way_m)
         return found, line
 
-    def _others(self) -> list[Floats]:
+    def _others(self, deadline_s: float) -> list[Floats]:
         """Other ways over the lattice: with a price on climbing, and past a disc that is shut on the first."""
         assert self.line is not None
         router, p = self.router, self.problem
@@ -323,6 +326,8 @@ class _Work:
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])
         floor = router.lattice.floor_m
         for f in DETOURS:
+            if time.perf_counter() > deadline_s:
+                break
             place = [np.interp(f * s[-1], s, self.line.points[:, k]) for k in range(2)]
             router.lattice.floor_m = floor.copy()
             router.lattice.shut(np.array(place), DETOUR_STEPS * router.lattice.step_m)

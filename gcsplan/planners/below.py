@@ -62,6 +62,8 @@ class Below:
         self.by_storeys = False
         """Whether bounds ask where tracks can get to by what they climb and descend on their way."""
         self.timed_out = self.in_space = self.searched = False
+        self.may_spend = 1.0
+        """What part of the time may be spent by now."""
         limits = problem.limits
         top_m = limits.max_amsl_m
         self.top_m = above_all(problem) if top_m is None else top_m - limits.altitude_error_m
@@ -292,8 +294,10 @@ class Below:
         return self.gap <= self.wanted
 
     def in_time(self) -> bool:
-        self.timed_out = time.perf_counter() - self.begun_s > self.problem.budget_s
-        return not self.timed_out
+        """Whether there is time left, of the part of it that may be spent by now."""
+        gone_s = time.perf_counter() - self.begun_s
+        self.timed_out = gone_s > self.problem.budget_s
+        return gone_s <= self.may_spend * self.problem.budget_s
 
     def solution(self) -> Solution:
         """The best path, with as few way points as are worth it, and the bound."""

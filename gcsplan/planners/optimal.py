@@ -99,11 +99,10 @@ def _sharp(problem: Problem, begun: float, laps: bool = True) -> Solution:
     below.search_small(MUCH)
     tighten(below)
     apart = not asked and below.gap > FAR
-    if apart and (problem.objective == "energy" or below.in_space or below.timed_out):
-        # Where climbing is dear, or the world is as high as wide, the best track may not be the shortest below any cap;
-        # and who ran out of time may not have looked at slopes.
+    if apart and below.in_time() and (problem.objective == "energy" or below.in_space):
+        # Where climbing is dear, or the world is as high as wide, the best track may not be the shortest below any cap.
         try:
-            better = below.take(plan_band(problem, tell, begun).path.points)
+            better = below.take(plan_band(problem, tell, begun, known=True).path.points)
         except Refusal:
             better = False
         if better:

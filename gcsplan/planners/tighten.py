@@ -30,6 +30,8 @@ PIECES = 4
 """Into how many pieces the lengths of tracks that matter are cut, each of which must climb no less than a bound."""
 NEARLY = 0.9
 """What part of what lay between path and bound is left, at most, where a better path makes another bound worth it."""
+KEPT = 0.6
+"""What part of the time is spent, at most, before slopes are looked at."""
 NEARER = 0.45
 """What part of the wanted gap is tried first, and worth a look even where the gap is small enough; a first path that is
 as near is good enough."""
@@ -51,6 +53,7 @@ def tighten(below: Below) -> None:
 
 
 def _tighten_length(below: Below) -> None:
+    below.may_spend = KEPT
     below.try_below(below.top_m, fine=True)
     if below.gap > FAR:
         below.past(PAST, fine=False)
@@ -63,6 +66,7 @@ def _tighten_length(below: Below) -> None:
             break
         if below.cost - below.bound < NEARLY * before:
             _halve(below)
+    below.may_spend = 1.0
     for _ in range(ROUNDS):
         if not _traverse(below):
             break
@@ -143,7 +147,7 @@ def _traverse(below: Below) -> bool:
     if found is not None:
         below.take_longer(found, fine=True)
     for level in (0, 1):  # which lattice gives the better lines is a matter of luck
-        if below.gap > TWICE * below.wanted:
+        if below.gap > TWICE * below.wanted and below.in_time():
             tight = pulled_tight(below.problem, below.best, level, below.begun_s + below.problem.budget_s)
             if tight is not None:
                 below.take_simpler(*tight, fine=True, longer=True)
