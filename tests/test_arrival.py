@@ -301,7 +301,7 @@ def test_a_refusal_survives_another_process() -> None:
     )  # fmt: skip
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(st.floats(100, 2000), min_size=2, max_size=6), st.sampled_from(["ground", "gate", "none"]),
     st.sampled_from(["first", "fleet"]),
@@ -375,7 +375,7 @@ def test_a_hundred_vehicles_are_ordered_as_sorting_orders_them() -> None:
     assert best_order(fast, fast, 5.0, "first", None) is None
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(st.floats(1, 100), st.floats(0, 100)), min_size=2, max_size=6), st.booleans())
 def test_an_interval_works_exactly_where_its_range_says(windows: list[tuple[float, float]], fleet: bool) -> None:
     fast = np.array([a for a, _ in windows])

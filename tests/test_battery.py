@@ -121,7 +121,7 @@ def test_rounds_are_flown_as_often_as_they_are() -> None:
     assert [leg.seq for leg in flown(legs)] == [1, 2, 3, 4, 3, 4, 3, 4, 5]
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     places=st.lists(
         st.tuples(st.floats(-3000, 3000), st.floats(-3000, 3000), st.floats(5, 200)), min_size=1, max_size=4

@@ -88,7 +88,7 @@ def test_marks_follow_from_the_ends_and_not_from_a_list(scenario: str) -> None:
 
 
 @given(st.lists(st.tuples(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5)), min_size=1, max_size=30))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_no_path_of_even_steps_pitches_more_than_its_length_allows(steps: list[tuple[float, float]]) -> None:
     heading, pitch = np.array(steps).T
     legs = np.stack([np.cos(pitch) * np.cos(heading), np.cos(pitch) * np.sin(heading), np.sin(pitch)], axis=-1)
@@ -187,7 +187,7 @@ def test_the_rank_test_is_scipys_on_made_runs() -> None:
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_holms_correction_lies_between_the_raw_values_and_bonferronis(p: list[float]) -> None:
     out = holm(p)
     order = np.argsort(p, kind="stable")

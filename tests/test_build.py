@@ -46,7 +46,7 @@ def test_px4_points_its_nose_along_the_leg_and_ardupilot_is_sent_none() -> None:
     assert all(item.params[3] == 0 for item in copter.items)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(
         st.tuples(st.floats(-9000, 9000), st.floats(-9000, 9000), st.floats(360, 2000)), min_size=2, max_size=6,

@@ -83,7 +83,7 @@ class Caps:
 
 
 @given(st.integers(0, 2**31), st.sampled_from([0.0, 1e-3, 1e-2]), st.sampled_from([0.0, 0.02, 0.3]))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 def test_no_cap_costs_less_than_the_bound(seed: int, gap: float, blind: float) -> None:
     caps = Caps(seed, blind=blind)
     bound = caps.search(gap)
@@ -118,7 +118,7 @@ def test_out_of_time_the_bound_holds_and_nothing_more_is_asked() -> None:
 
 
 @given(st.integers(0, 2**31))
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80)
 def test_the_least_of_ranges_is_that_of_each_place_alone(seed: int) -> None:
     rng = np.random.default_rng(seed)
     size, count = int(rng.integers(1, 70)), int(rng.integers(0, 30))

@@ -132,7 +132,7 @@ def test_zones_that_leave_no_room_between_them_are_named() -> None:
     assert shut.by == pytest.approx(20.0, abs=0.1)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10**6))
 def test_no_choice_of_sides_costs_less_than_what_is_lacking_tells(seed: int) -> None:
     rng = np.random.default_rng(seed)

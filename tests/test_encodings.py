@@ -41,7 +41,7 @@ def scene() -> Scene:
 
 @pytest.mark.parametrize("name", ENCODINGS)
 @given(seed=st.integers(0, 2**31), points=st.integers(1, 12), corner=st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_control_points_lie_in_the_volume_and_the_stops_are_among_them(
     name: str, seed: int, points: int, corner: bool
 ) -> None:
@@ -208,7 +208,7 @@ def test_what_kernels_have_of_a_basis_is_the_whole_of_it(points: tuple[int, ...]
 
 
 @given(seed=st.integers(0, 2**31), part=st.floats(1e-4, 0.3))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_fewer_points_keep_every_sample_within_the_corridor(seed: int, part: float) -> None:
     rng = np.random.default_rng(seed)
     line = curve((4, 3), (40, 30))

@@ -80,7 +80,7 @@ def outline(shape: Circle | Polygon) -> shapely.Polygon:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(zones(), st.sampled_from(list(Autopilot)))
 @example(Zone("two corners as far out", Polygon(FIVE)), Autopilot.ARDUCOPTER)
 def test_a_zone_comes_back_from_its_items_as_they_are_stored(zone: Zone, autopilot: Autopilot) -> None:

@@ -226,7 +226,7 @@ def test_the_ideal_vehicle_of_the_papers_flies_length_over_speed() -> None:
     assert fly([way], [0.0]).arrive_s[0] == pytest.approx(length_m / 8, abs=0.1)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(
     legs=st.lists(st.tuples(st.floats(-150, 150), st.floats(-150, 150), st.floats(20, 90)), min_size=1, max_size=6),
     cruise=st.floats(2, 20),

@@ -121,7 +121,7 @@ def test_the_bound_knows_how_long_a_climb_takes() -> None:
     assert energy == pytest.approx(120.0 * 300.0 + 100.0 * 300.0 / math.tan(math.radians(15.0)))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(2, 40))
 def test_the_kernels_string_is_the_taut_string(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)

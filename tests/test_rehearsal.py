@@ -254,7 +254,7 @@ def a_trace(name: str, rng: np.random.Generator, *, stays: bool = False, spread_
     return Trace(name, times, points, column, np.ones(n - 1, np.intp), float(times[-1]), 0.0, 0.0, stays)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32), count=st.integers(2, 5), stays=st.booleans())
 def test_the_least_distance_is_that_of_brute_force_and_never_more(seed: int, count: int, stays: bool) -> None:
     rng = np.random.default_rng(seed)
@@ -280,7 +280,7 @@ def test_the_least_distance_is_that_of_brute_force_and_never_more(seed: int, cou
         assert found[0].distance_m <= min(least.values()) + 0.5
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 2**32), slack=st.sampled_from([0.0, 0.1]))
 def test_the_least_height_and_every_zone_of_a_trace_are_those_of_fine_sampling(seed: int, slack: float) -> None:
     rng = np.random.default_rng(seed)

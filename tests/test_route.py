@@ -78,7 +78,7 @@ def jumpy(draw: st.DrawFn) -> tuple[MissionItem, ...]:
     return tuple(items)
 
 
-@settings(deadline=None, max_examples=120)
+@settings(max_examples=120)
 @given(jumpy())
 def test_every_leg_is_flown_as_often_as_one_by_one(items: tuple[MissionItem, ...]) -> None:
     # Relative to the wire, where the take-off is item 1.

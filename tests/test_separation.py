@@ -160,7 +160,7 @@ def test_with_a_window_the_least_distance_is_that_over_all_shifts() -> None:
     assert met > 30
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 3.0))
 def test_a_wider_window_never_shows_more_distance(seed: int, window_s: float) -> None:
     fleet = random_fleet(seed)
@@ -180,7 +180,7 @@ def test_every_shift_within_the_window_keeps_at_least_what_was_told() -> None:
             assert (separation(moved, Rules(10.0)).distance_m >= told - 1e-6).all(), f"seed {seed}"
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1))
 def test_two_straight_pieces_come_no_nearer_on_any_grid_than_in_closed_form(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -287,7 +287,7 @@ INTERESTING = [
 ]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     autopilot=st.sampled_from(list(Autopilot)),
     said=st.lists(
@@ -332,7 +332,7 @@ def test_half_a_frame_of_an_unknown_kind_does_not_swallow_the_next_datagram() ->
         assert len(sent) == 2
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.binary(max_size=300), max_size=10), st.booleans())
 def test_any_bytes_are_survived(pieces: list[bytes], datagram: bool) -> None:
     hub = Hub([a_vehicle()])

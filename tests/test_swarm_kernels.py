@@ -153,7 +153,7 @@ def test_a_path_costs_the_same_alone_and_in_any_company() -> None:
         assert together[::-1].tobytes() == cost.terms(np.ascontiguousarray(controls[::-1])).tobytes()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.floats(0.0, math.pi), st.floats(-12.0, 12.0))
 def test_angles_are_those_of_the_library(turn: float, size: float) -> None:
     across, along = abs(math.sin(turn)) * 10.0**size, math.cos(turn) * 10.0**size
@@ -164,7 +164,7 @@ def test_angles_at_the_corners() -> None:
     assert [ck.angle(*p) for p in ((0.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 0.0))] == [0, 0, math.pi, math.pi / 2]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.floats(0.0, ck.EXP_MOST))
 def test_exponentials_are_those_of_the_library(x: float) -> None:
     assert ck.exponential(x) == pytest.approx(math.exp(x), rel=5e-15)

@@ -516,7 +516,7 @@ def test_gridded_peaks_are_never_below_the_true_ones(
         assert above.max() <= 0.02
 
 
-@settings(deadline=None, derandomize=True, max_examples=24)
+@settings(max_examples=24)
 @given(
     st.lists(
         st.builds(
@@ -644,7 +644,7 @@ def good_tif(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-@settings(deadline=None, derandomize=True, max_examples=90, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=90, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_corrupted_geotiff_is_read_or_refused(good_tif: bytes, tmp_path: Path, data: st.DataObject) -> None:
     broken = bytearray(good_tif)
@@ -658,7 +658,7 @@ def test_a_corrupted_geotiff_is_read_or_refused(good_tif: bytes, tmp_path: Path,
     judged(path)
 
 
-@settings(deadline=None, derandomize=True, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 1201 * 1201 * 2 + 50), st.binary(max_size=64))
 def test_an_hgt_of_the_wrong_size_is_refused(tmp_path: Path, size: int, head: bytes) -> None:
     path = tmp_path / "N36W085.hgt"
@@ -671,7 +671,7 @@ def test_an_hgt_without_its_name_is_refused_with_the_cure(tmp_path: Path) -> Non
     assert "N36W085.hgt" in str(refusal(hgt(tmp_path / "tile.hgt", hills(1201, 1201))))
 
 
-@settings(deadline=None, derandomize=True, max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_garbled_ascii_grid_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> None:
     number = st.sampled_from(["100", "0", "-1", "1e9", "99999999999", "nan", "inf", "0.002", "-84.6", "x", "", "36.4"])

@@ -10,7 +10,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -153,7 +153,7 @@ def path_of(turns: list[tuple[float, float, float]]) -> list[tuple[float, float,
     return points
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(corners)
 @pytest.mark.slow
 def test_the_judged_pieces_hold_the_flown_track_with_every_way_to_reckon_its_altitude(
@@ -345,8 +345,9 @@ def test_a_glide_is_judged_straight_and_one_that_is_too_steep_is_named() -> None
     assert any("30.0 m below" in n for n in high.not_judged)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(-30.0, 60.0), st.floats(100.0, 700.0), st.floats(-100.0, 100.0), st.floats(80.0, 250.0))
+@example(60.0, 100.0, 100.0, 99.0)
 def test_the_room_below_a_climb_out_is_what_sampling_finds(high: float, east: float, north: float, wide: float) -> None:
     where, limits = hill(east, north, high, wide), wing().limits
     ground = where.airspace.surface.ground_at(0.0, 0.0)
@@ -362,7 +363,7 @@ def test_the_room_below_a_climb_out_is_what_sampling_finds(high: float, east: fl
     found = slant_room(line, line[0], 0.0, limits, where.airspace)
     if least < -0.06:
         assert found is not None
-        assert found[3] >= -least - 0.05
+        assert found[3] >= -least - 0.2  # that it is too low is told exactly, by how much to a decimetre or two
     elif least > 0.6:  # the check knows the ground within three metres all around, not only to both sides
         assert found is None
 
@@ -539,7 +540,7 @@ def test_a_corner_that_needs_more_acceptance_than_a_byte_holds_is_two_on_the_sam
     assert rates[[0, -1]] == pytest.approx(before)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(st.floats(-20.0, 20.0), st.floats(0.1, 500.0)), min_size=2, max_size=8))
 def test_way_points_that_crowd_are_thinned_and_what_is_left_lies_on_the_same_way(
     steps: list[tuple[float, float]],

@@ -353,7 +353,7 @@ def test_a_swapped_zone_is_told_from_a_far_one() -> None:
     assert not looks_swapped(far, FRAME)
 
 
-@settings(deadline=None, derandomize=True, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.floats(-80, 80), st.floats(-180, 180), st.floats(0.001, 1.5), st.integers(3, 12), st.integers(0, 10**6),
     st.booleans(),
@@ -407,7 +407,7 @@ def paths_into(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 @settings(
-    deadline=None, derandomize=True, max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(st.data())
 def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path, data: st.DataObject) -> None:
@@ -431,7 +431,7 @@ def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path, data: st.Data
 
 
 @settings(
-    deadline=None, derandomize=True, max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(st.data())
 def test_any_kml_gives_zones_or_clear_problems(tmp_path: Path, data: st.DataObject) -> None:
