@@ -79,7 +79,10 @@ def mesh_of(
         c, r = inverse @ np.array(place)
         return float(c), float(r)
 
-    plane = cast(Plane, SimpleNamespace(at=at, parts=1, stride=1, inside=np.ones((ny - 1, nx - 1), np.bool_)))
+    plane = cast(
+        Plane,
+        SimpleNamespace(at=at, begins=lambda _: (0, 0), parts=1, stride=1, inside=np.ones((ny - 1, nx - 1), np.bool_)),
+    )
     named = 8 * (nx * ny + 1) * of.shape[1]
     return Mesh(
         plane, 1, 0, 0, excess, excess, diagonal, span, piece, start, ends[:n], names[:n], joins[:n], order, named

@@ -97,38 +97,46 @@ def blank(value: Floats, around: Ints, at_first: float) -> None:
             value[j, i] = at_first
 
 
-@kernel("f8[,] i8 f8[,] f8[,]")
-def pool(z: Floats, stride: int, low: Floats, high: Floats) -> None:
-    """Every ``stride``-th node of a lattice, lowered (``low``) and raised (``high``) until bilinear patches between
-    those left lie nowhere above, and nowhere below, the bilinear patches between all.
+@device
+def _on_border(z: Floats, over: NDArray[np.int64], j: int, i: int) -> float:
+    """The height of the node that is j rows north of and i columns east of a corner; beyond the end, the end's."""
+    return float(z[over[3] - min(j, over[3] - over[1]), over[0] + min(i, over[2] - over[0])])
 
-    The difference of the two is bilinear in each small cell, so it is greatest at a node. Unknown nodes (NaN) shut
-    every patch that they lie in for ``high`` (inf), and are passed over for ``low``.
+
+@kernel("f8[,] i8[] i8 f8[,] f8[,]")
+def pool(z: Floats, over: NDArray[np.int64], stride: int, low: Floats, high: Floats) -> None:
+    """Every ``stride``-th node of a terrain model, rows going north, lowered (``low``) and raised (``high``) until
+    bilinear patches between those left lie nowhere above, and nowhere below, the bilinear patches between all.
+
+    ``over``: its first and last column and row (col0, row0, col1, row1). Beyond those all is as high as there. The
+    difference of the two is bilinear in each small cell, so it is greatest at a node. Unknown nodes (NaN) shut every
+    patch that they lie in for ``high`` (inf), and are passed over for ``low``.
     """
     rows, cols = low.shape
     for j in range(rows):
         for i in range(cols):
-            h = z[j * stride, i * stride]
+            h = _on_border(z, over, j * stride, i * stride)
             low[j, i] = -1e9 if math.isnan(h) else h
             high[j, i] = math.inf if math.isnan(h) else h
     for j in range(rows - 1):
         for i in range(cols - 1):
-            a, b = z[j * stride, i * stride], z[j * stride, (i + 1) * stride]
-            c, d = z[(j + 1) * stride, (i + 1) * stride], z[(j + 1) * stride, i * stride]
+            a, b = _on_border(z, over, j * stride, i * stride), _on_border(z, over, j * stride, (i + 1) * stride)
+            c = _on_border(z, over, (j + 1) * stride, (i + 1) * stride)
+            d = _on_border(z, over, (j + 1) * stride, i * stride)
             most = least = 0.0
             for q in range(stride + 1):
                 v = q / stride
                 for p in range(stride + 1):
                     u = p / stride
                     off = a * (1.0 - u) * (1.0 - v) + b * u * (1.0 - v) + c * u * v + d * (1.0 - u) * v
-                    off -= z[j * stride + q, i * stride + p]
+                    off -= _on_border(z, over, j * stride + q, i * stride + p)
                     if math.isnan(off):
                         least = -math.inf
                     else:
                         most, least = max(most, off), min(least, off)
             for k in range(4):
                 jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
-                h = z[jj * stride, ii * stride]
+                h = _on_border(z, over, jj * stride, ii * stride)
                 if not math.isnan(h):
                     low[jj, ii] = min(low[jj, ii], h - most)
                     high[jj, ii] = max(high[jj, ii], h - least)

@@ -92,7 +92,9 @@ class Below:
                     self.proved_shut = True
                     return
             self._raise_tracks()
-            if self.try_below(self.top_m, fine=False) or self.try_below(self.top_m, fine=True):
+            # Ways that the first look misses are short, or there are no others.
+            patient = slack in (SLACKS[0], SLACKS[-1])
+            if self.try_below(self.top_m, fine=False) or (patient and self.try_below(self.top_m, fine=True)):
                 return
             if self.past(PAST, fine=False, first=True):
                 return

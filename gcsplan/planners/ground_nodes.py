@@ -11,6 +11,8 @@ from gcsplan.planners._fill import lay, pool
 from gcsplan.world.surface import GridMap
 
 Floats = NDArray[np.float64]
+Extent = tuple[int, int, int, int]
+"""First and last columns and rows (col0, row0, col1, row1) of a terrain model's nodes."""
 
 
 def slopes(z: Floats, x: Floats, y: Floats) -> Floats:
@@ -27,21 +29,19 @@ def slopes(z: Floats, x: Floats, y: Floats) -> Floats:
     return np.hypot(a, b)
 
 
-def nodes(z: Floats, parts: int, stride: int, whole: int) -> tuple[Floats, Floats]:
-    """Heights at a lattice's nodes for bounds and for paths, from the terrain model's, rows going north."""
+def nodes(z: Floats, over: Extent, parts: int, stride: int, whole: int) -> tuple[Floats, Floats]:
+    """Heights at a lattice's nodes for bounds and for paths, rows going north, from the terrain model's, as far as it
+    is ``over``."""
+    col0, row0, col1, row1 = over
     if stride == 1 and whole == 1:
-        finer = _finer(z, parts)
+        finer = _finer(z[row0 : row1 + 1, col0 : col1 + 1][::-1], parts)
         return finer, finer
+    cells = [-(-n // whole) * whole // stride for n in (row1 - row0, col1 - col0)]
+    low, high = (np.empty((cells[0] + 1, cells[1] + 1)) for _ in range(2))
+    pool(np.ascontiguousarray(z), np.array(over), stride, low, high)
     # Beyond the border bounds may do as they like, and paths may not go.
-    more = [(0, -(n - 1) % whole) for n in z.shape]
-    wide = np.pad(np.ascontiguousarray(z), more, mode="edge")
-    low, high = (np.empty(tuple((n - 1) // stride + 1 for n in wide.shape)) for _ in range(2))
-    pool(wide, stride, low, high)
-    for axis, (_, extra) in enumerate(more):
-        if extra:
-            edge = [slice(None), slice(None)]
-            edge[axis] = slice((z.shape[axis] - 1) // stride + 1, None)
-            high[tuple(edge)] = np.inf
+    high[(row1 - row0) // stride + 1 :] = np.inf
+    high[:, (col1 - col0) // stride + 1 :] = np.inf
     return low, high
 
 

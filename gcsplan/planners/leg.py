@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.mesh import Exhausted, Guide, Way
-from gcsplan.planners.plane import Plane, make_plane
+from gcsplan.planners.mesh import Exhausted, Guide, Mesh, Way
+from gcsplan.planners.plane import Box, Plane, extent, finer_plane, make_plane, on_finer
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.relief import Cone, Relief
-from gcsplan.planners.shapes import CLOSE, LOOSE, Fit
+from gcsplan.planners.relief import Cone, Relief, box_of
+from gcsplan.planners.shapes import CLOSE, LOOSE
 from gcsplan.planners.storeys import MOST, SPARE_M, Reached, Stop, Storeys
 from gcsplan.world.zones import Circle
 
@@ -29,6 +29,8 @@ Spare = tuple[float, float]
 
 DETOURS = (1.25, 2.5, math.inf)
 """How long tracks may be, in times the straight way, before the lattice must be widened."""
+MUCH = 0.5
+"""What part of the terrain model is so much that all of it may be looked at as well."""
 COARSE_M = 100.0
 """Cells of the first look are no larger, if the terrain model's are not."""
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
@@ -37,6 +39,8 @@ FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 MOST_NODES, MOST_BESIDE, LARGE = 16e6, 6e6, 4e6
 """Nodes of the finest lattice, at most, in the box around a corridor: so many, and fewer beside a terrain model of more
 nodes than that, to need no more than half a gigabyte besides."""
+BESIDE = 8
+"""How many cells more the finer lattice is over than those that are asked for: later tracks may lie beside them."""
 RAISED, WORTHWHILE = 4, 0.05
 """Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
 
@@ -96,8 +100,9 @@ class Leg:
         self.reach_m = 0.0
         """Tracks shorter than this lie within the lattice, and within what the flood has seen."""
         self.plane: Plane
-        self._twin: Plane | None = None
+        self._twin: tuple[Plane, Bools] | None = None
         self._detour = 0.0
+        self._mesh: Mesh
         self._guide: Guide
         self._ahead: Guide | None = None
         self._close: Nearby | None = None
@@ -144,18 +149,20 @@ class Leg:
         for detour in DETOURS:
             if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                 continue
+            if detour != self._detour and DETOURS[0] < detour < math.inf and self._is_most(detour):
+                continue
             within = detour * self.straight_m if math.isfinite(detour) else math.inf
             if detour != self._detour:
-                self.plane, self._twin = self._lattice(detour, self._stride), None
+                self.plane, self._twin = self._lattice(detour), None
                 self._detour = detour
-            mesh = self.plane.mesh(self.top_m, True)
+                self._mesh = self.plane.mesh(self.top_m, True)
             a, b = self.goal.place, self.start.place
             try:
-                way, self._guide = mesh.flood(a, b, within, slack)
+                way, self._guide = self._mesh.flood(a, b, within, slack)
             except Exhausted as given_up:
                 # What was seen is as good as a flood that was asked to go no farther.
                 self.length_m = self.reach_m = given_up.seen_m * (1.0 - 1e-9)
-                self._guide = mesh.flood(a, b, self.reach_m, slack)[1]
+                self._guide = self._mesh.flood(a, b, self.reach_m, slack)[1]
                 return
             if way is not None:
                 self.length_m = way.length_m
@@ -182,9 +189,7 @@ class Leg:
             if plane is self.plane and self._stride == 1:
                 fineness *= self._cut
             elif plane is self.plane and self.has_fine:
-                if self._twin is None:
-                    self._twin = self._lattice(self._detour, self._fine_stride)
-                plane, cells = self._twin, self._finer(cells)
+                plane, cells = self._over(cells)
         return Relief(plane, cap_m, low, fineness, cells, ends, under, over), guide
 
     def track(
@@ -274,12 +279,10 @@ class Leg:
         most = MOST_NODES if self.problem.airspace.surface.ground_m.size < LARGE else MOST_BESIDE
         if float(np.ptp(rows) + 1) * float(np.ptp(cols) + 1) * (self._ratio * parts) ** 2 > most:
             return False
-        if self._stride == 1:
-            twin = self._lattice(self._detour, 1, self.parts * self._cut, CLOSE)
-        else:
-            twin = self._lattice(self._detour, self._fine_stride, fit=CLOSE)
+        finer = self.parts * self._cut if self._stride == 1 else self.parts
         # Nodes lie elsewhere by as much as the other lattice is bent.
-        found = self._each_cell(twin, self._finer(wanted), limit + 2.0 * LOOSE.bent_m, close.away)
+        more = limit + 2.0 * LOOSE.bent_m
+        found = self._each_cell(*finer_plane(self.plane, wanted, finer, self._fine_stride, CLOSE), more, close.away)
         if found is None:
             return False
         self._close, self.reach_m, self.closer = found, limit, parts
@@ -357,9 +360,15 @@ class Leg:
             return None
         return Nearby(limit_m, away, left, *plane.rooms(mesh, self.top_m), away.cells(), left.cells())
 
-    def _finer(self, cells: Bools) -> Bools:
-        """The same cells of the finer lattice."""
-        return np.repeat(np.repeat(cells, self._ratio, axis=0), self._ratio, axis=1)
+    def _over(self, cells: Bools) -> tuple[Plane, Bools]:
+        """The finer lattice over some cells, and perhaps more, and which of its cells these are."""
+        if self._twin is None or (cells & ~self._twin[1]).any():
+            row, col, last_row, last_col = box_of(cells)
+            wide = np.zeros(cells.shape, np.bool_)
+            wide[max(row - BESIDE, 0) : last_row + BESIDE, max(col - BESIDE, 0) : last_col + BESIDE] = True
+            self._twin = finer_plane(self.plane, wide, self.parts, self._fine_stride, LOOSE)[0], wide
+        plane = self._twin[0]
+        return plane, on_finer(self.plane, cells, plane)
 
     def _from_start(self) -> Guide:
         """Distances from the start over the coarse mesh, as far as the flood from the goal has seen."""
@@ -380,15 +389,23 @@ class Leg:
             if end.amsl_m is not None and math.isfinite(slope)
         ]
 
-    def _lattice(self, detour: float, stride: int, parts: int | None = None, fit: Fit = LOOSE) -> Plane:
-        a, b, d = self.start.place, self.goal.place, self.straight_m
-        parts = self.parts if parts is None else parts
-        if math.isinf(detour):
-            everywhere = (-math.inf, -math.inf, math.inf, math.inf)
-            return make_plane(self.problem, everywhere, parts, stride, self._stride, fit=fit)
-        more = max(0.5 * d * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * d) + 1.0
-        box = (min(a[0], b[0]) - more, min(a[1], b[1]) - more, max(a[0], b[0]) + more, max(a[1], b[1]) + more)
-        cell = self._stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
+    def _lattice(self, detour: float) -> Plane:
+        reach = None
+        if math.isfinite(detour):
+            a, b = self.start.place, self.goal.place
+            cell = self._stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
+            reach = a, b, detour * self.straight_m + 4.0 * cell
+        return make_plane(self.problem, self._box(detour), self.parts, self._stride, self._stride, reach)
 
-        reach = a, b, detour * d + 4.0 * cell
-        return make_plane(self.problem, box, parts, stride, self._stride, reach, fit)
+    def _box(self, detour: float) -> Box:
+        """What tracks may meet that are so many times as long as the straight way."""
+        if math.isinf(detour):
+            return -math.inf, -math.inf, math.inf, math.inf
+        (x0, y0), (x1, y1), d = self.start.place, self.goal.place, self.straight_m
+        more = max(0.5 * d * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * d) + 1.0
+        return min(x0, x1) - more, min(y0, y1) - more, max(x0, x1) + more, max(y0, y1) + more
+
+    def _is_most(self, detour: float) -> bool:
+        """Whether a lattice for such tracks is so large that one might as well look at everything."""
+        col0, row0, col1, row1 = extent(self.problem, self._box(detour))
+        return (col1 - col0) * (row1 - row0) > MUCH * self.problem.airspace.surface.ground_m.size

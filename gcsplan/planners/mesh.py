@@ -231,7 +231,8 @@ class Guide:
         ratio = finer.fineness * share // self.mesh.fineness
         out = np.full(len(finer.start) - 1, np.inf)
         cols, fine_cols = self.mesh.excess.shape[1] - 1, finer.excess.shape[1] - 1
-        row, col = finer.row // share - self.mesh.row, finer.col // share - self.mesh.col
+        first_row, first_col = finer.plane.begins(self.mesh.plane)
+        row, col = (finer.row + first_row) // share - self.mesh.row, (finer.col + first_col) // share - self.mesh.col
         least_of_cells(
             self.mesh.piece, self.entered, cols, finer.piece, finer.span, fine_cols, ratio, row, col, out
         )  # fmt: skip

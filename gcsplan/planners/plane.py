@@ -19,15 +19,19 @@ from numpy.typing import NDArray
 
 from gcsplan.planners._stamp import PAIR, TOP, TOP_2, UNDER, UNDER_2, narrow_rooms
 from gcsplan.planners._storeys import cut_storeys
-from gcsplan.planners.ground_nodes import nodes, places, slopes
+from gcsplan.planners.ground_nodes import Extent, nodes, places, slopes
 from gcsplan.planners.mesh import Mesh
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.relief import Relief
+from gcsplan.planners.relief import Relief, box_of
 from gcsplan.planners.scratch import Scratch
 from gcsplan.planners.shapes import LOOSE, Fit, Shapes, make_shapes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Box = tuple[float, float, float, float]
+"""West, south, east, north; infinite: everywhere."""
+Reach = tuple[tuple[float, float], tuple[float, float], float]
+"""Two places, and how far from both together."""
 
 
 @dataclass(eq=False, slots=True)
@@ -122,6 +126,11 @@ class Plane:
         around = slopes(self.tops[1][part], self.x[part], self.y[part])
         return np.ascontiguousarray(around[less_row:, less_col:][: last_row - row, : last_col - col])
 
+    def begins(self, other: Plane) -> tuple[int, int]:
+        """Row and column, counted in cells as large as its own from where another plane begins, at which it does."""
+        scale = self.parts / self.stride
+        return round(scale * (other.row1 - self.row1)), round(scale * (self.col0 - other.col0))
+
     def at(self, place: tuple[float, float]) -> tuple[float, float]:
         """Column and row of a place on this lattice."""
         if place not in self.known:
@@ -133,11 +142,11 @@ class Plane:
 
 def make_plane(
     problem: Problem,
-    box: tuple[float, float, float, float],
+    box: Box,
     parts: int = 1,
     stride: int = 1,
     whole: int = 1,
-    reach: tuple[tuple[float, float], tuple[float, float], float] | None = None,
+    reach: Reach | None = None,
     fit: Fit = LOOSE,
 ) -> Plane:
     """The lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
@@ -146,27 +155,63 @@ def make_plane(
     that are ``whole`` cells of the terrain model wide and long, times some number. ``reach``: only what is no farther
     from two places together is looked at.
     """
+    return _lattice(problem, extent(problem, box), parts, stride, whole, reach, fit)
+
+
+def extent(problem: Problem, box: Box) -> Extent:
+    """The terrain model's nodes that a box needs."""
     surface = problem.airspace.surface
-    grid = surface.grid
     rows, cols = surface.ground_m.shape
     west, south, east, north = box
     if math.isinf(west):
-        col0, row0, col1, row1 = 0, 0, cols - 1, rows - 1
-    else:
-        e, n = np.meshgrid(np.linspace(west, east, 5), np.linspace(south, north, 5))
-        at = grid(e.ravel(), n.ravel())
-        low, high = at.min(axis=0).clip(-2.0, [cols, rows]), at.max(axis=0).clip(-2.0, [cols, rows])
-        col0, row0 = (min(max(math.floor(v) - 1, 0), m - 2) for v, m in zip(low, (cols, rows), strict=True))
-        col1, row1 = (min(math.ceil(v) + 1, m - 1) for v, m in zip(high, (cols, rows), strict=True))
-        col1, row1 = max(col1, col0 + 1), max(row1, row0 + 1)
-    part = np.s_[row0 : row1 + 1, col0 : col1 + 1]
-    grounds = nodes(surface.ground_m[part][::-1], parts, stride, whole)
+        return 0, 0, cols - 1, rows - 1
+    e, n = np.meshgrid(np.linspace(west, east, 5), np.linspace(south, north, 5))
+    at = surface.grid(e.ravel(), n.ravel())
+    low, high = at.min(axis=0).clip(-2.0, [cols, rows]), at.max(axis=0).clip(-2.0, [cols, rows])
+    col0, row0 = (min(max(math.floor(v) - 1, 0), m - 2) for v, m in zip(low, (cols, rows), strict=True))
+    col1, row1 = (min(math.ceil(v) + 1, m - 1) for v, m in zip(high, (cols, rows), strict=True))
+    return col0, row0, max(col1, col0 + 1), max(row1, row0 + 1)
+
+
+def finer_plane(
+    plane: Plane, cells: NDArray[np.bool_], parts: int, stride: int, fit: Fit
+) -> tuple[Plane, NDArray[np.bool_]]:
+    """A finer lattice over some of a plane's cells, and which of its cells these are; see `make_plane`."""
+    cols = plane.problem.airspace.surface.ground_m.shape[1]
+    row, col, last_row, last_col = box_of(cells)
+    span = plane.stride / plane.parts  # a cell's width in the terrain model's
+    col0, col1 = plane.col0 + math.floor(span * col), min(plane.col0 + math.ceil(span * last_col), cols - 1)
+    row0, row1 = max(plane.row1 - math.ceil(span * last_row), 0), plane.row1 - math.floor(span * row)
+    finer = _lattice(plane.problem, (col0, row0, col1, row1), parts, stride, plane.stride, None, fit)
+    return finer, on_finer(plane, cells, finer)
+
+
+def on_finer(plane: Plane, cells: NDArray[np.bool_], finer: Plane) -> NDArray[np.bool_]:
+    """(rows - 1, cols - 1) a plane's cells on a finer lattice that lies over all of them."""
+    ratio = plane.stride * finer.parts // (plane.parts * finer.stride)
+    row, col, last_row, last_col = box_of(cells)
+    first_row, first_col = (ratio * first - more for first, more in zip((row, col), finer.begins(plane), strict=True))
+    small = np.repeat(np.repeat(cells[row:last_row, col:last_col], ratio, axis=0), ratio, axis=1)
+    out = np.zeros((finer.x.shape[0] - 1, finer.x.shape[1] - 1), np.bool_)
+    room = out[first_row:, first_col:][: small.shape[0], : small.shape[1]]
+    room[:] = small[: room.shape[0], : room.shape[1]]
+    return out
+
+
+def _lattice(
+    problem: Problem, over: Extent, parts: int, stride: int, whole: int, reach: Reach | None,
+    fit: Fit,
+) -> Plane:  # fmt: skip
+    """The lattice over an `extent`."""
+    surface = problem.airspace.surface
+    col0, _, _, row1 = over
+    grounds = nodes(surface.ground_m, over, parts, stride, whole)
     tops = grounds
     if surface.top_m is not surface.ground_m:
-        tops = nodes(surface.top_m[part][::-1], parts, stride, whole)
+        tops = nodes(surface.top_m, over, parts, stride, whole)
     shape = tops[0].shape
     block = max(problem.airspace.straight_cells(fit.bent_m) * parts // stride, 1)
-    x, y, looked_at = places(grid, col0, row1, shape, parts / stride, block, reach)
+    x, y, looked_at = places(surface.grid, col0, row1, shape, parts / stride, block, reach)
     return Plane(
         problem,
         col0,

@@ -62,7 +62,7 @@ class Relief:
         whole = whole or wanted is None
         wanted = plane.inside if wanted is None else wanted
         self.plane, self.fineness, self.cap_m, self.low = plane, fineness, cap_m, low
-        self.row, self.col, last_row, last_col = _box_of(wanted)
+        self.row, self.col, last_row, last_col = box_of(wanted)
         inner = np.s_[self.row : last_row, self.col : last_col]
         nodes = np.s_[self.row : last_row + 1, self.col : last_col + 1]
         top, ground, x, y = (
@@ -203,7 +203,7 @@ def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:
     )
 
 
-def _box_of(wanted: Bools) -> tuple[int, int, int, int]:
+def box_of(wanted: Bools) -> tuple[int, int, int, int]:
     """First row and column, and those after the last, of what is true; the first cell where nothing is."""
     rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if not len(rows):
