@@ -25,8 +25,9 @@ BENT_M = LOOSE.bent_m
 """Most that a raster's line may bow between the corners of a block."""
 ASIDE = 0.25
 """How far beside where it is said to be a place may lie on a lattice, in cells, at most."""
-MOST_OPENED = 3_000_000
-"""Intervals that are looked at before a search is given up."""
+MOST_OPENED, ANYHOW, OF_PORTAL = 3_000_000, 100_000, 64
+"""Intervals that are looked at before a search is given up: in all, and, beyond some, for each portal. Where the goal
+is farther than the limit, and there are many ways around many corners, they would be many times that."""
 MOST_OF_SHEETS = 300_000
 """The same where some cells are there twice."""
 
@@ -186,6 +187,7 @@ class Mesh:
             return None
         sources = np.array([(*start, 0.0)] * len(pieces))
         remaining = np.zeros(0) if guide is None else guide.over(self)
+        most = min(MOST_OPENED, ANYHOW + OF_PORTAL * len(self.joins)) if self.sheets == 1 else MOST_OF_SHEETS
         room = max(1 << 19, 8 * len(self.start))  # what is not touched costs nothing
         while True:
             best, origin = np.zeros(self.named), np.zeros(self.named, np.int64)  # cost nothing until they are touched
@@ -196,7 +198,7 @@ class Mesh:
             n = search(
                 self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span,
                 sources, np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32),
-                limit_m, slack, MOST_OPENED if self.sheets == 1 else MOST_OF_SHEETS, remaining, met,
+                limit_m, slack, most, remaining, met,
                 node, link, name, np.empty(room), np.empty(room, np.int32), out,
                 np.zeros((portals if self.sheets > 1 else 0, 8)),
             )  # fmt: skip
