@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
+import mmap
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+LARGE = 1 << 22
+"""Bytes from which on numpy asks for huge pages."""
+
 
 class Scratch:
     """Arrays by name, each as it was left by whoever had it last: memory is cleared by the system when it is first
-    touched, a huge page for a few numbers, which takes longer than what is done with them."""
+    touched, which takes longer than what is done with it.
+
+    Of large arrays only a corridor is touched, a few numbers of each row. With huge pages that would be all of them.
+    """
 
     def __init__(self) -> None:
         self._held: dict[str, NDArray[Any]] = {}
@@ -21,5 +28,12 @@ class Scratch:
         size = math.prod(shape)
         held = self._held.get(name)
         if held is None or held.size < size:
-            held = self._held[name] = np.empty(size, dtype)
+            self._held.pop(name, None)
+            held = self._held[name] = _small_pages(size, np.dtype(dtype))
         return held[:size].reshape(shape)
+
+
+def _small_pages(size: int, dtype: np.dtype[Any]) -> NDArray[Any]:
+    if size * dtype.itemsize < LARGE:
+        return np.empty(size, dtype)
+    return np.frombuffer(mmap.mmap(-1, size * dtype.itemsize), dtype)
