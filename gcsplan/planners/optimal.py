@@ -10,8 +10,9 @@ the ground) gives a length that no track below the cap can beat. A path is longe
 climb: between which heights every track that is short enough must be after so many metres is known too, from the
 ground and from zones that leave one way past them alone (`rising`). For energy the cap itself is what costs: caps are
 searched from both sides until no height between two of them can hold anything better (`caps`). Close to the ends a
-path can be no higher than it has had way to climb, which moves the walls. A zone that can be passed over in one place
-and under in another lies on two sheets of the plane (`_mesh`).
+path can be no higher than it has had way to climb, which moves the walls (`relief`); and all along its way only those
+altitudes between zones can be flown at which can be climbed to, and back from, on a track that is short enough
+(`storeys`). A zone that can be passed over in one place and under in another lies on two sheets of the plane (`_mesh`).
 
 **What is in the way all the same.** A shortest track may have no profile: from under one zone there may be no time to
 climb over the next. Then sides of zones are shut, or laps put in, best first (`detours`). Under a zone a few metres
