@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.plane import Mesh, Plane, make_plane
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.relief import AROUND, _around
 from gcsplan.planners.shapes import convex_parts
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -337,3 +338,22 @@ def test_convex_parts_make_up_the_polygon_and_are_convex(seed: int, corners: int
     for p in parts:
         assert p.exterior.is_ccw
         assert p.convex_hull.area == pytest.approx(p.area, rel=1e-9)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 5, 30])
+def test_nodes_that_are_looked_at_lie_around_the_cells_that_are_wanted(rows: int) -> None:
+    rng = np.random.default_rng(rows)
+    for _ in range(20):
+        cols = int(rng.integers(2, 60))
+        span = np.sort(rng.integers(0, cols, (rows, 2)), axis=1).astype(np.int32)
+        found = _around(span, cols)
+        near = np.zeros((rows + 1, cols), bool)
+        for j, (first, last) in enumerate(span.tolist()):
+            if first < last:
+                near[max(j - AROUND, 0) : j + AROUND + 2, max(first - AROUND, 0) : last + AROUND + 1] = True
+        for j in range(rows + 1):
+            some = np.flatnonzero(near[j])
+            if len(some):
+                assert found[j].tolist() == [some[0], some[-1] + 1]
+            else:
+                assert found[j, 0] >= found[j, 1]

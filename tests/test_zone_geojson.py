@@ -406,9 +406,7 @@ def paths_into(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return found
 
 
-@settings(
-    max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path, data: st.DataObject) -> None:
     multi = feature({"type": "MultiPolygon", "coordinates": [[SQUARE, HOLE]]})
@@ -430,9 +428,7 @@ def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path, data: st.Data
     judged(tmp_path / "z.geojson", text.encode())
 
 
-@settings(
-    max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_kml_gives_zones_or_clear_problems(tmp_path: Path, data: st.DataObject) -> None:
     broken = bytearray(KML.encode())

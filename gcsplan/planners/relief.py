@@ -225,7 +225,8 @@ def _around(span: Ints, cols: int) -> Ints:
     some = span[:, 1] > span[:, 0]
     left, right = np.where(some, span[:, 0] - AROUND, cols), np.where(some, span[:, 1] + AROUND + 1, 0)
     for k in range(-AROUND, AROUND + 2):
-        low, high = max(k, 0), min(len(span) + k, len(first))
+        low = max(k, 0)
+        high = max(min(len(span) + k, len(first)), low)
         np.minimum(first[low:high], left[low - k : high - k], out=first[low:high])
         np.maximum(last[low:high], right[low - k : high - k], out=last[low:high])
     return np.ascontiguousarray(np.stack([first.clip(0, cols), last.clip(0, cols)], axis=-1), np.int32)

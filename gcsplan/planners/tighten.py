@@ -104,7 +104,7 @@ def _tighten_energy(below: Below) -> None:
 def _raise_climb(below: Below) -> None:
     """Raise a bound of energy by what tracks that are short enough must climb and descend, a few lengths at a time."""
     p = below.problem
-    if below.done() or not below.in_time():
+    if below.gap <= NEARER * below.wanted or not below.in_time():
         return
     limits = [below.limit(leg) for leg in below.legs]
     known = [leg.bound(below.top_m, leg.corridor(m), m, True) for leg, m in zip(below.legs, limits, strict=True)]
@@ -222,5 +222,6 @@ def _search_caps(below: Below, cost_of: Callable[[Layer], float]) -> float:
             if below.try_below(cap, fine=False):
                 below.try_below(cap, fine=True)
 
+    near = (NEARER if below.problem.objective == "energy" else 1.0) * below.wanted
     layers = [Layer(max(below.known_m), below.top_m, sum(leg.length_m for leg in below.legs))]
-    return search_caps(layers, cost_of, track_m, lambda: below.cost, try_at, below.wanted, below.in_time)
+    return search_caps(layers, cost_of, track_m, lambda: below.cost, try_at, near, below.in_time)
