@@ -193,6 +193,31 @@ def own_zones(
     return count
 
 
+@device
+def over_ground(zones: Floats, z: int) -> bool:
+    """Whether a level of a zone past which one may fly is told over ground."""
+    under_agl = zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0
+    return bool(under_agl or (zones[z, TOP] < np.inf and zones[z, TOP_AGL] > 0.0))
+
+
+@device
+def shut_over(
+    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, z: int, j: int, i: int
+) -> tuple[float, float]:
+    """Up to which altitude, and from which on, one may fly somewhere in a cell that lies in a zone as a whole.
+    Everywhere, the two infinite and the wrong way round, where it does not lie in it, or that is not known."""
+    bottom, top = -np.inf, np.inf
+    for k in range(4):
+        jj, ii = j + (k >> 1), i + (k & 1)
+        unknown = over_ground(zones, z) and math.isnan(ground[jj, ii])
+        if unknown or depth(zones, edges, z, x[jj, ii], y[jj, ii]) <= 0.0:
+            return np.inf, -np.inf
+        top = min(top, level(zones, z, TOP, ground[jj, ii]))
+        if zones[z, UNDER] > 0.0:
+            bottom = max(bottom, level(zones, z, BOTTOM, ground[jj, ii]))
+    return bottom, top
+
+
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8[,] f8[,]")
 def narrow_rooms(
     ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, exact: bool, low: Floats,
@@ -206,23 +231,13 @@ def narrow_rooms(
     """
     for _ in range(2):  # what one zone leaves may shut another's way
         for z in range(len(zones)):
-            under_agl = zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0
-            over_agl = zones[z, TOP] < np.inf and zones[z, TOP_AGL] > 0.0
-            if zones[z, PAIR] > 0.0 or (not exact and (under_agl or over_agl)):
+            if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):
                 continue
             for j in range(boxes[z, 2], boxes[z, 3] + 1):
                 for i in range(boxes[z, 0], boxes[z, 1] + 1):
-                    bottom, top, inside = -np.inf, np.inf, low[j, i] <= high[j, i]
-                    for k in range(4):
-                        jj, ii = j + (k >> 1), i + (k & 1)
-                        inside = inside and depth(zones, edges, z, x[jj, ii], y[jj, ii]) > 0.0
-                        if not inside:
-                            break
-                        top = min(top, level(zones, z, TOP, ground[jj, ii]))
-                        if zones[z, UNDER] > 0.0:
-                            bottom = max(bottom, level(zones, z, BOTTOM, ground[jj, ii]))
-                    if not inside:
+                    if low[j, i] > high[j, i]:
                         continue
+                    bottom, top = shut_over(ground, x, y, zones, edges, z, j, i)
                     under, over = bottom >= low[j, i], top <= high[j, i]
                     if not under:
                         low[j, i] = top if over else np.inf

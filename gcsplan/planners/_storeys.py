@@ -6,13 +6,11 @@ same cell, for a zone that covers all of it is between them.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners._intervals import pop, push
-from gcsplan.planners._stamp import BOTTOM, BOTTOM_AGL, PAIR, TOP, TOP_AGL, UNDER, depth, level
+from gcsplan.planners._stamp import PAIR, over_ground, shut_over
 from gcsplan.planners.compiled import device, kernel
 
 Floats = NDArray[np.float64]
@@ -30,24 +28,15 @@ def cut_storeys(
     One that would be cut in two where there is room for no more is left as it is. ``exact``: as in `narrow_rooms`.
     """
     for z in range(len(zones)):
-        under_agl = zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0
-        over_agl = zones[z, TOP] < np.inf and zones[z, TOP_AGL] > 0.0
-        if zones[z, PAIR] > 0.0 or (not exact and (under_agl or over_agl)):
+        if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):
             continue
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
             for i in range(boxes[z, 0], boxes[z, 1] + 1):
                 cell = j * (x.shape[1] - 1) + i
-                bottom, top, inside = -np.inf, np.inf, count[cell] > 0
-                for k in range(4):
-                    jj, ii = j + (k >> 1), i + (k & 1)
-                    unknown = (under_agl or over_agl) and math.isnan(ground[jj, ii])
-                    inside = inside and not unknown and depth(zones, edges, z, x[jj, ii], y[jj, ii]) > 0.0
-                    if not inside:
-                        break
-                    top = min(top, level(zones, z, TOP, ground[jj, ii]))
-                    if zones[z, UNDER] > 0.0:
-                        bottom = max(bottom, level(zones, z, BOTTOM, ground[jj, ii]))
-                if inside and top - spare > bottom + spare:
+                if count[cell] == 0:
+                    continue
+                bottom, top = shut_over(ground, x, y, zones, edges, z, j, i)
+                if top - spare > bottom + spare:
                     count[cell] = _cut(low, high, cell, count[cell], bottom + spare, top - spare)
 
 

@@ -297,9 +297,10 @@ class Below:
 
     def in_time(self) -> bool:
         """Whether there is time left, of the part of it that may be spent by now."""
-        gone_s = time.perf_counter() - self.begun_s
-        self.timed_out = gone_s > self.problem.budget_s
-        return gone_s <= self.may_spend * self.problem.budget_s
+        if time.perf_counter() - self.begun_s > self.may_spend * self.problem.budget_s:
+            self.timed_out = True  # what comes later may be in time again, but something was left out
+            return False
+        return True
 
     def solution(self) -> Solution:
         """The best path, with as few way points as are worth it, and the bound."""

@@ -275,9 +275,9 @@ class Leg:
         if close.left is self._guide or self.closer > 1:
             return False
         wanted = close.away.between(close.left, limit)
-        rows, cols = (np.flatnonzero(wanted.any(axis=axis)) for axis in (1, 0))
+        row, col, last_row, last_col = box_of(wanted)
         most = MOST_NODES if self.problem.airspace.surface.ground_m.size < LARGE else MOST_BESIDE
-        if float(np.ptp(rows) + 1) * float(np.ptp(cols) + 1) * (self._ratio * parts) ** 2 > most:
+        if (last_row - row) * (last_col - col) * (self._ratio * parts) ** 2 > most:
             return False
         finer = self.parts * self._cut if self._stride == 1 else self.parts
         # Nodes lie elsewhere by as much as the other lattice is bent.

@@ -199,9 +199,8 @@ def on_finer(plane: Plane, cells: NDArray[np.bool_], finer: Plane) -> NDArray[np
 
 
 def _lattice(
-    problem: Problem, over: Extent, parts: int, stride: int, whole: int, reach: Reach | None,
-    fit: Fit,
-) -> Plane:  # fmt: skip
+    problem: Problem, over: Extent, parts: int, stride: int, whole: int, reach: Reach | None, fit: Fit
+) -> Plane:
     """The lattice over an `extent`."""
     surface = problem.airspace.surface
     col0, _, _, row1 = over

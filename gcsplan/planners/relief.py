@@ -87,9 +87,7 @@ class Relief:
         )  # fmt: skip
         self._zones, self._edges = plane.zones(low, under, over)
         self._boxes = plane.boxes(self.row, self.col, fineness, rows, cols)
-        self._of, self._values = self._array("of", (self._diagonal.size, 1), np.int32), np.zeros((1, WALL))
-        if len(self._boxes):
-            self._values = np.empty((1 + plane.shapes.cells * fineness**2, WALL))
+        self._of, self._values = np.empty((0, 0), np.int32), np.empty((0, WALL))
         self._laid = False
         self._held: list[Cone] = []
         self._lift: Floats
