@@ -31,8 +31,9 @@ Bools = NDArray[np.bool_]
 Stops = tuple[Floats, Bools, Floats]
 """A track (N, 2), which of its points are stops, and their altitudes (NaN free)."""
 
-HAIR_M = 0.2
-"""So little room is missing because the lattice rounds: the same is looked at so much lower, and what is missing."""
+LACKING_M, HAIR_M = 3.0, 0.2
+"""So little room is missing because cells are more lenient than the check, about terrain that is kept clear of
+sideways most of all: the same is looked at lower by what is missing, and a hair."""
 TAKEN = 5
 """Tracks that paths are looked for over, at most."""
 MORE = 1.1
@@ -152,7 +153,7 @@ class Search:
                 known[name] = lacking(self.ask.problem, sampled_track(self.ask.problem, *stops))
             lack = known[name]
             if isinstance(lack, Shut):
-                if not seen and lack.by < HAIR_M:
+                if not seen and lack.by < LACKING_M:
                     push(length_m, replace(choice, lower_m=choice.lower_m + lack.by + HAIR_M))
                 self._shut(length_m, choice, lack.zones, push)
                 continue
