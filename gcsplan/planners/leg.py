@@ -39,6 +39,8 @@ FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 MOST_NODES, MOST_BESIDE, LARGE = 16e6, 6e6, 4e6
 """Nodes of the finest lattice, at most, in the box around a corridor: so many, and fewer beside a terrain model of more
 nodes than that, to need no more than half a gigabyte besides."""
+MOST_ALONE = 50_000
+"""Cells of the finer lattice that may be looked at each alone in four parts."""
 BESIDE = 8
 """How many cells more the finer lattice is over than those that are asked for: later tracks may lie beside them."""
 RAISED, WORTHWHILE = 4, 0.05
@@ -264,8 +266,9 @@ class Leg:
         self.sheets = relief.mesh(sheets=True).sheets > 1
         return self.sheets
 
-    def look_closer(self, limit_m: float, parts: int) -> bool:
-        """Look anew, at each cell of the finer lattice alone, at what tracks shorter than ``limit_m`` may meet.
+    def look_closer(self, limit_m: float, parts: int, cut: int) -> bool:
+        """Look anew, at each cell of the finer lattice alone, at what tracks shorter than ``limit_m`` may meet; where
+        they are few, at each of their ``cut`` parts a side.
 
         No longer ones are known after that. `track` and `bound` cut the cells of such corridors into ``parts`` a side.
         False, and nothing is done, where that would be too many.
@@ -279,13 +282,15 @@ class Leg:
         most = MOST_NODES if self.problem.airspace.surface.ground_m.size < LARGE else MOST_BESIDE
         if (last_row - row) * (last_col - col) * (self._ratio * parts) ** 2 > most:
             return False
-        finer = self.parts * self._cut if self._stride == 1 else self.parts
+        if self._fine_stride > 1 or np.count_nonzero(wanted) * self._ratio**2 > MOST_ALONE:
+            cut = 1
+        finer = cut * (self.parts * self._cut if self._stride == 1 else self.parts)
         # Nodes lie elsewhere by as much as the other lattice is bent.
         more = limit + 2.0 * LOOSE.bent_m
         found = self._each_cell(*finer_plane(self.plane, wanted, finer, self._fine_stride, CLOSE), more, close.away)
         if found is None:
             return False
-        self._close, self.reach_m, self.closer = found, limit, parts
+        self._close, self.reach_m, self.closer = found, limit, parts // cut
         return True
 
     def corridor(self, limit_m: float) -> Corridor:

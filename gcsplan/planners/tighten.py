@@ -21,9 +21,9 @@ PAST_FINE, ROUNDS = 9, 2
 TWICE, NEAR, FINER = 2.0, 5e-2, 4
 """From so many times the wanted gap on, and up to which gap, as a part, cells are cut once more, and into how many
 parts a side: for walls and zones that the first lattice rounds off."""
-CLOSER, LEFT, FLAT = 8, 0.05, 0.12
-"""Times that what lies between path and bound is halved, at most, and what part of the gap is not worth it: close to
-the ends a shorter path has less way to climb. How little shorter paths' bounds rise that are taken to rise no more."""
+CLOSER, LEFT, SURE, FLAT = 8, 0.05, 0.4, 0.12
+"""Times that what lies between path and bound is cut, at most, and what part of the gap is not worth it, or what part
+of that where it is known how bounds rise; where it is cut first where path and bound are far apart."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
 PIECES = 4
@@ -78,9 +78,10 @@ def _tighten_length(below: Below) -> None:
         below.by_storeys = True
         _halve(below)
     far = not below.in_space and TWICE * below.wanted < below.gap <= NEAR and below.in_time()
-    if far and sum(leg.look_closer(below.limit(leg), FINER) for leg in below.legs):
+    alone = 2 if below.gap > FAR else 1
+    if far and sum(leg.look_closer(below.limit(leg), FINER, alone) for leg in below.legs):
         below.try_below(below.top_m, fine=True)
-        _halve(below)
+        _halve(below, far=True)
 
 
 def _tighten_energy(below: Below) -> None:
@@ -146,30 +147,52 @@ def _traverse(below: Below) -> bool:
     before, found = below.cost, traverse(below.problem, below.longest())
     if found is not None:
         below.take_longer(found, fine=True)
-    for level in (0, 1):  # which lattice gives the better lines is a matter of luck
+    for level in (0, 1):  # where finer lines are better, yet finer ones may be, too
+        known = below.cost
         if below.gap > TWICE * below.wanted and below.in_time():
             tight = pulled_tight(below.problem, below.best, level, below.begun_s + below.problem.budget_s)
             if tight is not None:
                 below.take_simpler(*tight, fine=True, longer=True)
+        if below.cost == known:
+            break
     return below.cost < before
 
 
-def _halve(below: Below) -> None:
-    """Raise the bound, up to the wanted gap if it can be; what lies between is halved."""
-    low, high, before, flat = below.bound, below.cost, 0.0, False
+def _halve(below: Below, *, far: bool = False) -> None:
+    """Raise the bound, up to the wanted gap if it can be, which is tried first if it is not ``far``: what lies between
+    is halved until it can be told how bounds rise with shorter paths."""
+    low, high = below.bound, below.cost
+    shorter: list[tuple[float, float]] = []  # what was asked, and the bound of that, where it is known
+    part = FLAT if far else 0.5
     for k in range(CLOSER):
         nearer = below.cost / (1.0 + NEARER * below.wanted)
-        enough = low >= nearer if k == 0 else below.done()
-        if enough or high - low < max(2e-5 * low, LEFT * (below.cost - low)) or not below.in_time():
+        at_once = k == 0 and not far
+        enough = low >= nearer if at_once else below.done()
+        least = max(2e-5 * low, LEFT * (below.cost - low))
+        where = _meeting(shorter, low, high)
+        if enough or high - low < least or where - low < SURE * least or not below.in_time():
             break
         # No path is shorter than `low`; is any shorter than `middle`?
-        middle = max(low + (FLAT if flat else 0.5) * (high - low), nearer if k == 0 else 0.0)
+        middle = where if math.isfinite(where) else low + part * (high - low)
+        middle = max(middle, nearer if at_once else 0.0)
         found = _bound_shorter(below, middle)
-        flat = k > 0 and found < min(middle, before + FLAT * (high - middle))
         if found < middle:
-            high, before = middle, found  # the bound of shorter paths is higher; where it hardly is, they are close
+            high = middle
+        part = 0.5 if found < middle else min(2.0 * part, 0.5)
+        if found != middle:
+            shorter = [*shorter[-1:], (middle, found)]
         low = max(low, min(found, middle))
         below.raise_bound(low)
+
+
+def _meeting(shorter: list[tuple[float, float]], low: float, high: float) -> float:
+    """Where a length is the bound of all that is shorter, by the last two that were asked, if that tells; else inf."""
+    if len(shorter) < 2:
+        return math.inf
+    (a, of_a), (b, of_b) = shorter
+    slope = (of_b - of_a) / (b - a)
+    at = (of_b - slope * b) / (1.0 - slope)
+    return at if slope <= 0.0 and low <= at < high else math.inf
 
 
 def _bound_shorter(below: Below, longest_m: float) -> float:
