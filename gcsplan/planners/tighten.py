@@ -24,6 +24,10 @@ parts a side: for walls and zones that the first lattice rounds off."""
 CLOSER, LEFT, SURE, FLAT = 8, 0.05, 0.4, 0.12
 """Times that what lies between path and bound is cut, at most, and what part of the gap is not worth it, or what part
 of that where it is known how bounds rise; where it is cut first where path and bound are far apart."""
+MOST_CELLS = 50_000
+"""Cells of all corridors whose storeys are looked at, at most."""
+FALLS = -0.25
+"""By how much a bound of shorter paths falls with each metre that they may be longer, where that is not known."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
 PIECES = 4
@@ -75,7 +79,9 @@ def _tighten_length(below: Below) -> None:
     if far and sum(leg.part_sheets(below.limit(leg)) for leg in below.legs):
         _halve(below)
     if below.gap > TWICE * below.wanted and below.climbs() and below.in_time():
-        below.by_storeys = True
+        cells = sum(int(leg.corridor(below.limit(leg)).cells.sum()) for leg in below.legs)
+        below.by_storeys = cells <= MOST_CELLS
+    if below.by_storeys:
         _halve(below)
     far = not below.in_space and TWICE * below.wanted < below.gap <= NEAR and below.in_time()
     alone = 2 if below.gap > FAR else 1
@@ -186,11 +192,12 @@ def _halve(below: Below, *, far: bool = False) -> None:
 
 
 def _meeting(shorter: list[tuple[float, float]], low: float, high: float) -> float:
-    """Where a length is the bound of all that is shorter, by the last two that were asked, if that tells; else inf."""
-    if len(shorter) < 2:
+    """Where a length is the bound of all that is shorter, by the last two that were asked, or one, if that tells; else
+    inf."""
+    if not shorter or (len(shorter) == 1 and shorter[0][1] < shorter[0][0]):
         return math.inf
-    (a, of_a), (b, of_b) = shorter
-    slope = (of_b - of_a) / (b - a)
+    (a, of_a), (b, of_b) = shorter[0], shorter[-1]
+    slope = (of_b - of_a) / (b - a) if b != a else FALLS
     at = (of_b - slope * b) / (1.0 - slope)
     return at if slope <= 0.0 and low <= at < high else math.inf
 
