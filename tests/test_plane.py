@@ -244,6 +244,39 @@ def test_the_mesh_for_bounds_has_the_straight_way_wherever_the_exact_check_passe
     assert held > 25
 
 
+@pytest.mark.parametrize("fineness", [3, 6])
+@pytest.mark.parametrize("world", ["hills", "turned"])
+def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str, fineness: int) -> None:
+    rng = np.random.default_rng([fineness, *world.encode()])
+    raised = held = 0
+    turn = np.linspace(0.0, 2.0 * math.pi, 181)
+    for k in range(4):
+        problem, plane, cap = world_of(rng, world, "errors", 1 + k % 2)
+        limits, surface = problem.limits, problem.airspace.surface
+        mesh = plane.mesh(cap, True, fineness)
+        places = inner(rng, 1500, plane)
+        cell = (np.array([plane.at((float(x), float(y))) for x, y in places]) - [mesh.col, mesh.row]) * fineness
+        i, j = np.floor(cell).astype(np.intp).T
+        u, v = (cell - np.floor(cell)).T
+        f, rows, cols = mesh.floor, *(n - 1 for n in mesh.excess.shape)
+        a, b, c, d = f[j, i], f[j, i + 1], f[j + 1, i + 1], f[j + 1, i]
+        straight = mesh.diagonal.reshape(rows, cols)[j, i] == 0
+        own = np.where(
+            straight,
+            np.where(u >= v, a + u * (b - a) + v * (c - b), a + v * (d - a) + u * (c - d)),
+            np.where(u + v <= 1.0, a + u * (b - a) + v * (d - a), c + (1.0 - u) * (d - c) + (1.0 - v) * (b - c)),
+        )
+        around = places[:, None] + limits.track_error_m * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+        high = surface.ground_at(around[..., 0], around[..., 1]).max(axis=1)
+        here = surface.ground_at(places[:, 0], places[:, 1])
+        known = np.isfinite(high) & np.isfinite(own)
+        more = limits.min_agl_m + limits.altitude_error_m
+        assert (own <= np.maximum(high, here) + more + 1e-3)[known].all()
+        raised += int((own > here + more + 0.1)[known].sum())
+        held += int(known.sum())
+    assert raised > 0.2 * held, raised / held
+
+
 @pytest.mark.parametrize("stride", [2, 3])
 @pytest.mark.parametrize("world", ["amsl", "turned"])
 def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str, stride: int) -> None:

@@ -12,6 +12,9 @@ from gcsplan.planners.compiled import device, kernel
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+SPARE = 0.999
+"""What part of a way is taken for it: cells beside each other are not quite as large."""
+
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] b1[,] i8 f8 f8 f8 f8[,] b1 i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i1[]")
 def fill(
@@ -21,7 +24,8 @@ def fill(
 ) -> None:  # fmt: skip
     """Cut each ``wanted`` (rows - 1, cols - 1) cell into ``fineness`` parts a side and give their nodes values.
 
-    ``floor`` is ``top`` + ``more`` + ``beside`` times ``steep`` (empty: 0); ``excess`` what it is over ``cap`` and over
+    ``floor`` is ``top`` + ``more`` + ``beside`` times how steep it is: for bounds (``low``) what it rises at least
+    within that way of all places next to a node, for paths ``steep``. ``excess`` is what it is over ``cap`` and over
     ``cones`` (K, 4: x, y, height, slope), which are too low rather than too high between nodes, inf at the other nodes
     of ``around`` (see `blank`); ``under`` the ground. ``diagonal``: the way to cut a cell so that triangles never lie
     above (``low``), or never below, the bilinear patch.
@@ -38,6 +42,10 @@ def fill(
             dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
             square = (dx * dx + dy * dy) / (fineness * fineness)
             side = math.sqrt(square)
+            ex, ey, nx, ny = x[j, i + 1] - x[j, i], y[j, i + 1] - y[j, i], x[j + 1, i] - x[j, i], y[j + 1, i] - y[j, i]
+            across, along = math.sqrt(ex * ex + ey * ey), math.sqrt(nx * nx + ny * ny)
+            # So far along one axis and the other is no farther than `beside`, were they not at right angles.
+            near = SPARE * beside / (1.0 + abs(ex * nx + ey * ny) / (across * along))
             for q in range(fineness + 1):
                 v = q / fineness
                 for p in range(fineness + 1):
@@ -54,6 +62,9 @@ def fill(
                     height += more
                     if len(steep):
                         height += beside * _mix(steep, j, i, a, b, c, d)
+                    elif near > 0.0:
+                        wide_u, wide_v = 1.0 / fineness + near / across, 1.0 / fineness + near / along
+                        height += near * _rises(top, j + v, i + u, wide_v, wide_u, along, across)
                     px, py = _mix(x, j, i, a, b, c, d), _mix(y, j, i, a, b, c, d)
                     e = height - cap
                     for k in range(len(cones)):
@@ -63,6 +74,28 @@ def fill(
                     excess[jj, ii], floor[jj, ii] = e, height
                     under[jj, ii] = _mix(ground, j, i, a, b, c, d)
                     fine_x[jj, ii], fine_y[jj, ii] = px, py
+
+
+@device
+def _rises(top: Floats, row: float, col: float, rows: float, cols: float, along: float, across: float) -> float:
+    """How steeply a surface rises in some one direction, at least, everywhere as few rows and columns from a place."""
+    least_e = least_n = math.inf
+    most_e = most_n = -math.inf
+    for j in range(math.floor(row - rows), math.floor(row + rows) + 1):
+        for i in range(math.floor(col - cols), math.floor(col + cols) + 1):
+            if not (0 <= j < top.shape[0] - 1 and 0 <= i < top.shape[1] - 1):
+                return 0.0
+            a, b, c, d = top[j, i], top[j, i + 1], top[j + 1, i + 1], top[j + 1, i]
+            if not abs(a + b + c + d) < math.inf:
+                return 0.0
+            for k in range(2):
+                v = max(row - rows - j, 0.0) if k == 0 else min(row + rows - j, 1.0)
+                u = max(col - cols - i, 0.0) if k == 0 else min(col + cols - i, 1.0)
+                e, n = (b - a) * (1.0 - v) + (c - d) * v, (d - a) * (1.0 - u) + (c - b) * u
+                least_e, most_e, least_n, most_n = min(least_e, e), max(most_e, e), min(least_n, n), max(most_n, n)
+    # Of all slopes that there may be, the least is nearest to none.
+    e, n = max(least_e, -most_e, 0.0) / across, max(least_n, -most_n, 0.0) / along
+    return math.sqrt(e * e + n * n)
 
 
 @kernel("f8[,] f8[,] i8 f8 f8 f8 f8 f8 f8[,] f8[,] b1[,]")

@@ -33,6 +33,8 @@ AROUND = 8
 """How many nodes beside those of cells that are wanted are looked at, at most: more than `_cones.BESIDE`."""
 RIM = 12.0
 """How many cells deep zones are looked at that cannot be climbed over so near to an end."""
+ALIKE = 12.0
+"""How many times as large as the error of tracks cells may be for bounds to make use of it."""
 MANY = 8
 """Names a portal from which on a mesh's are numbered one by one, for searches have room for every name."""
 
@@ -80,6 +82,10 @@ class Relief:
             # Beside cliffs it is the clearance that binds; this is more than both demand together.
             beside += limits.horizontal_clearance_m * scale
         more += -plane.fit.spare_m if low else plane.fit.hair_m
+        if low:
+            # Where cells are much larger, slopes are hardly alike as far as that.
+            cell_m = math.dist((x[0, 0], y[0, 0]), (x[1, 1], y[1, 1])) / fineness
+            beside = limits.track_error_m if limits.track_error_m * ALIKE > cell_m else 0.0
         fill(
             top, ground, steep, x, y, np.ascontiguousarray(wanted[inner]), fineness, more, beside, cap_m,
             np.array(ends or []).reshape(-1, 4), low, self._around, self._excess, self._floor, self._ground, self._x,
