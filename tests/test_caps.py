@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.below import Below
 from gcsplan.planners.caps import MOST_CAPS, Layer, search_caps
-from gcsplan.planners.leg import End, Leg
+from gcsplan.planners.corridor import End
+from gcsplan.planners.leg import Leg
 from gcsplan.planners.problem import Objective, Problem, Via
 from gcsplan.planners.rising import _least, climb_bound, rise_bound, rooms
 from gcsplan.planners.tighten import tighten

@@ -258,7 +258,7 @@ def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str,
         cell = (np.array([plane.at((float(x), float(y))) for x, y in places]) - [mesh.col, mesh.row]) * fineness
         i, j = np.floor(cell).astype(np.intp).T
         u, v = (cell - np.floor(cell)).T
-        f, rows, cols = mesh.floor, *(n - 1 for n in mesh.excess.shape)
+        f, (rows, cols) = np.where(np.isfinite(mesh.excess), mesh.floor, np.nan), (n - 1 for n in mesh.excess.shape)
         a, b, c, d = f[j, i], f[j, i + 1], f[j + 1, i + 1], f[j + 1, i]
         straight = mesh.diagonal.reshape(rows, cols)[j, i] == 0
         own = np.where(

@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from gcsplan.planners._storeys import spread
-from gcsplan.planners.leg import End, Leg
+from gcsplan.planners.corridor import End
+from gcsplan.planners.leg import Leg
 from gcsplan.planners.plane import make_plane
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.storeys import MOST, Reached, Stop, Storeys

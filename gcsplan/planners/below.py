@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from gcsplan.planners.band import straight_bound
 from gcsplan.planners.caps import above_all
 from gcsplan.planners.climb import with_laps
+from gcsplan.planners.corridor import End
 from gcsplan.planners.detours import Choice, Search, Stops, joined
 from gcsplan.planners.finish import way_points
 from gcsplan.planners.lattice import terminals
-from gcsplan.planners.leg import End, Leg
+from gcsplan.planners.leg import Leg
 from gcsplan.planners.polish import fewer, polished
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.planners.settle import Judge, Unsettled, settle
@@ -98,6 +99,9 @@ class Below:
                 return
             if self.past(PAST, fine=False, first=True):
                 return
+        for closely in (False, True):
+            if self.dare(closely=closely):
+                return
 
     def try_below(self, cap_m: float, *, fine: bool) -> bool:
         """Look for a path below a cap; True if it is the best so far."""
@@ -112,6 +116,20 @@ class Below:
                 return found is not None and self.take_simpler(*found, fine=fine, longer=False)
         past = flown.kind == "zone" or self.best is None
         return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
+
+    def dare(self, *, closely: bool = False) -> bool:
+        """Look for a path through what is open for the exact check alone: a lattice keeps as much beside its tracks as
+        the ground may rise there. ``closely``: along the way of the bound, in cells as small as can be. True if it is
+        the best so far."""
+        limits = self.problem.limits
+        if max(limits.track_error_m, limits.horizontal_clearance_m) <= 0.0:
+            return False
+        for leg in self.legs:
+            leg.exact, leg.closely = True, closely
+        found = self.try_below(self.top_m, fine=True)
+        for leg in self.legs:
+            leg.exact = leg.closely = False
+        return found
 
     def stops(self, choice: Choice, cap_m: float, fine: bool) -> Stops | None:
         """The shortest track of a choice below a cap, from stop to stop; see `Leg.track`."""

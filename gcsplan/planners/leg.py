@@ -9,15 +9,15 @@ be short enough.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners.corridor import Corridor, End, Nearby
 from gcsplan.planners.mesh import Exhausted, Guide, Mesh, Way
 from gcsplan.planners.plane import Box, Plane, extent, finer_plane, make_plane, on_finer
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.relief import Cone, Relief, box_of
+from gcsplan.planners.relief import Cone, Relief, box_of, sampled
 from gcsplan.planners.shapes import CLOSE, LOOSE
 from gcsplan.planners.storeys import MOST, SPARE_M, Reached, Stop, Storeys
 from gcsplan.world.zones import Circle
@@ -41,54 +41,14 @@ MOST_NODES, MOST_BESIDE, LARGE = 16e6, 6e6, 4e6
 nodes than that, to need no more than half a gigabyte besides."""
 MOST_ALONE = 50_000
 """Cells of the finer lattice that may be looked at each alone in four parts."""
+LEARNT = 10
+"""Times that a track is looked for where nodes alone are as high as the exact check has them."""
+ASIDE, MOST_OFTEN = 3, 2_000_000
+"""How many cells beside a way slits are looked for, and in how many of the finest lattice's cells, at most."""
 BESIDE = 8
 """How many cells more the finer lattice is over than those that are asked for: later tracks may lie beside them."""
 RAISED, WORTHWHILE = 4, 0.05
 """Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
-
-
-@dataclass(frozen=True, slots=True)
-class End:
-    """A stop: where, and how high; None where its height is free."""
-
-    east_m: float
-    north_m: float
-    amsl_m: float | None
-
-    @property
-    def place(self) -> tuple[float, float]:
-        """(east_m, north_m)."""
-        return self.east_m, self.north_m
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Corridor:
-    """(rows - 1, cols - 1) the cells of a leg's lattice that tracks of some length may enter, and how far the goal is
-    from there at least."""
-
-    cells: Bools
-    guide: Guide
-
-    def within(self, cells: Bools) -> Corridor:
-        """That part of it which lies in some of the guide's mesh's cells."""
-        return Corridor(self.cells & self.guide.mesh.over_plane(cells), self.guide)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Nearby:
-    """What tracks shorter than ``limit_m`` may meet, and how far that is from start and goal.
-
-    Of all cells of the guides' mesh (cells,) the lowest and the highest altitude that can be flown at, and how long
-    ways there and on are at least.
-    """
-
-    limit_m: float
-    away: Guide
-    left: Guide
-    low_m: Floats
-    high_m: Floats
-    away_m: Floats
-    left_m: Floats
 
 
 class Leg:
@@ -107,6 +67,7 @@ class Leg:
         self._mesh: Mesh
         self._guide: Guide
         self._ahead: Guide | None = None
+        self._told = np.array([start.place, goal.place])
         self._close: Nearby | None = None
         self._reached: tuple[Nearby, Reached] | None = None
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
@@ -127,6 +88,9 @@ class Leg:
         """Whether bounds hold tracks to pass each zone that has a floor and a ceiling over or under all of it."""
         self.closer = 1
         """Into how many parts a side the finer lattice's cells are cut once more, see `look_closer`."""
+        self.exact = self.closely = False
+        """Whether tracks are looked for where nodes are legal, though what is between them may not be by a little; and
+        that along the way of the last flood or bound, in cells as small as can be."""
         self.has_fine = self._ratio > 1
         """Whether there is a lattice finer than that of the first look."""
 
@@ -167,7 +131,7 @@ class Leg:
                 self._guide = self._mesh.flood(a, b, self.reach_m, slack)[1]
                 return
             if way is not None:
-                self.length_m = way.length_m
+                self.length_m, self._told = way.length_m, way.points
                 self.reach_m = min(within, way.length_m * (1.0 + slack))
                 return
 
@@ -180,6 +144,7 @@ class Leg:
         ends: list[Cone] | None = None,
         under: Bools | None = None,
         over: Bools | None = None,
+        exact: bool = False,
     ) -> tuple[Relief, Guide]:
         """What to make a mesh of, finer ``within`` a corridor, or else the first look's for tracks shorter than
         ``limit_m``; and how far the goal is."""
@@ -187,12 +152,13 @@ class Leg:
             plane, fineness, guide = self.plane, 1, self._guide
             cells = guide.reach(self.start.place, limit_m)
         else:
-            plane, fineness, guide, cells = within.guide.mesh.plane, self.closer, within.guide, within.cells
+            plane, guide, cells = within.guide.mesh.plane, within.guide, within.cells
+            fineness = within.parts or self.closer
             if plane is self.plane and self._stride == 1:
                 fineness *= self._cut
             elif plane is self.plane and self.has_fine:
                 plane, cells = self._over(cells)
-        return Relief(plane, cap_m, low, fineness, cells, ends, under, over), guide
+        return Relief(plane, cap_m, low, fineness, cells, ends, under, over, exact=exact), guide
 
     def track(
         self,
@@ -211,11 +177,17 @@ class Leg:
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
-        relief, guide = self._relief(cap_m, False, within, limit, cones, under, over)
+        if within is not None and self.closely:
+            within = self._along(within)
+        relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, self.exact)
         try:
-            return relief.mesh().way(self.start.place, self.goal.place, limit, guide)
+            for _ in range(LEARNT if self.exact else 1):
+                way = relief.mesh().way(self.start.place, self.goal.place, limit, guide)
+                if way is None or not self.exact or not relief.learn(way.points):
+                    return way
         except Exhausted:
-            return None
+            pass
+        return None
 
     def bound(self, cap_m: float, within: Corridor | None, limit_m: float, climbs: bool = False) -> float:
         """A lower bound of every track's length below ``cap_m``; ``limit_m``, or `reach_m`, if it is more.
@@ -235,6 +207,7 @@ class Leg:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:
                 return limit
+            self._told = way.points
             # Ways are longer between the walls that the cones raised, so there is less to spare for a climb: again.
             enough = not cones or way.length_m < known + WORTHWHILE * spare
             known = max(known, way.length_m)
@@ -292,6 +265,17 @@ class Leg:
             return False
         self._close, self.reach_m, self.closer = found, limit, parts // cut
         return True
+
+    def _along(self, within: Corridor) -> Corridor:
+        """What of a corridor lies along the way of the last flood or bound, in cells as small as can be."""
+        plane = within.guide.mesh.plane
+        near = np.zeros(within.cells.shape, np.bool_)
+        cell_m = math.dist((plane.x[0, 0], plane.y[0, 0]), (plane.x[0, 1], plane.y[0, 1]))
+        for i, j in np.unique(plane.all_at(sampled(self._told, cell_m)).astype(np.intp), axis=0).tolist():
+            near[max(j - ASIDE, 0) : j + ASIDE + 1, max(i - ASIDE, 0) : i + ASIDE + 1] = True
+        near &= within.cells
+        parts = math.isqrt(MOST_OFTEN // max(int(near.sum()) * self._ratio**2, 1))
+        return Corridor(near, within.guide, max(1, min(MOST_FINE, parts)))
 
     def corridor(self, limit_m: float) -> Corridor:
         """What tracks shorter than ``limit_m``, and than `reach_m`, may meet."""

@@ -134,10 +134,14 @@ class Plane:
     def at(self, place: tuple[float, float]) -> tuple[float, float]:
         """Column and row of a place on this lattice."""
         if place not in self.known:
-            c, r = self.problem.airspace.surface.grid(*place)
-            scale = self.parts / self.stride
-            self.known[place] = scale * (float(c) - self.col0), scale * (self.row1 - float(r))
+            c, r = self.all_at(np.array([place]))[0].tolist()
+            self.known[place] = c, r
         return self.known[place]
+
+    def all_at(self, places: Floats) -> Floats:
+        """(N, 2) the same of places (N, 2)."""
+        at = self.problem.airspace.surface.grid(places[:, 0], places[:, 1])
+        return self.parts / self.stride * np.stack([at[:, 0] - self.col0, self.row1 - at[:, 1]], axis=-1)
 
 
 def make_plane(

@@ -35,6 +35,8 @@ RIM = 12.0
 """How many cells deep zones are looked at that cannot be climbed over so near to an end."""
 ALIKE = 12.0
 """How many times as large as the error of tracks cells may be for bounds to make use of it."""
+LEARN_M, LEARN_HAIR_M = 2.0, 0.05
+"""How closely a track is looked at, and by how much more than is missing nodes are raised."""
 MANY = 8
 """Names a portal from which on a mesh's are numbered one by one, for searches have room for every name."""
 
@@ -45,7 +47,8 @@ class Relief:
 
     ``cap_m``, ``low`` as in `Plane.mesh`; ``ends``: where paths climb from, see `_fill.fill`; ``under``, ``over``
     (zones,): which zones may be passed below their floors, above their ceilings; None for all. ``whole``: such meshes
-    are asked for places all over them, and kept; others last until the plane's next relief.
+    are asked for places all over them, and kept; others last until the plane's next relief. ``exact``: nodes are as
+    high as the exact check has them, and not higher for what may be between them.
     """
 
     def __init__(
@@ -59,6 +62,7 @@ class Relief:
         under: Bools | None = None,
         over: Bools | None = None,
         whole: bool = False,
+        exact: bool = False,
     ) -> None:
         limits, scale = plane.problem.limits, plane.problem.airspace.scale
         whole = whole or wanted is None
@@ -91,6 +95,8 @@ class Relief:
             np.array(ends or []).reshape(-1, 4), low, self._around, self._excess, self._floor, self._ground, self._x,
             self._y, self._diagonal,
         )  # fmt: skip
+        if exact:
+            self._be_exact()
         self._zones, self._edges = plane.zones(low, under, over)
         self._boxes = plane.boxes(self.row, self.col, fineness, rows, cols)
         self._of, self._values = np.empty((0, 0), np.int32), np.empty((0, WALL))
@@ -98,6 +104,35 @@ class Relief:
         self._held: list[Cone] = []
         self._lift: Floats
         self._either: NDArray[np.int8]
+
+    def _be_exact(self) -> None:
+        """Give the nodes that are looked at the floors that the exact check has there."""
+        cols = np.arange(self.shape[1])
+        seen = (cols >= self._around[:, :1]) & (cols < self._around[:, 1:])
+        seen[seen] = np.isfinite(self._excess[seen])
+        more = self._too_high(self._x[seen], self._y[seen]) - (self._floor[seen] - self.cap_m)
+        self._floor[seen] += more
+        self._excess[seen] += more
+
+    def _too_high(self, east_m: Floats, north_m: Floats) -> Floats:
+        """What floors of the exact check are over the cap."""
+        floor = self.plane.problem.airspace.floor_amsl(east_m, north_m, self.plane.problem.limits)
+        return np.asarray(floor) - self.cap_m
+
+    def learn(self, track: Floats) -> bool:
+        """Raise the nodes of cells in which the exact check shuts a track (N, 2) over them; whether there are any."""
+        places = sampled(track, LEARN_M)
+        over = self._too_high(*places.T)
+        shut = np.isfinite(over) & (over > 0.0)
+        cells = np.floor((self.plane.all_at(places[shut]) - [self.col, self.row]) * self.fineness).astype(np.intp)
+        more = np.zeros(self.shape)
+        for (i, j), by in zip(cells.tolist(), over[shut].tolist(), strict=True):
+            corners = more[max(j, 0) : j + 2, max(i, 0) : i + 2]
+            np.maximum(corners, by + LEARN_HAIR_M, out=corners)
+        self._floor += more
+        self._excess += more
+        self._laid = False
+        return bool(shut.any())
 
     def hold(self, cones: list[Cone]) -> None:
         """Hold nodes down to ``cones``, which no path of a length that matters is higher than near its ends: a bound's
@@ -196,6 +231,15 @@ class Relief:
                 self._edges, self._boxes, self.low, owner, sheet, self._of, self._values, walls,
             )  # fmt: skip
         self._laid = sheets == 1
+
+
+def sampled(track: Floats, step_m: float) -> Floats:
+    """(K, 2) places over a track (N, 2), at most so far from each other."""
+    step = np.diff(track, axis=0)
+    parts = np.maximum(np.ceil(np.hypot(*step.T) / step_m), 1.0).astype(np.intp)
+    leg = np.repeat(np.arange(len(parts)), parts)
+    t = (np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts) + 0.5) / np.repeat(parts, parts)
+    return np.asarray(track[leg] + t[:, None] * step[leg])
 
 
 def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:

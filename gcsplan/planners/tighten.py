@@ -28,6 +28,8 @@ MOST_CELLS = 50_000
 """Cells of all corridors whose storeys are looked at, at most."""
 FALLS = -0.25
 """By how much a bound of shorter paths falls with each metre that they may be longer, where that is not known."""
+WIDE = 2e-2
+"""Gap, as a part, from which on it is worth to look for slits in cells as small as can be."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
 PIECES = 4
@@ -69,6 +71,9 @@ def _tighten_length(below: Below) -> None:
         if below.done() or not below.past(PAST_FINE, fine=True):
             break
         if below.cost - below.bound < NEARLY * before:
+            _halve(below)
+    for closely, far in ((False, FAR), (True, WIDE)):
+        if below.gap > far and below.in_time() and below.dare(closely=closely):
             _halve(below)
     below.may_spend = 1.0
     for _ in range(ROUNDS):
