@@ -255,7 +255,7 @@ def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str,
         limits, surface = problem.limits, problem.airspace.surface
         mesh = plane.mesh(cap, True, fineness)
         places = inner(rng, 1500, plane)
-        cell = (np.array([plane.at((float(x), float(y))) for x, y in places]) - [mesh.col, mesh.row]) * fineness
+        cell = (plane.all_at(places) - [mesh.col, mesh.row]) * fineness
         i, j = np.floor(cell).astype(np.intp).T
         u, v = (cell - np.floor(cell)).T
         f, (rows, cols) = np.where(np.isfinite(mesh.excess), mesh.floor, np.nan), (n - 1 for n in mesh.excess.shape)

@@ -43,7 +43,7 @@ MOST_ALONE = 50_000
 """Cells of the finer lattice that may be looked at each alone in four parts."""
 LEARNT = 10
 """Times that a track is looked for where nodes alone are as high as the exact check has them."""
-ASIDE, MOST_OFTEN = 3, 2_000_000
+ALONG, MOST_OFTEN = 3, 2_000_000
 """How many cells beside a way slits are looked for, and in how many of the finest lattice's cells, at most."""
 BESIDE = 8
 """How many cells more the finer lattice is over than those that are asked for: later tracks may lie beside them."""
@@ -67,7 +67,7 @@ class Leg:
         self._mesh: Mesh
         self._guide: Guide
         self._ahead: Guide | None = None
-        self._told = np.array([start.place, goal.place])
+        self._last_way = np.array([start.place, goal.place])  # of flood or bound
         self._close: Nearby | None = None
         self._reached: tuple[Nearby, Reached] | None = None
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
@@ -131,7 +131,7 @@ class Leg:
                 self._guide = self._mesh.flood(a, b, self.reach_m, slack)[1]
                 return
             if way is not None:
-                self.length_m, self._told = way.length_m, way.points
+                self.length_m, self._last_way = way.length_m, way.points
                 self.reach_m = min(within, way.length_m * (1.0 + slack))
                 return
 
@@ -207,7 +207,7 @@ class Leg:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:
                 return limit
-            self._told = way.points
+            self._last_way = way.points
             # Ways are longer between the walls that the cones raised, so there is less to spare for a climb: again.
             enough = not cones or way.length_m < known + WORTHWHILE * spare
             known = max(known, way.length_m)
@@ -271,8 +271,8 @@ class Leg:
         plane = within.guide.mesh.plane
         near = np.zeros(within.cells.shape, np.bool_)
         cell_m = math.dist((plane.x[0, 0], plane.y[0, 0]), (plane.x[0, 1], plane.y[0, 1]))
-        for i, j in np.unique(plane.all_at(sampled(self._told, cell_m)).astype(np.intp), axis=0).tolist():
-            near[max(j - ASIDE, 0) : j + ASIDE + 1, max(i - ASIDE, 0) : i + ASIDE + 1] = True
+        for i, j in np.unique(plane.all_at(sampled(self._last_way, cell_m)).astype(np.intp), axis=0).tolist():
+            near[max(j - ALONG, 0) : j + ALONG + 1, max(i - ALONG, 0) : i + ALONG + 1] = True
         near &= within.cells
         parts = math.isqrt(MOST_OFTEN // max(int(near.sum()) * self._ratio**2, 1))
         return Corridor(near, within.guide, max(1, min(MOST_FINE, parts)))

@@ -7,7 +7,7 @@ time ways become longer by that there is less to spare for a climb, so it can be
 from __future__ import annotations
 
 import math
-from itertools import combinations
+from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,7 @@ from gcsplan.planners._mesh import WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners._stamp import lift_lids, own_zones, stamp_zones
 from gcsplan.planners.mesh import Mesh
 from gcsplan.planners.scratch import Scratch
+from gcsplan.planners.track import divided
 
 if TYPE_CHECKING:
     from gcsplan.planners.plane import Plane
@@ -81,15 +82,18 @@ class Relief:
         self._span = _spans(wanted[inner], fineness)
         self._around = np.tile(np.array([0, cols], np.int32), (rows, 1)) if whole else _around(self._span, cols)
         self._diagonal = np.zeros((rows - 1) * (cols - 1), np.int8)
-        more, beside = limits.min_agl_m + limits.altitude_error_m, limits.track_error_m * scale + plane.fit.hair_m
-        if limits.horizontal_clearance_m > limits.min_agl_m:
-            # Beside cliffs it is the clearance that binds; this is more than both demand together.
-            beside += limits.horizontal_clearance_m * scale
-        more += -plane.fit.spare_m if low else plane.fit.hair_m
+        more = limits.min_agl_m + limits.altitude_error_m
         if low:
+            more -= plane.fit.spare_m
             # Where cells are much larger, slopes are hardly alike as far as that.
             cell_m = math.dist((x[0, 0], y[0, 0]), (x[1, 1], y[1, 1])) / fineness
             beside = limits.track_error_m if limits.track_error_m * ALIKE > cell_m else 0.0
+        else:
+            more += plane.fit.hair_m
+            beside = limits.track_error_m * scale + plane.fit.hair_m
+            if limits.horizontal_clearance_m > limits.min_agl_m:
+                # Beside cliffs it is the clearance that binds; this is more than both demand together.
+                beside += limits.horizontal_clearance_m * scale
         fill(
             top, ground, steep, x, y, np.ascontiguousarray(wanted[inner]), fineness, more, beside, cap_m,
             np.array(ends or []).reshape(-1, 4), low, self._around, self._excess, self._floor, self._ground, self._x,
@@ -125,12 +129,14 @@ class Relief:
         over = self._too_high(*places.T)
         shut = np.isfinite(over) & (over > 0.0)
         cells = np.floor((self.plane.all_at(places[shut]) - [self.col, self.row]) * self.fineness).astype(np.intp)
-        more = np.zeros(self.shape)
+        more: dict[tuple[int, int], float] = {}  # of few nodes: those that are not touched take no memory
         for (i, j), by in zip(cells.tolist(), over[shut].tolist(), strict=True):
-            corners = more[max(j, 0) : j + 2, max(i, 0) : i + 2]
-            np.maximum(corners, by + LEARN_HAIR_M, out=corners)
-        self._floor += more
-        self._excess += more
+            for node in product((j, j + 1), (i, i + 1)):
+                if 0 <= node[0] < self.shape[0] and 0 <= node[1] < self.shape[1]:
+                    more[node] = max(more.get(node, 0.0), by + LEARN_HAIR_M)
+        for node, by in more.items():
+            self._floor[node] += by
+            self._excess[node] += by
         self._laid = False
         return bool(shut.any())
 
@@ -235,11 +241,9 @@ class Relief:
 
 def sampled(track: Floats, step_m: float) -> Floats:
     """(K, 2) places over a track (N, 2), at most so far from each other."""
-    step = np.diff(track, axis=0)
-    parts = np.maximum(np.ceil(np.hypot(*step.T) / step_m), 1.0).astype(np.intp)
-    leg = np.repeat(np.arange(len(parts)), parts)
-    t = (np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts) + 0.5) / np.repeat(parts, parts)
-    return np.asarray(track[leg] + t[:, None] * step[leg])
+    leg, part, parts = divided(track, step_m)
+    t = ((part + 0.5) / parts)[:, None]
+    return np.asarray(track[leg] + t * (track[leg + 1] - track[leg]))
 
 
 def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.track import divided
 from gcsplan.world.airspace import Legs
 
 Floats = NDArray[np.float64]
@@ -125,11 +126,8 @@ def _moved(problem: Problem, points: Floats, kinds: Ints, move_m: float) -> Floa
 
 def _divided(points: Floats, kinds: Ints, step_m: float) -> tuple[Floats, Ints]:
     """The same path with a point every ``step_m`` at least."""
-    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    parts = np.maximum(np.ceil(length / step_m), 1.0).astype(np.intp)
-    leg = np.repeat(np.arange(len(parts)), parts)
-    part = np.arange(len(leg)) - np.repeat(np.cumsum(parts) - parts, parts)
-    t = (part / parts[leg])[:, None]
+    leg, part, parts = divided(points, step_m)
+    t = (part / parts)[:, None]
     inner = points[leg] + t * (points[leg + 1] - points[leg])
     return np.vstack([inner, points[-1:]]), np.append(np.where(part == 0, kinds[leg], FREE), kinds[-1])
 

@@ -72,8 +72,8 @@ def _tighten_length(below: Below) -> None:
             break
         if below.cost - below.bound < NEARLY * before:
             _halve(below)
-    for closely, far in ((False, FAR), (True, WIDE)):
-        if below.gap > far and below.in_time() and below.dare(closely=closely):
+    for closely, beyond in ((False, FAR), (True, WIDE)):
+        if below.gap > beyond and below.in_time() and below.dare(closely=closely):
             _halve(below)
     below.may_spend = 1.0
     for _ in range(ROUNDS):
@@ -89,8 +89,8 @@ def _tighten_length(below: Below) -> None:
     if below.by_storeys:
         _halve(below)
     far = not below.in_space and TWICE * below.wanted < below.gap <= NEAR and below.in_time()
-    alone = 2 if below.gap > FAR else 1
-    if far and sum(leg.look_closer(below.limit(leg), FINER, alone) for leg in below.legs):
+    cut = 2 if below.gap > FAR else 1
+    if far and sum(leg.look_closer(below.limit(leg), FINER, cut) for leg in below.legs):
         below.try_below(below.top_m, fine=True)
         _halve(below, far=True)
 
@@ -159,12 +159,10 @@ def _traverse(below: Below) -> bool:
     if found is not None:
         below.take_longer(found, fine=True)
     for level in (0, 1):  # where finer lines are better, yet finer ones may be, too
-        known = below.cost
-        if below.gap > TWICE * below.wanted and below.in_time():
-            tight = pulled_tight(below.problem, below.best, level, below.begun_s + below.problem.budget_s)
-            if tight is not None:
-                below.take_simpler(*tight, fine=True, longer=True)
-        if below.cost == known:
+        if below.gap <= TWICE * below.wanted or not below.in_time():
+            break
+        tight = pulled_tight(below.problem, below.best, level, below.begun_s + below.problem.budget_s)
+        if tight is None or not below.take_simpler(*tight, fine=True, longer=True):
             break
     return below.cost < before
 

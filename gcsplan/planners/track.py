@@ -108,6 +108,15 @@ def distances(points: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.hypot(d[:, 0], d[:, 1]))])
 
 
+def divided(points: Floats, step_m: float) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Legs of a track or path (N, 2 or 3) in equal parts, none longer than ``step_m``: of each part (K,) the leg, which
+    of that leg's it is, and how many those are."""
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    parts = np.maximum(np.ceil(length / step_m), 1.0).astype(np.intp)
+    leg = np.repeat(np.arange(len(parts)), parts)
+    return leg, np.arange(len(leg)) - np.repeat(np.cumsum(parts) - parts, parts), parts[leg]
+
+
 def make_track(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> Track:
     """A track with its tube; points nearer than 1 mm to the one before are dropped (the pinned one is kept)."""
     keep = np.ones(len(points), bool)
