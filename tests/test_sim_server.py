@@ -510,24 +510,27 @@ def test_stopping_twice_and_starting_again() -> None:
 
 
 def test_serving_ends_quietly_when_interrupted() -> None:
+    # A test run in the background may have been told to ignore interrupts, which children inherit.
     program = """
+        import signal
         from gcsplan.sim.server import serve
         from gcsplan.sim.vehicle import LoopbackVehicle
         from gcsplan.vehicle import Autopilot
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         vehicle = LoopbackVehicle(1, Autopilot.PX4, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.0)
         serve([vehicle], "udpin:127.0.0.1:0", on_ready=lambda server: print(server.url_for_gcs, flush=True))
         print("done", flush=True)
     """
-    child = subprocess.Popen([sys.executable, "-c", textwrap.dedent(program)], stdout=subprocess.PIPE, text=True)
-    try:
-        assert child.stdout is not None
-        url = child.stdout.readline().strip()
-        assert url.startswith("udpout:127.0.0.1:")
-        with station(("127.0.0.1", int(url.rsplit(":", 1)[1]))) as one:
-            assert one.upload(some_items(2)) == 0
-        child.send_signal(signal.SIGINT)
-        rest, _ = child.communicate(timeout=20)
-        assert (rest.strip(), child.returncode) == ("done", 0)
-    finally:
-        child.kill()
-        child.wait(10)
+    command = [sys.executable, "-c", textwrap.dedent(program)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+        try:
+            assert child.stdout is not None
+            url = child.stdout.readline().strip()
+            assert url.startswith("udpout:127.0.0.1:")
+            with station(("127.0.0.1", int(url.rsplit(":", 1)[1]))) as one:
+                assert one.upload(some_items(2)) == 0
+            child.send_signal(signal.SIGINT)
+            rest, _ = child.communicate(timeout=20)
+            assert (rest.strip(), child.returncode) == ("done", 0)
+        finally:
+            child.kill()
