@@ -39,6 +39,7 @@ def ridge(over_m: float, askew: float, half_m: float, ends: bool) -> Problem:
 CASES = [(0.1, 0.0, 120.0), (0.05, 0.0, 60.0), (0.2, 0.5, 40.0), (0.1, 0.2, 80.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("over_m", "askew", "half_m"), CASES)
 def test_a_path_leads_through_what_is_open_by_centimetres(
     over_m: float, askew: float, half_m: float, monkeypatch: pytest.MonkeyPatch
