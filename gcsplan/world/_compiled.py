@@ -26,6 +26,7 @@ KERNELS = Kernels(
         "_sweep_zones.py",
         "_judge.py",
         "_envelope.py",
+        "_surroundings.py",
         "_entries.py",
         "surface.py",
     ),
@@ -37,6 +38,7 @@ KERNELS = Kernels(
         ),
         "pieces": f"f8[] f8[,] f8[,] {_HALO} {_HALO} {_HALO} f8[,] f8 f8 f8 f8[,]",
         "around": f"f8[] f8[,] {_HALO} f8 f8[,] f8 f8[]",
+        "surroundings": "f8[,] f8 f8 i8 i8 i8[] f4[,,] f4[,] f4[,] f4[,]",
     },
 )
 
@@ -85,3 +87,8 @@ def pieces(*arguments: Any) -> int:
 def around(*arguments: Any) -> int:
     """See `gcsplan.world._entries.around`."""
     return KERNELS["around"](*arguments)
+
+
+def surroundings(*arguments: Any) -> int:
+    """See `gcsplan.world._surroundings.surroundings`."""
+    return KERNELS["surroundings"](*arguments)

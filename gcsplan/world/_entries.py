@@ -6,6 +6,7 @@ from gcsplan.world._envelope import around as around_kernel
 from gcsplan.world._envelope import pieces as pieces_kernel
 from gcsplan.world._judge import judge as judge_kernel
 from gcsplan.world._shared import Demands, Halo, Zones
+from gcsplan.world._surroundings import surroundings as surroundings_kernel
 from gcsplan.world._sweep import device
 
 
@@ -55,3 +56,9 @@ def pieces(  # type: ignore[no-untyped-def]
 def around(m, z, slope, high, low, cols, rows, sign, points, reach_m, out):  # type: ignore[no-untyped-def]
     """See `gcsplan.world._envelope.around`."""
     around_kernel(m, z, Halo(slope, high, low, cols, rows), sign, points, reach_m, out)
+
+
+@device
+def surroundings(z, step_x, step_y, cols, rows, box, room, slope, high, low):  # type: ignore[no-untyped-def]
+    """See `gcsplan.world._surroundings.surroundings`."""
+    return surroundings_kernel(z, step_x, step_y, cols, rows, box, room, slope, high, low)

@@ -48,6 +48,8 @@ def lift_beside(m, z, halo, ea, na, eb, nb, c0, r0, c1, r1, i, j, reach):  # typ
 
     The segment's ends in the plane, then in the grid.
     """
+    if halo.slope[j, i] == math.inf:
+        return math.nan
     if halo.slope[j, i] < 0.0:
         d, _ = unknown_near(m, z, halo.cols, halo.rows, ea, na, eb, nb, reach, i, j)
         if d < reach:

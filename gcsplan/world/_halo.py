@@ -1,81 +1,98 @@
-"""What lies around each cell of a surface: the steepest slope, the highest and the lowest node within a reach."""
+"""What lies around each cell of a surface: the steepest slope, the highest and the lowest node within a reach.
+
+A large surface is looked at where it is asked for alone: of a lidar's model of a county a mission sees a few streets.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+import threading
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.native.form import Held
+from gcsplan.world._compiled import HALO, surroundings
 from gcsplan.world._field import Field
-from gcsplan.world._shared import Halo
+from gcsplan.world._shared import Floats, Halo
+from gcsplan.world.surface import GridMap
 
-CELLS_AT_ONCE = 200_000  # stay in the processor's cache
-FEW_STEPS = 4  # up to so many cells of reach, shifting is faster than scipy's filter
-
-
-def halo_around(field: Field, heights: NDArray[np.float64], reach_m: float) -> Halo:
-    """Bounds for every point within ``reach_m`` of a point of the cell."""
-    cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
-    shape = heights.shape[0] - 1, heights.shape[1] - 1
-    slope, high, low = (np.empty(shape, np.float32) for _ in range(3))
-    unknown, near = np.empty(shape, np.bool_), np.empty(shape, np.bool_)
-    at_once = max(CELLS_AT_ONCE // shape[1], 1)
-    for at in range(0, shape[0], at_once):
-        part = slice(at, min(at + at_once, shape[0]))
-        steep, most, least = _cells(field, heights[at : part.stop + 1])
-        lost = np.isnan(steep)
-        unknown[part] = lost
-        if lost.any():
-            steep[lost], most[lost], least[lost] = 0.0, -np.inf, np.inf
-        near[part] = _spread(lost, cols, 1, True)
-        slope[part] = _spread(steep, cols, 1, 0.0)
-        high[part] = _spread(most, cols, 1, -np.inf)
-        low[part] = -_spread(-least, cols, 1, -np.inf)
-    slope = _spread(slope, rows, 0, 0.0)
-    high = _spread(high, rows, 0, -np.inf)
-    low = -_spread(-low, rows, 0, -np.inf)
-    if cols or rows:
-        near = _spread(near, rows, 0, True)
-        slope[near] = -slope[near] - np.float32(1e-9)
-    slope[unknown] = np.inf
-    return Halo(slope, high, low, cols, rows)
+LARGE = 2_000_000
+"""Cells from which on a surface is looked at a tile at a time."""
+TILE, SPACING = 128, 32
+"""Columns and rows of a tile, and how far apart places on a line are, at most, whose tiles are looked at."""
+BOW = 2
+"""Columns or rows by which a line in the plane leaves that between two such places in the grid, and more."""
+TALL, WIDE, WIDER = 64, 1024, 4
+"""Rows and columns that are worked on at once, at least: they stay in the processor's cache. As many, at least, as a
+few times how far around them is looked."""
 
 
-def _cells(
-    field: Field, z: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Steepest slope, highest and lowest node of each cell; NaN where one of them is unknown."""
-    a, b, c, d = z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]
-    east, south = z[:, 1:] - z[:, :-1], z[1:] - z[:-1]
-    # The gradient of a bilinear patch is largest in a corner.
-    across = np.maximum(np.abs(east[:-1]), np.abs(east[1:])) * (1.0 / field.step_x)
-    down = np.maximum(np.abs(south[:, :-1]), np.abs(south[:, 1:])) * (1.0 / field.step_y)
-    steep = np.sqrt(across * across + down * down) * (1.0 + 1e-6)
-    most, least = np.maximum(np.maximum(a, b), np.maximum(c, d)), np.minimum(np.minimum(a, b), np.minimum(c, d))
-    return (
-        steep.astype(np.float32),
-        (most + (1e-4 + 1e-6 * np.abs(most))).astype(np.float32),
-        (least - (1e-4 + 1e-6 * np.abs(least))).astype(np.float32),
-    )
+class Surroundings:
+    """The halo of a surface (rows, cols) for a reach. What has not been asked for stands in it as unknown."""
+
+    def __init__(self, grid: GridMap, field: Field, heights: Floats, reach_m: float) -> None:
+        self._grid, self._field, self._heights, self._reach_m = grid, field, heights, reach_m
+        shape = heights.shape[0] - 1, heights.shape[1] - 1
+        cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
+        slope, high, low = (np.empty(shape, np.float32) for _ in range(3))
+        self.halo = Halo(slope, high, low, cols, rows)
+        self._lock = threading.Lock()
+        self._seen = np.ones((0, 0), np.bool_)
+        if shape[0] * shape[1] > LARGE:
+            self.halo.slope.fill(np.inf)
+            self._seen = np.zeros((-(-shape[0] // TILE), -(-shape[1] // TILE)), np.bool_)
+        else:
+            self._look_at(slice(0, shape[0]), slice(0, shape[1]))
+        self._held = Held(HALO, *self.halo)
+
+    def __reduce__(self) -> tuple[type[Surroundings], tuple[GridMap, Field, Floats, float]]:
+        """A copy in another process looks anew."""
+        return Surroundings, (self._grid, self._field, self._heights, self._reach_m)
+
+    def along(self, start: Floats, end: Floats) -> Held:
+        """The halo as kernels take it, looked at along lines between places (N, 2 or more) of the plane."""
+        if self._seen.size and not self._seen.all():
+            tiles = self._tiles(start, end)
+            with self._lock:  # what is seen by one who comes later is done
+                for i, j in np.argwhere(tiles & ~self._seen).tolist():
+                    self._look_at(slice(i * TILE, (i + 1) * TILE), slice(j * TILE, (j + 1) * TILE))
+                    self._seen[i, j] = True
+        return self._held
+
+    def _tiles(self, start: Floats, end: Floats) -> NDArray[np.bool_]:
+        """Those that lines meet, and perhaps more."""
+        found = np.zeros(self._seen.shape, np.bool_)
+        length = np.hypot(*(end - start)[:, :2].T)
+        parts = np.ceil(length / (SPACING * min(self._field.step_x, self._field.step_y))).astype(np.intp) + 1
+        line = np.repeat(np.arange(len(parts)), parts)
+        nth = np.arange(len(line)) - np.repeat(np.cumsum(parts) - parts, parts)
+        t = nth / np.maximum(parts[line] - 1, 1)
+        places = start[line, :2] + t[:, None] * (end - start)[line, :2]
+        cells = self._grid(*places.T)[:, ::-1]
+        most = np.array(found.shape) - 1
+        beside = 0.5 * SPACING + BOW
+        low, high = (np.clip((cells + d) // TILE, 0, most).astype(np.intp) for d in (-beside, beside))
+        for rows, cols in product((low, high), repeat=2):
+            found[rows[:, 0], cols[:, 1]] = True
+        return found
+
+    def _look_at(self, rows: slice, cols: slice) -> None:
+        """Fill these rows and columns of the halo."""
+        halo = self.halo
+        tall = min(max(TALL, WIDER * halo.rows), rows.stop - rows.start)
+        wide = min(max(WIDE, WIDER * halo.cols), cols.stop - cols.start)
+        room = np.empty((tall + 2 * halo.rows, 4, wide + 2 * halo.cols), np.float32)
+        box = np.array([rows.start, rows.stop, cols.start, cols.stop], np.int64)
+        surroundings(
+            self._heights, self._field.step_x, self._field.step_y, halo.cols, halo.rows, box, room,
+            halo.slope, halo.high, halo.low,
+        )  # fmt: skip
 
 
-def _spread(a: NDArray[Any], reach: int, axis: int, beyond: float | bool) -> NDArray[Any]:
-    """Greatest of ``a`` within ``reach`` places along ``axis``; ``beyond`` the border it is that."""
-    if reach == 0:
-        return a
-    if reach > FEW_STEPS:
-        from scipy import ndimage
-
-        kind = np.uint8 if a.dtype == np.bool_ else a.dtype
-        spread = ndimage.maximum_filter1d(a.astype(kind), 2 * reach + 1, axis, mode="constant", cval=beyond)
-        return np.asarray(spread.astype(a.dtype))
-    source, out = (a, a.copy()) if axis == 0 else (a.T, a.copy().T)
-    for step in range(1, reach + 1):
-        np.maximum(out[step:], source[:-step], out=out[step:])
-        np.maximum(out[:-step], source[step:], out=out[:-step])
-    if beyond:
-        np.maximum(out[:reach], beyond, out=out[:reach])
-        np.maximum(out[-reach:], beyond, out=out[-reach:])
-    return out if axis == 0 else out.T
+def whole_halo(grid: GridMap, field: Field, heights: Floats, reach_m: float) -> Halo:
+    """The halo of a surface, looked at everywhere."""
+    around = Surroundings(grid, field, heights, reach_m)
+    around._look_at(slice(0, heights.shape[0] - 1), slice(0, heights.shape[1] - 1))
+    return around.halo

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.native.form import Held
-from gcsplan.world._compiled import FOUND, HALO, ONE_SURFACE, SURFACE, ZONES, around, judge, room
+from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES, around, judge, room
 from gcsplan.world._field import Field
-from gcsplan.world._halo import halo_around
+from gcsplan.world._halo import Surroundings
 from gcsplan.world._shapes import deepest_inside
 from gcsplan.world._shared import (
     BOW_M,
@@ -39,7 +39,6 @@ from gcsplan.world._shared import (
     TERRAIN,
     TOUCH_M,
     Demands,
-    Halo,
 )
 from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.limits import Limits
@@ -169,8 +168,9 @@ class Airspace:
         self.scale = scale
         self._field = Field.of(surface.grid)
         self._zones = zones_as_arrays(self.zones, surface, self._field, scale)
-        self._halos: dict[tuple[bool, int, int], tuple[Halo, Held]] = {}
+        self._halos: dict[tuple[bool, int, int], Surroundings] = {}
         ground, top = (np.ascontiguousarray(a, dtype=np.float64) for a in (surface.ground_m, surface.top_m))
+        self._heights = ground, top
         self._surfaces = Held(SURFACE, self._field.packed, ground, top)
         self._grounds = Held(SURFACE, self._field.packed, ground, ground)
         self._tops, self._bare = (Held(ONE_SURFACE, self._field.packed, z) for z in (top, ground))
@@ -231,9 +231,11 @@ class Airspace:
         points = np.array(track, dtype=np.float64, order="C")
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
             raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
-        return make_tube(
-            points, limits, self._field, self._zones, self._held, self._surfaces, self._grounds, self.scale
-        )
+
+        def halo(of_top: bool, reach_m: float) -> Held:
+            return self._held(of_top, reach_m, points[:-1], points[1:])
+
+        return make_tube(points, limits, self._field, self._zones, halo, self._surfaces, self._grounds, self.scale)
 
     def straight_cells(self, bow_m: float) -> int:
         """So many cells of the terrain model lie in the plane as if its lines were straight, within ``bow_m``."""
@@ -247,25 +249,20 @@ class Airspace:
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
         out = np.empty(e.size)
         points = np.stack([e.ravel(), n.ravel()], axis=-1)
-        around(self._tops if sign > 0.0 else self._bare, self._held(sign > 0.0, reach_m), sign, points, reach_m, out)
+        held = self._held(sign > 0.0, reach_m, points, points)
+        around(self._tops if sign > 0.0 else self._bare, held, sign, points, reach_m, out)
         return out.reshape(e.shape)
 
-    def _halo(self, of_top: bool, reach_m: float) -> Halo:
-        """The halo of top or ground for a reach, made once for each size in cells."""
-        return self._halo_and_held(of_top, reach_m)[0]
-
-    def _held(self, of_top: bool, reach_m: float) -> Held:
-        """The same, as kernels take it."""
-        return self._halo_and_held(of_top, reach_m)[1]
-
-    def _halo_and_held(self, of_top: bool, reach_m: float) -> tuple[Halo, Held]:
+    def _held(self, of_top: bool, reach_m: float, start: Floats, end: Floats) -> Held:
+        """The halo of top or ground for a reach, for lines between places (N, 2 or more), as kernels take it; made
+        once for each size in cells."""
         f = self._field
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))
         if key not in self._halos:
-            halo = halo_around(f, self.surface.top_m if of_top else self.surface.ground_m, reach_m)
-            self._halos[key] = halo, Held(HALO, *halo)
-        return self._halos[key]
+            heights = self._heights[of_top]
+            self._halos[key] = Surroundings(self.surface.grid, f, heights, reach_m)
+        return self._halos[key].along(start, end)
 
     def _judge(
         self,
@@ -278,11 +275,12 @@ class Airspace:
         f = self._field
         spare = 0.0 if f.affine else BOW_M + f.error_m
         near_m = float(legs.track_error_m.max(initial=0.0)) * self.scale + spare
-        near = self._held(True, near_m)
-        far = self._held(True, near_m + limits.horizontal_clearance_m * self.scale)
+        lines = legs.start, legs.end
+        near = self._held(True, near_m, *lines)
+        far = self._held(True, near_m + limits.horizontal_clearance_m * self.scale, *lines)
         return int(
             judge(
-                self._surfaces, near, far, self._held(False, near_m), self._held_zones,
+                self._surfaces, near, far, self._held(False, near_m, *lines), self._held_zones,
                 legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
                 *_demands(limits, self.scale), full, ok, found,
                 room(self._zones.most_corners, len(self.zones)),

@@ -147,7 +147,7 @@ def _pieces(
     track[0::2], track[1::2] = np.where(back[:, None], ends, starts), np.where(back[:, None], starts, ends)
     bow = 0.0 if air._field.affine else BOW_M + 2.0 * air._field.error_m
     kinds = zip((False, of_top, of_top), reaches, strict=True)
-    held = [air._held(top, _few(max(reach, 0.0) + bow, air)) for top, reach in kinds]
+    held = [air._held(top, _few(max(reach, 0.0) + bow, air), track[:-1], track[1:]) for top, reach in kinds]
     surfaces = air._surfaces if of_top else air._grounds
     length = np.hypot(*np.diff(track, axis=0).T)
     room = 4096 + 16 * n + int(3.0 * float(length.sum()) / min(air._field.step_x, air._field.step_y))

@@ -1,0 +1,129 @@
+"""What lies around each cell of a surface, in one pass over it: the kernel of `_halo`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gcsplan.world._sweep import device
+
+SLOPE, HIGH, LOW, LOST = range(4)
+
+
+@device
+def surroundings(z, step_x, step_y, cols, rows, box, room, slope, high, low):  # type: ignore[no-untyped-def]
+    """Fill a ``box`` (first row, that after the last, the same of columns) of a `Halo` of nodes ``z``: ``slope``,
+    ``high``, ``low`` (rows - 1, cols - 1). ``room`` for as many as are worked on at once, and what is around them."""
+    n, m = min(box[1], slope.shape[0]), min(box[3], slope.shape[1])
+    tall, wide = room.shape[0] - 2 * rows, room.shape[2] - 2 * cols
+    for top in range(box[0], n, tall):
+        height = min(tall, n - top)
+        for left in range(box[2], m, wide):
+            width = min(wide, m - left)
+            far = width + 2 * cols
+            any_lost = False
+            for i in range(height + 2 * rows):
+                if _look_at(z, step_x, step_y, top - rows + i, left - cols, far, room[i]):
+                    any_lost = True
+            fields = 4 if any_lost else 3
+            for i in range(height):
+                # Which cells are not known themselves, before they are spread.
+                lost, out = room[rows + i, LOST, cols:], slope[top + i, left : left + width]
+                for j in range(width):
+                    out[j] = lost[j]
+            for k in range(fields):
+                for i in range(height + 2 * rows):
+                    _spread_along(room[i, k], far, 2 * cols + 1)
+                _spread_down(room, k, height + 2 * rows, width, 2 * rows + 1)
+            for i in range(height):
+                _put(room[i], any_lost, slope[top + i], high[top + i], low[top + i], left, width)
+    return 0
+
+
+@device
+def _look_at(z, step_x, step_y, row, left, count, into):  # type: ignore[no-untyped-def]
+    """Steepest slope, highest and lowest (negative) node of ``count`` cells of a row, and which are not known; whether
+    any is not. Beyond the border nothing is known."""
+    n, m = z.shape[0] - 1, z.shape[1] - 1
+    slope, high, low, lost = into[SLOPE], into[HIGH], into[LOW], into[LOST]
+    first, last = (max(-left, 0), min(m - left, count)) if 0 <= row < n else (count, count)
+    for j in range(count):
+        if j < first or j >= last:
+            slope[j], high[j], low[j], lost[j] = 0.0, -np.inf, -np.inf, 1.0
+    some = last - first < count
+    if first >= last:
+        return some
+    a, b = z[row, left + first : left + last + 1], z[row + 1, left + first : left + last + 1]
+    a1, b1 = a[1:], b[1:]
+    slope, high, low, lost = slope[first:last], high[first:last], low[first:last], lost[first:last]
+    per_x, per_y = 1.0 / step_x, 1.0 / step_y
+    for j in range(last - first):
+        nw, ne, sw, se = a[j], a1[j], b[j], b1[j]
+        # The gradient of a bilinear patch is largest in a corner.
+        across, across_south = abs(ne - nw), abs(se - sw)
+        down, down_east = abs(sw - nw), abs(se - ne)
+        across = (across if across > across_south else across_south) * per_x
+        down = (down if down > down_east else down_east) * per_y
+        slope[j] = math.sqrt(across * across + down * down) * (1.0 + 1e-6)
+        most, most_south = ne if ne > nw else nw, se if se > sw else sw
+        least, least_south = ne if ne < nw else nw, se if se < sw else sw
+        most = most if most > most_south else most_south
+        least = least if least < least_south else least_south
+        high[j] = most + (1e-4 + 1e-6 * abs(most))
+        low[j] = (1e-4 + 1e-6 * abs(least)) - least
+        known = nw + ne + sw + se
+        lost[j] = 0.0 if known == known else 1.0
+    for j in range(last - first):
+        if lost[j] != 0.0:
+            slope[j], high[j], low[j] = 0.0, -np.inf, -np.inf
+            some = True
+    return some
+
+
+@device
+def _spread_along(line, count, window):  # type: ignore[no-untyped-def]
+    """Greatest of ``window`` places from each on, for all that have so many."""
+    done, left = 1, count
+    while done < window:
+        shift = min(done, window - done)
+        left -= shift
+        beside = line[shift:]
+        for j in range(left):
+            line[j] = line[j] if line[j] > beside[j] else beside[j]
+        done += shift
+
+
+@device
+def _spread_down(room, k, count, width, window):  # type: ignore[no-untyped-def]
+    """The same of rows, of field ``k``."""
+    done, left = 1, count
+    while done < window:
+        shift = min(done, window - done)
+        left -= shift
+        for i in range(left):
+            line, below = room[i, k], room[i + shift, k]
+            for j in range(width):
+                line[j] = line[j] if line[j] > below[j] else below[j]
+        done += shift
+
+
+@device
+def _put(line, any_lost, slope, high, low, left, width):  # type: ignore[no-untyped-def]
+    """Write a row of what was spread; in ``slope`` stand those that are not known themselves."""
+    of_slope, of_high, of_low, near = line[SLOPE], line[HIGH], line[LOW], line[LOST]
+    slope, high, low = slope[left : left + width], high[left : left + width], low[left : left + width]
+    for j in range(width):
+        high[j] = of_high[j]
+        low[j] = -of_low[j]
+    if not any_lost:
+        for j in range(width):
+            slope[j] = of_slope[j]
+        return
+    for j in range(width):
+        if slope[j] != 0.0:
+            slope[j] = np.inf
+        elif near[j] != 0.0:
+            slope[j] = -of_slope[j] - np.float32(1e-9)
+        else:
+            slope[j] = of_slope[j]

@@ -1,0 +1,144 @@
+"""What lies around each cell: against a look at every cell by itself, and a tile at a time against all at once."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gcsplan.world import _halo
+from gcsplan.world._field import Field
+from gcsplan.world._halo import Surroundings, whole_halo
+from gcsplan.world._shared import Halo
+from gcsplan.world.airspace import Airspace, Legs
+from gcsplan.world.limits import Limits
+from gcsplan.world.surface import GridMap, Surface
+
+Floats = NDArray[np.float64]
+
+
+def legs_of(start: Floats, end: Floats) -> Legs:
+    n = len(start)
+    return Legs(start, end, np.zeros(n, np.bool_), np.full(n, 3.0), np.full(n, 2.0))
+
+
+def rough(rng: np.random.Generator, shape: tuple[int, int], unknown: float) -> Floats:
+    z = np.asarray(rng.normal(300.0, 100.0, shape))
+    z[rng.random(shape) < unknown] = np.nan
+    return z
+
+
+def by_hand(field: Field, z: Floats, halo: Halo) -> tuple[Floats, Floats, Floats]:
+    """Slope, highest and lowest of every cell, in plain numpy and in doubles."""
+    corners = np.stack([z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]])
+    across = np.maximum(abs(corners[1] - corners[0]), abs(corners[3] - corners[2])) / field.step_x
+    down = np.maximum(abs(corners[2] - corners[0]), abs(corners[3] - corners[1])) / field.step_y
+    steep = np.hypot(across, down)
+    slope, high, low = (np.empty(steep.shape) for _ in range(3))
+    rows, cols = steep.shape
+    for r in range(rows):
+        for c in range(cols):
+            box = np.s_[max(r - halo.rows, 0) : r + halo.rows + 1, max(c - halo.cols, 0) : c + halo.cols + 1]
+            known = ~np.isnan(steep[box])
+            beyond = known.size < (2 * halo.rows + 1) * (2 * halo.cols + 1)
+            slope[r, c] = steep[box][known].max(initial=0.0) * (-1.0 if beyond or not known.all() else 1.0)
+            high[r, c] = corners[:, *box][:, known].max(initial=-np.inf)
+            low[r, c] = corners[:, *box][:, known].min(initial=np.inf)
+            if np.isnan(steep[r, c]):
+                slope[r, c] = np.inf
+    return slope, high, low
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_it_bounds_all_that_is_around_and_hardly_more(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    z = rough(rng, (int(rng.integers(2, 60)), int(rng.integers(2, 60))), float(rng.choice([0.0, 0.002, 0.1])))
+    grid = GridMap.affine(0.0, 0.0, float(rng.uniform(1.0, 30.0)), float(rng.uniform(1.0, 30.0)))
+    field = Field.of(grid)
+    halo = whole_halo(grid, field, z, float(rng.choice([0.0, 1.0, 10.0, 90.0])))
+    slope, high, low = by_hand(field, z, halo)
+    assert np.array_equal(np.isinf(halo.slope), np.isinf(slope))
+    known = np.isfinite(slope)
+    assert np.array_equal(np.signbit(halo.slope[known]), np.signbit(slope[known]))
+    for ours, theirs, sign in ((abs(halo.slope), abs(slope), 1.0), (halo.high, high, 1.0), (halo.low, low, -1.0)):
+        a, b = sign * ours[known].astype(float), sign * theirs[known]
+        assert (a >= b).all()
+        assert (a <= b + 1e-3 + 3e-6 * abs(b)).all()
+
+
+def same_where_seen(part: Halo, whole: Halo, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> bool:
+    return all(np.array_equal(a[rows, cols], b[rows, cols]) for a, b in zip(part[:3], whole[:3], strict=True))
+
+
+@pytest.mark.parametrize("reach_m", [0.0, 4.0, 70.0])
+def test_lines_find_all_that_they_meet_looked_at_and_little_else(
+    reach_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(3)
+    z = rough(rng, (900, 1100), 1e-4)
+    grid = GridMap.affine(0.0, 0.0, 5.0, 4.0)
+    field = Field.of(grid)
+    whole = whole_halo(grid, field, z, reach_m)
+    monkeypatch.setattr(_halo, "LARGE", 1000)
+    for _ in range(20):
+        ours = Surroundings(grid, field, z, reach_m)
+        assert np.isinf(ours.halo.slope).all()
+        start, end = np.stack([rng.uniform(-200.0, 5700.0, (2, 3)), -rng.uniform(-200.0, 3800.0, (2, 3))], axis=-1)
+        ours.along(start, end)
+        t = np.linspace(0.0, 1.0, 20_000)[:, None, None]
+        cells = np.floor(grid(*(start + t * (end - start)).reshape(-1, 2).T)).astype(np.intp)
+        cells = cells[((cells >= 0) & (cells < [1099, 899])).all(axis=1)]
+        assert same_where_seen(ours.halo, whole, cells[:, 1], cells[:, 0])
+        assert not ours._seen.all()
+    copy = pickle.loads(pickle.dumps(ours))
+    copy.along(start, end)
+    assert same_where_seen(copy.halo, whole, cells[:, 1], cells[:, 0])
+
+
+def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(8)
+    z = np.cumsum(np.cumsum(rng.normal(0.0, 0.4, (700, 800)), axis=0), axis=1)
+    z = 200.0 + 60.0 * z / abs(z).max()
+    surface = Surface(z, z, GridMap.affine(0.0, 0.0, 6.0, 6.0), {})
+    limits = Limits(min_agl_m=30.0, max_agl_m=150.0, horizontal_clearance_m=20.0, track_error_m=3.0)
+    start, end = (
+        np.stack([rng.uniform(20.0, 4700.0, 300), -rng.uniform(20.0, 4100.0, 300), rng.uniform(180.0, 420.0, 300)], -1)
+        for _ in range(2)
+    )
+    end = start + (end - start) * rng.uniform(0.0, 1.0, (300, 1)) ** 3
+    legs = legs_of(start, end)
+    whole = Airspace(surface)
+    clear, report = whole.clear(legs, limits), whole.examine(legs, limits)
+    floor, ceiling = whole.floor_amsl(*start[:, :2].T, limits), whole.ceiling_amsl(*start[:, :2].T, limits)
+    tubes = [whole.tube(np.stack([a[:2], b[:2]]), limits) for a, b in zip(start, end, strict=True)]
+    monkeypatch.setattr(_halo, "LARGE", 1000)
+    assert clear.any()
+    assert not clear.all()
+    # One leg alone, so that nothing is known of what lies beside its own tiles.
+    for k in range(0, 300, 10):
+        assert Airspace(surface).clear(legs_of(start[k : k + 1], end[k : k + 1]), limits)[0] == clear[k]
+    part = Airspace(surface)
+    assert np.array_equal(part.floor_amsl(*start[:, :2].T, limits), floor)
+    assert np.array_equal(part.ceiling_amsl(*start[:, :2].T, limits), ceiling)
+    for a, b, tube in zip(start, end, tubes, strict=True):
+        again = Airspace(surface).tube(np.stack([a[:2], b[:2]]), limits)
+        assert np.array_equal(again.floor_m, tube.floor_m)
+        assert np.array_equal(again.ceiling_m, tube.ceiling_m)
+    assert np.array_equal(part.clear(legs, limits), clear)
+    assert part.examine(legs, limits).violations == report.violations
+
+
+def test_what_was_not_looked_at_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No kernel takes it for flat ground, should it ever come there."""
+    monkeypatch.setattr(_halo, "LARGE", 100)
+    monkeypatch.setattr(Surroundings, "_tiles", lambda self, start, end: np.zeros(self._seen.shape, np.bool_))
+    z = np.full((50, 50), 100.0)
+    blind = Airspace(Surface(z, z, GridMap.affine(0.0, 0.0, 10.0, 10.0), {}))
+    limits = Limits(min_agl_m=30.0, max_agl_m=500.0, horizontal_clearance_m=20.0, track_error_m=3.0)
+    a, b = np.array([[100.0, -100.0, 200.0]]), np.array([[300.0, -250.0, 200.0]])
+    assert not blind.clear(legs_of(a, b), limits)[0]
+    assert blind.examine(legs_of(a, b), limits).violations
+    assert np.isinf(blind.floor_amsl(a[:, 0], a[:, 1], limits)).all()
+    assert np.isinf(blind.tube(np.concatenate([a, b])[:, :2], limits).floor_m).all()
