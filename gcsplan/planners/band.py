@@ -57,7 +57,7 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     Start, goal and vias are known to be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
     `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s``, for all that comes after the
     first path, is a backstop. ``climbs``: may climb on the spot over start and goal; ``known``: there is a path
-    already. Raises Refusal where no path is found.
+    already, and one more try is all that another is worth. Raises Refusal where no path is found.
     """
     tell("search", None)
     bound = straight_bound(problem)
@@ -72,14 +72,12 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     router: Router | None = None
     timed_out = False
     deadline_s = begun + problem.budget_s
-    for level in LEVELS if climbs else LEVELS[:2]:
-        if known and time.perf_counter() > deadline_s:
-            break
+    for level in LEVELS[:1] if known else LEVELS if climbs else LEVELS[:2]:
         work = _Work.at(problem, level, way)
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
-        found = None if any(cut) else work.first()
-        if found is None and climbs and best is None and (any(cut) or level is LEVELS[0]):
+        found = None if any(cut) else work.first(1 if known else SEARCHES)
+        if found is None and climbs and best is None and not known and (any(cut) or level is LEVELS[0]):
             ends = cut if any(cut) else (True, True)
             found = with_climbs(problem, ends, lambda p: plan_band(p, tell, begun, climbs=False).path.points)
         if found is not None:
@@ -223,9 +221,9 @@ class _Work:
         """Build the lattice of ``level``."""
         return cls(problem, Router.at(problem, level), way_m)
 
-    def first(self) -> Floats | None:
-        """Way points of the first way that could be made to hold."""
-        for _ in range(SEARCHES):
+    def first(self, searches: int) -> Floats | None:
+        """Way points of the first way that could be made to hold, of so many."""
+        for _ in range(searches):
             if self.router.opened > MOST_OPENED:
                 return None
             way = self.router.way()

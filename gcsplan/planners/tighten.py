@@ -72,9 +72,8 @@ def _tighten_length(below: Below) -> None:
             break
         if below.cost - below.bound < NEARLY * before:
             _halve(below)
-    for closely, beyond in ((False, FAR), (True, WIDE)):
-        if below.gap > beyond and below.in_time() and below.dare(closely=closely):
-            _halve(below)
+    for _ in _dared(below):
+        _halve(below)
     below.may_spend = 1.0
     for _ in range(ROUNDS):
         if not _traverse(below):
@@ -106,11 +105,21 @@ def _tighten_energy(below: Below) -> None:
     _raise_climb(below)
     if below.gap > FAR and below.past(PAST_FINE, fine=True):
         below.raise_bound(_search_caps(below, least))
+    for _ in _dared(below):
+        below.raise_bound(_search_caps(below, least))
+        _raise_climb(below)
     for _ in range(ROUNDS):
         if not _traverse(below):
             break
         below.raise_bound(_search_caps(below, least))
         _raise_climb(below)
+
+
+def _dared(below: Below) -> Iterator[None]:
+    """Look for paths through slits, where path and bound are far apart; once for each that is the best so far."""
+    for closely, beyond in ((False, FAR), (True, WIDE)):
+        if below.gap > beyond and below.in_time() and below.dare(closely=closely):
+            yield
 
 
 def _raise_climb(below: Below) -> None:
