@@ -41,6 +41,9 @@ STEEP = 0.5
 """What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
 FAR = 5e-3
 """Gap, as a part, beyond which other ways to find a path are asked for a better one, too."""
+DARED_M, PINCHED_M = (0.05, 0.1, 0.2, 0.4), 1.0
+"""By how much more than it lacked the nodes beside a track through a slit are raised, one after the other, and what it
+may lack for another to be looked for."""
 SMALL = 50.0
 """A world is small where the straight ways from stop to stop are so many cells of the terrain model long, at most."""
 
@@ -59,6 +62,8 @@ class Below:
         self.first_s = math.inf
         self._gained: dict[tuple[bool, bool], float] = {}
         self._simplified: set[tuple[bool, bytes]] = set()
+        self.unsettled: Unsettled | None = None
+        """Why the last track that was looked at closely holds no path."""
         self.proved_shut = False
         self.by_storeys = False
         """Whether bounds ask where tracks can get to by what they climb and descend on their way."""
@@ -124,9 +129,17 @@ class Below:
         limits = self.problem.limits
         if max(limits.track_error_m, limits.horizontal_clearance_m) <= 0.0:
             return False
+        shut: list[tuple[Floats, float]] = []
         for leg in self.legs:
-            leg.exact, leg.closely = True, closely
-        found = self.try_below(self.top_m, fine=True)
+            leg.exact, leg.closely, leg.shut = True, closely, shut
+        found = False
+        for more_m in DARED_M:
+            self.unsettled = None
+            found = self.try_below(self.top_m, fine=True)
+            lacks = self.unsettled
+            if found or lacks is None or lacks.kind != "pinched" or not lacks.by < PINCHED_M or not self.in_time():
+                break
+            shut.append((lacks.place, lacks.by + more_m))
         for leg in self.legs:
             leg.exact = leg.closely = False
         return found
@@ -204,6 +217,7 @@ class Below:
             if not self.judge.violations(found[0]):
                 return found
         careful = settle(self.problem, self.judge, track.points, track.pinned, track.pin_m)
+        self.unsettled = careful if isinstance(careful, Unsettled) else None
         return None if isinstance(careful, Unsettled) else careful
 
     def search_space(self) -> bool:

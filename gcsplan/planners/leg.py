@@ -91,6 +91,8 @@ class Leg:
         self.exact = self.closely = False
         """Whether tracks are looked for where nodes are legal, though what is between them may not be by a little; and
         that along the way of the last flood or bound, in cells as small as can be."""
+        self.shut: list[tuple[Floats, float]] = []
+        """Where tracks lacked so many metres all the same."""
         self.has_fine = self._ratio > 1
         """Whether there is a lattice finer than that of the first look."""
 
@@ -180,6 +182,8 @@ class Leg:
         if within is not None and self.closely:
             within = self._along(within)
         relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, self.exact)
+        for place, by in self.shut if self.exact else ():
+            relief.lift(place[None], np.array([by]))
         try:
             for _ in range(LEARNT if self.exact else 1):
                 way = relief.mesh().way(self.start.place, self.goal.place, limit, guide)

@@ -128,9 +128,14 @@ class Relief:
         places = sampled(track, LEARN_M)
         over = self._too_high(*places.T)
         shut = np.isfinite(over) & (over > 0.0)
-        cells = np.floor((self.plane.all_at(places[shut]) - [self.col, self.row]) * self.fineness).astype(np.intp)
+        self.lift(places[shut], over[shut])
+        return bool(shut.any())
+
+    def lift(self, places: Floats, by_m: Floats) -> None:
+        """Raise the nodes of the cells of ``places`` (N, 2) by so much (N,), and a hair."""
+        cells = np.floor((self.plane.all_at(places) - [self.col, self.row]) * self.fineness).astype(np.intp)
         more: dict[tuple[int, int], float] = {}  # of few nodes: those that are not touched take no memory
-        for (i, j), by in zip(cells.tolist(), over[shut].tolist(), strict=True):
+        for (i, j), by in zip(cells.tolist(), by_m.tolist(), strict=True):
             for node in product((j, j + 1), (i, i + 1)):
                 if 0 <= node[0] < self.shape[0] and 0 <= node[1] < self.shape[1]:
                     more[node] = max(more.get(node, 0.0), by + LEARN_HAIR_M)
@@ -138,7 +143,6 @@ class Relief:
             self._floor[node] += by
             self._excess[node] += by
         self._laid = False
-        return bool(shut.any())
 
     def hold(self, cones: list[Cone]) -> None:
         """Hold nodes down to ``cones``, which no path of a length that matters is higher than near its ends: a bound's
