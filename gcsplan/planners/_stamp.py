@@ -16,6 +16,10 @@ Ints = NDArray[np.int32]
 
 EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
 PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, NUMBERS = range(10, 17)
+BESIDE = 2.0
+"""Datum of a level over all ground within reach, for paths; 1 is over that below, 0 none."""
+MOST_BESIDE = 6
+"""Nodes that are looked at for that, a side and at most; of more every second, third … is."""
 
 
 @device
@@ -44,12 +48,29 @@ def level(zones: Floats, z: int, level: int, ground: float) -> float:
 
 
 @device
-def _open(zones: Floats, z: int, floor: float, allowed: float, ground: float, over: bool, under: bool) -> bool:
+def _level_at(zones: Floats, z: int, at: int, ground: Floats, up: Floats, down: Floats, j: int, i: int) -> float:
+    """The same at a node, of a datum `BESIDE`, too: ``up``, ``down`` how far the ground rises and falls within
+    reach."""
+    value = level(zones, z, at, ground[j, i])
+    if zones[z, at + 2] < BESIDE:
+        return value
+    return value + up[j, i] if at in (TOP, TOP_2) else value - down[j, i]
+
+
+@device
+def _open(
+    zones: Floats, z: int, floor: float, allowed: float, ground: Floats, up: Floats, down: Floats, j: int, i: int,
+    over: bool, under: bool,
+) -> bool:  # fmt: skip
     """Whether there is an altitude to fly at, over a zone, under it, or between the two of a pair."""
-    bottom, top = level(zones, z, BOTTOM, ground), level(zones, z, TOP, ground)
+    bottom, top = (
+        _level_at(zones, z, BOTTOM, ground, up, down, j, i), _level_at(zones, z, TOP, ground, up, down, j, i)
+    )  # fmt: skip
     if zones[z, PAIR] == 0.0:
         return (over and top <= allowed) or (under and floor <= bottom)
-    bottom_2, top_2 = level(zones, z, BOTTOM_2, ground), level(zones, z, TOP_2, ground)
+    bottom_2, top_2 = (
+        _level_at(zones, z, BOTTOM_2, ground, up, down, j, i), _level_at(zones, z, TOP_2, ground, up, down, j, i)
+    )  # fmt: skip
     under_2 = zones[z, UNDER_2] > 0.0
     if max(top, top_2) <= allowed or (under and under_2 and floor <= min(bottom, bottom_2)):
         return True
@@ -58,10 +79,13 @@ def _open(zones: Floats, z: int, floor: float, allowed: float, ground: float, ov
     return under and top_2 <= min(bottom, allowed) and floor <= bottom
 
 
-@kernel("i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] i8 i4[,] f8[,] i8")
+@kernel(
+    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] i8 f8 b1 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] i8 i4[,] f8[,] i8"
+)
 def stamp_zones(
-    around: Ints, span: Ints, excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats,
-    edges: Floats, boxes: Ints, low: bool, owner: Ints, sheet: int, of: Ints, values: Floats, count: int,
+    around: Ints, span: Ints, excess: Floats, floor: Floats, ground: Floats, steep: Floats, fineness: int, reach: float,
+    exact: bool, up: Floats, down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, low: bool,
+    owner: Ints, sheet: int, of: Ints, values: Floats, count: int,
 ) -> int:  # fmt: skip
     """Give cells that zones shut walls of their own: how deep in the shape they lie. Returns how many walls there are.
 
@@ -69,12 +93,20 @@ def stamp_zones(
     ``span``, ``owner``, ``of``, ``values`` as in `_mesh`, of the ``sheet``, which has none yet: a cell's owner is
     passed over on the first and under on the second. ``low``: only what is shut for certain; else all that may be shut.
     ``count``: walls that there are.
+
+    For paths, ``reach`` is within which a zone's ground tells its levels: at each node (``up``, ``down``, room for it)
+    as ``steep`` (of the nodes of a lattice ``fineness`` times coarser) lets it be, or, ``exact``, as nodes are.
     """
     for j in range(len(span)):
         for i in range(around[j, 0], min(around[j, 1], excess.shape[1] - 1)):
             of[j * (excess.shape[1] - 1) + i, sheet] = 0
     wall = values[len(values) - 1]
     for z in range(len(zones)):
+        if _looks_beside(zones, z):
+            if exact and zones[z, PAIR] == 0.0:
+                _look_beside(around, excess, ground, x, y, zones, edges, boxes, z, reach, up, down)
+            else:
+                _guess_beside(around, steep, fineness, boxes, z, reach, up, down)
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
             for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
                 cell = j * (excess.shape[1] - 1) + i
@@ -90,7 +122,8 @@ def stamp_zones(
                     jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
                     wall[k] = depth(zones, edges, z, x[jj, ii], y[jj, ii])
                     deepest, shallowest = max(deepest, wall[k]), min(shallowest, wall[k])
-                    if _open(zones, z, floor[jj, ii], floor[jj, ii] - excess[jj, ii], ground[jj, ii], over, under):
+                    allowed = floor[jj, ii] - excess[jj, ii]
+                    if _open(zones, z, floor[jj, ii], allowed, ground, up, down, jj, ii, over, under):
                         ways += 1
                 if ways == 4:
                     continue
@@ -99,7 +132,7 @@ def stamp_zones(
                     twist = _twist(floor, ground, j, i) if zones[z, TOP_AGL] > 0.0 else 0.0
                     for k in range(4):
                         jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
-                        wall[k] = level(zones, z, TOP, ground[jj, ii]) - floor[jj, ii] + excess[jj, ii]
+                        wall[k] = _level_at(zones, z, TOP, ground, up, down, jj, ii) - floor[jj, ii] + excess[jj, ii]
                         wall[k] += -twist if low else twist
                     count = _put(of, sheet, values, cell, wall, count)
                     continue
@@ -125,6 +158,65 @@ def stamp_zones(
                         wall[k] += more
                 count = _put(of, sheet, values, cell, wall, count)
     return count
+
+
+@device
+def _looks_beside(zones: Floats, z: int) -> bool:
+    """Whether a level is told by what is within reach."""
+    if zones[z, PAIR] > 0.0 and max(zones[z, TOP_2_AGL], zones[z, BOTTOM_2_AGL]) >= BESIDE:
+        return True
+    return bool(max(zones[z, TOP_AGL], zones[z, BOTTOM_AGL]) >= BESIDE)
+
+
+@device
+def _guess_beside(
+    around: Ints, steep: Floats, fineness: int, boxes: Ints, z: int, reach: float, up: Floats, down: Floats
+) -> None:
+    """How far the ground rises and falls within reach of a zone's nodes, at most."""
+    for j in range(boxes[z, 2], boxes[z, 3] + 2):
+        for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
+            jj, ii = min(j // fineness, len(steep) - 2), min(i // fineness, steep.shape[1] - 2)
+            v, u = j / fineness - jj, i / fineness - ii
+            south, north = steep[jj, ii] * (1.0 - u), steep[jj + 1, ii] * (1.0 - u)
+            if u > 0.0:  # a weight of 0 does not carry an unknown neighbour's NaN over
+                south, north = south + u * steep[jj, ii + 1], north + u * steep[jj + 1, ii + 1]
+            up[j, i] = down[j, i] = reach * (south if v <= 0.0 else south * (1.0 - v) + north * v)
+
+
+@device
+def _look_beside(
+    around: Ints, excess: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
+    z: int, reach: float, up: Floats, down: Floats,
+) -> None:  # fmt: skip
+    """How far, up and down, that ground of a zone differs from the ground below a node which is within reach, by which
+    the zone is grown; by what is known of other nodes, or not at all where there is none."""
+    row, col = min(boxes[z, 2], len(x) - 2), min(boxes[z, 0], x.shape[1] - 2)
+    col = min(max(col, around[row, 0]), x.shape[1] - 2)
+    across = math.sqrt((x[row, col + 1] - x[row, col]) ** 2 + (y[row, col + 1] - y[row, col]) ** 2)
+    along = math.sqrt((x[row + 1, col] - x[row, col]) ** 2 + (y[row + 1, col] - y[row, col]) ** 2)
+    rows, cols = int(reach / along), int(reach / across)
+    every = 1 + max(rows, cols) // (MOST_BESIDE + 1)
+    for j in range(boxes[z, 2], boxes[z, 3] + 2):
+        for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
+            up[j, i] = down[j, i] = 0.0
+            if excess[j, i] == np.inf:
+                continue
+            most, least = -np.inf, np.inf
+            for q in range(-(rows // every), rows // every + 1):
+                jj = j + q * every
+                if not 0 <= jj < len(x):
+                    continue
+                for p in range(-(cols // every), cols // every + 1):
+                    ii = i + p * every
+                    if not around[jj, 0] <= ii < around[jj, 1] or excess[jj, ii] == np.inf:
+                        continue
+                    if least <= ground[jj, ii] <= most:
+                        continue
+                    off = (x[jj, ii] - x[j, i]) ** 2 + (y[jj, ii] - y[j, i]) ** 2
+                    if off <= reach * reach and depth(zones, edges, z, x[jj, ii], y[jj, ii]) > reach:
+                        most, least = max(most, ground[jj, ii]), min(least, ground[jj, ii])
+            if most > -np.inf:
+                up[j, i], down[j, i] = most - ground[j, i], ground[j, i] - least
 
 
 @kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8 f8[,] i1[,]")

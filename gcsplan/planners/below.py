@@ -110,6 +110,7 @@ class Below:
 
     def try_below(self, cap_m: float, *, fine: bool) -> bool:
         """Look for a path below a cap; True if it is the best so far."""
+        self.unsettled = None
         stops = self.stops(self.choice, cap_m, fine)
         if stops is None:
             return False
@@ -134,7 +135,6 @@ class Below:
             leg.exact, leg.closely, leg.shut = True, closely, shut
         found = False
         for more_m in DARED_M:
-            self.unsettled = None
             found = self.try_below(self.top_m, fine=True)
             lacks = self.unsettled
             if found or lacks is None or lacks.kind != "pinched" or not lacks.by < PINCHED_M or not self.in_time():

@@ -103,6 +103,8 @@ class Relief:
             self._be_exact()
         self._zones, self._edges = plane.zones(low, under, over)
         self._boxes = plane.boxes(self.row, self.col, fineness, rows, cols)
+        self._steep, self._exact, self._reach_m = steep, exact, plane.problem.airspace.beside_m(limits)
+        self._up, self._down = (self._array(name, self.shape) for name in ("up", "down"))
         self._of, self._values = np.empty((0, 0), np.int32), np.empty((0, WALL))
         self._laid = False
         self._held: list[Cone] = []
@@ -237,8 +239,9 @@ class Relief:
         walls = 0
         for sheet in range(sheets):
             walls = stamp_zones(
-                self._around, self._span, self._excess, self._floor, self._ground, self._x, self._y, self._zones,
-                self._edges, self._boxes, self.low, owner, sheet, self._of, self._values, walls,
+                self._around, self._span, self._excess, self._floor, self._ground, self._steep, self.fineness,
+                self._reach_m, self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges,
+                self._boxes, self.low, owner, sheet, self._of, self._values, walls,
             )  # fmt: skip
         self._laid = sheets == 1
 

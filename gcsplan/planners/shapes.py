@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners._stamp import (
+    BESIDE,
     BOTTOM,
     BOTTOM_2,
     EAST,
@@ -72,10 +73,12 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
 
     Levels over ground are those over the zone's own ground, which tells what may be flown beside it too. There, a level
     is known by the ground below but for what that rises within reach. So such a zone is laid down twice: as it is, and
-    grown, with levels moved by so much.
+    grown, with levels moved by so much: the most that it rises anywhere, or, for paths, there, where cells are no
+    smaller than that.
     """
     air, limits = problem.airspace, problem.limits
     reach = air.beside_m(limits)
+    there = reach <= min(math.dist((x[0, 0], y[0, 0]), place) for place in ((x[0, 1], y[0, 1]), (x[1, 0], y[1, 0])))
     box = float(x.min()), float(y.min()), float(x.max()), float(y.max())
     found: list[tuple[int, Zone, Floats | None]] = []
     moved: list[float] = []
@@ -108,7 +111,9 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
                     off = sign * off_m if over_ground or sign < 0.0 else -TOUCH_M
                     row[at] = level.value_m + more * (limits.altitude_error_m + off)
                     row[at + 2] = over_ground
-                    if over_ground:
+                    if over_ground and moved[k] > 0.0 and there and sign > 0.0:
+                        row[at + 2] = BESIDE
+                    elif over_ground:
                         row[at] += more * sign * moved[k]
             row[UNDER] = zone.floor is not None
             row[RADIUS] = -1.0
