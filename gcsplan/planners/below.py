@@ -89,9 +89,12 @@ class Below:
             known = self.cost if cost is None and self.best is not None else cost
             self.problem.progress(Progress(time.perf_counter() - self.begun_s, known, self.bound, phase))
 
-    def look(self) -> None:
-        """Flood the legs, and find the first path."""
-        for slack in SLACKS:
+    def look(self, slacks: tuple[float, ...] = SLACKS, dares: tuple[bool, ...] = (False, True)) -> None:
+        """Flood the legs, and find the first path, over a track that is so much longer than the shortest at most.
+
+        ``dares``: how `dare` looks for one where there is no other.
+        """
+        for slack in slacks:
             for leg in self.legs:
                 leg.flood(slack)
                 if math.isinf(leg.length_m):
@@ -99,12 +102,12 @@ class Below:
                     return
             self._raise_tracks()
             # Ways that the first look misses are short, or there are no others.
-            patient = slack in (SLACKS[0], SLACKS[-1])
+            patient = slack in (slacks[0], slacks[-1])
             if self.try_below(self.top_m, fine=False) or (patient and self.try_below(self.top_m, fine=True)):
                 return
             if self.past(PAST, fine=False, first=True):
                 return
-        for closely in (False, True):
+        for closely in dares:
             if self.dare(closely=closely):
                 return
 
@@ -176,6 +179,15 @@ class Below:
         if found is not None:
             self.choice = replace(found, least_m=(0.0, 0.0), most_m=(0.0, 0.0))
         return found is not None
+
+    def take_along(self, stops: Stops) -> bool:
+        """Look for a path over a track; True if it is the best so far."""
+        track = make_track(self.problem, *stops)
+        flown = fly(self.problem, track)
+        if not isinstance(flown, Flown) and flown.kind != "pinched":
+            return False
+        found = self._exact(track, flown)
+        return found is not None and self.take_simpler(*found, fine=True, longer=False)
 
     def take_longer(self, stops: Stops, fine: bool) -> bool:
         """Look for a path over a track, with laps where it is too steep; True if it is the best so far."""

@@ -61,13 +61,15 @@ class Leg:
         """A lower bound of every track's length below the highest cap; inf: there is none, proved."""
         self.reach_m = 0.0
         """Tracks shorter than this lie within the lattice, and within what the flood has seen."""
+        self.farthest = math.inf
+        """No ways are looked for that may be more times as long as the straight one."""
         self.plane: Plane
         self._twin: tuple[Plane, Bools] | None = None
         self._detour = 0.0
         self._mesh: Mesh
         self._guide: Guide
         self._ahead: Guide | None = None
-        self._last_way = np.array([start.place, goal.place])  # of flood or bound
+        self.last_way = np.array([start.place, goal.place])  # of flood or bound
         self._close: Nearby | None = None
         self._reached: tuple[Nearby, Reached] | None = None
         cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
@@ -115,6 +117,8 @@ class Leg:
         self._ahead = self._close = self._reached = None
         self.closer = 1
         for detour in DETOURS:
+            if detour > self.farthest:
+                break
             if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                 continue
             if detour != self._detour and DETOURS[0] < detour < math.inf and self._is_most(detour):
@@ -133,7 +137,7 @@ class Leg:
                 self._guide = self._mesh.flood(a, b, self.reach_m, slack)[1]
                 return
             if way is not None:
-                self.length_m, self._last_way = way.length_m, way.points
+                self.length_m, self.last_way = way.length_m, way.points
                 self.reach_m = min(within, way.length_m * (1.0 + slack))
                 return
 
@@ -211,7 +215,7 @@ class Leg:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:
                 return limit
-            self._last_way = way.points
+            self.last_way = way.points
             # Ways are longer between the walls that the cones raised, so there is less to spare for a climb: again.
             enough = not cones or way.length_m < known + WORTHWHILE * spare
             known = max(known, way.length_m)
@@ -275,7 +279,7 @@ class Leg:
         plane = within.guide.mesh.plane
         near = np.zeros(within.cells.shape, np.bool_)
         cell_m = math.dist((plane.x[0, 0], plane.y[0, 0]), (plane.x[0, 1], plane.y[0, 1]))
-        for i, j in np.unique(plane.all_at(sampled(self._last_way, cell_m)).astype(np.intp), axis=0).tolist():
+        for i, j in np.unique(plane.all_at(sampled(self.last_way, cell_m)).astype(np.intp), axis=0).tolist():
             near[max(j - ALONG, 0) : j + ALONG + 1, max(i - ALONG, 0) : i + ALONG + 1] = True
         near &= within.cells
         parts = math.isqrt(MOST_OFTEN // max(int(near.sum()) * self._ratio**2, 1))

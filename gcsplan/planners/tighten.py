@@ -13,6 +13,7 @@ from functools import partial
 
 from gcsplan.planners.below import FAR, PAST, Below
 from gcsplan.planners.caps import Layer, search_caps
+from gcsplan.planners.follow import follow
 from gcsplan.planners.rising import climb_bound, rise_bound
 from gcsplan.planners.traverse import pulled_tight, traverse
 
@@ -92,6 +93,8 @@ def _tighten_length(below: Below) -> None:
     if far and sum(leg.look_closer(below.limit(leg), FINER, cut) for leg in below.legs):
         below.try_below(below.top_m, fine=True)
         _halve(below, far=True)
+        if below.gap > TWICE * below.wanted and below.in_time() and follow(below):
+            _halve(below, far=True)
 
 
 def _tighten_energy(below: Below) -> None:
@@ -117,6 +120,8 @@ def _tighten_energy(below: Below) -> None:
 
 def _dared(below: Below) -> Iterator[None]:
     """Look for paths through slits, where path and bound are far apart; once for each that is the best so far."""
+    if below.gap > FAR and below.in_time() and follow(below):
+        yield
     for closely, beyond in ((False, FAR), (True, WIDE)):
         if below.gap > beyond and below.in_time() and below.dare(closely=closely):
             yield
