@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.detours import joined
 from gcsplan.planners.track import distances
+from gcsplan.world.path import Path
 
 if TYPE_CHECKING:
     from gcsplan.planners.below import Below
@@ -39,55 +40,108 @@ SLACKS = (0.008, 0.15)
 """How much longer than the shortest tracks of a stretch are, as a part; longer ones are no slits."""
 FARTHEST = 1.5
 """How many times as long as the straight way tracks may be that are looked for between two places."""
+BESIDE_M, WORTH = 15.0, 0.1
+"""How far from a path a way has left it; and what part of what both differ in must be gained there for a look."""
 MOST = 24
 """Stretches of a way, of which more are not looked at."""
 
 
 def follow(below: Below) -> bool:
-    """Look for a path along the ways of the last bounds, leg by leg; True if it is the best so far."""
-    paths: list[Floats] = []
-    start = below.problem.start
-    for leg in below.legs:
-        path = _along(below, leg, start)
-        if path is None:
-            return False
-        paths.append(path)
-        start = tuple(path[-1].tolist())
+    """Where the ways of the last bounds leave the best path, look for a path along them; True if one is the best so
+    far."""
+    assert below.best is not None
+    stops = [0, len(below.best) - 1] if below.pinned is None else np.flatnonzero(below.pinned).tolist()
+    if len(stops) != len(below.legs) + 1:
+        return False
+    parts = [below.best[a : b + 1] for a, b in pairwise(stops)]
+    found = [_nearer(below, leg, part) for leg, part in zip(below.legs, parts, strict=True)]
+    if all(new is None for new in found):
+        return False
+    paths = [part if new is None else new for part, new in zip(parts, found, strict=True)]
     points, pinned, _ = joined(paths, [None] * (len(paths) - 1))
     return not below.judge.violations(points) and below.take_simpler(points, pinned, fine=True, longer=False)
 
 
-def _along(below: Below, leg: Leg, start: Point) -> Floats | None:
-    """(N, 3) way points along the way of a leg's last bound, led past what is shut on it; None where that fails."""
+def _nearer(below: Below, leg: Leg, path: Floats) -> Floats | None:
+    """(N, 3) a cheaper path of a leg than a known one, which it leaves where the way of the last bound does; None where
+    none was found."""
     way = leg.last_way
-    at = distances(way)
+    at, on_path = distances(way), distances(path[:, :2])
     s = np.linspace(0.0, at[-1], math.ceil(at[-1] / STEP_M) + 1)
     places = np.stack([np.interp(s, at, way[:, k]) for k in range(2)], axis=-1)
-    east, north = places.T
-    over = below.problem.airspace.floor_amsl(east, north, below.problem.limits) - below.top_m
+    away, nearest = _nearest(places, path[:, :2])
+    better: list[tuple[float, float, Floats]] = []
+    for first, last in _runs(away > BESIDE_M):
+        low, high = max(first - 1, 0), min(last + 1, len(s) - 1)
+        a, b = nearest[low], nearest[high]
+        begun = better[-1][1] if better else 0.0
+        if a < begun or (b - a) - (s[high] - s[low]) < WORTH * (below.longest() - at[-1]):
+            continue
+        ends = [np.array([np.interp(x, on_path, path[:, k]) for k in range(3)]) for x in (a, b)]
+        part = _along(below, leg, ends, places[low : high + 1], s[low : high + 1], at[-1])
+        known = np.vstack([ends[0], path[(on_path > a) & (on_path < b)], ends[1]])
+        if part is not None and below.problem.cost(Path(part)) < below.problem.cost(Path(known)):
+            better.append((a, b, part))
+    out, begin = [], -math.inf
+    for a, b, part in better:
+        out += [path[(on_path > begin + APART_M) & (on_path < a - APART_M)], part]
+        begin = b
+    return np.vstack([*out, path[on_path > begin + APART_M]]) if out else None
+
+
+def _along(below: Below, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float) -> Floats | None:
+    """(N, 3) way points from one end to the other along a way, led past what is shut on it; None where that fails.
+
+    ``places`` (N, 2) of the way, ``s`` (N,) how far along it they are; ``whole_m`` how long all of it is.
+    """
+    over = below.problem.airspace.floor_amsl(places[:, 0], places[:, 1], below.problem.limits) - below.top_m
     stretches = _stretches(over)
     if len(stretches) > MOST:
         return None
     cuts = sorted({0, len(s) - 1, *(k for stretch in stretches for k in stretch)})
     out: list[Floats] = []
+    start = ends[0]
     for first, last in pairwise(cuts):
-        goal = _height(below, leg, *map(float, (s[last], at[-1] - s[last], over[last])))
-        part = replace(
-            below.problem, start=start, goal=(*places[last].tolist(), goal), via=(), progress=None, objective="length"
-        )
+        goal = ends[1]
+        if last < len(s) - 1:
+            height = _height(below, leg, *map(float, (s[last], whole_m - s[last], over[last])))
+            goal = np.array([*places[last], height])
+        part = replace(below.problem, start=_point(start), goal=_point(goal), via=(), progress=None, objective="length")
         found = type(below)(part, below.begun_s)
         for piece in found.legs:
             piece.farthest = FARTHEST
         if (first, last) not in stretches:
-            open_way = np.vstack([places[first], way[(at > s[first]) & (at < s[last])], places[last]])
-            found.take_along(joined([open_way], []))
+            found.take_along(joined([np.vstack([start[:2], places[first + 1 : last], goal[:2]])], []))
         if found.best is None:
             found.look(SLACKS, (False,))
         if found.best is None or not below.in_time():
             return None
         out.append(found.best if not out else found.best[1:])
-        start = part.goal
+        start = goal
     return np.vstack(out)
+
+
+def _nearest(places: Floats, track: Floats) -> tuple[Floats, Floats]:
+    """(N,) how far places are from a track, and where on it that is, in metres along it."""
+    a, d = track[:-1], np.diff(track, axis=0)
+    t = ((places[:, None] - a) * d).sum(axis=-1) / np.maximum((d * d).sum(axis=-1), 1e-12)
+    t = t.clip(0.0, 1.0)
+    away = np.hypot(*(places[:, None] - a - t[..., None] * d).transpose(2, 0, 1))
+    k = away.argmin(axis=1)
+    rows = np.arange(len(places))
+    s = distances(track)
+    return away[rows, k], s[k] + t[rows, k] * (s[k + 1] - s[k])
+
+
+def _runs(some: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last of what is true, run by run."""
+    change = np.flatnonzero(np.diff(np.concatenate([[False], some, [False]]).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in zip(change[::2], change[1::2], strict=True)]
+
+
+def _point(place: Floats) -> Point:
+    east, north, z = place.tolist()
+    return east, north, z
 
 
 def _stretches(over: Floats) -> list[tuple[int, int]]:

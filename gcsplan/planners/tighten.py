@@ -120,7 +120,7 @@ def _tighten_energy(below: Below) -> None:
 
 def _dared(below: Below) -> Iterator[None]:
     """Look for paths through slits, where path and bound are far apart; once for each that is the best so far."""
-    if below.gap > FAR and below.in_time() and follow(below):
+    if below.gap > TWICE * below.wanted and below.in_time() and follow(below):
         yield
     for closely, beyond in ((False, FAR), (True, WIDE)):
         if below.gap > beyond and below.in_time() and below.dare(closely=closely):
