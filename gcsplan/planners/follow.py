@@ -40,7 +40,7 @@ SLACKS = (0.008, 0.15)
 """How much longer than the shortest tracks of a stretch are, as a part; longer ones are no slits."""
 FARTHEST = 1.5
 """How many times as long as the straight way tracks may be that are looked for between two places."""
-BESIDE_M, WORTH = 15.0, 0.1
+BESIDE_M, WORTH = 10.0, 0.03
 """How far from a path a way has left it; and what part of what both differ in must be gained there for a look."""
 MOST = 24
 """Stretches of a way, of which more are not looked at."""

@@ -18,7 +18,7 @@ from gcsplan.planners.rising import climb_bound, rise_bound
 from gcsplan.planners.traverse import pulled_tight, traverse
 
 PAST_FINE, ROUNDS = 9, 2
-"""Tracks past what is in the way that are looked at on the finer lattice; and how often, there and aslant."""
+"""Tracks past what is in the way that are looked at on the finer lattice; and how often."""
 TWICE, NEAR, FINER = 2.0, 5e-2, 4
 """From so many times the wanted gap on, and up to which gap, as a part, cells are cut once more, and into how many
 parts a side: for walls and zones that the first lattice rounds off."""
@@ -76,9 +76,7 @@ def _tighten_length(below: Below) -> None:
     for _ in _dared(below):
         _halve(below)
     below.may_spend = 1.0
-    for _ in range(ROUNDS):
-        if not _traverse(below):
-            break
+    if _traverse(below):
         _halve(below)
     far = below.gap > TWICE * below.wanted and below.in_time()
     if far and sum(leg.part_sheets(below.limit(leg)) for leg in below.legs):
@@ -111,9 +109,7 @@ def _tighten_energy(below: Below) -> None:
     for _ in _dared(below):
         below.raise_bound(_search_caps(below, least))
         _raise_climb(below)
-    for _ in range(ROUNDS):
-        if not _traverse(below):
-            break
+    if _traverse(below):
         below.raise_bound(_search_caps(below, least))
         _raise_climb(below)
 
