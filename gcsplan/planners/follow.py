@@ -44,6 +44,8 @@ BESIDE_M, WORTH = 10.0, 0.03
 """How far from a path a way has left it; and what part of what both differ in must be gained there for a look."""
 MOST = 24
 """Stretches of a way, of which more are not looked at."""
+AT_ONCE = 512
+"""Places whose distance from a track is worked out at once."""
 
 
 def follow(below: Below) -> bool:
@@ -123,14 +125,17 @@ def _along(below: Below, leg: Leg, ends: list[Floats], places: Floats, s: Floats
 
 def _nearest(places: Floats, track: Floats) -> tuple[Floats, Floats]:
     """(N,) how far places are from a track, and where on it that is, in metres along it."""
-    a, d = track[:-1], np.diff(track, axis=0)
-    t = ((places[:, None] - a) * d).sum(axis=-1) / np.maximum((d * d).sum(axis=-1), 1e-12)
-    t = t.clip(0.0, 1.0)
-    away = np.hypot(*(places[:, None] - a - t[..., None] * d).transpose(2, 0, 1))
-    k = away.argmin(axis=1)
-    rows = np.arange(len(places))
-    s = distances(track)
-    return away[rows, k], s[k] + t[rows, k] * (s[k + 1] - s[k])
+    a, d, s = track[:-1], np.diff(track, axis=0), distances(track)
+    away, where = np.empty(len(places)), np.empty(len(places))
+    for first in range(0, len(places), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        t = ((places[part, None] - a) * d).sum(axis=-1) / np.maximum((d * d).sum(axis=-1), 1e-12)
+        t = t.clip(0.0, 1.0)
+        off = np.hypot(*(places[part, None] - a - t[..., None] * d).transpose(2, 0, 1))
+        k = off.argmin(axis=1)
+        rows = np.arange(len(k))
+        away[part], where[part] = off[rows, k], s[k] + t[rows, k] * (s[k + 1] - s[k])
+    return away, where
 
 
 def _runs(some: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -168,7 +168,8 @@ def _traverse(below: Below) -> bool:
     before, found = below.cost, traverse(below.problem, below.longest())
     if found is not None:
         below.take_longer(found, fine=True)
-    for level in (0, 1):  # where finer lines are better, yet finer ones may be, too
+    # Where finer lines are better, yet finer ones may be, too; for length that is hardly worth the time.
+    for level in (0, 1) if below.problem.objective == "energy" else (0,):
         if below.gap <= TWICE * below.wanted or not below.in_time():
             break
         tight = pulled_tight(below.problem, below.best, level, below.begun_s + below.problem.budget_s)

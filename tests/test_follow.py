@@ -1,0 +1,94 @@
+"""Paths along the ways of bounds: a notch that was passed by is found, one that is shut is not, and the rest stays."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from gcsplan.planners import follow
+from gcsplan.planners.band import plan_band
+from gcsplan.planners.below import Below
+from gcsplan.planners.problem import Via
+from gcsplan.planners.tighten import tighten
+from gcsplan.world.path import Path
+from tests.planner_worlds import faults
+from tests.test_slits import MIDDLE_M, ROUND_M, STRAIGHT_M, ridge
+
+Floats = NDArray[np.float64]
+
+
+def looked(over_m: float, **more: object) -> Below:
+    """With a path round the ridge, and the way of a bound through its notch."""
+    problem = replace(ridge(over_m, 0.2, 80.0, True), **more)  # type: ignore[arg-type]
+    begun_s = time.perf_counter()
+    below = Below(problem, begun_s)
+    below.look(dares=())
+    assert below.best is None
+    below.take(plan_band(problem, below.tell, begun_s).path.points)
+    assert below.cost > ROUND_M
+    for leg in below.legs:
+        limit_m = 1.05 * leg.straight_m
+        leg.bound(below.top_m, leg.corridor(limit_m), limit_m)
+    return below
+
+
+def test_a_path_leads_through_a_notch_that_was_passed_by() -> None:
+    below = looked(0.1)
+    assert follow.follow(below)
+    assert below.best is not None
+    assert below.cost < STRAIGHT_M
+    assert faults(below.problem, Path(below.best)) == []
+    assert not follow.follow(below)  # there is no other
+
+
+def test_a_notch_that_is_shut_is_left_alone() -> None:
+    below = looked(-0.3)
+    before = below.cost
+    assert not follow.follow(below)
+    assert below.cost == before
+
+
+def test_stops_are_passed_as_before() -> None:
+    below = looked(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
+    assert below.best is not None
+    assert not follow.follow(below)  # nobody knows where on the path its stops are
+    stop = np.array([500.0, MIDDLE_M + 30.0, 82.0])
+    below.pinned = (np.abs(below.best - stop) < 1e-6).all(axis=1)
+    below.pinned[[0, -1]] = True
+    assert follow.follow(below)
+    assert below.best is not None
+    assert below.cost < STRAIGHT_M + 10.0
+    assert below.pinned.sum() == 3
+    assert np.abs(below.best[below.pinned][1] - stop).max() < 1e-6
+    assert faults(below.problem, Path(below.best)) == []
+
+
+def test_the_planner_asks_for_it() -> None:
+    below = looked(0.1)
+    below.dare = lambda *, closely=False: False  # type: ignore[method-assign]
+    tighten(below)
+    assert below.cost < STRAIGHT_M
+    assert below.gap < 0.003
+
+
+places = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), min_size=2, max_size=6, unique=True)
+
+
+@given(places, places)
+def test_the_nearest_place_of_a_track_is_as_near_as_any(some: list[tuple[float, float]], track: object) -> None:
+    line = np.array(track, dtype=float)
+    away, where = follow._nearest(np.array(some), line)
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    t = np.linspace(0.0, s[-1], 2001)
+    dense = np.stack([np.interp(t, s, line[:, k]) for k in range(2)], axis=-1)
+    for place, far, at in zip(some, away, where, strict=True):
+        assert far <= np.hypot(*(dense - place).T).min() + 1e-6
+        there = [np.interp(at, s, line[:, k]) for k in range(2)]
+        assert math.dist(there, place) == pytest.approx(far, abs=1e-6)
