@@ -14,6 +14,7 @@ from functools import partial
 from gcsplan.planners.below import FAR, PAST, Below
 from gcsplan.planners.caps import Layer, search_caps
 from gcsplan.planners.follow import follow
+from gcsplan.planners.leg import LARGE
 from gcsplan.planners.rising import climb_bound, rise_bound
 from gcsplan.planners.traverse import pulled_tight, traverse
 
@@ -29,6 +30,9 @@ MOST_CELLS = 50_000
 """Cells of all corridors whose storeys are looked at, at most."""
 FALLS = -0.25
 """By how much a bound of shorter paths falls with each metre that they may be longer, where that is not known."""
+ASLANT = 1e-2
+"""Gap, as a part, from which on paths for length that climb aslant are looked for over large terrain models, where that
+takes seconds; over others, and for energy, from `FAR` on."""
 WIDE = 2e-2
 """Gap, as a part, from which on it is worth to look for slits in cells as small as can be."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
@@ -163,13 +167,16 @@ def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float]
 
 def _traverse(below: Below) -> bool:
     """Look for a path that climbs slopes aslant, if path and bound are far apart; True if it is the best so far."""
-    if below.best is None or below.gap <= FAR or not below.climbs() or not below.in_time():
+    energy = below.problem.objective == "energy"
+    large = below.problem.airspace.surface.ground_m.size >= LARGE
+    far = below.gap > (ASLANT if large and not energy else FAR)
+    if below.best is None or not far or not below.climbs() or not below.in_time():
         return False
     before, found = below.cost, traverse(below.problem, below.longest())
     if found is not None:
         below.take_longer(found, fine=True)
     # Where finer lines are better, yet finer ones may be, too; for length that is hardly worth the time.
-    for level in (0, 1) if below.problem.objective == "energy" else (0,):
+    for level in (0, 1) if energy else (0,):
         if below.gap <= TWICE * below.wanted or not below.in_time():
             break
         tight = pulled_tight(below.problem, below.best, level, below.begun_s + below.problem.budget_s)
