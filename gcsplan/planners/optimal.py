@@ -19,7 +19,9 @@ climb over the next. Then sides of zones are shut, or laps put in, best first (`
 over the lowest that may be flown one has to follow the ground, and a slope steeper than the climb limit is climbed
 aslant: tracks for that are found on a lattice of reachable altitudes (`traverse`). A track that has to keep clear of
 what is beside it may fit through a notch that the lattice for paths, which knows slopes by their cells, has shut: there
-the exact check's own floors are asked, and what they shut is learnt (`Below.dare`, `Relief.learn`).
+the exact check's own floors are asked, and what they shut is learnt (`Below.dare`, `Relief.learn`). And where the way
+of a bound leaves the best path, one along it is looked for, past each stretch that is shut there in a problem of its
+own, whose cells are a metre or two wide (`follow`).
 
 **Where that does not hold**, under a maximum AGL, or where the climb limit binds far from the ends, the ways are
 searched on a lattice of reachable altitudes (`band`); the bound of the plane is true there as well. In worlds as high
