@@ -260,6 +260,7 @@ def on_two_sheets(areas: tuple[Free, Free], inside: shapely.Geometry, places: Fl
     return np.asarray(found[:, : len(places)])
 
 
+@pytest.mark.slow
 def test_ways_over_two_sheets_change_them_outside_alone() -> None:
     rng = np.random.default_rng(5)
     compared = changed = 0

@@ -273,7 +273,7 @@ def test_bound_lets_height_be_won_on_the_way_out_of_a_pocket() -> None:
     wall = Polygon(np.array([[390.0, 300.0], [400.0, 300.0], [400.0, 900.0], [390.0, 900.0]]))
     air = Airspace(Surface(z, z, plane_ground(z, 30.0, 30.0).grid), (Zone("wall", wall),))
     limits = Limits(10.0, max_climb_deg=9.0, max_descent_deg=60.0)
-    problem = Problem(air, limits, (380.0, 600.0, 10.01), (570.0, 600.0, 56.0))
+    problem = Problem(air, limits, (380.0, 600.0, 10.01), (570.0, 600.0, 56.0), budget_s=60.0)
     way = np.array([problem.start, [389.99, 900.01, 56.0], [400.01, 900.01, 56.0], problem.goal])
     assert is_feasible(problem, way)
     solution = plan(problem)

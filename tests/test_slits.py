@@ -62,6 +62,7 @@ def test_the_first_path_leads_through_it_where_there_is_no_other(over_m: float, 
     assert faults(problem, found.path) == []
 
 
+@pytest.mark.slow
 def test_no_path_leads_through_a_notch_that_is_shut() -> None:
     problem = ridge(-0.3, 0.0, 60.0, True)
     found = optimal.plan(problem)
