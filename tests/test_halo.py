@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gcsplan.world import _halo
 from gcsplan.world._field import Field
-from gcsplan.world._halo import Surroundings, whole_halo
+from gcsplan.world._halo import Surroundings, halo_around
 from gcsplan.world._shared import Halo
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -57,7 +57,7 @@ def test_it_bounds_all_that_is_around_and_hardly_more(seed: int) -> None:
     z = rough(rng, (int(rng.integers(2, 60)), int(rng.integers(2, 60))), float(rng.choice([0.0, 0.002, 0.1])))
     grid = GridMap.affine(0.0, 0.0, float(rng.uniform(1.0, 30.0)), float(rng.uniform(1.0, 30.0)))
     field = Field.of(grid)
-    halo = whole_halo(grid, field, z, float(rng.choice([0.0, 1.0, 10.0, 90.0])))
+    halo = halo_around(field, z, float(rng.choice([0.0, 1.0, 10.0, 90.0])))
     slope, high, low = by_hand(field, z, halo)
     assert np.array_equal(np.isinf(halo.slope), np.isinf(slope))
     known = np.isfinite(slope)
@@ -80,7 +80,7 @@ def test_lines_find_all_that_they_meet_looked_at_and_little_else(
     z = rough(rng, (900, 1100), 1e-4)
     grid = GridMap.affine(0.0, 0.0, 5.0, 4.0)
     field = Field.of(grid)
-    whole = whole_halo(grid, field, z, reach_m)
+    whole = halo_around(field, z, reach_m)
     monkeypatch.setattr(_halo, "LARGE", 1000)
     for _ in range(20):
         ours = Surroundings(grid, field, z, reach_m)

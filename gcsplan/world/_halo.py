@@ -34,17 +34,14 @@ class Surroundings:
 
     def __init__(self, grid: GridMap, field: Field, heights: Floats, reach_m: float) -> None:
         self._grid, self._field, self._heights, self._reach_m = grid, field, heights, reach_m
-        shape = heights.shape[0] - 1, heights.shape[1] - 1
-        cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
-        slope, high, low = (np.empty(shape, np.float32) for _ in range(3))
-        self.halo = Halo(slope, high, low, cols, rows)
         self._lock = threading.Lock()
         self._seen = np.ones((0, 0), np.bool_)
-        if shape[0] * shape[1] > LARGE:
-            self.halo.slope.fill(np.inf)
-            self._seen = np.zeros((-(-shape[0] // TILE), -(-shape[1] // TILE)), np.bool_)
+        rows, cols = heights.shape[0] - 1, heights.shape[1] - 1
+        if rows * cols > LARGE:
+            self.halo = _not_looked_at(field, heights, reach_m)
+            self._seen = np.zeros((-(-rows // TILE), -(-cols // TILE)), np.bool_)
         else:
-            self._look_at(slice(0, shape[0]), slice(0, shape[1]))
+            self.halo = halo_around(field, heights, reach_m)
         self._held = Held(HALO, *self.halo)
 
     def __reduce__(self) -> tuple[type[Surroundings], tuple[GridMap, Field, Floats, float]]:
@@ -57,7 +54,8 @@ class Surroundings:
             tiles = self._tiles(start, end)
             with self._lock:  # what is seen by one who comes later is done
                 for i, j in np.argwhere(tiles & ~self._seen).tolist():
-                    self._look_at(slice(i * TILE, (i + 1) * TILE), slice(j * TILE, (j + 1) * TILE))
+                    rows, cols = (slice(k * TILE, (k + 1) * TILE) for k in (i, j))
+                    _look_at(self._field, self._heights, self.halo, rows, cols)
                     self._seen[i, j] = True
         return self._held
 
@@ -78,21 +76,27 @@ class Surroundings:
             found[rows[:, 0], cols[:, 1]] = True
         return found
 
-    def _look_at(self, rows: slice, cols: slice) -> None:
-        """Fill these rows and columns of the halo."""
-        halo = self.halo
-        tall = min(max(TALL, WIDER * halo.rows), rows.stop - rows.start)
-        wide = min(max(WIDE, WIDER * halo.cols), cols.stop - cols.start)
-        room = np.empty((tall + 2 * halo.rows, 4, wide + 2 * halo.cols), np.float32)
-        box = np.array([rows.start, rows.stop, cols.start, cols.stop], np.int64)
-        surroundings(
-            self._heights, self._field.step_x, self._field.step_y, halo.cols, halo.rows, box, room,
-            halo.slope, halo.high, halo.low,
-        )  # fmt: skip
 
-
-def whole_halo(grid: GridMap, field: Field, heights: Floats, reach_m: float) -> Halo:
+def halo_around(field: Field, heights: Floats, reach_m: float) -> Halo:
     """The halo of a surface, looked at everywhere."""
-    around = Surroundings(grid, field, heights, reach_m)
-    around._look_at(slice(0, heights.shape[0] - 1), slice(0, heights.shape[1] - 1))
-    return around.halo
+    halo = _not_looked_at(field, heights, reach_m)
+    _look_at(field, heights, halo, slice(0, halo.slope.shape[0]), slice(0, halo.slope.shape[1]))
+    return halo
+
+
+def _not_looked_at(field: Field, heights: Floats, reach_m: float) -> Halo:
+    """A halo in which nothing is known."""
+    shape = heights.shape[0] - 1, heights.shape[1] - 1
+    cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
+    slope, high, low = (np.empty(shape, np.float32) for _ in range(3))
+    slope.fill(np.inf)
+    return Halo(slope, high, low, cols, rows)
+
+
+def _look_at(field: Field, heights: Floats, halo: Halo, rows: slice, cols: slice) -> None:
+    """Fill these rows and columns of a halo."""
+    tall = min(max(TALL, WIDER * halo.rows), rows.stop - rows.start)
+    wide = min(max(WIDE, WIDER * halo.cols), cols.stop - cols.start)
+    room = np.empty((tall + 2 * halo.rows, 4, wide + 2 * halo.cols), np.float32)
+    box = np.array([rows.start, rows.stop, cols.start, cols.stop], np.int64)
+    surroundings(heights, field.step_x, field.step_y, halo.cols, halo.rows, box, room, halo.slope, halo.high, halo.low)
