@@ -116,6 +116,26 @@ def bench_terrain(
     Console(width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
 
 
+@bench_app.command("everyday", short_help="A working day's missions, beside a visibility graph.")
+def bench_everyday(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables go there.")] = Path("bench-everyday"),
+    seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds of the missions.")] = "1",
+    count: Annotated[int, typer.Option(metavar="N", help="Missions of each seed.")] = 100,
+    kinds: Annotated[str | None, typer.Option(metavar="LIST", help="Kinds of missions [default: all]")] = None,
+) -> None:
+    """Short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat ground, hills, the sample DEM."""
+    from gcsplan.bench import everyday
+    from gcsplan.bench.everyday_missions import KINDS
+    from gcsplan.console import say
+
+    try:
+        numbers = [int(s) for s in seeds.split(",")]
+    except ValueError:
+        raise UsageError(f"--seeds takes whole numbers such as 1,2,3, given {seeds!r}") from None
+    asked = KINDS if kinds is None else kinds.split(",")
+    put(everyday.report(everyday.run(out, seeds=numbers, count=count, kinds=asked, tell=lambda words: say(words))))
+
+
 @bench_app.command("papers", short_help="The five papers' tables run again.")
 def bench_papers(
     out: Annotated[
