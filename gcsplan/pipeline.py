@@ -14,8 +14,8 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, InputError
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.planners.problem import Progress
-from gcsplan.planners.table import VOLUME_KEYS
-from gcsplan.planners.table import get as get_planner
+from gcsplan.planners.registry import VOLUME_KEYS
+from gcsplan.planners.registry import get as get_planner
 from gcsplan.steps.fleeting import FleetPlan, fleet_of
 from gcsplan.steps.gate import GateTime
 from gcsplan.steps.planning import Brief, VehiclePlan, make_problem, plan_vehicle

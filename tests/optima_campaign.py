@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
-from gcsplan.planners.optimal import plan
+from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.world.airspace import Legs
 from gcsplan.world.path import Path

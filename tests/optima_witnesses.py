@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
-from gcsplan.planners.optimal import plan
+from gcsplan.planners.optimal.planner import plan
 from tests.optima_polish import PATIENT, cost_of, is_feasible, polish, simplify
 from tests.optima_search import best_path
 from tests.optima_worlds import FAMILIES, Case, make

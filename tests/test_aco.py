@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gcsplan.errors import InputError, NoMission
-from gcsplan.planners.aco import _walk, make_layers, open_between, search
 from gcsplan.planners.problem import Problem, Via
-from gcsplan.planners.repair import violations
-from gcsplan.planners.scene import Scene
-from gcsplan.planners.swarm_planner import Settings
-from gcsplan.planners.table import get
+from gcsplan.planners.registry import get
+from gcsplan.planners.swarm.aco import _walk, make_layers, open_between, search
+from gcsplan.planners.swarm.planner import Settings
+from gcsplan.planners.swarm.repair import violations
+from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Zone

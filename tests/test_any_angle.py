@@ -17,10 +17,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.bench.terrain_problems import problems
-from gcsplan.planners import mesh as mesh_module
-from gcsplan.planners import optimal
-from gcsplan.planners._mesh import make_pieces, make_portals, sort_portals
-from gcsplan.planners.plane import Mesh, Plane
+from gcsplan.planners.optimal import planner as optimal
+from gcsplan.planners.optimal.navmesh import mesh as mesh_module
+from gcsplan.planners.optimal.navmesh.grid import Mesh, Plane
+from gcsplan.planners.optimal.navmesh.mesh_kernels import make_pieces, make_portals, sort_portals
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -45,6 +45,12 @@ PAIR = ("ssgwo", "gwo")
 # -- printed numbers ---------------------------------------------------------------------------------------------------
 
 
+def test_a_change_of_any_planner_makes_kept_runs_old() -> None:
+    root = Path(papers_runs.__file__).parents[1]
+    counted = {file for pattern in papers_runs.CODE for file in root.glob(pattern)}
+    assert set((root / "planners").rglob("*.py")) <= counted
+
+
 def test_a_printed_number_is_below_another_only_after_rounding() -> None:
     assert Number("1129").below(1131.47)
     assert not Number("1131").below(1131.47)  # 1131.47 rounds to it

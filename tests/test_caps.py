@@ -15,14 +15,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gcsplan.planners.below import Below
-from gcsplan.planners.caps import MOST_CAPS, Layer, search_caps
-from gcsplan.planners.corridor import End
-from gcsplan.planners.leg import Leg
+from gcsplan.planners.optimal.bounds.climb_bound import _least, climb_bound, rise_bound, rooms
+from gcsplan.planners.optimal.bounds.refine import tighten
+from gcsplan.planners.optimal.cap_search import MOST_CAPS, Layer, search_caps
+from gcsplan.planners.optimal.corridor import End
+from gcsplan.planners.optimal.incumbent import Below
+from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.problem import Objective, Problem, Via
-from gcsplan.planners.rising import _least, climb_bound, rise_bound, rooms
-from gcsplan.planners.tighten import tighten
-from gcsplan.planners.track import Flown, fly, make_track
+from gcsplan.planners.profile.track import Flown, fly, make_track
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path

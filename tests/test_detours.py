@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.bench.terrain_problems import problems
-from gcsplan.planners.below import PAST, Below
-from gcsplan.planners.climb import extend
+from gcsplan.planners.optimal.bounds.refine import PAST_FINE, tighten
+from gcsplan.planners.optimal.incumbent import PAST, Below
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.settle import sampled_track
-from gcsplan.planners.taut_string import Blocked, taut_string
-from gcsplan.planners.tighten import PAST_FINE, tighten
-from gcsplan.planners.track import Flown, Lacking, Shut, _rooms, fly, lacking
+from gcsplan.planners.profile.climb_laps import extend
+from gcsplan.planners.profile.exact import sampled_track
+from gcsplan.planners.profile.taut_string import Blocked, taut_string
+from gcsplan.planners.profile.track import Flown, Lacking, Shut, _rooms, fly, lacking
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path

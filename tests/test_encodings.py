@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
 from gcsplan.errors import InputError
-from gcsplan.planners.encodings import ENCODINGS, LATERAL, OFFSET, Code, get_encoding, shares
 from gcsplan.planners.problem import Problem, Via
-from gcsplan.planners.scene import GROWN, Scene
-from gcsplan.planners.smoothing import curve, fewer
+from gcsplan.planners.swarm.bspline import curve, fewer
+from gcsplan.planners.swarm.encodings import ENCODINGS, LATERAL, OFFSET, Code, get_encoding, shares
+from gcsplan.planners.swarm.scene import GROWN, Scene
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from tests.planner_worlds import FIELD, ground, jacksboro, random_mission

@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gcsplan.planners import follow
-from gcsplan.planners.band import plan_band
-from gcsplan.planners.below import Below
+from gcsplan.planners.lattice.planner import plan_band
+from gcsplan.planners.optimal.bounds.refine import tighten
+from gcsplan.planners.optimal.incumbent import Below
+from gcsplan.planners.optimal.sources import bound_corridor
 from gcsplan.planners.problem import Via
-from gcsplan.planners.tighten import tighten
 from gcsplan.world.path import Path
 from tests.planner_worlds import faults
 from tests.test_slits import MIDDLE_M, ROUND_M, STRAIGHT_M, ridge
@@ -41,28 +41,28 @@ def looked(over_m: float, **more: object) -> Below:
 
 def test_a_path_leads_through_a_notch_that_was_passed_by() -> None:
     below = looked(0.1)
-    assert follow.follow(below)
+    assert bound_corridor.follow(below)
     assert below.best is not None
     assert below.cost < STRAIGHT_M
     assert faults(below.problem, Path(below.best)) == []
-    assert not follow.follow(below)  # there is no other
+    assert not bound_corridor.follow(below)  # there is no other
 
 
 def test_a_notch_that_is_shut_is_left_alone() -> None:
     below = looked(-0.3)
     before = below.cost
-    assert not follow.follow(below)
+    assert not bound_corridor.follow(below)
     assert below.cost == before
 
 
 def test_stops_are_passed_as_before() -> None:
     below = looked(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
     assert below.best is not None
-    assert not follow.follow(below)  # nobody knows where on the path its stops are
+    assert not bound_corridor.follow(below)  # nobody knows where on the path its stops are
     stop = np.array([500.0, MIDDLE_M + 30.0, 82.0])
     below.pinned = (np.abs(below.best - stop) < 1e-6).all(axis=1)
     below.pinned[[0, -1]] = True
-    assert follow.follow(below)
+    assert bound_corridor.follow(below)
     assert below.best is not None
     assert below.cost < STRAIGHT_M + 10.0
     assert below.pinned.sum() == 3
@@ -84,7 +84,7 @@ places = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), min
 @given(places, places)
 def test_the_nearest_place_of_a_track_is_as_near_as_any(some: list[tuple[float, float]], track: object) -> None:
     line = np.array(track, dtype=float)
-    away, where = follow._nearest(np.array(some), line)
+    away, where = bound_corridor._nearest(np.array(some), line)
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     t = np.linspace(0.0, s[-1], 2001)
     dense = np.stack([np.interp(t, s, line[:, k]) for k in range(2)], axis=-1)

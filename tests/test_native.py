@@ -306,7 +306,7 @@ from pathlib import Path
 
 from gcsplan.native.unit import Unit
 
-UNIT = Unit("marked", Path(__file__).parent, "{package}", ("_unit", "helper", "marked"))
+UNIT = Unit("marked", Path(__file__).parent, "{package}", ("_unit", "inner.helper", "marked"))
 """
 
 
@@ -315,9 +315,10 @@ def fold_of(room: Path, package: str, scale: float) -> Any:
     for name in [m for m in sys.modules if m.split(".")[0] == package]:
         del sys.modules[name]
     folder = room / package
-    folder.mkdir(exist_ok=True)
-    for name, text in (("__init__", ""), ("_unit", UNIT_OF), ("helper", HELPER), ("marked", MARKED)):
-        text = text.format(package=package, helper="helper", scale=scale)
+    (folder / "inner").mkdir(parents=True, exist_ok=True)
+    files = {"__init__": "", "_unit": UNIT_OF, "inner/__init__": "", "inner/helper": HELPER, "marked": MARKED}
+    for name, text in files.items():
+        text = text.format(package=package, helper="inner.helper", scale=scale)
         (folder / f"{name}.py").write_text(text, encoding="utf-8")
     importlib.invalidate_caches()
     sys.dont_write_bytecode, before = True, sys.dont_write_bytecode

@@ -12,13 +12,13 @@ import pytest
 import shapely
 
 from gcsplan.errors import InputError
-from gcsplan.planners import _cost_kernels as k
-from gcsplan.planners import _scene_kernels as sk
-from gcsplan.planners import objectives as o
-from gcsplan.planners.encodings import Code
-from gcsplan.planners.objectives import OBJECTIVES, Cost, Earlier, get_objective
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.scene import FAR, KEEP_M, KEEP_SLOPE, Scene
+from gcsplan.planners.swarm import cost_kernels as k
+from gcsplan.planners.swarm import objectives as o
+from gcsplan.planners.swarm import scene_kernels as sk
+from gcsplan.planners.swarm.encodings import Code
+from gcsplan.planners.swarm.objectives import OBJECTIVES, Cost, Earlier, get_objective
+from gcsplan.planners.swarm.scene import FAR, KEEP_M, KEEP_SLOPE, Scene
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Polygon, Zone

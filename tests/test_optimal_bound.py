@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.errors import NoMission
-from gcsplan.planners.optimal import plan
+from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits

@@ -14,11 +14,11 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.mission_file.schema import Encoding, SwarmCost
 from gcsplan.pipeline import make_problem, world_of
-from gcsplan.planners.encodings import ENCODINGS
-from gcsplan.planners.objectives import OBJECTIVES
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.repair import violations
-from gcsplan.planners.table import get
+from gcsplan.planners.registry import get
+from gcsplan.planners.swarm.encodings import ENCODINGS
+from gcsplan.planners.swarm.objectives import OBJECTIVES
+from gcsplan.planners.swarm.repair import violations
 from gcsplan.world.zones import Circle
 
 FOLDER = Path(__file__).parent.parent / "missions" / "papers"

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gcsplan.planners.plane import Mesh, Plane, make_plane
+from gcsplan.planners.optimal.navmesh.clearance import AROUND, _around
+from gcsplan.planners.optimal.navmesh.grid import Mesh, Plane, make_plane
+from gcsplan.planners.optimal.navmesh.zone_shapes import convex_parts
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.relief import AROUND, _around
-from gcsplan.planners.shapes import convex_parts
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import TERMS, GridMap, Surface

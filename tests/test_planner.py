@@ -12,11 +12,11 @@ import pytest
 from gcsplan.errors import InputError
 from gcsplan.pipeline import load_mission, make_problem, world_of
 from gcsplan.pipeline import plan as plan_mission
-from gcsplan.planners.below import Below
-from gcsplan.planners.optimal import plan
+from gcsplan.planners.optimal.incumbent import Below
+from gcsplan.planners.optimal.planner import plan
+from gcsplan.planners.optimal.sources.roadmap_3d import is_steep, steep_path
 from gcsplan.planners.problem import Problem, Progress, Solution, Via
-from gcsplan.planners.steep import is_steep, steep_path
-from gcsplan.planners.table import get, names
+from gcsplan.planners.registry import get, names
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path as FlownPath

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import NoMission
-from gcsplan.planners import _string
-from gcsplan.planners.band import plan, straight_bound
-from gcsplan.planners.climb import climb_needed_deg, extend, laps, ways_up
+from gcsplan.planners.lattice import pull_kernels
+from gcsplan.planners.lattice.planner import plan, straight_bound
 from gcsplan.planners.problem import Problem, Progress, Via
-from gcsplan.planners.settle import Judge, Unsettled, sampled_track, settle
-from gcsplan.planners.taut_string import Profile, taut_string
+from gcsplan.planners.profile.climb_laps import climb_needed_deg, extend, laps, ways_up
+from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
+from gcsplan.planners.profile.taut_string import Profile, taut_string
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
@@ -131,7 +131,7 @@ def test_the_kernels_string_is_the_taut_string(seed: int, count: int) -> None:
     z0, z1 = rng.uniform(-5.0, 30.0, 2)
     low[[0, -1]] = high[[0, -1]] = z0, z1
     at, z = np.empty(count), np.empty(count)
-    n = _string.funnel(s, low, high, count, np.empty((4, count + 1)), at, z)
+    n = pull_kernels.funnel(s, low, high, count, np.empty((4, count + 1)), at, z)
     mine = Profile(s[at[:n].astype(int)], z[:n])
     best = taut_string(s, low, high, float(z0), float(z1))
     assert isinstance(best, Profile)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.planners.diagnose import Refusal
-from gcsplan.planners.optimal import plan
+from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Via
+from gcsplan.planners.refusal import Refusal
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface

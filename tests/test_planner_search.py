@@ -8,10 +8,10 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from gcsplan.planners.lattice import LINK_DOORS, STEPS, Lattice, Links, gaps, make_lattice, make_links
+from gcsplan.planners.lattice.lattice import LINK_DOORS, STEPS, Lattice, Links, gaps, make_lattice, make_links
+from gcsplan.planners.lattice.search import Label, search
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.search import Label, search
-from gcsplan.planners.taut_string import Profile, taut_string
+from gcsplan.planners.profile.taut_string import Profile, taut_string
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from tests.planner_worlds import Floats, ground

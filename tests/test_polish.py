@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gcsplan.planners.polish import fewer, polished
 from gcsplan.planners.problem import Objective, Problem
+from gcsplan.planners.simplify import fewer, polished
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gcsplan.planners import optimal
-from gcsplan.planners.below import Below
+from gcsplan.planners.optimal import planner as optimal
+from gcsplan.planners.optimal.incumbent import Below
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits

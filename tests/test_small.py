@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.planners.below import Below
-from gcsplan.planners.optimal import plan
+from gcsplan.planners.optimal.incumbent import Below
+from gcsplan.planners.optimal.planner import plan
+from gcsplan.planners.optimal.sources.local_roadmap import small_path
 from gcsplan.planners.problem import Problem, Via
-from gcsplan.planners.small import small_path
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path

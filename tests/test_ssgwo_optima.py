@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gcsplan.planners.optimal import plan
+from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gcsplan.planners._storeys import spread
-from gcsplan.planners.corridor import End
-from gcsplan.planners.leg import Leg
-from gcsplan.planners.plane import make_plane
+from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, Reached, Stop, Storeys
+from gcsplan.planners.optimal.corridor import End
+from gcsplan.planners.optimal.leg import Leg
+from gcsplan.planners.optimal.navmesh.grid import make_plane
+from gcsplan.planners.optimal.navmesh.interval_kernels import spread
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.storeys import MOST, Reached, Stop, Storeys
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface

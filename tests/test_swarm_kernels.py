@@ -23,14 +23,14 @@ from gcsplan.native import shelf
 from gcsplan.native.__main__ import ALL
 from gcsplan.native.form import Held
 from gcsplan.native.kernels import Kernels
-from gcsplan.planners import _cost_kernels as k
-from gcsplan.planners import _curve_kernels as ck
-from gcsplan.planners import _scene_kernels as sk
-from gcsplan.planners.compiled_swarm import UNIT
-from gcsplan.planners.encodings import Code
-from gcsplan.planners.objectives import OBJECTIVES, Cost
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.scene import Scene
+from gcsplan.planners.swarm import cost_kernels as k
+from gcsplan.planners.swarm import curve_kernels as ck
+from gcsplan.planners.swarm import scene_kernels as sk
+from gcsplan.planners.swarm.compiled import UNIT
+from gcsplan.planners.swarm.encodings import Code
+from gcsplan.planners.swarm.objectives import OBJECTIVES, Cost
+from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Polygon, Zone

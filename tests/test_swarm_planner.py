@@ -11,12 +11,12 @@ import pytest
 
 from gcsplan.errors import InputError, NoMission
 from gcsplan.pipeline import plan
-from gcsplan.planners import swarm_planner
 from gcsplan.planners.problem import Problem, Via
-from gcsplan.planners.repair import repair, violations
-from gcsplan.planners.scene import Scene
-from gcsplan.planners.swarm_planner import Settings, search
-from gcsplan.planners.table import TABLE, get, names
+from gcsplan.planners.registry import TABLE, get, names
+from gcsplan.planners.swarm import planner as swarm_planner
+from gcsplan.planners.swarm.planner import Settings, search
+from gcsplan.planners.swarm.repair import repair, violations
+from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
@@ -71,8 +71,8 @@ def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch:
     problem = toy(encoding="sections", points=3, iterations=30, population=30)
 
     def blind(name: str) -> object:
-        from gcsplan.planners import _cost_kernels as k
-        from gcsplan.planners.objectives import Objective
+        from gcsplan.planners.swarm import cost_kernels as k
+        from gcsplan.planners.swarm.objectives import Objective
 
         return Objective(name, "", "", 0, lambda terms, unit: terms[:, k.LENGTH])
 

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from gcsplan.planners.taut_string import Blocked, Profile, doors, taut_string
+from gcsplan.planners.profile.taut_string import Blocked, Profile, doors, taut_string
 
 Floats = NDArray[np.float64]
 Doors = tuple[Floats, Floats, Floats, float, float]

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.planners import optimal
-from gcsplan.planners.band import _sides, pulled
-from gcsplan.planners.below import Below
-from gcsplan.planners.guide import make_guide
+from gcsplan.planners.lattice.corridor_raster import make_guide
+from gcsplan.planners.lattice.planner import _sides, pulled
+from gcsplan.planners.lattice.routes import LEVELS
+from gcsplan.planners.optimal import planner as optimal
+from gcsplan.planners.optimal.incumbent import Below
+from gcsplan.planners.optimal.sources.contour import traverse
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.routes import LEVELS
-from gcsplan.planners.traverse import traverse
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path

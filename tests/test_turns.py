@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gcsplan.planners.belts import CHORD_M, MOST_DEG, moved
-from gcsplan.planners.mending import tried
 from gcsplan.planners.problem import Problem, Via
-from gcsplan.planners.turns import LEVELS, Rounded, belt_of, roomier, rounded
+from gcsplan.planners.turns.arc_path import CHORD_M, MOST_DEG, moved
+from gcsplan.planners.turns.planner import LEVELS, Rounded, belt_of, roomier, rounded
+from gcsplan.planners.turns.repair import tried
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path

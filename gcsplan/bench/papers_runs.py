@@ -29,11 +29,11 @@ from numpy.typing import NDArray
 
 from gcsplan.bench.papers_scenarios import SCENARIOS, Contender, Set, prepare, settings_of
 from gcsplan.errors import GcsplanError, InputError, NoMission
-from gcsplan.planners import aco
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.smoothing import fewer
-from gcsplan.planners.swarm_planner import Found, Settings, search
-from gcsplan.planners.table import get as get_planner
+from gcsplan.planners.registry import get as get_planner
+from gcsplan.planners.swarm import aco
+from gcsplan.planners.swarm.bspline import fewer
+from gcsplan.planners.swarm.planner import Found, Settings, search
 from gcsplan.world.path import Path as FlownPath
 from gcsplan.world.zones import Circle
 
@@ -52,8 +52,8 @@ CLOSE = 0.01
 """A run has converged when its cost is within this part of its last."""
 
 CODE = (
-    "planners/*.py", "swarm/*.py", "world/*.py", "mission_file/*.py", "pipeline.py", "steps/planning.py", "vehicle.py",
-    "bench/papers_runs.py", "bench/papers_scenarios.py",
+    "planners/**/*.py", "swarm/*.py", "world/*.py", "mission_file/*.py", "pipeline.py", "steps/planning.py",
+    "vehicle.py", "bench/papers_runs.py", "bench/papers_scenarios.py",
 )  # fmt: skip
 """Source files that decide a run's result, within the package; rather one too many than one too few."""
 

@@ -19,8 +19,8 @@ from gcsplan.errors import InputError, unknown_name
 from gcsplan.mavlink.build import Margins
 from gcsplan.mission_file import MissionFile
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.swarm_planner import Settings
-from gcsplan.planners.table import get as get_planner
+from gcsplan.planners.registry import get as get_planner
+from gcsplan.planners.swarm.planner import Settings
 from gcsplan.world.world import World
 
 FOLDERS = (

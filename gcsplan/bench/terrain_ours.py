@@ -12,7 +12,7 @@ from gcsplan.bench.terrain_measure import OURS, OURS_LONG, Memory, Outcome, Stat
 from gcsplan.bench.terrain_problems import NamedProblem, key_of
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import Problem, Solution
-from gcsplan.planners.table import get as get_planner
+from gcsplan.planners.registry import get as get_planner
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.surface import Surface
 

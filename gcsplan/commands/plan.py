@@ -105,7 +105,7 @@ def plan(
         transfer_progress,
     )
     from gcsplan.export.outdir import add_output, retire_outputs, write_outputs, write_whole
-    from gcsplan.planners import table
+    from gcsplan.planners import registry
     from gcsplan.steps import outputs
     from gcsplan.steps.gate import GateTime
 
@@ -113,7 +113,7 @@ def plan(
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     if planner is not None:
         try:
-            table.get(planner)
+            registry.get(planner)
         except InputError as error:
             raise UsageError(f"--planner: {error}") from None
     if objective not in (None, "length", "energy"):
@@ -202,11 +202,11 @@ def plan(
 def planners(as_json: JsonOption = False) -> None:
     """The table of planners, with paper and default parameters."""
     from gcsplan.console import planners_table
-    from gcsplan.planners import table
+    from gcsplan.planners import registry
 
     rows = [
         {"name": e.name, "summary": e.summary, "paper": e.paper, "defaults": dict(e.defaults)}
-        for e in table.TABLE.values()
+        for e in registry.TABLE.values()
     ]
     if as_json:
         emit({"planners": rows})

@@ -226,7 +226,7 @@ class _Reading:
         keys: PlannerKeys = self._section(PlannerKeys, "planner") or PlannerKeys()
         known = self.planner_names
         if known is None:
-            from gcsplan.planners.table import names
+            from gcsplan.planners.registry import names
 
             known = names()
         if keys.name not in known:

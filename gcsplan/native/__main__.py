@@ -16,8 +16,8 @@ from gcsplan.native.kernels import Kernels
 ALL = {
     "world": "gcsplan.world._compiled:KERNELS",
     "planners": "gcsplan.planners.compiled:UNIT",
-    "swarm": "gcsplan.planners.compiled_swarm:UNIT",
-    "turns": "gcsplan.planners.compiled_turns:UNIT",
+    "swarm": "gcsplan.planners.swarm.compiled:UNIT",
+    "turns": "gcsplan.planners.turns.compiled:UNIT",
 }
 """Each is made in a process of its own, since numba reads its options once."""
 

@@ -1,6 +1,6 @@
 """Kernels written as plain functions and marked as such: numba is imported only where they must be compiled.
 
-    UNIT = Unit("planners", Path(__file__).parent, "gcsplan.planners", ("_mesh", "_string"))
+    UNIT = Unit("planners", Path(__file__).parent, "gcsplan.planners", ("track_kernels", "lattice.search_kernels"))
 
     @UNIT.device
     def inner(x, y): ...
@@ -28,7 +28,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 class Unit(Kernels):
     """Kernels of some modules of a package that are compiled together.
 
-    ``modules``: all of them that hold a marked function or a constant that one uses, names within ``package``;
+    ``modules``: all of them that hold a marked function or a constant that one uses, dotted names within ``package``;
     ``more``: further files that they depend on, beside them. ``vectors``: loops over arrays are cut to vectors before
     they are shipped, sums in an order that is then fixed; no argument of a function may be a view of another's array.
     """
@@ -43,7 +43,7 @@ class Unit(Kernels):
         *,
         vectors: bool = False,
     ) -> None:
-        super().__init__(name, folder, (*(f"{m}.py" for m in modules), *more), package, {})
+        super().__init__(name, folder, (*(f"{m.replace('.', '/')}.py" for m in modules), *more), package, {})
         self.vectors = vectors
         self._modules = tuple(f"{package}.{m}" for m in modules)
         self._plain: dict[int, Callable[..., Any]] = {}

@@ -1,4 +1,4 @@
-"""This room's kernels: plain functions, marked, that run as machine code. See `gcsplan.native`."""
+"""Kernels of lattice, optimal and profile: plain functions, marked, that run as machine code. See `gcsplan.native`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,18 @@ UNIT = Unit(
     "planners",
     Path(__file__).parent,
     "gcsplan.planners",
-    ("_any_angle", "_cones", "_fill", "_intervals", "_mesh", "_reach", "_stamp", "_storeys", "_string", "_taut"),
+    (
+        "lattice.pull_kernels",
+        "lattice.search_kernels",
+        "optimal.navmesh.clearance_kernels",
+        "optimal.navmesh.climb_cones",
+        "optimal.navmesh.interval_kernels",
+        "optimal.navmesh.mesh_kernels",
+        "optimal.navmesh.polyanya",
+        "optimal.navmesh.polyanya_nodes",
+        "optimal.navmesh.zone_kernels",
+        "profile.taut_kernels",
+    ),
 )
 
 device = UNIT.device

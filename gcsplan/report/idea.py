@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from gcsplan.planners.below import Below
+from gcsplan.planners.optimal.bounds.refine import tighten
+from gcsplan.planners.optimal.incumbent import Below
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.tighten import tighten
 
 WALL, ROOM = "#b04a3a", "#2c7fb8"
 

@@ -1,0 +1,255 @@
+"""Samples of the room around a way, on which tracks are pulled tight at a hundred trials a millisecond.
+
+Floors and ceilings are `Airspace`'s own, on a raster along a corridor; zones that are flown over or under are part of
+them, the others are walls. What comes out is not yet proved: `exact` puts it to the exact check, and `Guide.narrow`
+tells the raster where it was wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.lattice import pull_kernels
+from gcsplan.planners.lattice.lattice import near_zone, terminals
+from gcsplan.planners.problem import Problem
+from gcsplan.world.limits import Limits
+from gcsplan.world.zones import Circle, Level, Zone
+
+Floats = NDArray[np.float64]
+
+SHUT_M = 1e5
+"""Floor where there is no room at all; kernels are spared infinities."""
+MOST_NODES = 150_000
+FINEST_PART, COARSEST_M = 0.45, 40.0
+"""Spacing of the raster in parts of the ground's cells, and at most."""
+MARGIN_M = 0.3
+"""Kept from floor and ceiling on the raster, for what lies between samples."""
+SLOPE_PART = 0.999
+PENALTY = 50.0
+"""What a metre too high or too steep costs, in metres of track."""
+AROUND_M = 2000.0
+"""A move is judged over so much of the track to each side."""
+ROUNDS = 6
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Line:
+    """A track as the guide has it: ``points`` (N, 2), which are ``pinned``, their altitudes ``pin_m`` (NaN free),
+    ``amsl_m`` (N,) of the profile at the vertices; ``cost``, and the metres that are ``missing`` for it to be legal."""
+
+    points: Floats
+    pinned: NDArray[np.bool_]
+    pin_m: Floats
+    amsl_m: Floats
+    cost: float
+    missing: float
+
+    @property
+    def value(self) -> float:
+        """Cost with what is missing, to compare."""
+        return self.cost * (1.0 + 1e3 * self.missing)
+
+
+@dataclass(eq=False, slots=True)
+class Guide:
+    """Rasters ``floor_m``, ``ceiling_m`` (rows, cols) from (``west_m``, ``south_m``), rows going north; walls."""
+
+    problem: Problem
+    west_m: float
+    south_m: float
+    step_m: float
+    floor_m: Floats
+    ceiling_m: Floats
+    circles: Floats
+    edges: Floats
+    work: tuple[Floats, ...]
+    margin_m: float = MARGIN_M
+    slope_part: float = SLOPE_PART
+
+    def strict(self) -> None:
+        """Keep more from floor, ceiling and the steepest slope from now on: the exact check was stricter."""
+        self.margin_m += 0.3
+        self.slope_part -= 0.005
+
+    def learn(self, samples: Floats) -> None:
+        """Correct the rasters where places (K, 4), east, north, floor, ceiling, are known to have less room."""
+        x, y = (samples[:, 0] - self.west_m) / self.step_m, (samples[:, 1] - self.south_m) / self.step_m
+        rows, cols = self.floor_m.shape
+        i, j = np.clip(np.floor(x).astype(int), 0, cols - 2), np.clip(np.floor(y).astype(int), 0, rows - 2)
+        u, v = x - i, y - j
+        for raster, sign, known in ((self.floor_m, 1.0, samples[:, 2]), (self.ceiling_m, -1.0, samples[:, 3])):
+            read = (1 - v) * ((1 - u) * raster[j, i] + u * raster[j, i + 1])
+            read += v * ((1 - u) * raster[j + 1, i] + u * raster[j + 1, i + 1])
+            less = sign * (np.clip(known, -SHUT_M, SHUT_M) - read)
+            less = np.where(less > 0.0, np.minimum(less, 10.0), 0.0)
+            more = np.zeros_like(raster)
+            for dj, di in ((0, 0), (0, 1), (1, 0), (1, 1)):
+                np.maximum.at(more, (j + dj, i + di), less)
+            raster += sign * more
+
+    def pull(self, line: Line, steps_m: Floats, gain_m: float, rounds: int = ROUNDS) -> Line:
+        """The line made cheaper by moves of ``steps_m``, each for a gain of ``gain_m`` metres of track."""
+        p, n = self.problem, len(line.points)
+        energy = p.objective == "energy"
+        unit = p.horizontal_j_per_m if energy else 1.0
+        room = pull_kernels.MOST_POINTS
+        if n > room - 2:
+            return line
+        points, pinned, pin_m, amsl = np.zeros((room, 2)), np.zeros(room), np.full(room, np.nan), np.zeros(room)
+        points[:n], pinned[:n], pin_m[:n], amsl[:n] = line.points, line.pinned, line.pin_m, line.amsl_m
+        pin_m[[0, n - 1]] = np.nan
+        length = float(np.hypot(*np.diff(line.points, axis=0).T).sum())
+        limits = p.limits
+        spec = np.array(
+            [
+                self.west_m,
+                self.south_m,
+                1.0 / self.step_m,
+                max(0.85 * self.step_m, 3.0 * length / pull_kernels.MOST_DOORS),
+                self.margin_m,
+                limits.max_climb_slope * self.slope_part,
+                limits.max_descent_slope * self.slope_part,
+                p.vertical_j_per_m,
+                unit,
+                float(energy),
+                PENALTY * unit,
+                p.airspace.beside_m(p.limits),
+            ]
+        )
+        count = pull_kernels.pull(
+            points, pinned, pin_m, amsl, n, float(p.start[2]), float(p.goal[2]), self.floor_m, self.ceiling_m,
+            self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, AROUND_M, *self.work,
+        )  # fmt: skip
+        cost, missing, _ = self.work[-1]
+        return Line(
+            points[:count].copy(),
+            pinned[:count] > 0.0,
+            pin_m[:count].copy(),
+            amsl[:count].copy(),
+            float(cost),
+            float(missing),
+        )
+
+    def narrow(self, place: Floats, by_m: float, ceiling: bool = False) -> None:
+        """Raise the floor (lower the ceiling) by ``by_m`` around a place, where the exact check found less room."""
+        i, j = math.floor((place[0] - self.west_m) / self.step_m), math.floor((place[1] - self.south_m) / self.step_m)
+        rows, cols = slice(max(j, 0), max(j + 2, 0)), slice(max(i, 0), max(i + 2, 0))
+        if ceiling:
+            self.ceiling_m[rows, cols] -= by_m
+        else:
+            self.floor_m[rows, cols] += by_m
+
+
+def line_of(points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> Line:
+    """A line that nothing is known of yet."""
+    return Line(points, pinned, pin_m, np.zeros(len(points)), math.inf, math.inf)
+
+
+def make_guide(
+    problem: Problem, ways: list[Floats], radius_m: float, over: dict[int, bool], finest_m: float = COARSEST_M
+) -> Guide:
+    """The guide within about ``radius_m`` of ``ways`` (N, 2). ``over``: zones known to be flown over (or under)."""
+    air, limits = problem.airspace, problem.limits
+    everything = np.vstack(ways)
+    west, south = (float(x) for x in everything.min(axis=0) - radius_m)
+    east, north = (float(x) for x in everything.max(axis=0) + radius_m)
+    length = sum(float(np.hypot(*np.diff(w, axis=0).T).sum()) for w in ways)
+    cell = float(air.surface.grid.metres_per_cell(*terminals(problem)[0]).min())
+    area = min((east - west) * (north - south), 2.0 * radius_m * (length + 2.0 * radius_m))
+    step = max(min(FINEST_PART * cell, finest_m, 0.02 * length), math.sqrt(area / MOST_NODES), 0.05)
+    x: Floats = np.arange(west, east + step, step)
+    y: Floats = np.arange(south, north + step, step)
+    near = np.zeros((len(y), len(x)), bool)
+    r = math.ceil(radius_m / step)
+    for way in ways:
+        for a, b in pairwise(way):
+            n = max(1, math.ceil(math.dist(a, b) / (0.4 * radius_m)))
+            for f in np.linspace(0.0, 1.0, n + 1):
+                place = a + f * (b - a)
+                i, j = round((place[0] - west) / step), round((place[1] - south) / step)
+                near[max(j - r, 0) : j + r + 1, max(i - r, 0) : i + r + 1] = True
+    jj, ii = np.nonzero(near)
+    floor, ceiling = np.full(near.shape, SHUT_M), np.full(near.shape, -SHUT_M)
+    floor[jj, ii] = np.minimum(air.floor_amsl(x[ii], y[jj], limits), SHUT_M)
+    ceiling[jj, ii] = np.clip(air.ceiling_amsl(x[ii], y[jj], limits), -SHUT_M, SHUT_M)
+    circles, edges = [], []
+    for number, zone in enumerate(air.zones):
+        at = _near(problem, zone, x, y, step)
+        if at is None:
+            continue
+        js, is_ = at
+        if not _passed(problem, zone, over.get(number), x, y, js, is_, floor, ceiling):
+            if isinstance(zone.shape, Circle):
+                c = zone.shape
+                circles.append(
+                    (c.east_m, c.north_m, c.radius_m * air.scale + problem.airspace.beside_m(problem.limits))
+                )
+            else:
+                v = zone.shape.vertices
+                edges.extend(np.hstack([v, np.roll(v, -1, axis=0)]).tolist())
+    return Guide(
+        problem, west, south, step, floor, ceiling,
+        np.array(circles).reshape(-1, 3), np.array(edges).reshape(-1, 4), pull_kernels.workspace(),
+    )  # fmt: skip
+
+
+def _near(problem: Problem, zone: Zone, x: Floats, y: Floats, step: float) -> tuple[NDArray[np.intp], ...] | None:
+    """Rows and columns of the nodes within reach of a zone and three quarters of a step; None where there are none."""
+    w, s, e, n = zone.bounds
+    reach = problem.airspace.beside_m(problem.limits) + 0.75 * step + 1.0
+    i = np.flatnonzero((x > w - reach) & (x < e + reach))
+    j = np.flatnonzero((y > s - reach) & (y < n + reach))
+    if not len(i) or not len(j):
+        return None
+    jj, ii = (a.ravel() for a in np.meshgrid(j, i, indexing="ij"))
+    at = np.stack([x[ii], y[jj]], axis=-1)
+    close = near_zone(at, at, zone, problem.airspace.beside_m(problem.limits) + 0.75 * step, problem.airspace.scale)
+    return (jj[close], ii[close]) if close.any() else None
+
+
+def _passed(
+    problem: Problem, zone: Zone, over: bool | None, x: Floats, y: Floats, jj: NDArray[np.intp], ii: NDArray[np.intp],
+    floor: Floats, ceiling: Floats,
+) -> bool:  # fmt: skip
+    """Make the way over (under) a zone a part of the rasters; False where there is none: the zone is a wall."""
+    error = problem.limits.altitude_error_m
+    room = []
+    for upper, level in ((True, zone.ceiling), (False, zone.floor)):
+        if level is None or over is (not upper):
+            continue
+        at = _level(problem, level, upper, x[ii], y[jj]) if level.datum == "agl" else np.full(len(ii), level.value_m)
+        if level.datum == "amsl":
+            at = at + (error if upper else -error)
+        spare = (
+            ceiling[jj, ii] - np.maximum(floor[jj, ii], at)
+            if upper
+            else np.minimum(ceiling[jj, ii], at) - floor[jj, ii]
+        )
+        if (spare >= 0.0).any():
+            room.append((float(np.median(spare)), upper, at))
+    if not room:
+        return False
+    _, upper, at = max(room, key=lambda r: r[0])
+    if upper:
+        floor[jj, ii] = np.minimum(np.maximum(floor[jj, ii], at), SHUT_M)
+    else:
+        ceiling[jj, ii] = np.maximum(np.minimum(ceiling[jj, ii], at), -SHUT_M)
+    return True
+
+
+def _level(problem: Problem, level: Level, upper: bool, east: Floats, north: Floats) -> Floats:
+    """Altitude that clears a level which follows the ground within reach."""
+    limits, air = problem.limits, problem.airspace
+    if upper:
+        wide = replace(limits, min_agl_m=0.0)
+        return air.floor_amsl(east, north, wide) + level.value_m
+    wide = Limits(
+        0.0, max_agl_m=level.value_m, track_error_m=limits.track_error_m + limits.horizontal_clearance_m,
+        altitude_error_m=limits.altitude_error_m,
+    )  # fmt: skip
+    return air.ceiling_amsl(east, north, wide)

@@ -1,0 +1,369 @@
+"""Planning where a maximum AGL or the climb limit binds: between a floor and a ceiling that both follow the ground.
+
+There the cap trick of the plane planner does not hold: whether ground can be crossed depends on the direction, and a
+steep slope is climbed by traversing it. So ways are searched on a lattice with the altitudes that can be reached
+(`routes`), pulled tight on samples of the room around them (`corridor_raster`), first of all until they hold and then
+until no move makes them cheaper, and put to the exact check (`exact`). Ways around the first one, and kicks that throw
+it out of its bed, are what finds the better ones.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
+from gcsplan.planners.lattice.lattice import straight_way_m, terminals
+from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
+from gcsplan.planners.problem import Problem, Solution
+from gcsplan.planners.profile.climb_laps import pins_of, ways_up, with_climbs
+from gcsplan.planners.profile.exact import Judge, Unsettled, settle, thinned
+from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, make_track
+from gcsplan.planners.refusal import Refusal, explain
+from gcsplan.world.path import Path
+
+Floats = NDArray[np.float64]
+Tell = Callable[[str, float | None], None]
+
+COARSE_STEPS = (0.03, 0.015, 0.007, 0.0035)
+FINE_STEPS = (0.01, 0.004, 0.0015, 0.0006)
+"""Moves of a pull, as parts of the straight way."""
+COARSE_GAIN, FINE_GAIN, WORTH = 5e-5, 1e-5, 3e-5
+"""Least gain worth a move, and what fewer way points may cost, as parts of the straight way."""
+CORRIDOR, CORRIDOR_STEPS = 0.08, 8.0
+"""Half the width of the corridor around a way: parts of the straight way, and at least so many lattice steps."""
+NARROW, FINE_M = 0.02, 12.0
+"""The same of the corridor around a line that is nearly done, and the spacing of the raster there."""
+MENDS, SEARCHES = 6, 6
+"""Pulls of one line that the exact check refuses; searches on one lattice where none of its ways could be mended."""
+MOST_OPENED = 200_000
+"""Labels taken up on one lattice, beyond which it is given up: they wind up and down to gain height."""
+DETOURS, DETOUR_STEPS = (0.2, 0.4, 0.6, 0.8), 4.0
+"""Where along the first way a disc is shut to find others, and its radius in lattice steps."""
+KICKS = 10
+KICK_PARTS = (0.02, 0.05)
+
+BOUND_NOTE = "the lower bound is the straight line from stop to stop: true, but not tight"
+
+
+def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True, known: bool = False) -> Solution:
+    """A path under a maximum AGL and the climb limit that `Airspace.examine` passes.
+
+    Start, goal and vias are known to be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
+    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s``, for all that comes after the
+    first path, is a backstop. ``climbs``: may climb on the spot over start and goal; ``known``: there is a path
+    already, and one more try is all that another is worth. Raises Refusal where no path is found.
+    """
+    tell("search", None)
+    bound = straight_bound(problem)
+    stops = terminals(problem)
+    if all(math.dist(stops[0], x) < 1e-3 for x in stops):
+        return _solution(problem, _on_the_spot(problem), bound, begun, time.perf_counter() - begun, False)
+    way = straight_way_m(problem)
+    best = straight(problem, way)
+    if best is not None and problem.cost(Path(best)) <= bound * (1.0 + 1e-9):
+        return _solution(problem, best, bound, begun, time.perf_counter() - begun, False)
+    first_s = math.inf if best is None else time.perf_counter() - begun
+    router: Router | None = None
+    timed_out = False
+    deadline_s = begun + problem.budget_s
+    for level in LEVELS[:1] if known else LEVELS if climbs else LEVELS[:2]:
+        work = _Work.at(problem, level, way)
+        router = work.router
+        cut = router.cut_off() if climbs else (False, False)
+        found = None if any(cut) else work.first(1 if known else SEARCHES)
+        if found is None and climbs and best is None and not known and (any(cut) or level is LEVELS[0]):
+            ends = cut if any(cut) else (True, True)
+            found = with_climbs(problem, ends, lambda p: plan_band(p, tell, begun, climbs=False).path.points)
+        if found is not None:
+            best = found if best is None else min(best, found, key=lambda p: problem.cost(Path(p)))
+        # A way longer than the detours that this lattice holds may have a shorter rival outside it.
+        if best is not None and (work.line is None or _flat(best) <= level.detour * way):
+            first_s = min(first_s, time.perf_counter() - begun)
+            tell("pull", problem.cost(Path(best)))
+            if work.line is not None:
+                better, timed_out = work.improve(deadline_s, tell)
+                if better is not None and problem.cost(Path(better)) < problem.cost(Path(best)):
+                    best = better
+            break
+    if best is None:
+        raise explain(problem, router) if climbs and not known else Refusal("no way was found", reason="not_found")
+    tell("done", problem.cost(Path(best)))
+    return _solution(problem, best, bound, begun, first_s, timed_out)
+
+
+def _solution(
+    problem: Problem, points: Floats, bound: float, begun: float, first_s: float, timed_out: bool
+) -> Solution:
+    path = Path(points)
+    near = problem.cost(path) - bound <= problem.gap_percent / 100.0 * max(bound, 1e-9)
+    return Solution(
+        path=path,
+        lower_bound=bound,
+        stopped_by="gap" if near else "time" if timed_out else "exhausted",
+        planning_s=time.perf_counter() - begun,
+        first_path_s=first_s,
+        notes=() if near else (BOUND_NOTE,),
+    )
+
+
+def straight_bound(problem: Problem) -> float:
+    """No path costs less: straight from stop to stop, heights free where they are."""
+    known: list[tuple[float, float]] = [(0.0, problem.start[2])]  # (metres along the track, altitude)
+    way, last = 0.0, problem.start[:2]
+    for v in problem.via:
+        way += math.dist(last, (v.east_m, v.north_m))
+        last = (v.east_m, v.north_m)
+        if v.amsl_m is not None:
+            known.append((way, v.amsl_m))
+    way += math.dist(last, problem.goal[:2])
+    known.append((way, problem.goal[2]))
+    if problem.objective == "energy":
+        return sum(
+            problem.vertical_j_per_m * abs(b[1] - a[1])
+            + problem.horizontal_j_per_m * max(b[0] - a[0], _run(problem, a, b))
+            for a, b in pairwise(known)
+        )
+    return sum(math.hypot(max(b[0] - a[0], _run(problem, a, b)), b[1] - a[1]) for a, b in pairwise(known))
+
+
+def _run(problem: Problem, a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Metres of track that the rise from a to b takes at least."""
+    limits, rise = problem.limits, b[1] - a[1]
+    return max(rise / limits.max_climb_slope, -rise / limits.max_descent_slope)
+
+
+def _on_the_spot(problem: Problem) -> Floats:
+    """Way points from start to goal where both are one place."""
+    place, low, high = problem.start[:2], problem.start[2], problem.goal[2]
+    found = None if problem.via else ways_up(problem, place, low, high)
+    if found is None:
+        kind, angle = (
+            ("climb", problem.limits.max_climb_deg) if high > low else ("descent", problem.limits.max_descent_deg)
+        )
+        raise Refusal(
+            f"no mission: start and goal are one place, {abs(high - low):.1f} m apart in height, and no {kind} in legs "
+            f"out and back, or in laps, was found there within max_{kind}_deg {angle:g} and turn_radius_m "
+            f"{problem.turn_radius_m:g}: move one of them, or allow more",
+            reason="not_found",
+            place=place,
+        )
+    return found
+
+
+def straight(problem: Problem, way_m: float) -> Floats | None:
+    """Way points straight from stop to stop, where that is legal."""
+    stops = np.array(terminals(problem))
+    pin_m = np.array([math.nan, *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via), math.nan])
+    pinned = np.ones(len(stops), bool)
+    if not isinstance(fly(problem, make_track(problem, stops, pinned, pin_m)), Flown):
+        return None
+    judge = Judge(problem)
+    found = settle(problem, judge, stops, pinned, pin_m)
+    return None if isinstance(found, Unsettled) else thinned(problem, judge, *found, WORTH * _unit(problem) * way_m)
+
+
+def _unit(problem: Problem) -> float:
+    return problem.horizontal_j_per_m if problem.objective == "energy" else 1.0
+
+
+def _flat(points: Floats) -> float:
+    return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
+
+
+def pulled(problem: Problem, points: Floats, level: Level, deadline_s: float) -> Floats | None:
+    """Way points of a better line than a path's, at best: of the one that is pulled from it, and of others around it.
+
+    Zones are passed over, or under, as that path (N, 3) passes them.
+    """
+    way = straight_way_m(problem)
+    work = _Work.at(problem, level, way)
+    pinned, pin_m = pins_of(problem, points)
+    work.over = _sides(problem, points, pinned, pin_m)
+    flat = np.ascontiguousarray(points[:, :2])
+    work.guide = work._guide([flat])
+    work.line = work.guide.pull(line_of(flat, pinned, pin_m), work._steps(FINE_STEPS), FINE_GAIN * way)
+    return work.improve(deadline_s, lambda _phase, _cost: None)[0]
+
+
+def _sides(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> dict[int, bool]:
+    """Of the zones that a path meets, whether it passes over them."""
+    track = make_track(problem, points[:, :2], pinned, pin_m)
+    s = distances(track.points)
+    over: dict[int, bool] = {}
+    for band in track.tube.bands:
+        at = 0.5 * (band.s_m[:-1] + band.s_m[1:])
+        height = np.interp(at, s, points[:, 2])
+        over[band.zone] = bool((height >= band.top_m.mean(axis=1)).mean() > 0.5)
+    return over
+
+
+class _Work:
+    """One lattice, the ways found on it, and the lines pulled from them."""
+
+    def __init__(self, problem: Problem, router: Router, way_m: float) -> None:
+        self.problem = problem
+        self.router = router
+        self.way_m = way_m
+        self.guide: Guide | None = None
+        self.line: Line | None = None
+        self.judge = Judge(problem)
+        self.over: dict[int, bool] = {}
+        """Zones that are known to be passed over, or under."""
+
+    @classmethod
+    def at(cls, problem: Problem, level: Level, way_m: float) -> _Work:
+        """Build the lattice of ``level``."""
+        return cls(problem, Router.at(problem, level), way_m)
+
+    def first(self, searches: int) -> Floats | None:
+        """Way points of the first way that could be made to hold, of so many."""
+        for _ in range(searches):
+            if self.router.opened > MOST_OPENED:
+                return None
+            way = self.router.way()
+            if way is None:
+                return None
+            line = self._line(way)
+            self.guide = self._guide([line.points])
+            line = self.guide.pull(line, self._steps(COARSE_STEPS), COARSE_GAIN * self.way_m, rounds=2)
+            found, line = self._mend(line)
+            if not isinstance(found, Unsettled):
+                self.line = line
+                return found[0]
+            self.router.last_place = found.place
+            self.router.last = Obstruction(found.kind, 0.0, found.span_m, found.by, found.zone)
+            if found.kind == "pinched":
+                self.router.lattice.raise_floor(found.place, found.by + 0.5)
+            elif found.kind == "zone":
+                self.router.lattice.raise_floor(found.place, math.inf)
+            else:
+                self.router.climb_factor *= 0.95
+        return None
+
+    def improve(self, deadline_s: float, tell: Tell) -> tuple[Floats | None, bool]:
+        """Way points of the best line found from several ways and kicks, and whether time ran out."""
+        assert self.line is not None
+        assert self.guide is not None
+        ways = self._others(deadline_s)
+        if ways:
+            self.guide = self._guide([self.line.points, *ways])
+        guide = self.guide
+        lines = [self.line]
+        for way in ways:
+            line = guide.pull(self._line(way), self._steps(COARSE_STEPS), COARSE_GAIN * self.way_m)
+            if line.missing <= 0.0:
+                lines.append(line)
+            if time.perf_counter() > deadline_s:
+                break
+        lines.sort(key=lambda line: line.cost)
+        best = lines[0]
+        tell("polish", best.cost)
+        rng = np.random.default_rng(self.problem.seed)
+        for line in lines[:2]:
+            for _ in range(KICKS):
+                if time.perf_counter() > deadline_s:
+                    break
+                kicked = guide.pull(self._kicked(line, rng), self._steps(FINE_STEPS), COARSE_GAIN * self.way_m)
+                if kicked.missing <= 0.0 and kicked.cost < line.cost:
+                    line = kicked
+            line = guide.pull(line, self._steps(FINE_STEPS), FINE_GAIN * self.way_m)
+            if line.value < best.value:
+                best = line
+        found, self.line = self._mend(best)
+        late = time.perf_counter() > deadline_s
+        if isinstance(found, Unsettled):
+            return None, late
+        return thinned(self.problem, self.judge, *found, WORTH * self.way_m * _unit(self.problem)), late
+
+    def _line(self, way: Floats) -> Line:
+        track = self.router.track_of(way)
+        return line_of(track.points, track.pinned, track.pin_m)
+
+    def _guide(self, ways: list[Floats]) -> Guide:
+        radius = max(CORRIDOR * self.way_m, CORRIDOR_STEPS * self.router.lattice.step_m)
+        return make_guide(self.problem, ways, radius, self.over)
+
+    def _steps(self, parts: tuple[float, ...]) -> Floats:
+        return np.array(parts) * self.way_m
+
+    def _mend(self, line: Line) -> tuple[tuple[Floats, NDArray[np.bool_]] | Unsettled, Line]:
+        """Settle a line; where the exact check refuses, tell the guide, and pull it into what is left of the room."""
+        found: tuple[Floats, NDArray[np.bool_]] | Unsettled
+        guide = make_guide(self.problem, [line.points], NARROW * self.way_m, self.over, FINE_M)
+        line = guide.pull(line, self._steps(FINE_STEPS), FINE_GAIN * self.way_m, rounds=3)
+        for attempt in range(MENDS):
+            found = settle(self.problem, self.judge, line.points, line.pinned, line.pin_m)
+            if not isinstance(found, Unsettled):
+                break
+            guide.learn(found.samples)
+            if found.kind == "pinched" and math.isfinite(found.by):
+                guide.narrow(found.place, 0.5 * found.by + 0.3)
+                guide.narrow(found.place, 0.5 * found.by + 0.3, ceiling=True)
+            elif found.kind in ("pinched", "zone"):
+                guide.narrow(found.place, 1e4)
+            elif attempt:
+                guide.strict()
+            steps = FINE_STEPS if attempt < 2 else COARSE_STEPS
+            line = guide.pull(line, self._steps(steps), COARSE_GAIN * self.way_m)
+        return found, line
+
+    def _others(self, deadline_s: float) -> list[Floats]:
+        """Other ways over the lattice: with a price on climbing, and past a disc that is shut on the first."""
+        assert self.line is not None
+        router, p = self.router, self.problem
+        if router.opened > MOST_OPENED // 4:
+            return []
+        prices = [climbing_weight(p)] if p.objective == "energy" else []
+        ways = [way for way in (router.way(weight=w) for w in prices) if way is not None]
+        s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])
+        floor = router.lattice.floor_m
+        for f in DETOURS:
+            if time.perf_counter() > deadline_s:
+                break
+            place = [np.interp(f * s[-1], s, self.line.points[:, k]) for k in range(2)]
+            router.lattice.floor_m = floor.copy()
+            router.lattice.shut(np.array(place), DETOUR_STEPS * router.lattice.step_m)
+            way = router.way(weight=prices[0] if prices else 0.0)
+            if way is not None:
+                ways.append(way)
+        router.lattice.floor_m = floor
+        return ways
+
+    def _kicked(self, line: Line, rng: np.random.Generator) -> Line:
+        """The line with a bump to one side."""
+        s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line.points, axis=0).T))])
+        at, side = rng.uniform(0.05, 0.95) * s[-1], rng.choice([-1.0, 1.0]) * rng.uniform(*KICK_PARTS) * self.way_m
+        half = rng.uniform(0.04, 0.15) * s[-1]
+        i = int(np.clip(np.searchsorted(s, at, "right") - 1, 0, len(s) - 2))
+        along = (line.points[i + 1] - line.points[i]) / max(s[i + 1] - s[i], 1e-9)
+        across = np.array([-along[1], along[0]])
+        bump = np.maximum(0.0, 1.0 - np.abs(s - at) / half) * ~line.pinned
+        points = line.points + bump[:, None] * (side * across)
+        middle = np.array([np.interp(at, s, line.points[:, k]) for k in range(2)]) + side * across
+        return Line(
+            np.insert(points, i + 1, middle, axis=0),
+            np.insert(line.pinned, i + 1, False),
+            np.insert(line.pin_m, i + 1, math.nan),
+            np.insert(line.amsl_m, i + 1, 0.0),
+            math.inf,
+            math.inf,
+        )
+
+
+def plan(problem: Problem) -> Solution:
+    """`plan_band` by itself."""
+    from gcsplan.planners.problem import Progress
+
+    begun = time.perf_counter()
+
+    def tell(phase: str, cost: float | None) -> None:
+        if problem.progress is not None:
+            problem.progress(Progress(time.perf_counter() - begun, cost, None, phase))
+
+    return plan_band(problem, tell, begun)

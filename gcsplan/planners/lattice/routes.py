@@ -1,0 +1,196 @@
+"""Ways over a lattice, from stop to stop, and the tracks that they make."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.lattice.lattice import Lattice, Links, make_lattice, make_links, terminals
+from gcsplan.planners.lattice.search import Found, Label, search
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.track import Obstruction, Track, make_track
+
+Floats = NDArray[np.float64]
+
+SHUT_IN = 200
+"""An end from which no more labels than this are to be had is shut in."""
+FORWARD, BACKWARD, MOST = 40_000, 60_000, 400_000
+"""Labels taken up by a search from the start; then, for a goal that is hard to come to, by one from the goal; then by
+one from the start again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """How widely and how finely to look: ``detour`` in times the straight way, about ``nodes`` nodes."""
+
+    detour: float
+    nodes: int
+
+
+LEVELS = (Level(1.35, 25_000), Level(2.0, 60_000), Level(math.inf, 120_000), Level(math.inf, 300_000))
+
+
+def coverage(problem: Problem) -> tuple[float, float, float, float]:
+    """West, south, east, north of the ground that is known about."""
+    rows, cols = problem.airspace.surface.ground_m.shape
+    # Edges of a raster in degrees bow in the plane: their middles count too.
+    c, r = np.meshgrid((0.0, 0.5 * (cols - 1), cols - 1.0), (0.0, 0.5 * (rows - 1), rows - 1.0))
+    corners = problem.airspace.surface.grid.to_plane(c.ravel(), r.ravel())
+    west, south = corners.min(axis=0)
+    east, north = corners.max(axis=0)
+    return float(west), float(south), float(east), float(north)
+
+
+def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float, float], float]:
+    """Box and spacing of a lattice for ``level``."""
+    west, south, east, north = coverage(problem)
+    stops = np.array(terminals(problem))
+    way = float(np.hypot(*np.diff(stops, axis=0).T).sum())
+    # No ellipse of a detour reaches farther from its ends than this; a whole box reaches four ways at most.
+    out = (0.5 * (level.detour - 1.0) if math.isfinite(level.detour) else 4.0) * way + 1.0
+    if math.isfinite(level.detour):
+        out = max(out, 0.5 * way * math.sqrt(level.detour**2 - 1.0))
+    low, high = stops.min(axis=0) - out, stops.max(axis=0) + out
+    box = (max(west, low[0]), max(south, low[1]), min(east, high[0]), min(north, high[1]))
+    area = max(box[2] - box[0], 1e-3) * max(box[3] - box[1], 1e-3)
+    cell = float(problem.airspace.surface.grid.metres_per_cell(*stops[0]).min())
+    step = max(math.sqrt(area / level.nodes), min(cell, way) / 8.0)
+    return box, step
+
+
+def climbing_weight(problem: Problem) -> float:
+    """Metres of track that cost as much energy as a metre of height."""
+    return problem.vertical_j_per_m / max(problem.horizontal_j_per_m, 1e-9)
+
+
+@dataclass(eq=False, slots=True)
+class Router:
+    """A lattice with its terminals, and what the exact test last found on it."""
+
+    problem: Problem
+    lattice: Lattice
+    stops: list[tuple[float, float]]
+    links: list[Links]
+    climb_factor: float = 1.0
+    last: Obstruction | None = None
+    last_place: Floats | None = field(default=None)
+    opened: int = 0
+    """Labels that searches on this lattice have taken up."""
+    opened_last: int = 0
+
+    @classmethod
+    def at(cls, problem: Problem, level: Level) -> Router:
+        """Build the lattice of ``level``."""
+        box, step = frame_of(problem, level)
+        lattice = make_lattice(problem, box, step, level.detour)
+        stops = terminals(problem)
+        heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
+        links = [make_links(problem, lattice, s, z) for s, z in zip(stops, heights, strict=True)]
+        return cls(problem, lattice, stops, links)
+
+    def way(self, cap_m: float = math.inf, weight: float = 0.0) -> Floats | None:
+        """(N, 2) places of the best way over the lattice under ``cap_m``, through every stop; None if there is none."""
+        direct = not self.problem.via
+        found = self.labels(cap_m, weight, FORWARD if direct else MOST)
+        if not found and direct and self.opened_last > FORWARD:
+            back = self._leg(-1, 0, cap_m, weight, BACKWARD)
+            if back:
+                return np.ascontiguousarray(back[0].places[::-1])
+            if self.opened_last > BACKWARD:
+                found = self.labels(cap_m, weight, MOST)
+        return found[0].places if found else None
+
+    def _leg(self, here: int, there: int, cap_m: float, weight: float, most_opened: int) -> tuple[Label, ...]:
+        """How the one end is reached from the other: from the start (0), or backwards from the goal (-1)."""
+        p = self.problem
+        up, down = p.limits.max_climb_slope * self.climb_factor, p.limits.max_descent_slope * self.climb_factor
+        heights = {0: p.start[2], -1: p.goal[2]}
+        z = heights[here]
+        found = search(
+            self.lattice,
+            [Label(0.0, z, z, z, z, np.array([self.stops[here]]))],
+            self.stops[here],
+            self.stops[there],
+            self.links[here],
+            self.links[there],
+            (heights[there], heights[there]),
+            cap_m=cap_m,
+            climb_slope=up if here == 0 else down,
+            descent_slope=down if here == 0 else up,
+            weight=weight,
+            most_opened=most_opened,
+        )
+        self.opened += found.opened
+        self.opened_last = found.opened
+        return found.labels
+
+    def labels(self, cap_m: float, weight: float, most_opened: int = MOST) -> tuple[Label, ...]:
+        """How the goal is reached, cheapest first."""
+        p = self.problem
+        z = p.start[2]
+        labels: tuple[Label, ...] = (Label(0.0, z, z, z, z, np.array([self.stops[0]])),)
+        ranges = [*((-math.inf, math.inf) if v.amsl_m is None else (v.amsl_m, v.amsl_m) for v in p.via)]
+        ranges.append((p.goal[2], p.goal[2]))
+        for k, goal_m in enumerate(ranges):
+            free = math.isinf(goal_m[0])
+            found: Found = search(
+                self.lattice,
+                list(labels),
+                self.stops[k],
+                self.stops[k + 1],
+                self.links[k],
+                self.links[k + 1],
+                goal_m,
+                cap_m=cap_m,
+                climb_slope=p.limits.max_climb_slope * self.climb_factor,
+                descent_slope=p.limits.max_descent_slope * self.climb_factor,
+                weight=weight,
+                want=4 if free else 1,
+                most_opened=most_opened,
+            )
+            labels = found.labels
+            self.opened += found.opened
+            self.opened_last = found.opened
+            if not labels:
+                break
+        return labels
+
+    def cut_off(self) -> tuple[bool, bool]:
+        """Whether start, and goal, are shut in on this lattice: nothing leads away from them (to them) for long."""
+        p = self.problem
+        up, down = p.limits.max_climb_slope * self.climb_factor, p.limits.max_descent_slope * self.climb_factor
+        out = []
+        for here, there, amsl, climb, descent in ((0, -1, p.start[2], up, down), (-1, 0, p.goal[2], down, up)):
+            found = search(
+                self.lattice,
+                [Label(0.0, amsl, amsl, amsl, amsl, np.array([self.stops[here]]))],
+                self.stops[here],
+                self.stops[there],
+                self.links[here],
+                self.links[there],
+                (-math.inf, math.inf),
+                climb_slope=climb,
+                descent_slope=descent,
+                most_opened=SHUT_IN,
+            )
+            out.append(not found.labels and found.opened <= SHUT_IN)
+        return out[0], out[1]
+
+    def track_of(self, way: Floats) -> Track:
+        """The track over ``way``, its stops pinned, its points on straight lines dropped."""
+        pinned = np.zeros(len(way), bool)
+        pin_m = np.full(len(way), np.nan)
+        pinned[0] = pinned[-1] = True
+        for (east, north), via in zip(self.stops[1:-1], self.problem.via, strict=True):
+            at = np.flatnonzero((way[:, 0] == east) & (way[:, 1] == north) & ~pinned)
+            if len(at):
+                pinned[at[0]] = True
+                pin_m[at[0]] = math.nan if via.amsl_m is None else via.amsl_m
+        d = np.diff(way, axis=0)
+        bent = np.abs(d[:-1, 0] * d[1:, 1] - d[:-1, 1] * d[1:, 0]) > 1e-9 * (d[:-1] ** 2).sum(-1)
+        keep = pinned.copy()
+        keep[1:-1] |= bent
+        return make_track(self.problem, way[keep], pinned[keep], pin_m[keep])

@@ -1,0 +1,1 @@
+"""Sources of bounds: what no path can be shorter or cheaper than."""

@@ -1,0 +1,408 @@
+"""The plane between two stops: shortest tracks below an altitude cap, and how long any track must be at least.
+
+The lattice is cut to an ellipse of detours around the stops, and widened when that is not enough. A flood from the far
+stop, over all that may be free below the highest cap, tells every later search how far it still is: lower caps and
+finer lattices only leave less room. So the fine lattices, too, need to be looked at only along the few tracks that may
+be short enough.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, Reached, Stop, Storeys
+from gcsplan.planners.optimal.corridor import Corridor, End, Nearby
+from gcsplan.planners.optimal.navmesh.clearance import Cone, Relief, box_of, sampled
+from gcsplan.planners.optimal.navmesh.grid import Box, Plane, extent, finer_plane, make_plane, on_finer
+from gcsplan.planners.optimal.navmesh.mesh import Exhausted, Guide, Mesh, Way
+from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
+from gcsplan.planners.problem import Problem
+from gcsplan.world.zones import Circle
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Spare = tuple[float, float]
+"""Metres that a path may fly in laps near its start and near its goal."""
+
+DETOURS = (1.25, 2.5, math.inf)
+"""How long tracks may be, in times the straight way, before the lattice must be widened."""
+MUCH = 0.5
+"""What part of the terrain model is so much that all of it may be looked at as well."""
+COARSE_M = 100.0
+"""Cells of the first look are no larger, if the terrain model's are not."""
+FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
+"""Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
+
+MOST_NODES, MOST_BESIDE, LARGE = 16e6, 6e6, 4e6
+"""Nodes of the finest lattice, at most, in the box around a corridor: so many, and fewer beside a terrain model of more
+nodes than that, to need no more than half a gigabyte besides."""
+MOST_ALONE = 50_000
+"""Cells of the finer lattice that may be looked at each alone in four parts."""
+LEARNT = 10
+"""Times that a track is looked for where nodes alone are as high as the exact check has them."""
+ALONG, MOST_OFTEN = 3, 2_000_000
+"""How many cells beside a way slits are looked for, and in how many of the finest lattice's cells, at most."""
+BESIDE = 8
+"""How many cells more the finer lattice is over than those that are asked for: later tracks may lie beside them."""
+RAISED, WORTHWHILE = 4, 0.05
+"""Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
+
+
+class Leg:
+    """One leg of a problem, from stop to stop, under caps of at most ``top_m``."""
+
+    def __init__(self, problem: Problem, start: End, goal: End, top_m: float) -> None:
+        self.problem, self.start, self.goal, self.top_m = problem, start, goal, top_m
+        self.straight_m = math.dist(start.place, goal.place)
+        self.length_m = math.inf
+        """A lower bound of every track's length below the highest cap; inf: there is none, proved."""
+        self.reach_m = 0.0
+        """Tracks shorter than this lie within the lattice, and within what the flood has seen."""
+        self.farthest = math.inf
+        """No ways are looked for that may be more times as long as the straight one."""
+        self.plane: Plane
+        self._twin: tuple[Plane, Bools] | None = None
+        self._detour = 0.0
+        self._mesh: Mesh
+        self._guide: Guide
+        self._ahead: Guide | None = None
+        self.last_way = np.array([start.place, goal.place])  # of flood or bound
+        self._close: Nearby | None = None
+        self._reached: tuple[Nearby, Reached] | None = None
+        cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
+        wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
+        self.parts = max(1, round(cell_m / wanted_m))
+        """Parts a side that the terrain model's cells are cut into, where they are large beside leg or zones."""
+        # Between nodes that are left out heights are guessed, so few are better kept.
+        self._fine_stride = 1 if self.parts > 1 or finest_m < 2.0 * cell_m else round(finest_m / cell_m)
+        self._stride = self._fine_stride * max(1, round(wanted_m / cell_m / self._fine_stride))
+        if self.parts > 1 or self._stride < 3:
+            self._stride = self._fine_stride = 1
+        # How many parts a side the first look's cells are cut into where it matters, of the plane or of its finer twin.
+        self._ratio = self._stride // self._fine_stride
+        self._cut = 1
+        if self._stride == 1:
+            self._ratio = self._cut = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
+        self.sheets = False
+        """Whether bounds hold tracks to pass each zone that has a floor and a ceiling over or under all of it."""
+        self.closer = 1
+        """Into how many parts a side the finer lattice's cells are cut once more, see `look_closer`."""
+        self.exact = self.closely = False
+        """Whether tracks are looked for where nodes are legal, though what is between them may not be by a little; and
+        that along the way of the last flood or bound, in cells as small as can be."""
+        self.shut: list[tuple[Floats, float]] = []
+        """Where tracks lacked so many metres all the same."""
+        self.has_fine = self._ratio > 1
+        """Whether there is a lattice finer than that of the first look."""
+
+    def _cell_m(self) -> float:
+        """How large cells may be for the first look."""
+        least, most = self.straight_m / 250.0, min(self.straight_m / 60.0, COARSE_M)
+        radii = [
+            z.shape.radius_m
+            if isinstance(z.shape, Circle)
+            else 0.5 * min(z.bounds[2] - z.bounds[0], z.bounds[3] - z.bounds[1])
+            for z in self.problem.airspace.zones
+        ]
+        return max(least, min([most, *(r / 3.0 for r in radii)]))
+
+    def flood(self, slack: float) -> None:
+        """Look at all that is free below the highest cap, as far as ways ``slack`` longer than the shortest lead.
+
+        Widens the lattice until that way lies within it.
+        """
+        self._ahead = self._close = self._reached = None
+        self.closer = 1
+        for detour in DETOURS:
+            if detour > self.farthest:
+                break
+            if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
+                continue
+            if detour != self._detour and DETOURS[0] < detour < math.inf and self._is_most(detour):
+                continue
+            within = detour * self.straight_m if math.isfinite(detour) else math.inf
+            if detour != self._detour:
+                self.plane, self._twin = self._lattice(detour), None
+                self._detour = detour
+                self._mesh = self.plane.mesh(self.top_m, True)
+            a, b = self.goal.place, self.start.place
+            try:
+                way, self._guide = self._mesh.flood(a, b, within, slack)
+            except Exhausted as given_up:
+                # What was seen is as good as a flood that was asked to go no farther.
+                self.length_m = self.reach_m = given_up.seen_m * (1.0 - 1e-9)
+                self._guide = self._mesh.flood(a, b, self.reach_m, slack)[1]
+                return
+            if way is not None:
+                self.length_m, self.last_way = way.length_m, way.points
+                self.reach_m = min(within, way.length_m * (1.0 + slack))
+                return
+
+    def _relief(
+        self,
+        cap_m: float,
+        low: bool,
+        within: Corridor | None,
+        limit_m: float,
+        ends: list[Cone] | None = None,
+        under: Bools | None = None,
+        over: Bools | None = None,
+        exact: bool = False,
+    ) -> tuple[Relief, Guide]:
+        """What to make a mesh of, finer ``within`` a corridor, or else the first look's for tracks shorter than
+        ``limit_m``; and how far the goal is."""
+        if within is None:
+            plane, fineness, guide = self.plane, 1, self._guide
+            cells = guide.reach(self.start.place, limit_m)
+        else:
+            plane, guide, cells = within.guide.mesh.plane, within.guide, within.cells
+            fineness = within.parts or self.closer
+            if plane is self.plane and self._stride == 1:
+                fineness *= self._cut
+            elif plane is self.plane and self.has_fine:
+                plane, cells = self._over(cells)
+        return Relief(plane, cap_m, low, fineness, cells, ends, under, over, exact=exact), guide
+
+    def track(
+        self,
+        cap_m: float,
+        within: Corridor | None,
+        limit_m: float,
+        under: Bools | None,
+        spare_m: Spare = (0.0, 0.0),
+        over: Bools | None = None,
+    ) -> Way | None:
+        """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``, if it is shorter than
+        ``limit_m``, and than `reach_m`.
+
+        ``within``: on the finer lattice there; else on that of the first look. ``spare_m``: metres that may be added
+        near start and goal to climb. ``under``, ``over`` (zones,): which zones may be passed so; None for all.
+        """
+        limit, limits = min(limit_m, self.reach_m), self.problem.limits
+        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
+        if within is not None and self.closely:
+            within = self._along(within)
+        relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, self.exact)
+        for place, by in self.shut if self.exact else ():
+            relief.lift(place[None], np.array([by]))
+        try:
+            for _ in range(LEARNT if self.exact else 1):
+                way = relief.mesh().way(self.start.place, self.goal.place, limit, guide)
+                if way is None or not self.exact or not relief.learn(way.points):
+                    return way
+        except Exhausted:
+            pass
+        return None
+
+    def bound(self, cap_m: float, within: Corridor | None, limit_m: float, climbs: bool = False) -> float:
+        """A lower bound of every track's length below ``cap_m``; ``limit_m``, or `reach_m`, if it is more.
+
+        ``climbs``: near the ends hold tracks to what they can climb to, if they are shorter than ``limit_m``.
+        """
+        limit, limits = min(limit_m, self.reach_m), self.problem.limits
+        relief, guide = self._relief(cap_m, True, within, limit)
+        known = self.length_m
+        for _ in range(RAISED):
+            spare = max(limit - known, 0.0)
+            cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare) if climbs else []
+            relief.hold(cones)
+            try:
+                way = relief.mesh().way(self.start.place, self.goal.place, limit, guide)
+            except Exhausted as given_up:
+                return max(known, min(limit, given_up.seen_m))
+            if way is None:
+                return limit
+            self.last_way = way.points
+            # Ways are longer between the walls that the cones raised, so there is less to spare for a climb: again.
+            enough = not cones or way.length_m < known + WORTHWHILE * spare
+            known = max(known, way.length_m)
+            if enough:
+                break
+        return max(known, self._bound_of_sheets(relief, guide, limit)) if self.sheets else known
+
+    def _bound_of_sheets(self, relief: Relief, guide: Guide, limit_m: float) -> float:
+        """The same where none may get from under a zone to over it within the zone."""
+        mesh = relief.mesh(sheets=True)
+        if mesh.sheets == 1:
+            return 0.0
+        try:
+            way = mesh.way(self.start.place, self.goal.place, limit_m, guide)
+        except Exhausted as given_up:
+            return min(limit_m, given_up.seen_m)
+        return limit_m if way is None else way.length_m
+
+    def part_sheets(self, limit_m: float) -> bool:
+        """Let `bound` tell over from under, if tracks shorter than ``limit_m`` may get from one to the other in a zone;
+        whether they may."""
+        limit, limits = min(limit_m, self.reach_m), self.problem.limits
+        if not self.plane.shapes.either or math.isinf(max(limits.max_climb_slope, limits.max_descent_slope)):
+            return False
+        spare = max(limit - self.length_m, 0.0)
+        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare)
+        relief, _ = self._relief(self.top_m, True, self.corridor(limit), limit)
+        relief.hold(cones)
+        self.sheets = relief.mesh(sheets=True).sheets > 1
+        return self.sheets
+
+    def look_closer(self, limit_m: float, parts: int, cut: int) -> bool:
+        """Look anew, at each cell of the finer lattice alone, at what tracks shorter than ``limit_m`` may meet; where
+        they are few, at each of their ``cut`` parts a side.
+
+        No longer ones are known after that. `track` and `bound` cut the cells of such corridors into ``parts`` a side.
+        False, and nothing is done, where that would be too many.
+        """
+        limit = min(limit_m, self.reach_m)
+        close = self._closer(limit)
+        if close.left is self._guide or self.closer > 1:
+            return False
+        wanted = close.away.between(close.left, limit)
+        row, col, last_row, last_col = box_of(wanted)
+        most = MOST_NODES if self.problem.airspace.surface.ground_m.size < LARGE else MOST_BESIDE
+        if (last_row - row) * (last_col - col) * (self._ratio * parts) ** 2 > most:
+            return False
+        if self._fine_stride > 1 or np.count_nonzero(wanted) * self._ratio**2 > MOST_ALONE:
+            cut = 1
+        finer = cut * (self.parts * self._cut if self._stride == 1 else self.parts)
+        # Nodes lie elsewhere by as much as the other lattice is bent.
+        more = limit + 2.0 * LOOSE.bent_m
+        found = self._each_cell(*finer_plane(self.plane, wanted, finer, self._fine_stride, CLOSE), more, close.away)
+        if found is None:
+            return False
+        self._close, self.reach_m, self.closer = found, limit, parts // cut
+        return True
+
+    def _along(self, within: Corridor) -> Corridor:
+        """What of a corridor lies along the way of the last flood or bound, in cells as small as can be."""
+        plane = within.guide.mesh.plane
+        near = np.zeros(within.cells.shape, np.bool_)
+        cell_m = math.dist((plane.x[0, 0], plane.y[0, 0]), (plane.x[0, 1], plane.y[0, 1]))
+        for i, j in np.unique(plane.all_at(sampled(self.last_way, cell_m)).astype(np.intp), axis=0).tolist():
+            near[max(j - ALONG, 0) : j + ALONG + 1, max(i - ALONG, 0) : i + ALONG + 1] = True
+        near &= within.cells
+        parts = math.isqrt(MOST_OFTEN // max(int(near.sum()) * self._ratio**2, 1))
+        return Corridor(near, within.guide, max(1, min(MOST_FINE, parts)))
+
+    def corridor(self, limit_m: float) -> Corridor:
+        """What tracks shorter than ``limit_m``, and than `reach_m`, may meet."""
+        limit = min(limit_m, self.reach_m)
+        close = self._closer(limit)
+        return Corridor(close.away.between(close.left, limit), close.left)
+
+    def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Of the cells that tracks shorter than ``limit_m`` may meet (and more): the lowest and the highest altitude
+        that can be flown at, ways there and on."""
+        if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that the flood did not
+            return np.full(1, -math.inf), np.full(1, math.inf), np.zeros(1), np.zeros(1)  # of those nothing is known
+        close = self._closer(min(limit_m, self.reach_m))
+        near = self._near(close, limit_m)
+        if self._reached is not None and self._reached[0] is close and limit_m <= close.limit_m:
+            of = self._reached[1].known(limit_m, near)
+            return of.low_m, of.high_m, of.away_m, of.left_m
+        return close.low_m[near], close.high_m[near], close.away_m[near], close.left_m[near]
+
+    def storeys(self, limit_m: float) -> Storeys:
+        """Those that tracks shorter than ``limit_m``, and than `reach_m`, may enter by what they climb and descend."""
+        limit = min(limit_m, self.reach_m)
+        close = self._closer(limit)
+        if self._reached is None or self._reached[0] is not close:
+            mesh, a, b = close.left.mesh, self.start, self.goal
+            near = self._near(close, close.limit_m)
+            count, low, high = mesh.plane.storeys(mesh, close.low_m, close.high_m, MOST, SPARE_M)
+            cell, nth = np.nonzero((np.arange(MOST) < count[:, None]) & near[:, None])
+            every = Storeys(
+                (mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1),
+                cell,
+                low[cell, nth],
+                high[cell, nth],
+                close.away_m[cell],
+                close.left_m[cell],
+                mesh.middles_from(a.place)[cell],
+                mesh.middles_from(b.place)[cell],
+                mesh.half_m(),
+                Stop(mesh.cells_at(a.place), a.amsl_m),
+                Stop(mesh.cells_at(b.place), b.amsl_m),
+            )
+            self._reached = close, Reached(every, self.problem.limits, close.limit_m)
+        return self._reached[1].within(limit, self._near(close, limit))
+
+    def _near(self, close: Nearby, limit_m: float) -> Bools:
+        """(cells,) what tracks no longer than ``limit_m`` may meet."""
+        return close.left.mesh.of_plane(close.away.between(close.left, limit_m)).ravel()
+
+    def _closer(self, limit_m: float) -> Nearby:
+        """A look at each cell alone, for tracks shorter than ``limit_m``; at whole pieces where that is too much."""
+        if self._close is None or limit_m > self._close.limit_m:
+            away, left = self._from_start(), self._guide
+            found = self._each_cell(self.plane, away.between(left, limit_m), limit_m, away)
+            if found is None:  # pieces are as near as their entrances
+                mesh = left.mesh
+                ends = (away, self.start), (left, self.goal)
+                ways = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
+                found = Nearby(limit_m, away, left, *mesh.plane.rooms(mesh, self.top_m), *ways)
+            self._close = found
+        return self._close
+
+    def _each_cell(self, plane: Plane, wanted: Bools, limit_m: float, ahead: Guide) -> Nearby | None:
+        """Each of the ``wanted`` cells of a lattice alone; None where that is too much to look at. ``ahead``: from the
+        start, over a mesh that leaves no less room."""
+        mesh = plane.mesh(self.top_m, True, 1, wanted, single=True)
+        a, b = self.start.place, self.goal.place
+        try:
+            left = mesh.flood(b, a, limit_m, math.inf, ahead)[1]
+            away = mesh.flood(a, b, limit_m, math.inf, left)[1]
+        except Exhausted:
+            return None
+        return Nearby(limit_m, away, left, *plane.rooms(mesh, self.top_m), away.cells(), left.cells())
+
+    def _over(self, cells: Bools) -> tuple[Plane, Bools]:
+        """The finer lattice over some cells, and perhaps more, and which of its cells these are."""
+        if self._twin is None or (cells & ~self._twin[1]).any():
+            row, col, last_row, last_col = box_of(cells)
+            wide = np.zeros(cells.shape, np.bool_)
+            wide[max(row - BESIDE, 0) : last_row + BESIDE, max(col - BESIDE, 0) : last_col + BESIDE] = True
+            self._twin = finer_plane(self.plane, wide, self.parts, self._fine_stride, LOOSE)[0], wide
+        plane = self._twin[0]
+        return plane, on_finer(self.plane, cells, plane)
+
+    def _from_start(self) -> Guide:
+        """Distances from the start over the coarse mesh, as far as the flood from the goal has seen."""
+        if self._ahead is None:
+            mesh = self._guide.mesh
+            try:
+                _, self._ahead = mesh.flood(self.start.place, self.goal.place, self.reach_m, math.inf, self._guide)
+            except Exhausted:
+                self._ahead = Guide(mesh, self.start.place, np.zeros(len(mesh.joins)), np.zeros(len(mesh.start) - 1))
+        return self._ahead
+
+    def _cones(self, climb: float, descent: float, at_start_m: float, at_goal_m: float) -> list[Cone]:
+        """Height and slope of what can be reached near the ends, by paths with so many metres to spare there."""
+        ends = ((self.start, climb, at_start_m), (self.goal, descent, at_goal_m))
+        return [
+            (end.east_m, end.north_m, end.amsl_m + slope * spare_m, slope)
+            for end, slope, spare_m in ends
+            if end.amsl_m is not None and math.isfinite(slope)
+        ]
+
+    def _lattice(self, detour: float) -> Plane:
+        reach = None
+        if math.isfinite(detour):
+            a, b = self.start.place, self.goal.place
+            cell = self._stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
+            reach = a, b, detour * self.straight_m + 4.0 * cell
+        return make_plane(self.problem, self._box(detour), self.parts, self._stride, self._stride, reach)
+
+    def _box(self, detour: float) -> Box:
+        """What tracks may meet that are so many times as long as the straight way."""
+        if math.isinf(detour):
+            return -math.inf, -math.inf, math.inf, math.inf
+        (x0, y0), (x1, y1), d = self.start.place, self.goal.place, self.straight_m
+        more = max(0.5 * d * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * d) + 1.0
+        return min(x0, x1) - more, min(y0, y1) - more, max(x0, x1) + more, max(y0, y1) + more
+
+    def _is_most(self, detour: float) -> bool:
+        """Whether a lattice for such tracks is so large that one might as well look at everything."""
+        col0, row0, col1, row1 = extent(self.problem, self._box(detour))
+        return (col1 - col0) * (row1 - row0) > MUCH * self.problem.airspace.surface.ground_m.size

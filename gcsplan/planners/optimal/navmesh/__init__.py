@@ -1,0 +1,1 @@
+"""Convex pieces of free plane below a cap, and the exact shortest way over them (Polyanya)."""

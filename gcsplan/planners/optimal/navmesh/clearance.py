@@ -1,0 +1,291 @@
+"""What can be flown over a part of a plane below a cap, node by node, and the mesh of that.
+
+A relief may be held down: near the ends of a leg paths can be only so high, which a bound may use as a lower cap. Each
+time ways become longer by that there is less to spare for a climb, so it can be held down once more, from where it is.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations, product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.optimal.navmesh.buffers import Scratch
+from gcsplan.planners.optimal.navmesh.clearance_kernels import fill
+from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, look_around, walk_around
+from gcsplan.planners.optimal.navmesh.mesh import Mesh
+from gcsplan.planners.optimal.navmesh.mesh_kernels import WALL, make_pieces, make_portals, sort_portals
+from gcsplan.planners.optimal.navmesh.zone_kernels import lift_lids, own_zones, stamp_zones
+from gcsplan.planners.profile.track import divided
+
+if TYPE_CHECKING:
+    from gcsplan.planners.optimal.navmesh.grid import Plane
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+Cone = tuple[float, float, float, float]
+"""Where it stands (east_m, north_m), its height there, and its slope."""
+
+AROUND = 8
+"""How many nodes beside those of cells that are wanted are looked at, at most: more than `climb_cones.BESIDE`."""
+RIM = 12.0
+"""How many cells deep zones are looked at that cannot be climbed over so near to an end."""
+ALIKE = 12.0
+"""How many times as large as the error of tracks cells may be for bounds to make use of it."""
+LEARN_M, LEARN_HAIR_M = 2.0, 0.05
+"""How closely a track is looked at, and by how much more than is missing nodes are raised."""
+MANY = 8
+"""Names a portal from which on a mesh's are numbered one by one, for searches have room for every name."""
+
+
+class Relief:
+    """The nodes of the ``wanted`` cells of a plane, or of all, cut ``fineness`` times finer: how much too high the
+    lowest is that can be flown at (*excess*), and the walls of the zones.
+
+    ``cap_m``, ``low`` as in `Plane.mesh`; ``ends``: where paths climb from, see `clearance_kernels.fill`; ``under``,
+    ``over`` (zones,): which zones may be passed below their floors, above their ceilings; None for all. ``whole``: such
+    meshes are asked for places all over them, and kept; others last until the plane's next relief. ``exact``: nodes are
+    as high as the exact check has them, and not higher for what may be between them.
+    """
+
+    def __init__(
+        self,
+        plane: Plane,
+        cap_m: float,
+        low: bool,
+        fineness: int,
+        wanted: Bools | None,
+        ends: list[Cone] | None = None,
+        under: Bools | None = None,
+        over: Bools | None = None,
+        whole: bool = False,
+        exact: bool = False,
+    ) -> None:
+        limits, scale = plane.problem.limits, plane.problem.airspace.scale
+        whole = whole or wanted is None
+        wanted = plane.inside if wanted is None else wanted
+        self.plane, self.fineness, self.cap_m, self.low = plane, fineness, cap_m, low
+        self.row, self.col, last_row, last_col = box_of(wanted)
+        inner = np.s_[self.row : last_row, self.col : last_col]
+        nodes = np.s_[self.row : last_row + 1, self.col : last_col + 1]
+        top, ground, x, y = (
+            np.ascontiguousarray(a[nodes]) for a in (plane.tops[not low], plane.grounds[not low], plane.x, plane.y)
+        )
+        steep = np.empty((0, 0)) if low else plane.steep(self.row, self.col, last_row + 1, last_col + 1)
+        rows, cols = self.shape = (top.shape[0] - 1) * fineness + 1, (top.shape[1] - 1) * fineness + 1
+        self._array = Scratch().array if whole else plane.scratch.array
+        self._excess, self._floor, self._ground, self._x, self._y = (self._array(f"{k}", self.shape) for k in range(5))
+        self._span = _spans(wanted[inner], fineness)
+        self._around = np.tile(np.array([0, cols], np.int32), (rows, 1)) if whole else _around(self._span, cols)
+        self._diagonal = np.zeros((rows - 1) * (cols - 1), np.int8)
+        more = limits.min_agl_m + limits.altitude_error_m
+        if low:
+            more -= plane.fit.spare_m
+            # Where cells are much larger, slopes are hardly alike as far as that.
+            cell_m = math.dist((x[0, 0], y[0, 0]), (x[1, 1], y[1, 1])) / fineness
+            beside = limits.track_error_m if limits.track_error_m * ALIKE > cell_m else 0.0
+        else:
+            more += plane.fit.hair_m
+            beside = limits.track_error_m * scale + plane.fit.hair_m
+            if limits.horizontal_clearance_m > limits.min_agl_m:
+                # Beside cliffs it is the clearance that binds; this is more than both demand together.
+                beside += limits.horizontal_clearance_m * scale
+        fill(
+            top, ground, steep, x, y, np.ascontiguousarray(wanted[inner]), fineness, more, beside, cap_m,
+            np.array(ends or []).reshape(-1, 4), low, self._around, self._excess, self._floor, self._ground, self._x,
+            self._y, self._diagonal,
+        )  # fmt: skip
+        if exact:
+            self._be_exact()
+        self._zones, self._edges = plane.zones(low, under, over)
+        self._boxes = plane.boxes(self.row, self.col, fineness, rows, cols)
+        self._steep, self._exact, self._reach_m = steep, exact, plane.problem.airspace.beside_m(limits)
+        self._up, self._down = (self._array(name, self.shape) for name in ("up", "down"))
+        self._of, self._values = np.empty((0, 0), np.int32), np.empty((0, WALL))
+        self._laid = False
+        self._held: list[Cone] = []
+        self._lift: Floats
+        self._either: NDArray[np.int8]
+
+    def _be_exact(self) -> None:
+        """Give the nodes that are looked at the floors that the exact check has there."""
+        cols = np.arange(self.shape[1])
+        seen = (cols >= self._around[:, :1]) & (cols < self._around[:, 1:])
+        seen[seen] = np.isfinite(self._excess[seen])
+        more = self._too_high(self._x[seen], self._y[seen]) - (self._floor[seen] - self.cap_m)
+        self._floor[seen] += more
+        self._excess[seen] += more
+
+    def _too_high(self, east_m: Floats, north_m: Floats) -> Floats:
+        """What floors of the exact check are over the cap."""
+        floor = self.plane.problem.airspace.floor_amsl(east_m, north_m, self.plane.problem.limits)
+        return np.asarray(floor) - self.cap_m
+
+    def learn(self, track: Floats) -> bool:
+        """Raise the nodes of cells in which the exact check shuts a track (N, 2) over them; whether there are any."""
+        places = sampled(track, LEARN_M)
+        over = self._too_high(*places.T)
+        shut = np.isfinite(over) & (over > 0.0)
+        self.lift(places[shut], over[shut])
+        return bool(shut.any())
+
+    def lift(self, places: Floats, by_m: Floats) -> None:
+        """Raise the nodes of the cells of ``places`` (N, 2) by so much (N,), and a hair."""
+        cells = np.floor((self.plane.all_at(places) - [self.col, self.row]) * self.fineness).astype(np.intp)
+        more: dict[tuple[int, int], float] = {}  # of few nodes: those that are not touched take no memory
+        for (i, j), by in zip(cells.tolist(), by_m.tolist(), strict=True):
+            for node in product((j, j + 1), (i, i + 1)):
+                if 0 <= node[0] < self.shape[0] and 0 <= node[1] < self.shape[1]:
+                    more[node] = max(more.get(node, 0.0), by + LEARN_HAIR_M)
+        for node, by in more.items():
+            self._floor[node] += by
+            self._excess[node] += by
+        self._laid = False
+
+    def hold(self, cones: list[Cone]) -> None:
+        """Hold nodes down to ``cones``, which no path of a length that matters is higher than near its ends: a bound's
+        relief. Cones that come later know of the ways that are longer because of those before."""
+        if not cones:
+            return
+        cell_m = self.plane.stride * float(
+            self.plane.problem.airspace.surface.grid.metres_per_cell(*cones[0][:2]).max()
+        )
+        if not self._held:
+            self._lift, self._either = self._array("lift", self.shape), np.zeros(self.shape, np.int8)
+            lift_lids(
+                self._around, self._floor, self._ground, self._x, self._y, self._zones, self._edges, self._boxes,
+                self.cap_m, RIM * cell_m / (self.plane.parts * self.fineness), self._lift, self._either,
+            )  # fmt: skip
+        if not self._laid:
+            self._lay(np.zeros(0, np.int32))
+        self._held += cones
+        lone = _apart(self._held, self.cap_m, 8.0 * cell_m)
+        excess, lift, x, y = self._excess, self._lift, self._x, self._y
+        for east, north, height, slope in cones:
+            c, r = self.plane.at((east, north))
+            c, r = (c - self.col) * self.fineness, (r - self.row) * self.fineness
+            if not 0 <= r < self.shape[0] or not self._around[int(r), 0] <= c < self._around[int(r), 1]:
+                continue
+            cone = np.array([east, north, c, r, height, slope, self.cap_m])
+            seen, away = np.zeros(self.shape, np.int8), self._array("away", self.shape)
+            missing = look_around(
+                self._around, excess, self._floor, lift, self._of, self._values, x, y, cone, seen, away
+            )
+            if missing:
+                way, root = self._array("way", self.shape), self._array("root", self.shape, np.int32)
+                done = np.zeros(self.shape, np.int8)
+                heap, ids = self._array("heap", (8 * way.size,)), self._array("ids", (8 * way.size,), np.int32)
+                walk_around(
+                    self._around, excess, lift, self._of, x, y, cone, seen, away, missing, way, root, done, heap, ids
+                )
+            hold_down(
+                self._around, excess, self._floor, lift, self._either, self._of, self._values, x, y, cone, lone, seen,
+                away,
+            )  # fmt: skip
+        # What cannot be reached so soon is no way over a zone either.
+        self._laid = False
+
+    def mesh(self, *, single: bool = False, sheets: bool = False) -> Mesh:
+        """The mesh of what can be crossed. ``single``: each free cell is a piece of its own; ``sheets``: zones that are
+        passed over here and under there lie on two."""
+        limits = self.plane.problem.limits
+        rows, cols = self.shape
+        owner = np.zeros(0, np.int32)
+        steepest = max(limits.max_climb_slope, limits.max_descent_slope)
+        if sheets and self.plane.shapes.either and math.isfinite(steepest):
+            owner = np.zeros(self._diagonal.size, np.int32)
+            if not own_zones(
+                self._span, self._excess, self._floor, self._ground, self._x, self._y, self._zones, self._edges,
+                self._boxes, steepest, owner,
+            ):  # fmt: skip
+                owner = owner[:0]
+        if len(owner) or not self._laid:
+            self._lay(owner)
+        excess, of, values, diagonal, span = self._excess, self._of, self._values, self._diagonal, self._span
+        piece = self._array("piece", (diagonal.size, 2 * of.shape[1]), np.int32)
+        block = 1 if single else self.plane.block * self.fineness
+        count = make_pieces(excess, of, values, diagonal, owner, self._around, span, piece, block)
+        room, part = 2 * count + 1024, np.empty(2)
+        while True:
+            ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
+            n = make_portals(
+                excess, of, values, diagonal, owner, span, piece, self._x, self._y, ends, names, joins, part
+            )
+            if n <= room:
+                break
+            room = n
+        start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
+        sort_portals(joins[:n], start, order)
+        names, named = names[:n], 8 * (rows * cols + 1) * of.shape[1]
+        if named > MANY * n:
+            corner = names >= 0
+            used, names[corner] = np.unique(names[corner], return_inverse=True)
+            named = len(used)
+        return Mesh(
+            self.plane, self.fineness, self.row, self.col, excess, self._floor, diagonal, span, piece, start, ends[:n],
+            names, joins[:n], order, named,
+        )  # fmt: skip
+
+    def _lay(self, owner: Ints) -> None:
+        """Lay the zones on the cells, twice on those that have an ``owner``."""
+        sheets = 2 if len(owner) else 1
+        if self._of.shape[1] != sheets:
+            self._of = self._array("of", (self._diagonal.size, sheets), np.int32)
+            self._values = np.empty((sheets * (1 + self.plane.shapes.cells * self.fineness**2), WALL))
+        walls = 0
+        for sheet in range(sheets):
+            walls = stamp_zones(
+                self._around, self._span, self._excess, self._floor, self._ground, self._steep, self.fineness,
+                self._reach_m, self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges,
+                self._boxes, self.low, owner, sheet, self._of, self._values, walls,
+            )  # fmt: skip
+        self._laid = sheets == 1
+
+
+def sampled(track: Floats, step_m: float) -> Floats:
+    """(K, 2) places over a track (N, 2), at most so far from each other."""
+    leg, part, parts = divided(track, step_m)
+    t = ((part + 0.5) / parts)[:, None]
+    return np.asarray(track[leg] + t * (track[leg + 1] - track[leg]))
+
+
+def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:
+    """Whether cones about different places do not come nearer than ``more_m`` to each other below a cap."""
+    wide = [max(cap_m - height, 0.0) / slope for *_, height, slope in cones]
+    return all(
+        a[:2] == b[:2] or math.dist(a[:2], b[:2]) > reach_a + reach_b + more_m
+        for (a, reach_a), (b, reach_b) in combinations(zip(cones, wide, strict=True), 2)
+    )
+
+
+def box_of(wanted: Bools) -> tuple[int, int, int, int]:
+    """First row and column, and those after the last, of what is true; the first cell where nothing is."""
+    rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
+    if not len(rows):
+        return 0, 0, 1, 1
+    return int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1
+
+
+def _spans(wanted: Bools, fineness: int) -> Ints:
+    """(rows, 2) of cells cut so many times finer: of each row the first that is wanted, and that after the last."""
+    first, last = wanted.argmax(axis=1), wanted.shape[1] - wanted[:, ::-1].argmax(axis=1)
+    spans = np.stack([first, np.where(wanted.any(axis=1), last, first)], axis=-1) * fineness
+    return np.ascontiguousarray(np.repeat(spans, fineness, axis=0), np.int32)
+
+
+def _around(span: Ints, cols: int) -> Ints:
+    """(rows + 1, 2) of nodes: of each row the first that is no farther than `AROUND` from cells of the ``span``, and
+    that after the last."""
+    first, last = np.full(len(span) + 1, cols), np.zeros(len(span) + 1, np.int64)
+    some = span[:, 1] > span[:, 0]
+    left, right = np.where(some, span[:, 0] - AROUND, cols), np.where(some, span[:, 1] + AROUND + 1, 0)
+    for k in range(-AROUND, AROUND + 2):
+        low = max(k, 0)
+        high = max(min(len(span) + k, len(first)), low)
+        np.minimum(first[low:high], left[low - k : high - k], out=first[low:high])
+        np.maximum(last[low:high], right[low - k : high - k], out=last[low:high])
+    return np.ascontiguousarray(np.stack([first.clip(0, cols), last.clip(0, cols)], axis=-1), np.int32)

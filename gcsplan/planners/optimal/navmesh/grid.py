@@ -1,0 +1,232 @@
+"""The plane under a mission as a lattice of nodes, and what of it can be crossed below an altitude cap.
+
+The lattice is the terrain model's own, each cell cut into parts where more is wanted, because ground is bilinear in
+those cells and in no others: over a bilinear patch the two ways of cutting it into triangles give one linear surface
+that never lies above it and one that never lies below it. So every question has two answers: a mesh that holds
+every legal track (``low``: for bounds), and one in which every track is legal but for rounding (for paths).
+
+In the plane the raster's lines are not quite straight. Here they are, between the corners of blocks so short that
+nothing moves by more than a few centimetres, or millimetres, for which a `Fit` makes up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.optimal.navmesh.buffers import Scratch
+from gcsplan.planners.optimal.navmesh.clearance import Relief, box_of
+from gcsplan.planners.optimal.navmesh.interval_kernels import cut_storeys
+from gcsplan.planners.optimal.navmesh.mesh import Mesh
+from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent, nodes, places, slopes
+from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, TOP, TOP_2, UNDER, UNDER_2, narrow_rooms
+from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, Fit, Shapes, make_shapes
+from gcsplan.planners.problem import Problem
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Box = tuple[float, float, float, float]
+"""West, south, east, north; infinite: everywhere."""
+Reach = tuple[tuple[float, float], tuple[float, float], float]
+"""Two places, and how far from both together."""
+
+
+@dataclass(eq=False, slots=True)
+class Plane:
+    """A lattice over a part of the terrain model: node (j, i) lies at ``x[j, i]``, ``y[j, i]``, north of (j - 1, i).
+
+    ``tops``, ``grounds`` (rows, cols) AMSL, NaN where unknown: for bounds and for paths;
+    ``inside`` (rows - 1, cols - 1) the cells that are looked at. A cell of the terrain model is ``parts`` cells wide
+    and long here, or each cell here ``stride`` of those; ``block`` cells lie on straight lines.
+    """
+
+    problem: Problem
+    col0: int
+    row1: int
+    parts: int
+    stride: int
+    block: int
+    x: Floats
+    y: Floats
+    tops: tuple[Floats, Floats]
+    grounds: tuple[Floats, Floats]
+    inside: NDArray[np.bool_]
+    shapes: Shapes
+    fit: Fit
+    known: dict[tuple[float, float], tuple[float, float]] = field(default_factory=dict)
+    """Places that were asked for, and where they lie on the lattice."""
+    scratch: Scratch = field(default_factory=Scratch)
+    """Room for meshes that are no longer needed when the next one is made."""
+
+    def mesh(
+        self, cap_m: float, low: bool, fineness: int = 1, wanted: NDArray[np.bool_] | None = None, single: bool = False
+    ) -> Mesh:
+        """What can be crossed at or below ``cap_m``: by a bound's way (``low``: all of it) or by a path's.
+
+        ``wanted``: only these cells. ``single``: each free cell is a piece of its own.
+        """
+        return Relief(self, cap_m, low, fineness, wanted, whole=single).mesh(single=single)
+
+    def rooms(self, mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
+        """(cells,) the lowest and the highest altitude, ``top_m`` at most, that can be flown at in each cell of a mesh
+        for bounds that is as fine as its plane; the wrong way round where there is none."""
+        low = mesh.lowest().reshape(mesh.excess.shape[0] - 1, -1)
+        high = np.full(low.shape, top_m)
+        narrow_rooms(*self._laid(mesh), low, high)
+        return low.ravel(), high.ravel()
+
+    def storeys(
+        self, mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: float
+    ) -> tuple[Ints, Floats, Floats]:
+        """How many storeys each cell of such a mesh has (cells,), ``most`` at most, by what zones leave of what `rooms`
+        tells of it, and (cells, most) from where to where they go, ``spare_m`` wider."""
+        low, high = np.empty((len(low_m), most)), np.empty((len(low_m), most))
+        low[:, 0], high[:, 0] = low_m - spare_m, high_m + spare_m
+        count = (low_m <= high_m).astype(np.int32)
+        cut_storeys(*self._laid(mesh), spare_m, count, low, high)
+        return count, low, high
+
+    def _laid(self, mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Ints, bool]:
+        """Ground and places of such a mesh's nodes, the shapes that are shut for certain and their boxes there, and
+        whether the ground is the terrain model's own."""
+        rows, cols = mesh.excess.shape
+        ground = np.ascontiguousarray(self.grounds[0][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols])
+        boxes = self.boxes(mesh.row, mesh.col, 1, rows, cols)
+        return ground, *mesh.places(), *self.shapes.low, boxes, self.stride == 1
+
+    def zones(
+        self, low: bool, under: NDArray[np.bool_] | None, over: NDArray[np.bool_] | None
+    ) -> tuple[Floats, Floats]:
+        """The shapes' numbers and forms; zones that may not be passed ``under``, or ``over``, changed."""
+        zones, edges = self.shapes.low if low else self.shapes.high
+        first, other = self.shapes.owner.T
+        if under is not None or over is not None:
+            zones = zones.copy()
+        if under is not None:
+            zones[:, UNDER] *= under[first]
+            zones[:, UNDER_2] *= under[other]
+        if over is not None:
+            zones[~over[first], TOP] = np.inf
+            zones[~over[other] & (zones[:, PAIR] > 0.0), TOP_2] = np.inf
+        return zones, edges
+
+    def boxes(self, row: int, col: int, fineness: int, rows: int, cols: int) -> Ints:
+        """The shapes' boxes on a part of the lattice, cut finer, of so many nodes."""
+        boxes = (self.shapes.boxes - np.array([col, col, row, row])) * fineness
+        boxes = boxes + np.array([0, fineness - 1, 0, fineness - 1])
+        return np.asarray(boxes.clip([0, -1, 0, -1], [cols, cols - 2, rows, rows - 2]), np.int32)
+
+    def steep(self, row: int, col: int, last_row: int, last_col: int) -> Floats:
+        """The steepest slope of the cells around each node of a part of the lattice."""
+        less_row, less_col = min(row, 1), min(col, 1)
+        part = np.s_[row - less_row : last_row + 1, col - less_col : last_col + 1]
+        around = slopes(self.tops[1][part], self.x[part], self.y[part])
+        return np.ascontiguousarray(around[less_row:, less_col:][: last_row - row, : last_col - col])
+
+    def begins(self, other: Plane) -> tuple[int, int]:
+        """Row and column, counted in cells as large as its own from where another plane begins, at which it does."""
+        scale = self.parts / self.stride
+        return round(scale * (other.row1 - self.row1)), round(scale * (self.col0 - other.col0))
+
+    def at(self, place: tuple[float, float]) -> tuple[float, float]:
+        """Column and row of a place on this lattice."""
+        if place not in self.known:
+            c, r = self.all_at(np.array([place]))[0].tolist()
+            self.known[place] = c, r
+        return self.known[place]
+
+    def all_at(self, places: Floats) -> Floats:
+        """(N, 2) the same of places (N, 2)."""
+        at = self.problem.airspace.surface.grid(places[:, 0], places[:, 1])
+        return self.parts / self.stride * np.stack([at[:, 0] - self.col0, self.row1 - at[:, 1]], axis=-1)
+
+
+def make_plane(
+    problem: Problem,
+    box: Box,
+    parts: int = 1,
+    stride: int = 1,
+    whole: int = 1,
+    reach: Reach | None = None,
+    fit: Fit = LOOSE,
+) -> Plane:
+    """The lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
+
+    ``parts``: into how many cells a side the terrain model's are cut; or ``stride``: how many become one, of lattices
+    that are ``whole`` cells of the terrain model wide and long, times some number. ``reach``: only what is no farther
+    from two places together is looked at.
+    """
+    return _lattice(problem, extent(problem, box), parts, stride, whole, reach, fit)
+
+
+def extent(problem: Problem, box: Box) -> Extent:
+    """The terrain model's nodes that a box needs."""
+    surface = problem.airspace.surface
+    rows, cols = surface.ground_m.shape
+    west, south, east, north = box
+    if math.isinf(west):
+        return 0, 0, cols - 1, rows - 1
+    e, n = np.meshgrid(np.linspace(west, east, 5), np.linspace(south, north, 5))
+    at = surface.grid(e.ravel(), n.ravel())
+    low, high = at.min(axis=0).clip(-2.0, [cols, rows]), at.max(axis=0).clip(-2.0, [cols, rows])
+    col0, row0 = (min(max(math.floor(v) - 1, 0), m - 2) for v, m in zip(low, (cols, rows), strict=True))
+    col1, row1 = (min(math.ceil(v) + 1, m - 1) for v, m in zip(high, (cols, rows), strict=True))
+    return col0, row0, max(col1, col0 + 1), max(row1, row0 + 1)
+
+
+def finer_plane(
+    plane: Plane, cells: NDArray[np.bool_], parts: int, stride: int, fit: Fit
+) -> tuple[Plane, NDArray[np.bool_]]:
+    """A finer lattice over some of a plane's cells, and which of its cells these are; see `make_plane`."""
+    cols = plane.problem.airspace.surface.ground_m.shape[1]
+    row, col, last_row, last_col = box_of(cells)
+    span = plane.stride / plane.parts  # a cell's width in the terrain model's
+    col0, col1 = plane.col0 + math.floor(span * col), min(plane.col0 + math.ceil(span * last_col), cols - 1)
+    row0, row1 = max(plane.row1 - math.ceil(span * last_row), 0), plane.row1 - math.floor(span * row)
+    finer = _lattice(plane.problem, (col0, row0, col1, row1), parts, stride, plane.stride, None, fit)
+    return finer, on_finer(plane, cells, finer)
+
+
+def on_finer(plane: Plane, cells: NDArray[np.bool_], finer: Plane) -> NDArray[np.bool_]:
+    """(rows - 1, cols - 1) a plane's cells on a finer lattice that lies over all of them."""
+    ratio = plane.stride * finer.parts // (plane.parts * finer.stride)
+    row, col, last_row, last_col = box_of(cells)
+    first_row, first_col = (ratio * first - more for first, more in zip((row, col), finer.begins(plane), strict=True))
+    small = np.repeat(np.repeat(cells[row:last_row, col:last_col], ratio, axis=0), ratio, axis=1)
+    out = np.zeros((finer.x.shape[0] - 1, finer.x.shape[1] - 1), np.bool_)
+    room = out[first_row:, first_col:][: small.shape[0], : small.shape[1]]
+    room[:] = small[: room.shape[0], : room.shape[1]]
+    return out
+
+
+def _lattice(
+    problem: Problem, over: Extent, parts: int, stride: int, whole: int, reach: Reach | None, fit: Fit
+) -> Plane:
+    """The lattice over an `extent`."""
+    surface = problem.airspace.surface
+    col0, _, _, row1 = over
+    grounds = nodes(surface.ground_m, over, parts, stride, whole)
+    tops = grounds
+    if surface.top_m is not surface.ground_m:
+        tops = nodes(surface.top_m, over, parts, stride, whole)
+    shape = tops[0].shape
+    block = max(problem.airspace.straight_cells(fit.bent_m) * parts // stride, 1)
+    x, y, looked_at = places(surface.grid, col0, row1, shape, parts / stride, block, reach)
+    return Plane(
+        problem,
+        col0,
+        row1,
+        parts,
+        stride,
+        block,
+        x,
+        y,
+        tops,
+        grounds,
+        looked_at,
+        make_shapes(problem, x, y, fit),
+        fit,
+    )

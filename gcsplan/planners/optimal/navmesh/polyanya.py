@@ -1,0 +1,353 @@
+"""Shortest paths in the plane, exact on a mesh of convex pieces: Polyanya (Cui, Harabor, Grastien, IJCAI 2017).
+
+A search node is an interval on a portal together with the last corner of the path, its *root*: the whole interval is
+seen from there. Pushed through the piece behind, it becomes an interval for each portal that it sees; where an end
+of the interval is a corner of a wall, the path may turn there, and what lies beyond in the piece is reached from it.
+
+Two things keep their number down, and take no shortest path away. Intervals of one root that meet on a portal are
+made one again before they are pushed on; so that they meet, nodes are taken in bands of about equal promise, and in a
+band by how near they are. And an interval is dropped where another root reaches all of it for less.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.compiled import kernel
+from gcsplan.planners.optimal.navmesh.polyanya_nodes import (
+    AHEAD,
+    CAME,
+    COST,
+    GONE,
+    LEFT,
+    LEFT_X,
+    LEFT_Y,
+    NEXT,
+    PARENT,
+    PIECE,
+    PORTAL,
+    RIGHT,
+    RIGHT_X,
+    RIGHT_Y,
+    ROOT,
+    ROOT_X,
+    ROOT_Y,
+    SAME_M,
+    TURNS,
+    ahead_of,
+    beaten,
+    end_of,
+    held,
+    join,
+    lies_on,
+    off_of,
+    place_on,
+    pop,
+    push,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+Names = NDArray[np.int64]
+
+BAND = 0.005
+"""How wide a band of promise is, as a part of the straight way to the goal."""
+BANDS = 1e8
+"""In metres more than any way; what it leaves of a number's precision orders the nodes of a band."""
+MOST_TURNS = 8
+"""No more pieces than this meet at one place of a sheet; who passes more of them turns in a circle around it."""
+
+
+@kernel(
+    "i4[] f8[,] i8[,] i4[,] i4[] f8[] i8[] i4[] i4[] f8[,] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[]"
+    " f8[,] i4[,] i8[,] f8[] i4[] f8[,] f8[,]"
+)
+def search(
+    start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats, origin: Names, first: Ints,
+    widest: Ints, span: Floats, sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float,
+    slack: float, most: int, remaining: Floats, met: Floats,
+    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats, spokes: Floats,
+) -> int:  # fmt: skip
+    """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
+
+    ``order`` (start[p] : start[p + 1]) lists the portals of piece p. ``sources_at`` (K, 3) x, y, cost so far, each in
+    piece ``sources_piece`` (K,); a goal in any of ``goal_piece``. ``best``, ``origin`` (names,), ``first`` (2 *
+    portals,) and ``widest`` (portals,) zeros; ``span`` (portals, 2); ``node`` (room, 8), ``link`` (room, 6), ``name``
+    (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining`` (pieces,): no way on from a piece's entrance
+    is shorter. ``slack`` >= 0: go on after the goal is reached, as far as that much (as a part of the length) beyond
+    it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. ``spokes`` (portals,
+    8), zeros, where portals of a piece may lie on each other, from sheet to sheet, or else empty. Returns the number of
+    corners, ends included, with ``out[0, 2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than
+    ``limit``; -1: no room left; -2: more than ``most`` nodes were opened, paths shorter than ``out[0, 0]`` all of them.
+    """
+    room = len(heap)
+    gx, gy = goal[0], goal[1]
+    count = size = opened = 0
+    reached = -1
+    flood, guided, sheets = len(met) > 0, len(remaining) > 0, len(spokes) > 0
+    far, shortest = limit, np.inf
+    band = max(BAND * math.sqrt((gx - sources_at[0, 0]) ** 2 + (gy - sources_at[0, 1]) ** 2), 1e-3)
+    # What a node pushes is listed here as from, to and root; sources push all portals of their piece.
+    current, key = -1, 0.0
+    source = 0
+    while True:
+        if source < len(sources_piece):
+            rx, ry, cost = sources_at[source, 0], sources_at[source, 1], sources_at[source, 2]
+            piece, came, all_round = sources_piece[source], -1, True
+            lx = ly = qx = qy = 0.0
+            left = right = np.int64(-1)
+            root = np.int64(-2 - source)
+            parent, turns = np.int64(-1), 0
+            source += 1
+        else:
+            if size == 0 or math.floor(heap[0] / BANDS) * band >= limit:
+                break
+            current, key = ids[0], heap[0]
+            size = pop(heap, ids, size)
+            piece, came = link[current, PIECE], link[current, CAME]
+            if piece == GONE:
+                continue
+            link[current, PIECE] = GONE
+            if node[current, COST] + node[current, AHEAD] >= limit:
+                continue
+            rx, ry, cost = node[current, ROOT_X], node[current, ROOT_Y], node[current, COST]
+            root = name[current, ROOT]
+            if root >= 0 and cost + 1.0 > best[root] + SAME_M:
+                continue
+            p = link[current, PORTAL]
+            if join(node, link, name, first, 2 * p + (1 if joins[p, 1] == piece else 0), current):
+                s0 = place_on(ends, p, node[current, RIGHT_X], node[current, RIGHT_Y])
+                s1 = place_on(ends, p, node[current, LEFT_X], node[current, LEFT_Y])
+                s0, s1 = min(s0, s1), max(s0, s1)
+                if s1 - s0 > span[p, 1] - span[p, 0]:
+                    widest[p], span[p, 0], span[p, 1] = current + 1, s0, s1
+            other = widest[p] - 1
+            if other != current and span[p, 0] == 0.0 and span[p, 1] == 1.0:
+                ax, ay = node[current, RIGHT_X], node[current, RIGHT_Y]
+                bx, by = node[current, LEFT_X], node[current, LEFT_Y]
+                if beaten(node, other, rx, ry, cost, off_of(rx, ry, ax, ay, bx, by), ax, ay, bx, by):
+                    continue
+            lx, ly, qx, qy = (
+                node[current, LEFT_X],
+                node[current, LEFT_Y],
+                node[current, RIGHT_X],
+                node[current, RIGHT_Y],
+            )
+            left, right = name[current, LEFT], name[current, RIGHT]
+            parent, turns = np.int64(current), link[current, TURNS]
+            all_round = False
+            opened += 1
+            if opened > most:
+                out[0, 0] = math.floor(key / BANDS) * band
+                return -2
+        width_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
+        width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
+        if width_l < SAME_M or width_r < SAME_M:
+            all_round = True  # the root is a corner of this convex piece
+            if turns >= (2 * MOST_TURNS if sheets else MOST_TURNS):
+                continue
+            turns += 1
+            if sheets and current >= 0:
+                # One may come round a place into a piece from several sheets: once is enough.
+                p = link[current, PORTAL]
+                k = end_of(ends, p, rx, ry)
+                if k >= 0 and 0.0 < spokes[p, 4 + k + (2 if joins[p, 1] == piece else 0)] <= cost + 1.0 + SAME_M:
+                    continue
+                for at in range(start[piece], start[piece + 1]):
+                    p = order[at]
+                    k = end_of(ends, p, rx, ry)
+                    if k >= 0:
+                        spokes[p, 4 + k + (2 if joins[p, 1] == piece else 0)] = cost + 1.0
+        else:
+            turns = 0
+        is_goal = False
+        for k in range(len(goal_piece)):
+            if goal_piece[k] == piece:
+                is_goal = True
+        for at in range(start[piece] - (1 if is_goal else 0), start[piece + 1]):
+            to_goal = at < start[piece]
+            behind = p = -1
+            forward = True
+            if to_goal:
+                ax, ay, bx, by = gx, gy, gx, gy
+                va = vb = np.int64(-1)
+            else:
+                p = order[at]
+                # From its right end a to its left end b, as seen from inside.
+                forward = joins[p, 0] == piece
+                if forward:
+                    behind = joins[p, 1]
+                    ax, ay, bx, by = ends[p, 0], ends[p, 1], ends[p, 2], ends[p, 3]
+                    va, vb = names[p, 0], names[p, 1]
+                else:
+                    behind = joins[p, 0]
+                    ax, ay, bx, by = ends[p, 2], ends[p, 3], ends[p, 0], ends[p, 1]
+                    va, vb = names[p, 1], names[p, 0]
+                if behind == came:
+                    continue
+            t0, t1, off = 0.0, 1.0, 0.0
+            at_a = at_b = 0.0
+            along = -1  # the end at which a portal begins that the root sees edge-on
+            if not to_goal:
+                ex, ey = bx - ax, by - ay
+                long = math.sqrt(ex * ex + ey * ey)
+                if abs(ex * (ry - ay) - ey * (rx - ax)) <= SAME_M * long:
+                    at_a = math.sqrt((rx - ax) ** 2 + (ry - ay) ** 2)
+                    at_b = math.sqrt((rx - bx) ** 2 + (ry - by) ** 2)
+                    if min(at_a, at_b) <= SAME_M and not all_round:
+                        continue  # back to the root along an edge, and round and round
+                    if min(at_a, at_b) > SAME_M and max(at_a, at_b) >= long:
+                        # Nothing behind it is seen from here; whoever goes on behind it turns at its end, or at a
+                        # portal's that is nearer to the root.
+                        along = 0 if at_a < at_b else 1
+                        if not all_round:
+                            # Nor is its near end, where the view through the interval does not reach that far round.
+                            ux, uy = (ax - rx, ay - ry) if along == 0 else (bx - rx, by - ry)
+                            if (qx - rx) * uy - (qy - ry) * ux < -SAME_M * width_r or (lx - rx) * uy - (
+                                ly - ry
+                            ) * ux > SAME_M * width_l:
+                                along = -1
+            if along >= 0:
+                t0, t1 = 1.0, 0.0
+            elif sheets and not all_round and not to_goal and lies_on(ax, ay, bx, by, qx, qy, lx, ly):
+                # Back to where one came from, on another sheet: round one end of what one came through.
+                t0, t1 = 2.0, -1.0
+            elif not all_round:
+                # Signed distances off the two rays; beyond a ray is beyond what the root sees.
+                ra = ((qx - rx) * (ay - ry) - (qy - ry) * (ax - rx)) / width_r
+                rb = ((qx - rx) * (by - ry) - (qy - ry) * (bx - rx)) / width_r
+                la = ((lx - rx) * (ay - ry) - (ly - ry) * (ax - rx)) / width_l
+                lb = ((lx - rx) * (by - ry) - (ly - ry) * (bx - rx)) / width_l
+                if rb < -SAME_M:
+                    t0 = 2.0
+                elif ra < -SAME_M:
+                    t0 = min(max(ra / (ra - rb), 0.0), 1.0)
+                if la > SAME_M:
+                    t1 = -1.0
+                elif lb > SAME_M:
+                    t1 = min(max(la / (la - lb), 0.0), 1.0)
+            for part in range(3):
+                # 0: what is seen; 1: right of it, round the right end; 2: left of it, round the left end.
+                x0, y0, x1, y1, n0, n1 = ax, ay, bx, by, va, vb
+                nx, ny, ncost, nroot = rx, ry, cost, root
+                s0, s1 = 0.0, 1.0
+                if along >= 0:
+                    if part > 0:
+                        continue
+                    nx, ny, nroot = (ax, ay, va) if along == 0 else (bx, by, vb)
+                    if nroot < 0:
+                        continue
+                    ncost = cost + min(at_a, at_b)
+                elif part == 0:
+                    if t0 > t1:
+                        continue
+                    s0, s1 = t0, t1
+                    if t0 > 0.0:
+                        x0, y0, n0 = ax + t0 * (bx - ax), ay + t0 * (by - ay), np.int64(-1)
+                    if t1 < 1.0:
+                        x1, y1, n1 = ax + t1 * (bx - ax), ay + t1 * (by - ay), np.int64(-1)
+                elif part == 1:
+                    if all_round or t0 == 0.0 or right < 0:
+                        continue
+                    nx, ny, ncost, nroot = qx, qy, cost + width_r, right
+                    s1 = min(t0, 1.0)
+                    if t0 < 1.0:
+                        x1, y1, n1 = ax + t0 * (bx - ax), ay + t0 * (by - ay), np.int64(-1)
+                else:
+                    if all_round or t1 == 1.0 or left < 0:
+                        continue
+                    nx, ny, ncost, nroot = lx, ly, cost + width_l, left
+                    s0 = max(t1, 0.0)
+                    if t1 > 0.0:
+                        x0, y0, n0 = ax + t1 * (bx - ax), ay + t1 * (by - ay), np.int64(-1)
+                if nroot >= 0 and nroot == root:
+                    if ncost + 1.0 > best[nroot] + SAME_M:
+                        continue
+                elif nroot >= 0:
+                    # Who comes as dear from elsewhere has nothing to add: along a straight wall with many corners that
+                    # would double the ways at each.
+                    if best[nroot] == 0.0 or ncost + 1.0 < best[nroot] - SAME_M:
+                        best[nroot], origin[nroot] = ncost + 1.0, root
+                    elif ncost + 1.0 > best[nroot] + SAME_M or origin[nroot] != root:
+                        continue
+                if to_goal:
+                    ahead = math.sqrt((gx - nx) ** 2 + (gy - ny) ** 2)
+                else:
+                    off = off_of(nx, ny, x0, y0, x1, y1)
+                    ahead = off + remaining[behind] if guided else 0.0
+                    if ncost + ahead >= limit:
+                        continue
+                    ahead = max(ahead, ahead_of(nx, ny, x1, y1, x0, y0, gx, gy))
+                if ncost + ahead >= limit:
+                    continue
+                if sheets and not to_goal:
+                    # Round a place there are many ways from sheet to sheet: what meets there is passed once, each way.
+                    k = end_of(ends, p, nx, ny)
+                    if k >= 0:
+                        k += 2 if forward else 0
+                        if 0.0 < spokes[p, k] <= ncost + 1.0 + SAME_M:
+                            continue
+                        spokes[p, k] = ncost + 1.0
+                if not to_goal:
+                    if not forward:
+                        s0, s1 = 1.0 - s1, 1.0 - s0
+                    here = first[2 * p + (1 if forward else 0)]
+                    if sheets and held(node, link, name, ends, p, here, nroot, ncost, s0, s1):
+                        continue
+                    if widest[p] > 0 and span[p, 0] <= s0 and s1 <= span[p, 1]:
+                        other = widest[p] - 1
+                        if beaten(node, other, nx, ny, ncost, off, x0, y0, x1, y1):
+                            continue
+                        # As wide, and cheaper at its ends: what comes later is held to this one.
+                        wider = s0 == span[p, 0] and s1 == span[p, 1] and ncost + off < node[other, COST]
+                    else:
+                        wider = widest[p] == 0 or s1 - s0 > span[p, 1] - span[p, 0]
+                    if wider and count < room:
+                        widest[p], span[p, 0], span[p, 1] = count + 1, s0, s1
+                if flood and not to_goal:
+                    met[p] = min(met[p], ncost + off)
+                if count >= room:
+                    return -1
+                node[count, ROOT_X], node[count, ROOT_Y], node[count, COST] = nx, ny, ncost
+                node[count, LEFT_X], node[count, LEFT_Y] = x1, y1
+                node[count, RIGHT_X], node[count, RIGHT_Y] = x0, y0
+                node[count, AHEAD] = ahead
+                link[count, PIECE], link[count, CAME] = -1 if to_goal else behind, piece
+                link[count, PARENT], link[count, TURNS] = parent, turns
+                name[count, LEFT], name[count, RIGHT], name[count, ROOT] = n1, n0, nroot
+                if to_goal:
+                    if ncost + ahead < shortest:
+                        reached, shortest = count, ncost + ahead
+                        limit = min(far, shortest * (1.0 + max(slack, 0.0)))
+                else:
+                    list_of = 2 * p + (1 if joins[p, 1] == behind else 0)
+                    link[count, PORTAL], link[count, NEXT] = p, first[list_of] - 1
+                    first[list_of] = count + 1
+                    near = min(ncost + off, 0.99 * BANDS)
+                    size = push(heap, ids, size, math.floor((ncost + ahead) / band) * BANDS + near, count)
+                count += 1
+    if reached < 0:
+        return 0
+    # Corners from the goal back.
+    current = reached
+    length = node[current, COST] + node[current, AHEAD]
+    out[0, 0], out[0, 1] = gx, gy
+    n = 1
+    at = current
+    number = 0
+    last = np.int64(-1 - 2**40)
+    while at >= 0:
+        if name[at, ROOT] != last:
+            last = name[at, ROOT]
+            if n >= len(out):
+                return -1
+            out[n, 0], out[n, 1] = node[at, ROOT_X], node[at, ROOT_Y]
+            n += 1
+            number = -2 - last
+        at = link[at, PARENT]
+    out[0, 2], out[1, 2] = number, length
+    return n

@@ -1,0 +1,197 @@
+"""Intervals on portals and the roots that see them: what `polyanya` searches over."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.compiled import device
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Names = NDArray[np.int64]
+
+ROOT_X, ROOT_Y, COST, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, AHEAD = range(8)
+PIECE, CAME, PARENT, TURNS, PORTAL, NEXT = range(6)
+LEFT, RIGHT, ROOT = range(3)
+
+SAME_M = 1e-6
+"""Places nearer than this are one."""
+GONE = -2
+"""The piece of a node that needs not be looked at any more."""
+
+
+@device
+def push(heap: Floats, ids: Ints, size: int, key: float, item: int) -> int:
+    k = size
+    while k > 0:
+        up = (k - 1) >> 1
+        if heap[up] <= key:
+            break
+        heap[k], ids[k] = heap[up], ids[up]
+        k = up
+    heap[k], ids[k] = key, item
+    return size + 1
+
+
+@device
+def pop(heap: Floats, ids: Ints, size: int) -> int:
+    size -= 1
+    key, item = heap[size], ids[size]
+    k = 0
+    while True:
+        down = 2 * k + 1
+        if down >= size:
+            break
+        if down + 1 < size and heap[down + 1] < heap[down]:
+            down += 1
+        if key <= heap[down]:
+            break
+        heap[k], ids[k] = heap[down], ids[down]
+        k = down
+    heap[k], ids[k] = key, item
+    return size
+
+
+@device
+def ahead_of(rx: float, ry: float, lx: float, ly: float, qx: float, qy: float, gx: float, gy: float) -> float:
+    """The shortest way from a root through an interval to the goal, nothing else in the way."""
+    ex, ey = qx - lx, qy - ly
+    side_r = ex * (ry - ly) - ey * (rx - lx)
+    side_g = ex * (gy - ly) - ey * (gx - lx)
+    if abs(side_r) <= SAME_M * math.sqrt(ex * ex + ey * ey):
+        # Seen edge-on, left and right may be the wrong way round.
+        to_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
+        to_q = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
+        if max(to_l, to_q) < math.sqrt(ex * ex + ey * ey):
+            return math.sqrt((gx - rx) ** 2 + (gy - ry) ** 2)
+        by_l = to_l + math.sqrt((gx - lx) ** 2 + (gy - ly) ** 2)
+        return min(by_l, to_q + math.sqrt((gx - qx) ** 2 + (gy - qy) ** 2))
+    if side_r * side_g > 0.0:  # on the same side: the goal's mirror image
+        square = ex * ex + ey * ey
+        if square > 0.0:
+            gx, gy = gx + 2.0 * side_g * ey / square, gy - 2.0 * side_g * ex / square
+    dx, dy = gx - rx, gy - ry
+    if dx * (ly - ry) - dy * (lx - rx) < 0.0:  # the left end lies right of the straight way
+        return math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2) + math.sqrt((gx - lx) ** 2 + (gy - ly) ** 2)
+    if dx * (qy - ry) - dy * (qx - rx) > 0.0:
+        return math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2) + math.sqrt((gx - qx) ** 2 + (gy - qy) ** 2)
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@device
+def off_of(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """How far a point is from a segment."""
+    ex, ey = bx - ax, by - ay
+    square = ex * ex + ey * ey
+    t = 0.0
+    if square > 0.0:
+        t = min(max(((px - ax) * ex + (py - ay) * ey) / square, 0.0), 1.0)
+    return math.sqrt((ax + t * ex - px) ** 2 + (ay + t * ey - py) ** 2)
+
+
+@device
+def lies_on(ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float) -> bool:
+    """Whether segments lie on one line, and on each other in more than a place."""
+    ex, ey = bx - ax, by - ay
+    long = math.sqrt(ex * ex + ey * ey)
+    if long <= SAME_M or abs(ex * (cy - ay) - ey * (cx - ax)) > SAME_M * long:
+        return False
+    if abs(ex * (dy - ay) - ey * (dx - ax)) > SAME_M * long:
+        return False
+    c, d = (ex * (cx - ax) + ey * (cy - ay)) / long, (ex * (dx - ax) + ey * (dy - ay)) / long
+    return bool(min(max(c, d), long) - max(min(c, d), 0.0) > SAME_M)
+
+
+@device
+def end_of(ends: Floats, p: int, x: float, y: float) -> int:
+    """Which end of a portal a place is, 0 or 1; -1 if neither."""
+    for k in range(2):
+        if (ends[p, 2 * k] - x) ** 2 + (ends[p, 2 * k + 1] - y) ** 2 <= SAME_M * SAME_M:
+            return k
+    return -1
+
+
+@device
+def place_on(ends: Floats, p: int, x: float, y: float) -> float:
+    """Where on a portal a place is, as a part of it."""
+    ex, ey = ends[p, 2] - ends[p, 0], ends[p, 3] - ends[p, 1]
+    square = ex * ex + ey * ey
+    if square <= SAME_M * SAME_M:
+        return 0.0
+    t = ((x - ends[p, 0]) * ex + (y - ends[p, 1]) * ey) / square
+    return 0.0 if t < 1e-9 else 1.0 if t > 1.0 - 1e-9 else t
+
+
+@device
+def held(
+    node: Floats, link: Ints, name: Names, ends: Floats, p: int, first: int, root: np.int64, cost: float, s0: float,
+    s1: float,
+) -> bool:  # fmt: skip
+    """Whether a node of a portal's list (numbers from 1) has this root, too, for no more, and holds the interval."""
+    k = first - 1
+    while k >= 0:
+        if link[k, PIECE] != GONE and name[k, ROOT] == root and node[k, COST] <= cost + SAME_M:
+            a = place_on(ends, p, node[k, RIGHT_X], node[k, RIGHT_Y])
+            b = place_on(ends, p, node[k, LEFT_X], node[k, LEFT_Y])
+            if min(a, b) <= s0 + 1e-9 and s1 - 1e-9 <= max(a, b):
+                return True
+        k = link[k, NEXT]
+    return False
+
+
+@device
+def join(node: Floats, link: Ints, name: Names, first: Ints, list_of: int, current: int) -> bool:
+    """Make the interval of a node one with those on its portal that touch it and have the same root; whether any do.
+
+    Those are gone; so are from the list (numbers from 1) those that have been looked at.
+    """
+    joined, again = False, True
+    while again:
+        again = False
+        before, k = -1, first[list_of] - 1
+        while k >= 0:
+            after = link[k, NEXT]
+            drop = link[k, PIECE] == GONE
+            if not drop and k != current and name[k, ROOT] == name[current, ROOT]:
+                same = abs(node[k, COST] - node[current, COST]) < SAME_M
+                for side in range(2):
+                    # Its right end is this one's left end, or the other way round.
+                    mine, its = (LEFT_X, RIGHT_X) if side == 0 else (RIGHT_X, LEFT_X)
+                    dx, dy = node[k, its] - node[current, mine], node[k, its + 1] - node[current, mine + 1]
+                    if same and not drop and dx * dx + dy * dy < SAME_M * SAME_M:
+                        node[current, mine], node[current, mine + 1] = node[k, mine], node[k, mine + 1]
+                        name[current, side] = name[k, side]
+                        link[k, PIECE] = GONE
+                        drop = joined = again = True
+            if drop or k == current:
+                if before < 0:
+                    first[list_of] = after + 1
+                else:
+                    link[before, NEXT] = after
+            else:
+                before = k
+            k = after
+    return joined
+
+
+@device
+def beaten(
+    node: Floats, other: int, rx: float, ry: float, cost: float, off: float, ax: float, ay: float, bx: float, by: float
+) -> bool:
+    """Whether another node ``other``, whose interval holds this one from a to b, reaches every place of it for less.
+
+    ``off``: how far the root is from the interval at least.
+    """
+    ox, oy, known = node[other, ROOT_X], node[other, ROOT_Y], node[other, COST]
+    to_a = known + math.sqrt((ax - ox) ** 2 + (ay - oy) ** 2)
+    to_b = known + math.sqrt((bx - ox) ** 2 + (by - oy) ** 2)
+    if max(to_a, to_b) < cost + off - SAME_M:
+        return True
+    if known < cost:
+        return bool(known + math.sqrt((rx - ox) ** 2 + (ry - oy) ** 2) < cost - SAME_M)
+    # The places that are nearer to one of two points by some length are convex: the ends tell of all between.
+    own_a, own_b = math.sqrt((ax - rx) ** 2 + (ay - ry) ** 2), math.sqrt((bx - rx) ** 2 + (by - ry) ** 2)
+    return bool(to_a < cost + own_a - SAME_M and to_b < cost + own_b - SAME_M)

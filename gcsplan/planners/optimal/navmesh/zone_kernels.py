@@ -1,0 +1,420 @@
+"""Zones laid on a lattice: cells that they shut, as a whole or in part, get walls of their own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.compiled import device, kernel
+from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
+from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
+PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, NUMBERS = range(10, 17)
+BESIDE = 2.0
+"""Datum of a level over all ground within reach, for paths; 1 is over that below, 0 none."""
+MOST_BESIDE = 6
+"""Nodes that are looked at for that, a side and at most; of more every second, third … is."""
+
+
+@device
+def depth(zones: Floats, edges: Floats, z: int, x: float, y: float) -> float:
+    """How far a point is inside a zone's convex shape: concave, above 0 inside."""
+    if zones[z, RADIUS] >= 0.0:
+        return zones[z, RADIUS] - math.sqrt((x - zones[z, EAST]) ** 2 + (y - zones[z, NORTH]) ** 2)
+    depth = np.inf
+    for k in range(int(zones[z, FIRST]), int(zones[z, LAST])):
+        depth = min(depth, _within(edges, k, x, y))
+    return depth
+
+
+@device
+def _within(edges: Floats, k: int, x: float, y: float) -> float:
+    """How far a point is inside a disc or a half-plane."""
+    if edges[k, 3] > 0.0:
+        return edges[k, 0] - math.sqrt((x - edges[k, 1]) ** 2 + (y - edges[k, 2]) ** 2)
+    return edges[k, 0] - edges[k, 1] * x - edges[k, 2] * y
+
+
+@device
+def level(zones: Floats, z: int, level: int, ground: float) -> float:
+    """A level of a zone where the ground is so high; its datum is told two numbers further on."""
+    return zones[z, level] + (ground if zones[z, level + 2] > 0.0 else 0.0)
+
+
+@device
+def _level_at(zones: Floats, z: int, at: int, ground: Floats, up: Floats, down: Floats, j: int, i: int) -> float:
+    """The same at a node, of a datum `BESIDE`, too: ``up``, ``down`` how far the ground rises and falls within
+    reach."""
+    value = level(zones, z, at, ground[j, i])
+    if zones[z, at + 2] < BESIDE:
+        return value
+    return value + up[j, i] if at in (TOP, TOP_2) else value - down[j, i]
+
+
+@device
+def _open(
+    zones: Floats, z: int, floor: float, allowed: float, ground: Floats, up: Floats, down: Floats, j: int, i: int,
+    over: bool, under: bool,
+) -> bool:  # fmt: skip
+    """Whether there is an altitude to fly at, over a zone, under it, or between the two of a pair."""
+    bottom, top = (
+        _level_at(zones, z, BOTTOM, ground, up, down, j, i), _level_at(zones, z, TOP, ground, up, down, j, i)
+    )  # fmt: skip
+    if zones[z, PAIR] == 0.0:
+        return (over and top <= allowed) or (under and floor <= bottom)
+    bottom_2, top_2 = (
+        _level_at(zones, z, BOTTOM_2, ground, up, down, j, i), _level_at(zones, z, TOP_2, ground, up, down, j, i)
+    )  # fmt: skip
+    under_2 = zones[z, UNDER_2] > 0.0
+    if max(top, top_2) <= allowed or (under and under_2 and floor <= min(bottom, bottom_2)):
+        return True
+    if under_2 and top <= min(bottom_2, allowed) and floor <= bottom_2:
+        return True
+    return under and top_2 <= min(bottom, allowed) and floor <= bottom
+
+
+@kernel(
+    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] i8 f8 b1 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] i8 i4[,] f8[,] i8"
+)
+def stamp_zones(
+    around: Ints, span: Ints, excess: Floats, floor: Floats, ground: Floats, steep: Floats, fineness: int, reach: float,
+    exact: bool, up: Floats, down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, low: bool,
+    owner: Ints, sheet: int, of: Ints, values: Floats, count: int,
+) -> int:  # fmt: skip
+    """Give cells that zones shut walls of their own: how deep in the shape they lie. Returns how many walls there are.
+
+    ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells each may touch; ``around``,
+    ``span``, ``owner``, ``of``, ``values`` as in `mesh_kernels`, of the ``sheet``, which has none yet: a cell's owner
+    is passed over on the first and under on the second. ``low``: only what is shut for certain; else all that may be
+    shut. ``count``: walls that there are.
+
+    For paths, ``reach`` is within which a zone's ground tells its levels: at each node (``up``, ``down``, room for it)
+    as ``steep`` (of the nodes of a lattice ``fineness`` times coarser) lets it be, or, ``exact``, as nodes are.
+    """
+    for j in range(len(span)):
+        for i in range(around[j, 0], min(around[j, 1], excess.shape[1] - 1)):
+            of[j * (excess.shape[1] - 1) + i, sheet] = 0
+    wall = values[len(values) - 1]
+    for z in range(len(zones)):
+        if _looks_beside(zones, z):
+            if exact and zones[z, PAIR] == 0.0:
+                _look_beside(around, excess, ground, x, y, zones, edges, boxes, z, reach, up, down)
+            else:
+                _guess_beside(around, steep, fineness, boxes, z, reach, up, down)
+        for j in range(boxes[z, 2], boxes[z, 3] + 1):
+            for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
+                cell = j * (excess.shape[1] - 1) + i
+                if sheet > 0 and owner[cell] == 0:
+                    continue
+                if min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0:
+                    continue  # nothing there is free anyway
+                mine = len(owner) > 0 and owner[cell] == z + 1
+                over, under = not mine or sheet == 0, zones[z, UNDER] > 0.0 and (not mine or sheet > 0)
+                deepest, shallowest = -np.inf, np.inf
+                ways = 0
+                for k in range(4):
+                    jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
+                    wall[k] = depth(zones, edges, z, x[jj, ii], y[jj, ii])
+                    deepest, shallowest = max(deepest, wall[k]), min(shallowest, wall[k])
+                    allowed = floor[jj, ii] - excess[jj, ii]
+                    if _open(zones, z, floor[jj, ii], allowed, ground, up, down, jj, ii, over, under):
+                        ways += 1
+                if ways == 4:
+                    continue
+                if shallowest > 0.0 and zones[z, PAIR] == 0.0 and not under and zones[z, TOP] < np.inf:
+                    # The whole cell is under a lid, which is what must be flown over: bilinear, as ground is.
+                    twist = _twist(floor, ground, j, i) if zones[z, TOP_AGL] > 0.0 else 0.0
+                    for k in range(4):
+                        jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
+                        wall[k] = _level_at(zones, z, TOP, ground, up, down, jj, ii) - floor[jj, ii] + excess[jj, ii]
+                        wall[k] += -twist if low else twist
+                    count = _put(of, sheet, values, cell, wall, count)
+                    continue
+                if low and ways > 0:
+                    if deepest > 0.0 and zones[z, PAIR] == 0.0:
+                        count = _in_part(
+                            excess, floor, ground, zones, z, over, under, of, sheet, values, wall, shallowest, j, i,
+                            count,
+                        )  # fmt: skip
+                    continue
+                if not low:
+                    dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
+                    square = dx * dx + dy * dy
+                    # A linear function under a concave one: by so much it may be too low between the corners.
+                    more = 0.0
+                    if zones[z, RADIUS] >= 0.0:
+                        more += square / (8.0 * max(zones[z, RADIUS] - math.sqrt(square), 0.5 * math.sqrt(square)))
+                    elif zones[z, LAST] - zones[z, FIRST] > 1.0 and shallowest < 0.0:
+                        more += _kink(zones, edges, z, x, y, j, i)
+                    if zones[z, RADIUS] >= 0.0 and deepest + more <= 0.0 and _meets(zones, z, x, y, j, i):
+                        more = 0.02 - deepest  # a disc that no corner lies near
+                    for k in range(4):
+                        wall[k] += more
+                count = _put(of, sheet, values, cell, wall, count)
+    return count
+
+
+@device
+def _looks_beside(zones: Floats, z: int) -> bool:
+    """Whether a level is told by what is within reach."""
+    if zones[z, PAIR] > 0.0 and max(zones[z, TOP_2_AGL], zones[z, BOTTOM_2_AGL]) >= BESIDE:
+        return True
+    return bool(max(zones[z, TOP_AGL], zones[z, BOTTOM_AGL]) >= BESIDE)
+
+
+@device
+def _guess_beside(
+    around: Ints, steep: Floats, fineness: int, boxes: Ints, z: int, reach: float, up: Floats, down: Floats
+) -> None:
+    """How far the ground rises and falls within reach of a zone's nodes, at most."""
+    for j in range(boxes[z, 2], boxes[z, 3] + 2):
+        for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
+            jj, ii = min(j // fineness, len(steep) - 2), min(i // fineness, steep.shape[1] - 2)
+            v, u = j / fineness - jj, i / fineness - ii
+            south, north = steep[jj, ii] * (1.0 - u), steep[jj + 1, ii] * (1.0 - u)
+            if u > 0.0:  # a weight of 0 does not carry an unknown neighbour's NaN over
+                south, north = south + u * steep[jj, ii + 1], north + u * steep[jj + 1, ii + 1]
+            up[j, i] = down[j, i] = reach * (south if v <= 0.0 else south * (1.0 - v) + north * v)
+
+
+@device
+def _look_beside(
+    around: Ints, excess: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
+    z: int, reach: float, up: Floats, down: Floats,
+) -> None:  # fmt: skip
+    """How far, up and down, that ground of a zone differs from the ground below a node which is within reach, by which
+    the zone is grown; by what is known of other nodes, or not at all where there is none."""
+    row, col = min(boxes[z, 2], len(x) - 2), min(boxes[z, 0], x.shape[1] - 2)
+    col = min(max(col, around[row, 0]), x.shape[1] - 2)
+    across = math.sqrt((x[row, col + 1] - x[row, col]) ** 2 + (y[row, col + 1] - y[row, col]) ** 2)
+    along = math.sqrt((x[row + 1, col] - x[row, col]) ** 2 + (y[row + 1, col] - y[row, col]) ** 2)
+    rows, cols = int(reach / along), int(reach / across)
+    every = 1 + max(rows, cols) // (MOST_BESIDE + 1)
+    for j in range(boxes[z, 2], boxes[z, 3] + 2):
+        for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
+            up[j, i] = down[j, i] = 0.0
+            if excess[j, i] == np.inf:
+                continue
+            most, least = -np.inf, np.inf
+            for q in range(-(rows // every), rows // every + 1):
+                jj = j + q * every
+                if not 0 <= jj < len(x):
+                    continue
+                for p in range(-(cols // every), cols // every + 1):
+                    ii = i + p * every
+                    if not around[jj, 0] <= ii < around[jj, 1] or excess[jj, ii] == np.inf:
+                        continue
+                    if least <= ground[jj, ii] <= most:
+                        continue
+                    off = (x[jj, ii] - x[j, i]) ** 2 + (y[jj, ii] - y[j, i]) ** 2
+                    if off <= reach * reach and depth(zones, edges, z, x[jj, ii], y[jj, ii]) > reach:
+                        most, least = max(most, ground[jj, ii]), min(least, ground[jj, ii])
+            if most > -np.inf:
+                up[j, i], down[j, i] = most - ground[j, i], ground[j, i] - least
+
+
+@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8 f8[,] i1[,]")
+def lift_lids(
+    around: Ints, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
+    cap: float, rim: float, lift: Floats, either: NDArray[np.int8],
+) -> None:  # fmt: skip
+    """By how much the zones over each node of ``around`` (``lift``) are higher than its floor that can be flown over
+    below ``cap``, no deeper in them than ``rim``: who does not get past that does not get farther in. ``either``
+    (zeros): 1 where one of them can be flown under, too."""
+    blank(lift, around, 0.0)
+    for z in range(len(zones)):
+        if zones[z, PAIR] > 0.0 or zones[z, TOP] == np.inf:
+            continue
+        for j in range(boxes[z, 2], boxes[z, 3] + 2):
+            for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
+                more = level(zones, z, TOP, ground[j, i]) - floor[j, i]
+                if not 0.0 < more <= cap - floor[j, i] or not 0.0 < depth(zones, edges, z, x[j, i], y[j, i]) <= rim:
+                    continue
+                lift[j, i] = max(lift[j, i], more)
+                if zones[z, UNDER] > 0.0 and floor[j, i] <= level(zones, z, BOTTOM, ground[j, i]):
+                    either[j, i] = 1
+
+
+@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 i4[]")
+def own_zones(
+    span: Ints, excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats,
+    boxes: Ints, slope: float, owner: Ints,
+) -> int:  # fmt: skip
+    """Tell the cells that want two sheets (``owner``, zeros): the number from 1 of a shape that they lie in; how many.
+
+    Such a shape may be passed over in one place and not under, and the other way round in another. From under it to
+    over it is so far, at a climb of ``slope``, that turning in the wrong place of an edge of a cell does not matter.
+    """
+    nx, count = excess.shape[1], 0
+    for z in range(len(zones)):
+        if zones[z, PAIR] > 0.0 or zones[z, UNDER] == 0.0 or zones[z, TOP] == np.inf:
+            continue
+        over_alone = under_alone = 0
+        lowest_top, highest_bottom, long = np.inf, -np.inf, 0.0
+        for again in range(2):
+            for j in range(boxes[z, 2], boxes[z, 3] + 1):
+                for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
+                    over = under = 0
+                    inside = True
+                    for k in range(4):
+                        jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
+                        inside = inside and excess[jj, ii] < np.inf
+                        inside = inside and depth(zones, edges, z, x[jj, ii], y[jj, ii]) > 0.0
+                        if not inside:
+                            break
+                        bottom, top = level(zones, z, BOTTOM, ground[jj, ii]), level(zones, z, TOP, ground[jj, ii])
+                        lowest_top, highest_bottom = min(lowest_top, top), max(highest_bottom, bottom)
+                        over += 1 if top <= floor[jj, ii] - excess[jj, ii] else 0
+                        under += 1 if floor[jj, ii] <= bottom else 0
+                    if not inside:
+                        continue
+                    if again > 0 and owner[j * (nx - 1) + i] == 0:
+                        owner[j * (nx - 1) + i] = z + 1
+                        count += 1
+                    over_alone += 1 if over > 0 and under < 4 else 0
+                    under_alone += 1 if under > 0 and over < 4 else 0
+                    long = max(long, math.sqrt((x[j + 1, i + 1] - x[j, i]) ** 2 + (y[j + 1, i + 1] - y[j, i]) ** 2))
+            if over_alone == 0 or under_alone == 0 or not lowest_top - highest_bottom >= 2.0 * slope * long:
+                break
+    return count
+
+
+@device
+def over_ground(zones: Floats, z: int) -> bool:
+    """Whether a level of a zone past which one may fly is told over ground."""
+    under_agl = zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0
+    return bool(under_agl or (zones[z, TOP] < np.inf and zones[z, TOP_AGL] > 0.0))
+
+
+@device
+def shut_over(
+    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, z: int, j: int, i: int
+) -> tuple[float, float]:
+    """Up to which altitude, and from which on, one may fly somewhere in a cell that lies in a zone as a whole.
+    Everywhere, the two infinite and the wrong way round, where it does not lie in it, or that is not known."""
+    bottom, top = -np.inf, np.inf
+    for k in range(4):
+        jj, ii = j + (k >> 1), i + (k & 1)
+        unknown = over_ground(zones, z) and math.isnan(ground[jj, ii])
+        if unknown or depth(zones, edges, z, x[jj, ii], y[jj, ii]) <= 0.0:
+            return np.inf, -np.inf
+        top = min(top, level(zones, z, TOP, ground[jj, ii]))
+        if zones[z, UNDER] > 0.0:
+            bottom = max(bottom, level(zones, z, BOTTOM, ground[jj, ii]))
+    return bottom, top
+
+
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8[,] f8[,]")
+def narrow_rooms(
+    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, exact: bool, low: Floats,
+    high: Floats,
+) -> None:  # fmt: skip
+    """Raise the lowest, and lower the highest, altitude that can be flown at somewhere in each cell (rows - 1,
+    cols - 1), where zones leave one way past them alone. Where they leave none both are infinite, the wrong way round.
+
+    ``exact``: whether the ground's nodes are the terrain model's own, or a part of its cells'; levels over others are
+    not known.
+    """
+    for _ in range(2):  # what one zone leaves may shut another's way
+        for z in range(len(zones)):
+            if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):
+                continue
+            for j in range(boxes[z, 2], boxes[z, 3] + 1):
+                for i in range(boxes[z, 0], boxes[z, 1] + 1):
+                    if low[j, i] > high[j, i]:
+                        continue
+                    bottom, top = shut_over(ground, x, y, zones, edges, z, j, i)
+                    under, over = bottom >= low[j, i], top <= high[j, i]
+                    if not under:
+                        low[j, i] = top if over else np.inf
+                    if not over:
+                        high[j, i] = bottom if under else -np.inf
+
+
+@device
+def _put(of: Ints, sheet: int, values: Floats, cell: int, wall: Floats, count: int) -> int:
+    """Give a cell a wall (its corners' values come first), if it stands anywhere; returns how many walls there are."""
+    if max(max(wall[0], wall[1]), max(wall[2], wall[3])) <= 0.0:
+        return count
+    for k in range(4):
+        values[count, k] = wall[k]
+    values[count, NEXT] = of[cell, sheet]
+    of[cell, sheet] = count + 1
+    return count + 1
+
+
+@device
+def _twist(floor: Floats, ground: Floats, j: int, i: int) -> float:
+    """How far the ground's patch may lie from its triangles in a cell that is cut as the floor wants it; 0 where the
+    floor is as twisted."""
+    same = floor[j, i] - ground[j, i]
+    for q in range(1, 4):
+        jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
+        if abs(floor[jj, ii] - ground[jj, ii] - same) > 1e-9 * (1.0 + abs(floor[jj, ii])):
+            return max(0.25 * abs(ground[j, i] + ground[j + 1, i + 1] - ground[j, i + 1] - ground[j + 1, i]), 1e-9)
+    return 0.0
+
+
+@device
+def _in_part(
+    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, over: bool, under: bool, of: Ints, sheet: int,
+    values: Floats, wall: Floats, least: float, j: int, i: int, count: int,
+) -> int:  # fmt: skip
+    """Shut the part of a cell that certainly lies in a zone and can be passed neither over nor under it there.
+
+    ``wall``: how deep its corners lie in the zone, ``least`` at least. What tells that is the least of functions that
+    are concave, or linear and not above the bilinear ones, in either triangle; a linear function between its corners
+    lies nowhere above it. Where the ground is not what floors are measured from, its patch may be cut the wrong way,
+    and nothing is said of what is below a level over it. Returns how many walls there are.
+    """
+    spare = 0.0
+    if zones[z, TOP_AGL] > 0.0 or (under and zones[z, BOTTOM_AGL] > 0.0):
+        spare = _twist(floor, ground, j, i)
+        if spare > 0.0 and under and zones[z, BOTTOM_AGL] > 0.0:
+            return count
+    for k in range(4):
+        jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
+        g = ground[jj, ii]
+        shut = np.inf
+        if over:
+            shut = level(zones, z, TOP, g) - floor[jj, ii] + excess[jj, ii] - spare
+        if under:
+            shut = min(shut, floor[jj, ii] - level(zones, z, BOTTOM, g))
+        # All of the cell is inside, if its corners are.
+        wall[k] = shut if least > 0.0 else min(shut, wall[k])
+    return _put(of, sheet, values, j * (excess.shape[1] - 1) + i, wall, count)
+
+
+@device
+def _meets(zones: Floats, z: int, x: Floats, y: Floats, j: int, i: int) -> bool:
+    """Whether a disc reaches into the box around a cell."""
+    west, east = min(x[j, i], x[j + 1, i]), max(x[j, i + 1], x[j + 1, i + 1])
+    south, north = min(y[j, i], y[j, i + 1]), max(y[j + 1, i], y[j + 1, i + 1])
+    dx = zones[z, EAST] - min(max(zones[z, EAST], west), east)
+    dy = zones[z, NORTH] - min(max(zones[z, NORTH], south), north)
+    return dx * dx + dy * dy < zones[z, RADIUS] ** 2
+
+
+@device
+def _kink(zones: Floats, edges: Floats, z: int, x: Floats, y: Floats, j: int, i: int) -> float:
+    """How much the least of several linear functions may rise between a cell's corners above its interpolation."""
+    most = 0.0
+    for k in range(int(zones[z, FIRST]), int(zones[z, LAST])):
+        # Where one edge alone binds at all four corners, the function is linear: nothing to add.
+        alone = True
+        for q in range(4):
+            jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
+            own = _within(edges, k, x[jj, ii], y[jj, ii])
+            if own > depth(zones, edges, z, x[jj, ii], y[jj, ii]) + 1e-9:
+                alone = False
+        if alone:
+            return 0.0
+        most = 1.0
+    dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
+    return 0.5 * math.sqrt(dx * dx + dy * dy) * most

@@ -1,0 +1,1 @@
+"""Sources of paths: searches beside the shortest track below a cap."""

@@ -1,0 +1,175 @@
+"""Paths along the ways of bounds, past what is shut there by little.
+
+The way of a bound is as short as a way can be. Where the exact check shuts it, it does so for a few hundred metres at
+most, for metres or centimetres: beside it, between cells too large to show it, there may be a slit that is open. Each
+such stretch is a problem of its own, so small that its cells are a metre or two wide.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.optimal.sources.detours import joined
+from gcsplan.planners.profile.track import distances
+from gcsplan.world.path import Path
+
+if TYPE_CHECKING:
+    from gcsplan.planners.optimal.incumbent import Below
+    from gcsplan.planners.optimal.leg import Leg
+
+Floats = NDArray[np.float64]
+Point = tuple[float, float, float]
+
+STEP_M = 8.0
+"""Between places of a way at which the exact check is asked."""
+ROOM_M = 8.0
+"""Over the floor at both ends of a stretch: there the slit is over."""
+UNDER_M = 0.5
+"""How far below the cap stretches begin and end."""
+REACHED = 0.95
+"""What part of the way from or to a stop is climbed on."""
+APART_M = 1e-3
+"""Places nearer to each other are one."""
+SLACKS = (0.008, 0.15)
+"""How much longer than the shortest tracks of a stretch are, as a part; longer ones are no slits."""
+FARTHEST = 1.5
+"""How many times as long as the straight way tracks may be that are looked for between two places."""
+BESIDE_M, WORTH = 10.0, 0.03
+"""How far from a path a way has left it; and what part of what both differ in must be gained there for a look."""
+MOST = 24
+"""Stretches of a way, of which more are not looked at."""
+AT_ONCE = 512
+"""Places whose distance from a track is worked out at once."""
+
+
+def follow(below: Below) -> bool:
+    """Where the ways of the last bounds leave the best path, look for a path along them; True if one is the best so
+    far."""
+    assert below.best is not None
+    stops = [0, len(below.best) - 1] if below.pinned is None else np.flatnonzero(below.pinned).tolist()
+    if len(stops) != len(below.legs) + 1:
+        return False
+    parts = [below.best[a : b + 1] for a, b in pairwise(stops)]
+    found = [_nearer(below, leg, part) for leg, part in zip(below.legs, parts, strict=True)]
+    if all(new is None for new in found):
+        return False
+    paths = [part if new is None else new for part, new in zip(parts, found, strict=True)]
+    points, pinned, _ = joined(paths, [None] * (len(paths) - 1))
+    return not below.judge.violations(points) and below.take_simpler(points, pinned, fine=True, longer=False)
+
+
+def _nearer(below: Below, leg: Leg, path: Floats) -> Floats | None:
+    """(N, 3) a cheaper path of a leg than a known one, which it leaves where the way of the last bound does; None where
+    none was found."""
+    way = leg.last_way
+    at, on_path = distances(way), distances(path[:, :2])
+    s = np.linspace(0.0, at[-1], math.ceil(at[-1] / STEP_M) + 1)
+    places = np.stack([np.interp(s, at, way[:, k]) for k in range(2)], axis=-1)
+    away, nearest = _nearest(places, path[:, :2])
+    better: list[tuple[float, float, Floats]] = []
+    for first, last in _runs(away > BESIDE_M):
+        low, high = max(first - 1, 0), min(last + 1, len(s) - 1)
+        a, b = nearest[low], nearest[high]
+        begun = better[-1][1] if better else 0.0
+        if a < begun or (b - a) - (s[high] - s[low]) < WORTH * (below.longest() - at[-1]):
+            continue
+        ends = [np.array([np.interp(x, on_path, path[:, k]) for k in range(3)]) for x in (a, b)]
+        part = _along(below, leg, ends, places[low : high + 1], s[low : high + 1], at[-1])
+        known = np.vstack([ends[0], path[(on_path > a) & (on_path < b)], ends[1]])
+        if part is not None and below.problem.cost(Path(part)) < below.problem.cost(Path(known)):
+            better.append((a, b, part))
+    out, begin = [], -math.inf
+    for a, b, part in better:
+        out += [path[(on_path > begin + APART_M) & (on_path < a - APART_M)], part]
+        begin = b
+    return np.vstack([*out, path[on_path > begin + APART_M]]) if out else None
+
+
+def _along(below: Below, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float) -> Floats | None:
+    """(N, 3) way points from one end to the other along a way, led past what is shut on it; None where that fails.
+
+    ``places`` (N, 2) of the way, ``s`` (N,) how far along it they are; ``whole_m`` how long all of it is.
+    """
+    over = below.problem.airspace.floor_amsl(places[:, 0], places[:, 1], below.problem.limits) - below.top_m
+    stretches = _stretches(over)
+    if len(stretches) > MOST:
+        return None
+    cuts = sorted({0, len(s) - 1, *(k for stretch in stretches for k in stretch)})
+    out: list[Floats] = []
+    start = ends[0]
+    for first, last in pairwise(cuts):
+        goal = ends[1]
+        if last < len(s) - 1:
+            height = _height(below, leg, *map(float, (s[last], whole_m - s[last], over[last])))
+            goal = np.array([*places[last], height])
+        part = replace(below.problem, start=_point(start), goal=_point(goal), via=(), progress=None, objective="length")
+        found = type(below)(part, below.begun_s)
+        for piece in found.legs:
+            piece.farthest = FARTHEST
+        if (first, last) not in stretches:
+            found.take_along(joined([np.vstack([start[:2], places[first + 1 : last], goal[:2]])], []))
+        if found.best is None:
+            found.look(SLACKS, (False,))
+        if found.best is None or not below.in_time():
+            return None
+        out.append(found.best if not out else found.best[1:])
+        start = goal
+    return np.vstack(out)
+
+
+def _nearest(places: Floats, track: Floats) -> tuple[Floats, Floats]:
+    """(N,) how far places are from a track, and where on it that is, in metres along it."""
+    a, d, s = track[:-1], np.diff(track, axis=0), distances(track)
+    away, where = np.empty(len(places)), np.empty(len(places))
+    for first in range(0, len(places), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        t = ((places[part, None] - a) * d).sum(axis=-1) / np.maximum((d * d).sum(axis=-1), 1e-12)
+        t = t.clip(0.0, 1.0)
+        off = np.hypot(*(places[part, None] - a - t[..., None] * d).transpose(2, 0, 1))
+        k = off.argmin(axis=1)
+        rows = np.arange(len(k))
+        away[part], where[part] = off[rows, k], s[k] + t[rows, k] * (s[k + 1] - s[k])
+    return away, where
+
+
+def _runs(some: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last of what is true, run by run."""
+    change = np.flatnonzero(np.diff(np.concatenate([[False], some, [False]]).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in zip(change[::2], change[1::2], strict=True)]
+
+
+def _point(place: Floats) -> Point:
+    east, north, z = place.tolist()
+    return east, north, z
+
+
+def _stretches(over: Floats) -> list[tuple[int, int]]:
+    """First and last of places, between which there is less room than `ROOM_M`, and somewhere none."""
+    out: list[tuple[int, int]] = []
+    tight = over > -ROOM_M
+    for k in np.flatnonzero(over > 0.0).tolist():
+        if out and k <= out[-1][1]:
+            continue
+        before, after = np.flatnonzero(~tight[:k]), np.flatnonzero(~tight[k:])
+        out.append((int(before[-1]) if len(before) else 0, k + int(after[0]) if len(after) else len(over) - 1))
+    return out
+
+
+def _height(below: Below, leg: Leg, from_start_m: float, to_goal_m: float, over_m: float) -> float:
+    """How high a path goes on at a place: below the cap by half of what there is to spare, or less; that of the goal
+    there; and what can be reached from start and goal."""
+    limits = below.problem.limits
+    z = below.top_m - min(UNDER_M, max(-0.5 * over_m, 0.0))
+    for stop, way_m, slope in (
+        (leg.start, from_start_m, limits.max_climb_slope),
+        (leg.goal, to_goal_m, limits.max_descent_slope),
+    ):
+        if stop.amsl_m is not None:
+            z = stop.amsl_m if way_m < APART_M else min(z, stop.amsl_m + REACHED * slope * way_m)
+    return z

@@ -1,0 +1,142 @@
+"""A legal path in space drawn together: all its points at once to the best places of cross-sections along it.
+
+Between the sections every leg that joins places of two neighbours is put to the exact check, and the cheapest chain of
+them is found exactly. So points move together, over an edge or along a hillside, where each alone would be stuck.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.track import divided
+from gcsplan.world.airspace import Legs
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.intp]
+
+FREE, UPRIGHT, FIXED = 0, 1, 2
+"""Kinds of points: may move, up and down alone, not at all."""
+HALVINGS, ROUNDS = 7, 6
+"""How often the moves are halved, and moves of one size at most."""
+LITTLE = 1e-4
+"""Gain, as a part, below which moves are halved."""
+ASIDE, UP = (0.0, -1.0, 1.0), (0.0, -1.0, -0.25, 0.25, 1.0)
+"""Places that a point may be moved to, in moves aside and up."""
+FAR_AHEAD = 24
+"""Points that may be left out in one piece, at most."""
+
+
+def drawn(
+    problem: Problem,
+    points: Floats,
+    kinds: Ints,
+    size_m: float,
+    in_time: Callable[[], bool],
+    halvings: int = HALVINGS,
+) -> tuple[Floats, Ints]:
+    """A legal path (N, 3) of points of ``kinds`` (N,) made cheaper by moves of half ``size_m`` and less."""
+    cost = cost_of(problem, points)
+    for k in range(halvings):
+        move_m = size_m * 0.5 ** (k + 1)
+        for _ in range(ROUNDS):
+            if not in_time():
+                return points, kinds
+            finer, its_kinds = _divided(points, kinds, 1.5 * math.sqrt(size_m * move_m))
+            moved = _moved(problem, finer, its_kinds, move_m)
+            before, now = cost, cost_of(problem, moved)
+            if now < cost:
+                points, kinds, cost = moved, its_kinds, now
+            if cost > before * (1.0 - LITTLE):
+                break
+        points, kinds = cheapest(problem, points, kinds)
+        cost = cost_of(problem, points)
+    return points, kinds
+
+
+def cheapest(problem: Problem, points: Floats, kinds: Ints) -> tuple[Floats, Ints]:
+    """The cheapest path over some points of a legal one, in order: all of its stops, and of the others what helps."""
+    n = len(points)
+    first, last = np.triu_indices(n, 1)
+    stops = np.concatenate([[0], np.cumsum(kinds != FREE)])
+    near = (stops[last] == stops[first + 1]) & (last - first <= FAR_AHEAD)
+    first, last = first[near], last[near]
+    legal = last == first + 1
+    legal[~legal] = clear(problem, points[first[~legal]], points[last[~legal]])
+    first, last = first[legal], last[legal]
+    leg = np.full((n, n), np.inf)
+    leg[first, last] = problem.leg_costs(points[first], points[last])
+    cost, before = np.zeros(n), np.zeros(n, np.intp)
+    for k in range(1, n):
+        over = cost[:k] + leg[:k, k]
+        before[k] = over.argmin()
+        cost[k] = over[before[k]]
+    keep = [n - 1]
+    while keep[-1] > 0:
+        keep.append(int(before[keep[-1]]))
+    keep.reverse()
+    return points[keep], kinds[keep]
+
+
+def _moved(problem: Problem, points: Floats, kinds: Ints, move_m: float) -> Floats:
+    """The cheapest chain over places around each point, across the path and in height."""
+    if len(points) < 3:
+        return points
+    along = points[2:] - points[:-2]
+    aside = np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], axis=1)
+    flat = np.hypot(aside[:, 0], aside[:, 1])
+    aside = np.where(flat[:, None] > 1e-9, aside / np.maximum(flat, 1e-9)[:, None], np.array([1.0, 0.0, 0.0]))
+    up = np.cross(along, aside)
+    length = np.linalg.norm(up, axis=1)
+    up = np.where(length[:, None] > 1e-9, up / np.maximum(length, 1e-9)[:, None], np.array([0.0, 0.0, 1.0]))
+    kind = kinds[1:-1]
+    aside[kind != FREE] = 0.0
+    up[kind == UPRIGHT] = 0.0, 0.0, 1.0
+    up[kind == FIXED] = 0.0
+    # Where the climb is limited, what is moved aside must move up or down by less, or the legs are too steep.
+    upright = min(1.0, problem.limits.max_climb_slope, problem.limits.max_descent_slope)
+    i, j = (a.ravel()[:, None] for a in np.meshgrid(ASIDE, UP))
+    places = points[1:-1, None] + move_m * (i * aside[:, None] + upright * j * up[:, None])  # (n, 15, 3)
+    n, w = places.shape[:2]
+    start = np.concatenate([np.repeat(points[:1], w, axis=0), np.repeat(places[:-1], w, axis=1).reshape(-1, 3)])
+    end = np.concatenate([places[0], np.tile(places[1:], (1, w, 1)).reshape(-1, 3)])
+    start, end = np.concatenate([start, places[-1]]), np.concatenate([end, np.repeat(points[-1:], w, axis=0)])
+    legs = np.where(clear(problem, start, end), problem.leg_costs(start, end), np.inf)
+    cost, before = legs[:w], []
+    for step in legs[w:-w].reshape(n - 1, w, w):
+        over = cost[:, None] + step
+        before.append(over.argmin(axis=0))
+        cost = over.min(axis=0)
+    cost = cost + legs[-w:]
+    at = int(cost.argmin())
+    if not math.isfinite(cost[at]):
+        return points  # where legs touch a limit, parts of them may fail by a rounding
+    chosen = [at]
+    for step_before in reversed(before):
+        chosen.append(int(step_before[chosen[-1]]))
+    out = points.copy()
+    out[1:-1] = places[np.arange(n), chosen[::-1]]
+    return out
+
+
+def _divided(points: Floats, kinds: Ints, step_m: float) -> tuple[Floats, Ints]:
+    """The same path with a point every ``step_m`` at least."""
+    leg, part, parts = divided(points, step_m)
+    t = (part / parts)[:, None]
+    inner = points[leg] + t * (points[leg + 1] - points[leg])
+    return np.vstack([inner, points[-1:]]), np.append(np.where(part == 0, kinds[leg], FREE), kinds[-1])
+
+
+def clear(problem: Problem, start: Floats, end: Floats) -> Bools:
+    """(N,) whether legs from ``start`` (N, 3) to ``end`` pass the exact check."""
+    return problem.airspace.clear(Legs.between(start, end, problem.limits), problem.limits)
+
+
+def cost_of(problem: Problem, points: Floats) -> float:
+    """Metres or joules of a path (N, 3)."""
+    return float(problem.leg_costs(points[:-1], points[1:]).sum())

@@ -1,0 +1,1 @@
+"""Altitude over a fixed track: tubes, the taut string, laps, way points under the exact check."""

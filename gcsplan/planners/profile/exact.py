@@ -1,0 +1,188 @@
+"""From a track that was pulled on samples to way points that the exact check passes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
+from gcsplan.planners.profile.waypoints import way_points
+from gcsplan.world.airspace import Legs, Tube, Violation
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+SAMPLE_M = 12.0
+"""Between places at which floor and ceiling over a track are read; its profile bends at these alone."""
+TIGHT_M, TIGHT_SAMPLE_M = 1.0, 1.0
+"""Where so little room, or less, is left between them, and how close they are read there."""
+SPARE_M = 0.05
+"""Kept from both where there is room: the exact check is quick where it need not cut hairs."""
+CORRECTIONS, CORRECTED_M = 24, 0.03
+"""How often a profile is corrected by what the exact check finds, and by how much beyond it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unsettled:
+    """Why no profile over a track passes: the place (east, north), how many metres are missing, and of what.
+
+    ``samples`` (K, 4): east, north, floor, ceiling along the track, as far as they are known by now. ``span_m``: how
+    far along the track; ``zone``: its index, -1 where it is none.
+    """
+
+    place: Floats
+    by: float
+    kind: Literal["pinched", "climb", "descent", "zone"]
+    samples: Floats
+    span_m: float = 0.0
+    zone: int = -1
+
+
+@dataclass(eq=False, slots=True)
+class Judge:
+    """The exact check of single legs, which remembers what it passed."""
+
+    problem: Problem
+    passed: set[bytes] = field(default_factory=set)
+    failed: set[bytes] = field(default_factory=set)
+
+    def violations(self, points: Floats) -> tuple[tuple[int, Violation], ...]:
+        """Leg and violation, of a path (N, 3)."""
+        legs = np.hstack([points[:-1], points[1:]])
+        new = np.array([k for k, leg in enumerate(legs) if leg.tobytes() not in self.passed], np.intp)
+        if not len(new):
+            return ()
+        found = self.problem.airspace.examine(self._legs(legs[new]), self.problem.limits).violations
+        bad = {v.leg for v in found}
+        self.passed.update(legs[k].tobytes() for i, k in enumerate(new) if i not in bad)
+        return tuple((int(new[v.leg]), v) for v in found)
+
+    def clear(self, legs: Floats) -> Bools:
+        """(K,) whether each of the legs (K, 6), start and end, is legal."""
+        keys = [leg.tobytes() for leg in legs]
+        new = np.array([k for k, key in enumerate(keys) if key not in self.passed and key not in self.failed], np.intp)
+        if len(new):
+            good = self.problem.airspace.clear(self._legs(legs[new]), self.problem.limits)
+            for k, ok in zip(new, good, strict=True):
+                (self.passed if ok else self.failed).add(keys[k])
+        return np.array([key in self.passed for key in keys], bool)
+
+    def _legs(self, legs: Floats) -> Legs:
+        return Legs.between(legs[:, :3], legs[:, 3:], self.problem.limits)
+
+
+def settle(
+    problem: Problem, judge: Judge, points: Floats, pinned: Bools, pin_m: Floats
+) -> tuple[Floats, Bools] | Unsettled:
+    """(N, 3) way points over a track that the exact check passes, and (N,) which of them must stay.
+
+    The profile is drawn over floors read point by point, which are nearer to the truth than bounds over whole pieces
+    of the track; where the exact check finds that something rises between two points, both are raised, and the
+    profile is drawn anew.
+    """
+    track = sampled_track(problem, points, pinned, pin_m)
+    tube = track.tube
+    worst: Violation | None = None
+
+    def refused(
+        place: Floats, by: float, kind: Literal["pinched", "climb", "descent", "zone"], span_m: float, zone: int
+    ) -> Unsettled:
+        s = tube.s_m[1:-1]
+        east, north = (np.interp(s, track.s_m, track.points[:, k]) for k in range(2))
+        floor = np.maximum(tube.floor_m[:-1, 1], tube.floor_m[1:, 0])
+        ceiling = np.minimum(tube.ceiling_m[:-1, 1], tube.ceiling_m[1:, 0])
+        return Unsettled(place, by, kind, np.stack([east, north, floor, ceiling], axis=-1), span_m, zone)
+
+    for _ in range(CORRECTIONS):
+        flown = fly(problem, track)
+        if not isinstance(flown, Flown):
+            return refused(
+                track.place(0.5 * (flown.s0_m + flown.s1_m)), flown.by, flown.kind, flown.s1_m - flown.s0_m, flown.zone
+            )
+        found, pins = way_points(problem, track, flown)
+        violations = judge.violations(found)
+        if not violations:
+            return found, pins
+        s = distances(found[:, :2])
+        for leg, v in violations:
+            at = float(s[leg] + v.fraction * (s[leg + 1] - s[leg]))
+            worst = v
+            k = min(max(int(np.searchsorted(tube.s_m, at, "right")) - 1, 0), len(tube.s_m) - 2)
+            z = flown.profile.at(tube.s_m[k : k + 2])
+            room = v.by + CORRECTED_M
+            if v.kind in ("min_agl", "terrain_clearance"):
+                tube.floor_m[k] = np.maximum(tube.floor_m[k], z + room)
+            elif v.kind == "max_agl":
+                tube.ceiling_m[k] = np.minimum(tube.ceiling_m[k], z - room)
+            else:
+                place = np.array([v.east_m, v.north_m])
+                return refused(
+                    place, math.inf if v.kind == "coverage" else v.by, "zone" if v.zone >= 0 else "pinched", 0.0, v.zone
+                )
+    assert worst is not None
+    return refused(np.array([worst.east_m, worst.north_m]), worst.by, "pinched", 0.0, -1)
+
+
+def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> Track:
+    """A track whose tube is read point by point; the zones' bands are exact."""
+    exact = make_track(problem, points, pinned, pin_m)
+    at = [np.zeros(1)]
+    for a, b in zip(exact.s_m[:-1], exact.s_m[1:], strict=True):
+        n = max(1, round((b - a) / SAMPLE_M))
+        at.append(a + (b - a) * np.arange(1, n + 1) / n)
+    s = np.concatenate(at)
+    s[-1] = exact.tube.s_m[-1]
+    floor, ceiling = _room(problem, exact, s)
+    with np.errstate(invalid="ignore"):  # unknown ground: infinite on both sides
+        room = np.abs(ceiling - floor)
+    tight = np.minimum(room[:-1], room[1:]) < TIGHT_M
+    if tight.any():
+        parts = np.where(tight, np.ceil(np.diff(s) / TIGHT_SAMPLE_M), 1.0).astype(np.intp)
+        first = np.cumsum(parts) - parts
+        part = (np.arange(parts.sum()) - np.repeat(first, parts)) / np.repeat(parts, parts)
+        s = np.append(np.repeat(s[:-1], parts) + part * np.repeat(np.diff(s), parts), s[-1])
+        floor, ceiling = _room(problem, exact, s)
+    with np.errstate(invalid="ignore"):
+        spare = np.clip(0.25 * (ceiling - floor), 0.0, SPARE_M)
+    spare[[0, -1]] = 0.0
+    spare = np.where(np.isfinite(floor), spare, 0.0)
+    floor, ceiling = floor + spare, ceiling - spare
+    tube = Tube(
+        s, np.stack([floor[:-1], floor[1:]], axis=-1), np.stack([ceiling[:-1], ceiling[1:]], axis=-1), exact.tube.bands
+    )
+    return Track(exact.points, exact.pinned, exact.pin_m, exact.s_m, tube)
+
+
+def _room(problem: Problem, track: Track, s_m: Floats) -> tuple[Floats, Floats]:
+    """Floor and ceiling at places along a track, zones left aside."""
+    east, north = (np.interp(s_m, track.s_m, track.points[:, k]) for k in range(2))
+    air, limits = problem.airspace, problem.limits
+    return np.asarray(air.floor_amsl(east, north, limits)), np.asarray(air.ceiling_amsl(east, north, limits))
+
+
+def thinned(problem: Problem, judge: Judge, points: Floats, pinned: Bools, worth: float) -> Floats:
+    """(M, 3) fewer way points: those are dropped whose absence is legal and costs less than ``worth`` all together."""
+    spent = 0.0
+    for _ in range(len(points)):
+        if len(points) < 3:
+            break
+        now = problem.leg_costs(points[:-1], points[1:])
+        rise = problem.leg_costs(points[:-2], points[2:]) - now[:-1] - now[1:]
+        wanted = np.flatnonzero((rise <= worth - spent) & ~pinned[1:-1])
+        legal = judge.clear(np.hstack([points[wanted], points[wanted + 2]]))
+        drop = np.zeros(len(points), bool)
+        wanted = wanted[legal]
+        for i in wanted[np.argsort(rise[wanted], kind="stable")] + 1:
+            extra = max(float(rise[i - 1]), 0.0)
+            if not drop[i - 1] and not drop[i + 1] and spent + extra <= worth:
+                drop[i] = True
+                spent += extra
+        if not drop.any():
+            break
+        points, pinned = points[~drop], pinned[~drop]
+    return points

@@ -1,0 +1,398 @@
+"""A ground track with its exact room above it, and the best altitude profile through that room.
+
+The tube comes from `Airspace.tube`, so what is decided here holds along the whole line and not at samples. A
+change of the track keeps the tube of what did not change: cut, join, and ask only for the new part.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.lattice.lattice import ENDS_M
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.taut_kernels import edge
+from gcsplan.planners.profile.taut_string import NO_LIMIT, Blocked, Profile, taut_string
+from gcsplan.world.airspace import Tube
+
+Floats = NDArray[np.float64]
+
+KEEP_M = 1e-4
+"""Kept from floors and ceilings where there is room, so that rounding never decides."""
+
+CLOSE_M, CLOSE_STEP_M, CLOSE_ROOM_M = 60.0, 1.0, 0.03
+"""Where a tube shuts an end in: so far from it the floor is read point by point, so often, with so much to spare."""
+
+DEARER = 2e-4
+"""What way over or under zones is dearer by, as a part, that is worth to look for one past them."""
+BESIDE_M = 1.0
+"""A piece of a profile that ends so near a zone ends there because of it."""
+
+BRANCHES = 64
+"""Most over/under combinations that are tried for one track."""
+
+
+Sides = tuple[bool | None, ...]
+"""For each band of a tube: over it, under it, or not chosen."""
+
+
+@dataclass(frozen=True, slots=True)
+class Obstruction:
+    """Why a track has no legal profile, where along it, and by how much (metres); ``zone`` -1: terrain or limits."""
+
+    kind: Literal["pinched", "climb", "descent", "zone"]
+    s0_m: float
+    s1_m: float
+    by: float
+    zone: int = -1
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Flown:
+    """A legal profile over a track, what it costs, and for each band of the tube whether it is passed above."""
+
+    profile: Profile
+    cost: float
+    over: Sides
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Track:
+    """``points`` (N, 2); ``pinned`` (N,) vertices that must stay; ``pin_m`` (N,) their altitude, NaN where free."""
+
+    points: Floats
+    pinned: NDArray[np.bool_]
+    pin_m: Floats
+    s_m: Floats
+    tube: Tube
+
+    def place(self, s_m: float) -> Floats:
+        """(2,) the point ``s_m`` along the track."""
+        return np.array([np.interp(s_m, self.s_m, self.points[:, 0]), np.interp(s_m, self.s_m, self.points[:, 1])])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Lacking:
+    """The profile over a track that would cost least if laps could be flown wherever it is too steep.
+
+    ``cost``: of that path; ``laps_m``: metres of laps in it; ``steep``: where they would have to be, the one that lacks
+    most first; ``zones``: which make it climb or descend there, or else, where ways over or under zones are dearer than
+    no zones, the one that is met deepest.
+    """
+
+    profile: Profile
+    cost: float
+    laps_m: float
+    steep: tuple[Obstruction, ...]
+    zones: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Shut:
+    """Why a track cannot be flown, however long: at the best of its worst places ``by`` metres of room are missing,
+    between what is passed there over and under; ``zones``: which of that are zones, as far as is known."""
+
+    by: float
+    zones: tuple[int, ...]
+
+
+def distances(points: Floats) -> Floats:
+    """(N,) metres along a track (N, 2)."""
+    d = np.diff(points, axis=0)
+    return np.concatenate([[0.0], np.cumsum(np.hypot(d[:, 0], d[:, 1]))])
+
+
+def divided(points: Floats, step_m: float) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Legs of a track or path (N, 2 or 3) in equal parts, none longer than ``step_m``: of each part (K,) the leg, which
+    of that leg's it is, and how many those are."""
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    parts = np.maximum(np.ceil(length / step_m), 1.0).astype(np.intp)
+    leg = np.repeat(np.arange(len(parts)), parts)
+    return leg, np.arange(len(leg)) - np.repeat(np.cumsum(parts) - parts, parts), parts[leg]
+
+
+def make_track(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> Track:
+    """A track with its tube; points nearer than 1 mm to the one before are dropped (the pinned one is kept)."""
+    keep = np.ones(len(points), bool)
+    last = 0
+    for i in range(1, len(points)):
+        if np.hypot(*(points[i] - points[last])) < 1e-3:
+            if pinned[i] and not pinned[last]:
+                keep[last] = False
+                last = i
+            else:
+                keep[i] = False
+        else:
+            last = i
+    points, pinned, pin_m = points[keep], pinned[keep], pin_m[keep]
+    tube = problem.airspace.tube(points, problem.limits)
+    s = distances(points)
+    return Track(points, pinned, pin_m, s * (tube.s_m[-1] / s[-1]), tube)
+
+
+def fly(
+    problem: Problem,
+    track: Track,
+    below: float = np.inf,
+    branches: int = BRANCHES,
+    known: Sequence[tuple[float, float, float]] = (),
+) -> Flown | Obstruction:
+    """The cheapest legal profile over ``track``, each band passed above or below as is cheaper.
+
+    Best first over the sides of those bands only that the string runs into; bands it clears cost nothing. Before
+    the sides are tried one by one, all bands that are hit are passed on their nearer side at once; if that costs
+    less than ``below``, it is taken where ``branches`` is 0. A profile of ``below`` or more is not wanted: the
+    search stops there and reports what it ran into. ``known`` are doors (s_m, low_m, high_m) to pass besides.
+    """
+    tube, limits = track.tube, problem.limits
+    ends = (problem.start[2], problem.goal[2])
+    room = _rooms(problem, track, known)
+    horizontal = float(room.s_m[-1])
+
+    def solve(over: Sides) -> Profile | Blocked:
+        low, high = room.between(over)
+        return taut_string(room.s_m, low, high, *ends, limits.max_climb_slope, limits.max_descent_slope)
+
+    def cost_of(p: Profile) -> float:
+        if problem.objective == "energy":
+            return problem.vertical_j_per_m * p.vertical_m + problem.horizontal_j_per_m * horizontal
+        return p.length_m
+
+    none: Sides = (None,) * len(tube.bands)
+    root = solve(none)
+    if isinstance(root, Blocked):
+        return Obstruction(root.kind, root.s0_m, root.s1_m, root.by)
+    first: Obstruction | None = None
+    open_set = [(cost_of(root), 0, none, root)]
+    count = 0
+    while open_set:
+        cost, _, over, profile = heappop(open_set)
+        if cost >= below:
+            break
+        hit = room.hits(profile, over)
+        if not hit:
+            return Flown(profile, cost, over)
+        deepest = max(hit, key=lambda h: h.depth_m)
+        band = tube.bands[deepest.band]
+        if first is None:
+            first = Obstruction("zone", band.s0_m, band.s1_m, deepest.depth_m, band.zone)
+        if branches == 0:
+            nearer = list(over)
+            for h in hit:
+                nearer[h.band] = h.nearer_over
+            found = solve(tuple(nearer))
+            if not isinstance(found, Blocked) and cost_of(found) < below:
+                heappush(open_set, (cost_of(found), -1, tuple(nearer), found))
+            if count == 4:
+                break
+            count += 1
+            continue
+        if count >= branches:
+            break
+        for side in (True, False):
+            choice = (*over[: deepest.band], side, *over[deepest.band + 1 :])
+            count += 1
+            found = solve(choice)
+            if not isinstance(found, Blocked):
+                heappush(open_set, (cost_of(found), count, choice, found))
+    return first or Obstruction("zone", 0.0, horizontal, 0.0)
+
+
+def lacking(problem: Problem, track: Track) -> Lacking | Shut:
+    """What the track lacks in length to be flown, where length helps.
+
+    What climbs as steeply as allowed over pieces that are too short costs a convex function of the slope, like all
+    that a taut string makes least; so sides are searched as in `fly`.
+    """
+    tube, limits = track.tube, problem.limits
+    room = _rooms(problem, track, ())
+    up, down = (min(slope, NO_LIMIT) + 1e-9 for slope in (limits.max_climb_slope, limits.max_descent_slope))
+    shut = Shut(math.inf, ())
+    deepest_zone: tuple[int, ...] = ()
+
+    def solve(over: Sides) -> tuple[float, Profile, Floats] | None:
+        nonlocal shut
+        low, high = room.between(over)
+        found = taut_string(room.s_m, low, high, problem.start[2], problem.goal[2])
+        if isinstance(found, Blocked):
+            if found.by < shut.by or not shut.zones:
+                shut = Shut(found.by, room.zones(tube, over, found.s0_m, found.s1_m))
+            return None
+        run, rise = np.diff(found.s_m), np.diff(found.amsl_m)
+        needed = np.maximum(run, np.maximum(rise / up, -rise / down))
+        if problem.objective == "energy":
+            cost = problem.horizontal_j_per_m * float(needed.sum()) + problem.vertical_j_per_m * found.vertical_m
+        else:
+            cost = float(np.hypot(needed, rise).sum())
+        return cost, found, needed - run
+
+    none: Sides = (None,) * len(tube.bands)
+    root = solve(none)
+    if root is None:
+        return shut
+    open_set = [(root[0], 0, none, root)]
+    count = 0
+    while open_set and count < BRANCHES:
+        cost, _, over, (_, profile, more) = heappop(open_set)
+        hit = room.hits(profile, over)
+        if not hit:
+            s, rise = profile.s_m, np.diff(profile.amsl_m)
+            missing = more * np.where(rise > 0.0, up, down)
+            steep = tuple(
+                Obstruction("climb" if rise[k] > 0.0 else "descent", float(s[k]), float(s[k + 1]), float(missing[k]))
+                for k in np.argsort(-missing, kind="stable")
+                if missing[k] > 0.0
+            )
+            zones = deepest_zone if cost > root[0] * (1.0 + DEARER) else ()
+            if steep:
+                zones = room.zones(tube, over, steep[0].s0_m, steep[0].s1_m)
+            return Lacking(profile, cost, float(more[missing > 0.0].sum()), steep, zones)
+        deepest = max(hit, key=lambda h: h.depth_m)
+        deepest_zone = deepest_zone or (tube.bands[deepest.band].zone,)
+        for side in (True, False):
+            choice = (*over[: deepest.band], side, *over[deepest.band + 1 :])
+            count += 1
+            found = solve(choice)
+            if found is not None:
+                heappush(open_set, (found[0], count, choice, found))
+    return shut
+
+
+@dataclass(frozen=True, slots=True)
+class _Hit:
+    """A band that a profile runs into, how deep, and whether over it is the nearer way out."""
+
+    band: int
+    depth_m: float
+    nearer_over: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Room:
+    """Doors at every breakpoint of a tube, its bands and the pins; for each band its doors' span and edges."""
+
+    s_m: Floats
+    low_m: Floats
+    high_m: Floats
+    spans: list[tuple[int, int]]
+    bottoms: list[Floats]
+    tops: list[Floats]
+
+    def between(self, over: Sides) -> tuple[Floats, Floats]:
+        """Doors with bands passed as chosen, narrowed by `KEEP_M` on both sides, or to their middle where there is
+        less room; the ends are exempt."""
+        low, high = self.low_m.copy(), self.high_m.copy()
+        for k, side in enumerate(over):
+            i, j = self.spans[k]
+            if side:
+                np.maximum(low[i:j], self.tops[k], out=low[i:j])
+            elif side is not None:
+                np.minimum(high[i:j], self.bottoms[k], out=high[i:j])
+        _narrow(low, high)
+        return low, high
+
+    def zones(self, tube: Tube, over: Sides, s0_m: float, s1_m: float) -> tuple[int, ...]:
+        """Zones passed on a chosen side, from one place along the track to another or beside them."""
+        chosen = (b for b, side in zip(tube.bands, over, strict=True) if side is not None)
+        return tuple({b.zone: None for b in chosen if b.s0_m < s1_m + BESIDE_M and b.s1_m > s0_m - BESIDE_M})
+
+    def hits(self, profile: Profile, over: Sides) -> list[_Hit]:
+        """Bands without a side that ``profile`` does not clear by `KEEP_M`."""
+        out = []
+        if any(side is None for side in over):
+            z = profile.at(self.s_m)
+            for k, side in enumerate(over):
+                if side is None:
+                    i, j = self.spans[k]
+                    up, down = float((self.tops[k] - z[i:j]).max()), float((z[i:j] - self.bottoms[k]).max())
+                    if up > -KEEP_M and down > -KEEP_M:
+                        out.append(_Hit(k, min(up, down), up < down))
+        return out
+
+
+def _narrow(low: Floats, high: Floats) -> None:
+    with np.errstate(invalid="ignore"):  # a door between infinities has no room, or any
+        room, middle = high - low, 0.5 * (low + high)
+    wide, open_ = room >= 2.0 * KEEP_M, room >= 0.0
+    ends = low[[0, -1]] - 1e-6, high[[0, -1]] + 1e-6
+    low[:] = np.where(wide, low + KEEP_M, np.where(open_, middle, low))
+    high[:] = np.where(wide, high - KEEP_M, np.where(open_, middle, high))
+    low[[0, -1]], high[[0, -1]] = ends
+
+
+def _rooms(problem: Problem, track: Track, known: Sequence[tuple[float, float, float]]) -> _Room:
+    tube, z0, z1 = track.tube, problem.start[2], problem.goal[2]
+    fixed = track.pinned & np.isfinite(track.pin_m)
+    close = _close_to_ends(problem, tube)
+    s = tube.s_m
+    if tube.bands or known or len(close) or fixed.any():
+        here = np.array([k[0] for k in known])
+        s = np.sort(np.concatenate([s, *(b.s_m for b in tube.bands), track.s_m[fixed], close, here]))
+        s = s[np.concatenate([[True], s[1:] - s[:-1] > 1e-9])]
+    low = _edge(s, tube.s_m, tube.floor_m, True)
+    high = _edge(s, tube.s_m, tube.ceiling_m, False)
+    if len(close):
+        near = np.flatnonzero((s <= CLOSE_M) | (s >= s[-1] - CLOSE_M))
+        east, north = (np.interp(s[near], track.s_m, track.points[:, i]) for i in range(2))
+        low[near] = np.minimum(low[near], problem.airspace.floor_amsl(east, north, problem.limits) + CLOSE_ROOM_M)
+    pins = [(at, z, z) for at, z in zip(track.s_m[fixed], track.pin_m[fixed], strict=True)]
+    for at, under, over in (*pins, *known):
+        k = int(np.argmin(np.abs(s - at)))
+        low[k], high[k] = max(low[k], under), min(high[k], over)
+    _forgive(low, high, 0, z0)
+    _forgive(low, high, -1, z1)
+    spans, bottoms, tops = [], [], []
+    for b in tube.bands:
+        i = int(np.searchsorted(s, b.s_m[0] - 1e-9))
+        j = int(np.searchsorted(s, b.s_m[-1] + 1e-9))
+        spans.append((i, j))
+        bottom = _edge(s[i:j], b.s_m, b.bottom_m, False)
+        top = _edge(s[i:j], b.s_m, b.top_m, True)
+        if i == 0:
+            _forgive(top, bottom, 0, z0)
+        if j == len(s):
+            _forgive(top, bottom, -1, z1)
+        bottoms.append(bottom)
+        tops.append(top)
+    return _Room(s, low, high, spans, bottoms, tops)
+
+
+def _close_to_ends(problem: Problem, tube: Tube) -> Floats:
+    """Places near an end to be looked at one by one, where the tube's floor is beyond what can be climbed to.
+
+    A tube bounds the floor over whole pieces. Start and goal lie on the floor more often than not, and a bound that
+    is a metre too high a few metres away would shut them in.
+    """
+    limits, length = problem.limits, float(tube.s_m[-1])
+    out = []
+    up, down = limits.max_climb_slope, limits.max_descent_slope
+    for at_start, z, slope, away, floor in (
+        (True, problem.start[2], up, tube.s_m[1:], tube.floor_m[:, 1]),
+        (False, problem.goal[2], down, length - tube.s_m[-2::-1], tube.floor_m[::-1, 0]),
+    ):
+        count = int(np.searchsorted(away, CLOSE_M, "right"))
+        if not np.isinf(slope) and (floor[:count] > z + slope * away[:count]).any():
+            steps = np.arange(CLOSE_STEP_M, min(CLOSE_M, 0.5 * length), CLOSE_STEP_M)
+            out.append(steps if at_start else length - steps)
+    return np.concatenate(out) if out else np.zeros(0)
+
+
+def _forgive(low: Floats, high: Floats, k: int, z: float) -> None:
+    """Let an end at ``z`` be legal by a little, in place: a tube is conservative, and ends are judged elsewhere."""
+    if z < low[k] < z + ENDS_M:
+        low[k] = z
+    if z - ENDS_M < high[k] < z:
+        high[k] = z
+
+
+def _edge(s: Floats, at: Floats, value: Floats, highest: bool) -> Floats:
+    """A piecewise-linear function with jumps at rising places ``s``: the higher (lower) limit where it jumps."""
+    out = np.empty(len(s))
+    edge(*(np.ascontiguousarray(a, np.float64) for a in (s, at, value)), highest, out)
+    return out

@@ -1,0 +1,109 @@
+"""The table of all planners: what each is, where it comes from, and how to call it. Cheap to import."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from types import MappingProxyType
+from typing import cast
+
+from gcsplan.errors import unknown_name
+from gcsplan.planners.problem import Problem, Solution
+
+VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
+"""Those of a swarm's ``parameters`` that tell of the flight volume's six sides, metres of the plane and AMSL."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One planner; ``module`` holds its ``plan`` and is imported on the first call only.
+
+    ``paper`` is its source, empty where it is our own; ``defaults`` its parameters as `Problem` has them, or of a
+    swarm (``optimiser``, a name of `gcsplan.swarm.table`) as ``Problem.options`` has them.
+    """
+
+    name: str
+    summary: str
+    module: str
+    paper: str = ""
+    defaults: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
+    optimiser: str = ""
+
+    def plan(self, problem: Problem) -> Solution:
+        """A safe path for ``problem``. Raises NoMission where none exists or was found."""
+        run = import_module(self.module).plan
+        if self.optimiser:
+            return cast(Solution, run(problem, self.optimiser, self.defaults))
+        return cast(Solution, run(problem))
+
+
+def _swarm(name: str, summary: str, paper: str, system: Mapping[str, object], **own: object) -> Entry:
+    """A row for an optimiser with its paper's encoding and cost, ``own`` defaults on top."""
+    return Entry(
+        name=name,
+        summary=summary,
+        module="gcsplan.planners.swarm.aco" if name == "aco" else "gcsplan.planners.swarm.planner",
+        paper=paper,
+        defaults=MappingProxyType({**system, **own}),
+        optimiser=name,
+    )
+
+
+_KRILL_PAPER = "Xu, Zhu, Sun 2024, Biomimetics 9, 353"
+_SSGWO_PAPER = "Feng et al. 2024, Electronics 13, 68"
+_MSFOA_PAPER = "Shi et al. 2020, Applied Sciences 10, 2822"
+_ABO_PAPER = "Li et al. 2024, adaptive budgerigar optimization"
+_IB_ABC_PAPER = "Tan et al. 2023, Robotica 41, 1244-1257"
+
+# What each paper searches: D where it is silent (the number of points of MSFOA and IB-ABC).
+_KRILL: Mapping[str, object] = {"encoding": "box", "cost": "krill", "points": 5, "population": 50, "iterations": 100}
+_SSGWO: Mapping[str, object] = {"encoding": "box", "cost": "ssgwo", "points": 30, "population": 30, "iterations": 500}
+_MSFOA: Mapping[str, object] = {"encoding": "box", "cost": "msfoa", "points": 5, "population": 100, "iterations": 200}
+_ABO: Mapping[str, object] = {"encoding": "box", "cost": "abo", "points": 3, "population": 200, "iterations": 100}
+_IB_ABC: Mapping[str, object] = {
+    "encoding": "sections", "cost": "ib-abc", "points": 10, "population": 20, "iterations": 200,
+}  # fmt: skip
+
+
+_ENTRIES = (
+    Entry(
+        name="optimal",
+        summary="exact shortest tracks under altitude caps, taut-string profiles, and a bound that no path can beat",
+        module="gcsplan.planners.optimal.planner",
+        defaults=MappingProxyType({"gap_percent": 0.1, "budget_s": 10.0}),
+    ),
+    _swarm("krill", "krill swarm: foraging, enemy avoidance, cruising", _KRILL_PAPER, _KRILL),
+    _swarm("aco", "ants on a grid of sections across the track", _KRILL_PAPER, _KRILL, encoding="sections"),
+    _swarm("abc", "artificial bee colony", f"Karaboga 2005; as in {_KRILL_PAPER}", _KRILL),
+    _swarm("b-abc", "balanced bee colony, no feedback", _IB_ABC_PAPER, _IB_ABC),
+    _swarm("ib-abc", "balanced bee colony with feedback", _IB_ABC_PAPER, _IB_ABC),
+    _swarm("gwo", "grey wolves", f"Mirjalili 2014; as in {_SSGWO_PAPER}", _SSGWO),
+    _swarm("mgwo", "grey wolves, weighted and greedy (our reading)", f"Zhang 2021; as in {_SSGWO_PAPER}", _SSGWO),
+    _swarm("igwo", "grey wolves that learn from neighbours", f"Nadimi-Shahraki 2021; as in {_SSGWO_PAPER}", _SSGWO),
+    _swarm("sogwo", "grey wolves with selective opposition", f"Dhargupta 2020; as in {_SSGWO_PAPER}", _SSGWO),
+    _swarm("ssgwo", "grey wolves, relative distances, annealing", _SSGWO_PAPER, _SSGWO),
+    _swarm("foa", "fruit flies, one swarm", f"Pan 2012; as in {_MSFOA_PAPER}", _MSFOA, encoding="polar"),
+    _swarm("mfoa", "fruit flies, swarms of a shrinking radius", f"Yuan 2014; as in {_MSFOA_PAPER}", _MSFOA),
+    _swarm("iffo", "fruit flies, one dimension at a time", f"Pan 2014; as in {_MSFOA_PAPER}", _MSFOA),
+    _swarm("msfoa", "fruit flies, competing swarms", _MSFOA_PAPER, _MSFOA, encoding="polar"),
+    _swarm("pso", "particle swarm", f"Shi, Eberhart 1998; as in {_MSFOA_PAPER}", _MSFOA),
+    _swarm("de", "differential evolution rand/1/bin", f"Storn, Price 1997; as in {_MSFOA_PAPER}", _MSFOA),
+    _swarm("po", "parrot optimizer", f"Lian 2024; as in {_ABO_PAPER}", _ABO),
+    _swarm("abo", "adaptive budgerigars", _ABO_PAPER, _ABO),
+)
+
+TABLE: Mapping[str, Entry] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
+
+
+def names() -> tuple[str, ...]:
+    """Every planner's name, the default one first."""
+    return tuple(TABLE)
+
+
+def get(name: str) -> Entry:
+    """The planner called ``name``. Raises InputError that names the nearest known one."""
+    entry = TABLE.get(name)
+    if entry is None:
+        raise unknown_name(f"there is no planner {name!r}", name, TABLE)
+    return entry

@@ -1,0 +1,116 @@
+"""Cubic B-splines from stop to stop, and few way points that stay beside the curve.
+
+E: the krill paper's eq. 11 prints the second numerator as ``u - u_{i+1}``; de Boor's is ``u_{i+k} - u``. The basis is
+clamped, so that a curve begins and ends in its stops; with two or three control points its degree falls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.swarm.curve_kernels import samples_of
+
+Floats = NDArray[np.float64]
+
+DEGREE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Control points (N, 3) to samples (S, 3): ``basis`` (N, S); ``stops`` (M,) samples that are stops.
+
+    ``bands`` (4, S), ``spans`` (n, 3): the same as kernels want it, without its zeros (`curve_kernels.draw`).
+    """
+
+    basis: Floats
+    stops: NDArray[np.intp]
+    bands: Floats
+    spans: NDArray[np.int64]
+
+    def samples(self, controls: Floats) -> Floats:
+        """(..., S, 3) samples of control points (..., N, 3)."""
+        count = self.basis.shape[1]
+        paths = np.ascontiguousarray(controls).reshape(-1, *controls.shape[-2:])
+        out = np.empty((len(paths), count, 3))
+        samples_of(paths, self.bands, self.spans, *np.empty((3, count)), out)
+        return out.reshape(*controls.shape[:-2], count, 3)
+
+
+@lru_cache(maxsize=64)
+def curve(points: tuple[int, ...], legs: tuple[int, ...]) -> Curve:
+    """The curve past ``points[i]`` free control points on stage i, sampled by ``legs[i]`` legs there; stages share
+    their stops."""
+    controls, samples = sum(points) + len(points) + 1, sum(legs) + 1
+    basis = np.zeros((controls, samples))
+    row = column = 0
+    stops = [0]
+    for free, count in zip(points, legs, strict=True):
+        part = _basis(free + 2, count + 1)
+        basis[row : row + free + 2, column : column + count + 1] = part
+        row, column = row + free + 1, column + count
+        stops.append(column)
+    basis.setflags(write=False)
+    return Curve(basis, np.array(stops), *_bands(basis))
+
+
+def _bands(basis: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """`Curve.bands` and `Curve.spans` of a basis."""
+    controls, samples = basis.shape
+    width = DEGREE + 1
+    first = np.minimum((basis != 0.0).argmax(axis=0), max(controls - width, 0))
+    begins = np.flatnonzero(np.diff(first, prepend=-1))
+    spans = np.stack([begins, np.append(begins[1:], samples), first[begins]], axis=-1)
+    rows = first + np.arange(width)[:, None]
+    bands = np.where(rows < controls, basis[np.minimum(rows, controls - 1), np.arange(samples)], 0.0)
+    return np.ascontiguousarray(bands), np.ascontiguousarray(spans, dtype=np.int64)
+
+
+def _basis(controls: int, samples: int) -> Floats:
+    """(controls, samples) values of the clamped basis of degree 3, or less where there are too few controls."""
+    degree = min(DEGREE, controls - 1)
+    knots = np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, controls - degree + 1), np.ones(degree)])
+    u = np.linspace(0.0, 1.0, samples)[:, None]
+    last = controls - 1  # the interval that the end belongs to
+    here = (knots[:-1] <= u) & (u < knots[1:])
+    here[-1, last] = True
+    basis = here.astype(float)
+    for k in range(1, degree + 1):
+        width = knots[k:] - knots[:-k]
+        share = np.divide(u - knots[:-k], width, out=np.zeros((samples, len(width))), where=width > 0.0)
+        rest = np.where(width > 0.0, 1.0 - share, 0.0)
+        basis = share[:, :-1] * basis[:, :-1] + rest[:, 1:] * basis[:, 1:]
+    return np.ascontiguousarray(basis.T)
+
+
+def fewer(points: Floats, kept: NDArray[np.intp], corridor_m: float) -> NDArray[np.intp]:
+    """Indices of a polyline (N, 3) of points (S, 3) that no point is further from than ``corridor_m``; ``kept`` stay.
+
+    Douglas and Peucker 1973, between each two that are kept.
+    """
+    chosen = [int(kept[0])]
+    for a, b in zip(kept[:-1].tolist(), kept[1:].tolist(), strict=True):
+        stack, inside = [(a, b)], []
+        while stack:
+            i, j = stack.pop()
+            if j - i < 2:
+                continue
+            off = _distances(points[i + 1 : j], points[i], points[j])
+            worst = int(off.argmax())
+            if off[worst] > corridor_m:
+                middle = i + 1 + worst
+                inside.append(middle)
+                stack += [(i, middle), (middle, j)]
+        chosen += [*sorted(inside), b]
+    return np.array(chosen)
+
+
+def _distances(points: Floats, a: Floats, b: Floats) -> Floats:
+    """(N,) distances of points from the segment a–b."""
+    d = b - a
+    square = float(d @ d)
+    t = np.clip((points - a) @ d / square, 0.0, 1.0) if square > 0.0 else np.zeros(len(points))
+    return np.asarray(np.linalg.norm(points - (a + t[:, None] * d), axis=1))

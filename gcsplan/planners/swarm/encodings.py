@@ -1,0 +1,161 @@
+"""From a vector of the unit box to the control points of a path: five ways, by name.
+
+Each codes one stage, from a stop to the next; a path with via points is its stages one after the other. Variables
+stand way point by way point, so that a rule may change one way point's together (``group``, `Encoding`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.errors import unknown_name
+from gcsplan.planners.swarm.scene import Scene
+
+Floats = NDArray[np.float64]
+
+LATERAL = 0.5
+"""Reach of a section to either side, as a part of the horizontal distance (IB-ABC, section 2.2)."""
+
+OFFSET = 0.25
+"""The same for `offsets`."""
+
+Decode = Callable[[Scene, Floats, Floats, Floats, Floats], None]
+"""(scene, from (3,), to (3,), u (n, K, variables)) to points, into the last argument (n, K, 3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Encoding:
+    """``variables`` for each way point; ``decode`` one stage; ``points`` the usual number of way points."""
+
+    name: str
+    summary: str
+    variables: int
+    points: int
+    decode: Decode
+
+
+def _box(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    np.multiply(u, scene.high - scene.low, out=out)
+    out += scene.low
+
+
+def _polar(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    # E: MSFOA's eq. 31 has d = 1 … 3D, its eq. 32 k = 2 … D + 1. S > 1 lies on the circle.
+    pairs = u.reshape(*u.shape[:2], 3, 2)
+    _box(scene, a, b, np.minimum(np.hypot(pairs[..., 0], pairs[..., 1]), 1.0), out)
+
+
+def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """The step from a to b in the plane, and the same turned left."""
+    ahead = b[:2] - a[:2]
+    if not ahead.any():
+        ahead = np.array([1.0, 0.0])
+    return ahead, np.array([-ahead[1], ahead[0]])
+
+
+def _flat(scene: Scene, a: Floats, b: Floats, along: Floats, aside: Floats, out: Floats) -> None:
+    """Points by their parts along the track and aside, within the map, into ``out`` (n, K, 2 or more)."""
+    ahead, left = _frame(a, b)
+    for i in range(2):
+        np.clip(a[i] + along * ahead[i] + aside * left[i], scene.low[i], scene.high[i], out=out[..., i])
+
+
+def _altitude(scene: Scene, u: Floats, out: Floats) -> None:
+    """Altitudes anywhere in the volume, into ``out`` (n, K, 3)."""
+    out[..., 2] = scene.low[2] + u * (scene.high[2] - scene.low[2])
+
+
+def _stations(count: int) -> Floats:
+    return np.arange(1, count + 1) / (count + 1.0)
+
+
+def _sections(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    _flat(scene, a, b, _stations(u.shape[1]), 2.0 * LATERAL * (u[..., 0] - 0.5), out)
+    low, high = scene.room(out)
+    out[..., 2] = low + u[..., 1] * (high - low)
+
+
+def _offsets(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    _flat(scene, a, b, _stations(u.shape[1]), 2.0 * OFFSET * (u[..., 0] - 0.5), out)
+    _altitude(scene, u[..., 1], out)
+
+
+def _bspline(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    count = u.shape[1]
+    along = _stations(count) + 2.0 * (u[..., 0] - 0.5) / (count + 1.0)
+    _flat(scene, a, b, along, 2.0 * LATERAL * (u[..., 1] - 0.5), out)
+    _altitude(scene, u[..., 2], out)
+
+
+ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
+    {
+        e.name: e
+        for e in (
+            Encoding("box", "each point anywhere in the flight volume", 3, 5, _box),
+            Encoding("sections", "a point on each of K planes across the track, floor to ceiling", 2, 10, _sections),
+            Encoding("polar", "a box whose coordinates are the radii of two hidden variables", 6, 5, _polar),
+            Encoding("bspline", "few points, each about its own station of the track", 3, 8, _bspline),
+            Encoding("offsets", "at each of K stations the offset to the side and the altitude", 2, 8, _offsets),
+        )
+    }
+)  # fmt: skip
+
+
+def get_encoding(name: str) -> Encoding:
+    """The encoding called ``name``. Raises InputError that lists the known ones."""
+    found = ENCODINGS.get(name)
+    if found is None:
+        raise unknown_name(f"there is no encoding {name!r}", name, ENCODINGS)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Code:
+    """An encoding on a scene: ``dim`` variables to control points, the stops among them; ``points`` a stage."""
+
+    encoding: Encoding
+    scene: Scene
+    points: tuple[int, ...]
+
+    @classmethod
+    def of(cls, name: str, scene: Scene, points: int | None = None) -> Code:
+        """``points`` way points in all (the encoding's own number unless given), shared out by the stages' lengths."""
+        encoding = get_encoding(name)
+        stages = len(scene.stops) - 1
+        wanted = max(encoding.points if points is None else points, stages)
+        lengths = np.linalg.norm(np.diff(scene.stops, axis=0), axis=1)
+        return cls(encoding, scene, shares(wanted, lengths))
+
+    @property
+    def dim(self) -> int:
+        """Number of variables."""
+        return self.encoding.variables * sum(self.points)
+
+    def controls(self, u: Floats) -> Floats:
+        """(n, dim) in the unit box to (n, N, 3) control points, stops included."""
+        stops, n, v = self.scene.stops, len(u), self.encoding.variables
+        out = np.empty((n, sum(self.points) + len(stops), 3))
+        at = row = 0
+        for i, count in enumerate(self.points):
+            out[:, row] = stops[i]
+            part = u[:, at : at + v * count].reshape(n, count, v)
+            self.encoding.decode(self.scene, stops[i], stops[i + 1], part, out[:, row + 1 : row + 1 + count])
+            at, row = at + v * count, row + count + 1
+        out[:, row] = stops[-1]
+        return out
+
+
+def shares(total: int, weights: Floats) -> tuple[int, ...]:
+    """``total`` things over places by weight, at least one each; the largest remainders are rounded up."""
+    weights = np.asarray(weights, float)
+    even = np.full(len(weights), 1.0 / len(weights))
+    exact = (total - len(weights)) * (weights / weights.sum() if weights.sum() > 0 else even)
+    whole = np.floor(exact).astype(int)
+    order = np.argsort(whole - exact, kind="stable")
+    whole[order[: total - len(weights) - int(whole.sum())]] += 1
+    return tuple(int(x) + 1 for x in whole)

@@ -1,0 +1,276 @@
+"""What the swarms minimise: the five papers' costs by name, over the terms that `cost_kernels` measures.
+
+Each is the paper's own formula plus `forbidden`, what the path does against the limits of the mission that the paper
+does not know, so that every objective orders what is not allowed. All of it is sampled: it never passes a mission.
+D marks a decision where a paper is silent, E where its print is departed from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.errors import unknown_name
+from gcsplan.native.form import Held
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.swarm import cost_kernels as k
+from gcsplan.planners.swarm.bspline import Curve, curve
+from gcsplan.planners.swarm.curve_kernels import CURVE
+from gcsplan.planners.swarm.encodings import Code, shares
+from gcsplan.planners.swarm.scene import Scene
+from gcsplan.planners.swarm.scene_kernels import SCENE, clocks_of, nearness
+
+Floats = NDArray[np.float64]
+
+PENALTY = 100.0
+"""Cost of a metre that is not allowed, in metres: D, all; C and PC of MSFOA, P of ABO, μ_obs of SSGWO are 100 too."""
+
+NODES, SAMPLES = 30, 200
+"""SSGWO's number of nodes, at which angles and nearness count, and about how many samples lie on a path."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """What terms are weighed against: the straight line's own terms (TERMS,), and how the mission counts."""
+
+    straight: Floats
+    straight_m: float
+    height_m: float
+    energy: bool
+    vertical_j_per_m: float
+    horizontal_j_per_m: float
+
+
+Weigh = Callable[[Floats, Unit], Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Objective:
+    """``weigh`` terms (n, TERMS) to costs (n,); ``wanted`` groups of terms that it needs beside the common ones."""
+
+    name: str
+    summary: str
+    equations: str
+    wanted: int
+    weigh: Weigh
+
+
+def forbidden(terms: Floats, straight_m: float, skip: Sequence[int] = ()) -> Floats:
+    """(n,) metres of path that break a limit, and how deeply; 0 where none is broken. ``skip`` terms that the
+    objective counts in its own way."""
+    out = np.zeros(len(terms))
+    for term in (k.BELOW, k.ABOVE, k.UNKNOWN, k.INSIDE, k.STEEP):
+        if term not in skip:
+            out += terms[:, term]
+    # Depths are summed along the path, m²; as a part of the way they order paths through one and the same hill.
+    for term in (k.SUNK, k.PROUD, k.DEEP):
+        if term not in skip:
+            out += terms[:, term] * (20.0 / straight_m)
+    return out
+
+
+def _krill(terms: Floats, unit: Unit) -> Floats:
+    """Length (eq. 12), or energy where the mission asks for it.
+
+    E eq. 12–13 sum four segments; here the whole curve. E eq. 13 multiplies R1 by the horizontal and R2 by the vertical
+    distance, the reverse of Table 1; Table 1 holds. E: free space is C without C_obs, not its section with it.
+    """
+    bad = PENALTY * forbidden(terms, unit.straight_m)
+    if unit.energy:
+        r1, r2 = unit.vertical_j_per_m, unit.horizontal_j_per_m
+        return np.asarray(r1 * terms[:, k.RISE] + r2 * (terms[:, k.FLAT] + bad))
+    return np.asarray(terms[:, k.LENGTH] + bad)
+
+
+SSGWO_WEIGHTS = (0.5, 0.2, 0.3)  # D: ρ of eq. 33, 34
+MU_OBS = 100.0  # D: eq. 31
+
+
+def _ssgwo(terms: Floats, unit: Unit) -> Floats:
+    """Eq. 26–34.
+
+    E eq. 29, 30: radians, wrapped, e^|Δθ| - 1 and |φ|. E eq. 31, 32 sum over all nodes and obstacles before they
+    compare with d_safe, measure to the centre as to a sphere, and reward a node inside: here each node against each
+    cylinder, d at least 0.1 m. D: plus 100 for each metre of path inside, so that infeasible paths are ordered.
+    """
+    length, angle, obstacle = SSGWO_WEIGHTS
+    own = length * terms[:, k.LENGTH] + angle * (terms[:, k.YAW] + terms[:, k.PITCH])
+    return np.asarray(own + obstacle * MU_OBS * terms[:, k.NEAR] + PENALTY * forbidden(terms, unit.straight_m))
+
+
+PC = C = 100.0  # D: eq. 25, 26, 28, 29
+
+
+def _msfoa(terms: Floats, unit: Unit) -> Floats:
+    """Eq. 20–27; the nearness of eq. 28–30 is added by `Cost`.
+
+    E eq. 21 is above ground: max(0, AGL - h_min). E eq. 24's T_de: max(0, 1 - d/R). E eq. 25 adds itself up: a
+    constant for each turn above φ_max (D 45°). E eq. 26 penalises slopes inside [β, α]: outside. D: JH as the path's
+    mean times its length, heights as a part of the volume's, as eq. 32 has them: in metres JH would be some 50 times
+    JL, and length would no longer count.
+    """
+    high = terms[:, k.HIGH] / unit.height_m * terms[:, k.LENGTH]
+    limits = C * (terms[:, k.TURNS] + terms[:, k.SLOPES])
+    own = high + terms[:, k.LENGTH] + terms[:, k.THREAT] + terms[:, k.BURIED] + limits
+    return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m))
+
+
+def _abo(terms: Floats, unit: Unit) -> Floats:
+    """Eq. 4–7: length, and P = 100 for each of the samples under ground (D: under the floor) or out of the volume."""
+    own = terms[:, k.LENGTH] + PENALTY * (terms[:, k.UNDER] + terms[:, k.OUTSIDE])
+    return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m, (k.BELOW, k.SUNK, k.UNKNOWN)))
+
+
+IB_ABC_WEIGHTS = (0.4, 0.2, 0.2, 0.2)  # D: λ of eq. 6
+
+
+def _ib_abc(terms: Floats, unit: Unit) -> Floats:
+    """Eq. 2–6, each term over its value on the straight line (D; over π, or one metre, where that is 0).
+
+    E eq. 3's atan of a cosine is arccos: Σ(π - α) is the sum of turns. E eq. 4 tests a segment's length against d_safe:
+    the distance to obstacle or ground; its Z is AGL. E eq. 5 charges W_t, zero at the centre: R_t - W_t.
+    """
+    out = np.zeros(len(terms))
+    own = (k.LENGTH, k.BEND, k.EXPOSED, k.SPHERE)
+    # The arccos of float noise is some 1e-8 rad a node: a straight line's turns are none below 1e-3.
+    for weight, term, least, none in zip(
+        IB_ABC_WEIGHTS, own, (1.0, math.pi, 1.0, 1.0), (1e-9, 1e-3, 1e-9, 1e-9), strict=True
+    ):
+        straight = float(unit.straight[term])
+        out += weight * terms[:, term] / (straight if straight > none else least)
+    return np.asarray(out + PENALTY * forbidden(terms, unit.straight_m) / unit.straight_m)
+
+
+OBJECTIVES: Mapping[str, Objective] = MappingProxyType(
+    {
+        o.name: o
+        for o in (
+            Objective("krill", "length or energy", "krill 12, 13", 0, _krill),
+            Objective("ssgwo", "length, angles, nearness to obstacles", "SSGWO 26-34", k.YAWS | k.NODES_NEAR, _ssgwo),
+            Objective("msfoa", "height, length, threat, terrain, turns, slopes, nearness to earlier vehicles",
+                      "MSFOA 20-30", k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
+            Objective("abo", "length, samples under ground or out of the volume", "ABO 4-7", k.COUNTS, _abo),
+            Objective("ib-abc", "length, smoothness, concealment, threat", "IB-ABC 2-6",
+                      k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
+        )
+    }
+)  # fmt: skip
+
+
+def get_objective(name: str) -> Objective:
+    """The cost called ``name``. Raises InputError that lists the known ones."""
+    found = OBJECTIVES.get(name)
+    if found is None:
+        raise unknown_name(f"there is no swarm cost {name!r}", name, OBJECTIVES)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Earlier:
+    """A vehicle that has the right of way (MSFOA, section 3.2.2): points (Q, 3) and when it is there, seconds (Q,)."""
+
+    points: Floats
+    clock_s: Floats
+
+    @classmethod
+    def at_speed(cls, points: Floats, speed_m_s: float, step_m: float = 5.0) -> Earlier:
+        """A polyline (N, 3) flown at one speed from 0 s, as points no further apart than ``step_m``."""
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        at = np.linspace(0.0, s[-1], max(2, math.ceil(s[-1] / step_m) + 1))
+        dense = np.stack([np.interp(at, s, points[:, i]) for i in range(3)], axis=-1)
+        return cls(np.ascontiguousarray(dense), np.ascontiguousarray(at / speed_m_s))
+
+
+SOON_S = 0.5  # eq. 29
+APART_M = 30.0
+
+
+class Cost:
+    """A batch objective over the unit box: (n, dim) to (n,).
+
+    ``earlier`` vehicles count in every objective; ``speed_m_s`` is this one's. A path costs the same, to the bit,
+    alone and in any population. For one thread at a time: it works in scratch of its own.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        code: Code,
+        objective: Objective,
+        *,
+        earlier: Sequence[Earlier] = (),
+        speed_m_s: float = 15.0,
+        apart_m: float = APART_M,
+    ) -> None:
+        self.code, self.objective = code, objective
+        self.earlier, self.speed_m_s, self.apart_m = tuple(earlier), speed_m_s, apart_m
+        scene = code.scene
+        self.curve, self.stride = sampled(scene, code.points)
+        wanted = objective.wanted | (k.CEILING if scene.ceiling_follows_ground else 0)
+        self._before = Held(
+            f"{CURVE} {SCENE} i8 i8 {k.ROOM}",
+            self.curve.bands, self.curve.spans, scene.heights, scene.quadratic, scene.floors, scene.floor_map,
+            scene.numbers, scene.zones, scene.corners, self.stride, wanted, *k.room(self.curve.basis.shape[1]),
+        )  # fmt: skip
+        straight = self.terms(self._straight()[None])[0]
+        self.unit = Unit(
+            straight,
+            max(scene.straight_m, 1e-9),
+            float(scene.high[2] - scene.low[2]),
+            problem.objective == "energy",
+            problem.vertical_j_per_m,
+            problem.horizontal_j_per_m,
+        )
+
+    @property
+    def dim(self) -> int:
+        """Number of variables."""
+        return self.code.dim
+
+    def __call__(self, u: Floats) -> Floats:
+        """(n,) costs of ``u`` (n, dim) in the unit box."""
+        return self.of_controls(self.code.controls(u))
+
+    def of_controls(self, controls: Floats) -> Floats:
+        """(n,) costs of control points (n, N, 3)."""
+        total = self.objective.weigh(self.terms(controls), self.unit)
+        if self.earlier:
+            # E eq. 30 prints the reciprocal: t is a time. E eq. 29's cubic grows with the gap: C·(0.5 - t)³.
+            paths = self.curve.samples(controls)
+            clocks, near = np.empty(paths.shape[:2]), np.empty(len(paths))
+            clocks_of(paths, self.speed_m_s, clocks)
+            for other in self.earlier:
+                nearness(paths, clocks, other.points, other.clock_s, self.apart_m, SOON_S, near)
+                total = total + PC * C * near
+        return np.asarray(total)
+
+    def terms(self, controls: Floats) -> Floats:
+        """(n, TERMS) terms of control points (n, N, 3)."""
+        out = np.empty((len(controls), k.TERMS))
+        k.measure(controls, self._before, out)
+        return out
+
+    def straight_cost(self) -> float:
+        """JL + JH of the straight line, no penalties: what MSFOA's threshold is set against (D)."""
+        s = self.unit.straight
+        return float(s[k.LENGTH] * (1.0 + s[k.HIGH] / self.unit.height_m))
+
+    def _straight(self) -> Floats:
+        """(N, 3) control points of the straight line from stop to stop."""
+        stops, rows = self.code.scene.stops, []
+        for i, count in enumerate(self.code.points):
+            t = np.arange(count + 1)[:, None] / (count + 1.0)
+            rows.append(stops[i] + t * (stops[i + 1] - stops[i]))
+        return np.vstack([*rows, stops[-1:]])
+
+
+def sampled(scene: Scene, points: tuple[int, ...]) -> tuple[Curve, int]:
+    """The curve past ``points`` free control points a stage, and how many samples lie between two nodes."""
+    stride = max(1, round(SAMPLES / (NODES + 1)))
+    legs = shares((NODES + 1) * stride, np.linalg.norm(np.diff(scene.stops, axis=0), axis=1))
+    return curve(points, legs), stride

@@ -1,0 +1,226 @@
+"""What becomes of a curve that fails the exact check: pushed out sideways, heights drawn anew, or given up.
+
+The push is a dynamic programme over a ribbon about the curve: at each station a side step, so that neighbouring
+points join over open ground, with the interval of altitudes that the climb limits reach there. Its track gets the
+taut string's profile through the exact tube, and the exact check decides.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
+from gcsplan.planners.profile.waypoints import thin, way_points
+from gcsplan.planners.swarm import scene_kernels as k
+from gcsplan.planners.swarm.scene import Scene
+from gcsplan.world.airspace import Legs, Violation
+
+Floats = NDArray[np.float64]
+
+STATIONS, SIDES, REACH = 160, 30, 4
+"""Stations along the ribbon, side steps to either side, and by how many steps neighbours may differ."""
+
+PUSHES = ((0.03, 0.0), (0.1, 0.0), (0.1, 0.01), (0.3, 0.0), (0.3, 0.01), (0.6, 0.005))
+"""Half-widths tried, as parts of the straight way; and what is kept over the floor and beside zones besides."""
+
+CORRECTIONS, CORRECTED_M = 12, 0.01
+"""How often a profile is corrected by what the exact check finds, and by how much beyond it."""
+
+WORTH = 1e-4
+"""What fewer way points may cost, as a part of the cost."""
+
+
+@dataclass(frozen=True, eq=False)
+class Repaired:
+    """Way points (N, 3) that the exact check passes; ``pushed_m`` how far the track was moved sideways at most."""
+
+    points: Floats
+    pushed_m: float
+
+
+def violations(problem: Problem, points: Floats) -> tuple[Violation, ...]:
+    """What the exact check has against a polyline (N, 3)."""
+    return problem.airspace.examine(Legs.of_path(points, problem.limits), problem.limits).violations
+
+
+def repair(problem: Problem, scene: Scene, samples: Floats, stops: NDArray[np.intp]) -> Repaired | None:
+    """A legal path near the curve ``samples`` (S, 3) whose ``stops`` must stay; None where none is found.
+
+    First the curve's own track with a new profile; then tracks pushed out further and further.
+    """
+    flat = samples[:, :2]
+    points = _with_profile(problem, flat, stops)
+    if points is not None:
+        return Repaired(points, 0.0)
+    way = float(np.hypot(*np.diff(scene.stops[:, :2], axis=0).T).sum())
+    for width, margin in PUSHES:
+        pushed = _push(problem, scene, flat, stops, width * way, margin * way)
+        if pushed is None:
+            continue
+        track, at, by = pushed
+        points = _with_profile(problem, track, at)
+        if points is not None:
+            return Repaired(points, by)
+    return None
+
+
+def _with_profile(problem: Problem, flat: Floats, stops: NDArray[np.intp]) -> Floats | None:
+    """Way points over a track (N, 2) with the best altitude profile; None where there is none that passes."""
+    pinned = np.zeros(len(flat), bool)
+    pinned[stops] = True
+    pin_m = np.full(len(flat), np.nan)
+    for i, via in zip(stops[1:-1], problem.via, strict=True):
+        pin_m[i] = math.nan if via.amsl_m is None else via.amsl_m
+    track = make_track(problem, np.ascontiguousarray(flat), pinned, pin_m)
+    with np.errstate(invalid="ignore"):  # a zone without a top under no ceiling: room from infinity to infinity
+        flown = fly(problem, track)
+    if not isinstance(flown, Flown):
+        return None
+    return _checked(problem, track, flown)
+
+
+def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
+    """Way points that pass; where the check finds the profile a little too low or high, it becomes a door."""
+    known: list[tuple[float, float, float]] = []
+    for _ in range(CORRECTIONS):
+        points, pinned = way_points(problem, track, flown)
+        found = violations(problem, points)
+        if not found:
+            few = thin(problem, points, pinned, WORTH * flown.cost)
+            return points if violations(problem, few) else few
+        s = distances(points[:, :2])
+        for v in found:
+            at = float(s[v.leg] + v.fraction * (s[v.leg + 1] - s[v.leg]))
+            room = v.by + CORRECTED_M
+            if v.kind in ("min_agl", "terrain_clearance"):
+                known.append((at, v.amsl_m + room, math.inf))
+            elif v.kind in ("max_agl", "max_amsl"):
+                known.append((at, -math.inf, v.amsl_m - room))
+            else:
+                return None
+        with np.errstate(invalid="ignore"):
+            again = fly(problem, track, known=known)
+        if not isinstance(again, Flown):
+            return None
+        flown = again
+    return None
+
+
+def _push(
+    problem: Problem, scene: Scene, flat: Floats, stops: NDArray[np.intp], half_m: float, margin_m: float
+) -> tuple[Floats, NDArray[np.intp], float] | None:
+    """The track pushed to open places within ``half_m``, its stops' indices, and how far it went at most.
+
+    The cheapest chain of side steps by length; a step is open if no point of it is shut, and if the altitudes that
+    can be reached along the cheapest chain so far meet its room.
+    """
+    base, left, at_stop = _ribbon(flat, stops, half_m)
+    n, m = len(base), 2 * SIDES + 1
+    step = half_m / SIDES
+    aside = (np.arange(m) - SIDES) * step
+    places = base[:, None] + aside[None, :, None] * left[:, None]  # (n, m, 2)
+    shifts = np.arange(-REACH, REACH + 1)
+    source = np.arange(m)[:, None] - shifts  # (m, t) which side one comes from
+    legal = (source >= 0) & (source < m)
+    source = np.clip(source, 0, m - 1)
+    low, high = _room(problem, scene, places, margin_m)
+    low, high = _pin(problem, scene, low, high, at_stop)
+    up, down = min(problem.limits.max_climb_slope, 1e6), min(problem.limits.max_descent_slope, 1e6)
+    cost = np.where(np.arange(m) == SIDES, 0.0, np.inf)
+    least, most = np.full(m, problem.start[2]), np.full(m, problem.start[2])
+    came = np.zeros((n, m), np.intp)
+    rows = np.arange(m)
+    for i in range(1, n):
+        a, b = places[i - 1][source], np.broadcast_to(places[i][:, None], (*source.shape, 2))
+        run = np.hypot(*np.moveaxis(b - a, -1, 0))
+        mid_low, mid_high = _room(problem, scene, a + 0.5 * (b - a), margin_m)
+        # Altitudes at the middle, then at the station.
+        half = 0.5 * run
+        lo = np.maximum(mid_low, least[source] - down * half)
+        hi = np.minimum(mid_high, most[source] + up * half)
+        open_way = legal & (lo <= hi)
+        lo, hi = np.maximum(low[i][:, None], lo - down * half), np.minimum(high[i][:, None], hi + up * half)
+        open_way &= lo <= hi
+        whole = np.where(open_way, cost[source] + run, np.inf)
+        best = whole.argmin(axis=1)
+        came[i], cost = source[rows, best], whole[rows, best]
+        least, most = lo[rows, best], hi[rows, best]
+        if not np.isfinite(cost).any():
+            return None
+    side = SIDES
+    if not np.isfinite(cost[side]):
+        return None
+    sides = [side]
+    for i in range(n - 1, 0, -1):
+        side = int(came[i, side])
+        sides.append(side)
+    chosen = np.array(sides[::-1])
+    track = places[np.arange(n), chosen]
+    track[at_stop] = flat[stops]
+    return track, at_stop, float(np.abs(aside[chosen]).max())
+
+
+def _ribbon(flat: Floats, stops: NDArray[np.intp], half_m: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
+    """Stations (n, 2) along a track, unit vectors to the left there (n, 2), and which stations are its stops.
+
+    A ribbon must not fold: the track's own turns within its half-width are smoothed away, between stop and stop.
+    """
+    parts, at_stop = [flat[:1]], [0]
+    whole = float(distances(flat)[-1])
+    for a, b in itertools.pairwise(stops):
+        track = _smoothed(flat[a : b + 1], half_m)
+        s = distances(track)
+        count = max(2, round(STATIONS * s[-1] / max(whole, 1e-9)))
+        at = np.linspace(0.0, s[-1], count + 1)[1:]
+        parts.append(np.stack([np.interp(at, s, track[:, i]) for i in range(2)], axis=-1))
+        at_stop.append(at_stop[-1] + count)
+    base = np.vstack(parts)
+    ahead = base[np.minimum(np.arange(len(base)) + 2, len(base) - 1)] - base[np.maximum(np.arange(len(base)) - 2, 0)]
+    long = np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)
+    return base, np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / long[:, None], np.array(at_stop)
+
+
+def _smoothed(track: Floats, reach_m: float, count: int = 400) -> Floats:
+    """A track (n, 2) averaged along itself over ``reach_m`` to either side, less near its ends, which stay."""
+    s = distances(track)
+    at = np.linspace(0.0, s[-1], count + 1)
+    even = np.stack([np.interp(at, s, track[:, i]) for i in range(2)], axis=-1)
+    total = np.vstack([np.zeros((1, 2)), np.cumsum(even, axis=0)])
+    here = np.arange(count + 1)
+    reach = np.minimum(round(reach_m / max(s[-1], 1e-9) * count), np.minimum(here, count - here))
+    return np.asarray((total[here + reach + 1] - total[here - reach]) / (2 * reach + 1)[:, None])
+
+
+def _room(problem: Problem, scene: Scene, places: Floats, margin_m: float) -> tuple[Floats, Floats]:
+    """Lowest and highest legal altitude at places (..., 2); the lowest is infinite where a place is shut."""
+    flat = np.ascontiguousarray(places.reshape(-1, 2))
+    air, limits = problem.airspace, problem.limits
+    low = air.floor_amsl(flat[:, 0], flat[:, 1], limits) + margin_m
+    high = air.ceiling_amsl(flat[:, 0], flat[:, 1], limits) - k_keep(limits.max_agl_m)
+    shut = np.empty(len(flat), np.bool_)
+    ground = np.nan_to_num(scene.ground(flat))
+    k.shut_by_zones(flat, ground, low, np.minimum(high, 1e8), scene.zones, scene.corners, shut)
+    low = np.where(shut, np.inf, low)
+    return low.reshape(places.shape[:-1]), high.reshape(places.shape[:-1])
+
+
+def k_keep(max_agl_m: float | None) -> float:
+    """Kept from the ceiling where it follows the ground, which is known less well between two places than at them."""
+    return 0.0 if max_agl_m is None else 0.02 * max_agl_m
+
+
+def _pin(problem: Problem, scene: Scene, low: Floats, high: Floats, at_stop: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """At stops the middle of the ribbon alone is open, at the altitude that is asked for there."""
+    low, high = low.copy(), high.copy()
+    heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
+    for i, z in zip(at_stop, heights, strict=True):
+        here = low[i, SIDES], high[i, SIDES]
+        low[i], high[i] = np.inf, -np.inf
+        low[i, SIDES], high[i, SIDES] = here if z is None else (z, z)
+    return low, high

@@ -1,0 +1,199 @@
+"""Paths for wings: a path of sharp corners made into legs and arcs of the turn radius, legal as flown.
+
+A fixed wing does not pass its way points: it begins to turn before each and flies an arc, tangent to both legs. So
+the corners that a shortest path has, where it touches obstacles, are laid on the arcs: a belt around discs (`arc_path`)
+that touch the corners from the obstacle's side, which shifts the way points outwards. What is legal is decided on the
+track as flown, arcs as chords widened by what the arc lies outside them; its altitude profile is drawn anew
+(`turns.profile`), and where ground or zones are in the way the discs are moved (`turns.repair`).
+
+- A via is passed exactly: it lies on its arc, and is a way point there, between the two that make the arc.
+- Start and goal have no heading of their own.
+- No lower bound comes from here; that of the path with corners holds for every path with arcs too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.track import distances
+from gcsplan.planners.turns.arc_path import Belt, through, unlooped
+from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
+from gcsplan.world.path import Path
+
+Floats = NDArray[np.float64]
+
+Replan = Callable[[float], tuple[Floats, NDArray[np.bool_]] | None]
+"""A path and its pinned points, planned with so many metres of track error more (`roomier`); None: there is none."""
+
+LEVELS = (0.15, 0.4, 1.0)
+"""Room asked for in new plans where a path cannot be rounded, in turn radii."""
+
+OUT_M = 0.3
+"""So far outside of a corner its arc is laid at first: bounds over a line lose centimetres, walls are not smooth."""
+
+WORTH, GOOD, DEAR = 3e-3, 1e-2, 3e-2
+"""What costs more than the path with corners by the first part is polished; by the second, begun anew; by the third,
+a path with more room is asked for."""
+
+SLACKS_M = (0.5, 4.0, 20.0)
+"""Points of the path that lie so near to the straight line between others are no corners; tried in turn."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Rounded:
+    """A path as a fixed wing flies it.
+
+    ``way_points`` (M, 3): what the autopilot is given; at each but the first and the last, where the legs turn, it
+    flies the arc of the turn radius that is tangent to both. Arcs of neighbours meet at most. Altitude is linear along
+    the track between way points, and that of a way point is reached in the middle of its arc. ``flown`` (K, 3): that
+    track, arcs as chords; ``widen_m`` (K - 1,) how far the arc may lie outside each chord. ``length_m`` of the track
+    itself, arcs as arcs; ``cost`` in the problem's objective.
+    """
+
+    way_points: Floats
+    flown: Floats
+    widen_m: Floats
+    length_m: float
+    cost: float
+
+
+def rounded(
+    problem: Problem,
+    points: Floats,
+    pinned: NDArray[np.bool_],
+    replan: Replan | None = None,
+    *,
+    patience: int = 1000,
+) -> Rounded | None:
+    """``points`` (N, 3), a legal path with corners, with turns of ``problem.turn_radius_m`` instead; None: not found.
+
+    ``pinned`` (N,) points that must be passed: the vias (ends are, always). ``replan`` is asked for a path with more
+    room where the given one cannot be rounded. ``patience`` counts the tracks that are tried for each path.
+    """
+    if problem.turn_radius_m <= 0.0:
+        raise ValueError(f"turn_radius_m must be greater than 0, given {problem.turn_radius_m:g}")
+    found = _rounded(problem, points, pinned, patience)
+    dear = (1.0 + DEAR) * problem.cost(Path(points))
+    for level in LEVELS if replan is not None else ():
+        if replan is None or (found is not None and found.cost <= dear):
+            break
+        again = replan(level * problem.turn_radius_m)
+        other = None if again is None else _rounded(problem, *again, patience)
+        if other is not None and (found is None or other.cost < found.cost):
+            found = other
+    return found
+
+
+def roomier(problem: Problem, extra_m: float) -> Problem:
+    """``problem`` with so many metres of track error more, for a path that leaves room for arcs; no turn radius.
+
+    Start and goal are lifted to where they are legal with it. A path for it begins and ends higher than it should:
+    `rounded` looks only at where a path goes, and draws its altitudes anew.
+    """
+    limits = replace(problem.limits, track_error_m=problem.limits.track_error_m + extra_m)
+
+    def lifted(point: tuple[float, float, float]) -> tuple[float, float, float]:
+        east, north, amsl = point
+        return east, north, max(amsl, float(problem.airspace.floor_amsl(east, north, limits)))
+
+    return replace(
+        problem, limits=limits, start=lifted(problem.start), goal=lifted(problem.goal), turn_radius_m=0.0,
+        via=tuple(replace(v, amsl_m=None) for v in problem.via),
+    )  # fmt: skip
+
+
+def _rounded(problem: Problem, points: Floats, pinned: NDArray[np.bool_], patience: int) -> Rounded | None:
+    given = problem.cost(Path(points))
+    best: Tried | None = None
+    cost = math.inf
+    for belt in _belts(problem, points, pinned):
+        found = mended(problem, belt, Patience(patience))
+        if found is None:
+            continue
+        found = polished(problem, found, (1.0 + WORTH) * given, Patience(patience))
+        assert found.risen is not None
+        if cost_of(problem, found.risen) < cost:
+            best, cost = found, cost_of(problem, found.risen)
+        if cost <= (1.0 + GOOD) * given:
+            break
+    if best is None or best.risen is None:
+        return None
+    risen = best.risen
+    length = float(np.hypot(np.diff(risen.true_m), np.diff(risen.flown[:, 2])).sum())
+    return Rounded(risen.way_points, risen.flown, risen.widen_m, length, cost)
+
+
+def _belts(problem: Problem, points: Floats, pinned: NDArray[np.bool_]) -> Iterator[Belt]:
+    """Belts to begin with: around all corners, then around fewer, each without the loops that it may have first."""
+    counts = set()
+    for slack in SLACKS_M:
+        belt = belt_of(problem, points, pinned, slack)
+        if len(belt.sense) in counts:
+            continue
+        counts.add(len(belt.sense))
+        open_ = unlooped(belt)
+        if len(open_.sense) not in counts:
+            counts.add(len(open_.sense))
+            yield open_
+        yield belt
+
+
+def belt_of(problem: Problem, points: Floats, pinned: NDArray[np.bool_], slack_m: float) -> Belt:
+    """The belt around those corners of a path that lie farther than ``slack_m`` from straight; not checked yet."""
+    flat = np.ascontiguousarray(points[:, :2], dtype=np.float64)
+    must = np.array(pinned, dtype=bool)
+    must[[0, -1]] = True
+    corners = _corners(flat, must, slack_m)
+    flat, must = flat[corners], must[corners]
+    a, b = np.diff(flat[:-1], axis=0), np.diff(flat[1:], axis=0)
+    turn = np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))
+    # A path that goes straight back turns about to the left as well as to the right.
+    sense = np.where(turn >= 0.0, 1.0, -1.0)
+    inner, pins = flat[1:-1], must[1:-1]
+    pin_m = np.full(len(inner), np.nan)
+    for k in np.flatnonzero(pins):
+        via = min(problem.via, key=lambda v: math.dist((v.east_m, v.north_m), inner[k]), default=None)
+        if via is not None and via.amsl_m is not None:
+            pin_m[k] = via.amsl_m
+    out = inner + OUT_M * (~pins * sense)[:, None] * _right(a, b)
+    return through(flat[[0, -1]], problem.turn_radius_m, out, sense, pins, pin_m)
+
+
+def _right(a: Floats, b: Floats) -> Floats:
+    """(N, 2) unit vectors to the right of the mean direction of ``a`` and ``b``; of ``a`` where they are opposite."""
+    way = a / np.hypot(*a.T)[:, None] + b / np.hypot(*b.T)[:, None]
+    way = np.where(np.hypot(*way.T)[:, None] > 1e-6, way, a)
+    way /= np.hypot(*way.T)[:, None]
+    return np.stack([way[:, 1], -way[:, 0]], axis=-1)
+
+
+def _corners(flat: Floats, must: NDArray[np.bool_], slack_m: float) -> NDArray[np.intp]:
+    """Indices of the points that are left when those near a straight line are not (Ramer, Douglas and Peucker)."""
+    keep = must.copy()
+    stops = np.flatnonzero(must)
+    spans = list(zip(stops[:-1].tolist(), stops[1:].tolist(), strict=True))
+    while spans:
+        i, j = spans.pop()
+        if j - i < 2:
+            continue
+        chord, off = flat[j] - flat[i], flat[i + 1 : j] - flat[i]
+        length = float(np.hypot(*chord))
+        if length < 1e-9:
+            away = np.hypot(off[:, 0], off[:, 1])
+        else:
+            along = np.clip(off @ chord / length**2, 0.0, 1.0)
+            away = np.hypot(*(off - along[:, None] * chord).T)
+        worst = int(np.argmax(away))
+        if away[worst] > slack_m:
+            keep[i + 1 + worst] = True
+            spans += [(i, i + 1 + worst), (i + 1 + worst, j)]
+    index = np.flatnonzero(keep)
+    apart = np.concatenate([[True], distances(flat[index])[1:] - distances(flat[index])[:-1] > 1e-3])
+    apart[-1] = True
+    return np.asarray(index[apart])

@@ -1,0 +1,274 @@
+"""Discs of a belt moved until the track is legal: a local search under the exact test of whole tracks.
+
+What a track breaks is one number: metres of floor over ceiling (and over what can be climbed to from start, or flown
+down from to the goal), summed along the track; the way through zones that can be passed neither above nor below; and
+by how much discs are too close. The discs next to the worst place are moved, left out, or joined by another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.track import Obstruction, Track
+from gcsplan.planners.turns.arc_path import Belt, Outline, inserted, moved, outline, tight, without
+from gcsplan.planners.turns.kernels import pinched, shut
+from gcsplan.planners.turns.profile import Risen, rise, track_of
+
+Floats = NDArray[np.float64]
+
+STEPS_M = (1.0, 4.0, 15.0, 50.0, 150.0)
+"""How far discs are moved."""
+
+NEAREST = 3
+"""Discs that are tried for the worst place."""
+
+ZONE_M, GAP_M = 30.0, 1e4
+"""What a metre through a zone, and a metre that discs are too close, count beside a metre of floor over ceiling."""
+
+SMALL, SLOW, LARGE = 0.999, 0.6, 0.3
+"""A change must leave less than the first part of what is broken; one that leaves more than the second is slow; one
+that leaves less than the third is taken at once."""
+
+SPARED = 4
+"""Of so many slow rounds, one looks at other ways out as well."""
+
+NEAR_END = 6.0
+"""So many turn radii from start or goal what is broken may be for want of climbing: then other ways out are tried."""
+
+WAYS_OUT, RUNS = 12, (0.0, 0.75, 2.0, 4.0)
+"""Headings out of start (into goal), and how far straight on, in turn radii, before the first (after the last) turn."""
+
+KICKS = 60
+"""Changes at random, of the discs near the worst place all at once, where no single one helps."""
+
+GAIN, PROBE = 1e-4, 0.01
+"""Polishing: least gain worth a try, as a part of the whole; how far a disc is moved to see if it can be, in radii."""
+
+
+@dataclass(eq=False, slots=True)
+class Patience:
+    """How many tracks may still be tried."""
+
+    left: int
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Tried:
+    """A belt and how much it breaks (0: nothing that was seen), and where along ``line``; or ``risen``, its flight."""
+
+    belt: Belt
+    line: Outline | None
+    track: Track | None
+    broken: float
+    worst_m: float
+    risen: Risen | None = None
+
+
+def mended(problem: Problem, belt: Belt, patience: Patience) -> Tried | None:
+    """A legal flight along ``belt``, or one that its discs can be moved to; None where none was found."""
+    rng = np.random.default_rng(problem.seed)
+    here = tried(problem, belt)
+    spared = 0
+    while here.risen is None:
+        best = here
+        for number, group in enumerate((_moves(here), _ways_out(problem, here), _kicks(here, rng))):
+            # Slow progress may be none in the end: then other ways out are looked at too, now and then.
+            slow = best.broken > SLOW * here.broken and number == 1 and spared % SPARED == 0
+            if best is not here and not slow:
+                break
+            for other in group:
+                if patience.left <= 0:
+                    return None
+                patience.left -= 1
+                found = tried(problem, other, here)
+                if found.risen is not None:
+                    return found
+                if found.broken < best.broken * SMALL:
+                    best = found
+                    if found.broken < LARGE * here.broken:
+                        break
+        if best is here:
+            return None
+        spared += best.broken > SLOW * here.broken
+        here = best
+    return here
+
+
+def polished(problem: Problem, here: Tried, enough: float, patience: Patience) -> Tried:
+    """``here`` with discs left out or moved inwards as long as that makes it cheaper and it costs over ``enough``."""
+    improved = True
+    while improved:
+        improved = False
+        for k in range(len(here.belt.sense) - 1, -1, -1):
+            if here.risen is None or cost_of(problem, here.risen) <= enough:
+                return here
+            if k >= len(here.belt.sense) or here.belt.pinned[k]:
+                continue
+            better = _shortened(problem, here, k, patience)
+            improved |= better is not here
+            here = better
+    return here
+
+
+def _shortened(problem: Problem, here: Tried, k: int, patience: Patience) -> Tried:
+    """``here`` without disc ``k``, or with it farther inwards, if that is legal and cheaper."""
+    belt, radius = here.belt, problem.turn_radius_m
+    assert here.line is not None
+    assert here.risen is not None
+    worth = GAIN * float(here.line.s_m[-1])
+
+    def better(other: Belt) -> Tried | None:
+        if patience.left <= 0:
+            return None
+        patience.left -= 1
+        found = tried(problem, other, here)
+        assert here.risen is not None
+        cheaper = found.risen is not None and cost_of(problem, found.risen) < cost_of(problem, here.risen) - 1e-3
+        return found if cheaper else None
+
+    rest = without(belt, k)
+    if rest.gap_m == 0.0 and float(here.line.s_m[-1]) - float(outline(rest).s_m[-1]) > worth:
+        found = better(rest)
+        if found is not None:
+            return found
+    if 2.0 * radius * math.sin(0.5 * min(belt.turn[k], math.pi)) > worth:
+        out = _outwards(belt, k)
+        first = better(moved(belt, k, -PROBE * radius * out))
+        if first is not None:  # nothing holds it, near by
+            for part in (1.0, 0.25, 0.06):
+                found = better(moved(belt, k, -part * radius * out))
+                if found is not None:
+                    return found
+            return first
+    return here
+
+
+def cost_of(problem: Problem, risen: Risen) -> float:
+    """Metres or joules of a flight, arcs as arcs."""
+    climbs = np.diff(risen.flown[:, 2])
+    if problem.objective == "energy":
+        flat = float(risen.true_m[-1])
+        return problem.vertical_j_per_m * float(np.abs(climbs).sum()) + problem.horizontal_j_per_m * flat
+    return float(np.hypot(np.diff(risen.true_m), climbs).sum())
+
+
+def tried(problem: Problem, belt: Belt, like: Tried | None = None) -> Tried:
+    """What ``belt`` breaks, or how it is flown; quicker where another is ``like`` it."""
+    if belt.gap_m > 0.0:
+        return Tried(belt, None, None, GAP_M * (1.0 + belt.gap_m), math.nan)
+    line = outline(belt)
+    known = None if like is None or like.line is None or like.track is None else (like.line, like.track)
+    track = track_of(problem, line, known)
+    broken, worst = _broken(problem, track)
+    if broken > 0.0:
+        return Tried(belt, line, track, broken, worst)
+    found = rise(problem, track, line)
+    if isinstance(found, Obstruction):
+        return Tried(belt, line, track, 1e-3 * max(found.by, 1e-6), 0.5 * (found.s0_m + found.s1_m))
+    return Tried(belt, line, track, 0.0, 0.0, found)
+
+
+def _middle(belt: Belt, k: int) -> float:
+    """Heading in the middle of a turn."""
+    return float(belt.heading[k] + 0.5 * belt.sense[k] * belt.turn[k])
+
+
+def _outwards(belt: Belt, k: int) -> Floats:
+    """Away from the centre in the middle of a turn, unit vector."""
+    at = _middle(belt, k)
+    return np.asarray(belt.sense[k] * np.array([math.sin(at), -math.cos(at)]))
+
+
+def _near(here: Tried) -> list[int]:
+    """Free discs, the nearest to the worst place first."""
+    belt, line = here.belt, here.line
+    if line is None:
+        return [k for k in range(len(belt.sense)) if not belt.pinned[k]]
+    order = line.disc[np.argsort(np.abs(line.s_m[line.arcs[:, 1]] - here.worst_m), kind="stable")]
+    return [k for k in dict.fromkeys(order.tolist()) if not belt.pinned[k]][:NEAREST]
+
+
+def _moves(here: Tried) -> Iterator[Belt]:
+    """One disc moved, left out, or put in at the worst place."""
+    belt, line, near = here.belt, here.line, _near(here)
+    for step in STEPS_M:
+        for k in near:
+            at = _middle(belt, k)
+            along = np.array([math.cos(at), math.sin(at)])
+            out = _outwards(belt, k)
+            for by in (out, -out, along, -along):
+                yield moved(belt, k, step * by)
+    for k in near:
+        yield without(belt, k)
+    if line is None:
+        return
+    leg = int(np.clip(np.searchsorted(line.s_m, here.worst_m) - 1, 0, len(line.s_m) - 2))
+    place = np.array([np.interp(here.worst_m, line.s_m, line.points[:, i]) for i in range(2)])
+    d = line.points[leg + 1] - line.points[leg]
+    heading = math.atan2(d[1], d[0])
+    passed = line.disc[line.s_m[line.arcs[:, 1]] < here.worst_m]
+    at_disc = int(passed[-1]) + 1 if len(passed) else 0
+    for step in STEPS_M:
+        for sense in (1.0, -1.0):
+            # A disc on the left shifts the track to the right, and the other way round.
+            shift = sense * step * np.array([math.sin(heading), -math.cos(heading)])
+            yield inserted(belt, at_disc, place + shift, heading, sense)
+
+
+def _ways_out(problem: Problem, here: Tried) -> Iterator[Belt]:
+    """Another first turn, where what is broken is near the start; another last one, near the goal."""
+    if here.line is None:
+        return
+    belt, radius = here.belt, problem.turn_radius_m
+    for at_goal in (False, True):
+        away = float(here.line.s_m[-1]) - here.worst_m if at_goal else here.worst_m
+        if away > NEAR_END * radius:
+            continue
+        for gone in range(5):
+            rest = belt
+            for _ in range(gone):
+                k = len(rest.sense) - 1 if at_goal else 0
+                if len(rest.sense) == 0 or rest.pinned[k]:
+                    break
+                rest = without(rest, k)
+            else:
+                for run in RUNS:
+                    for way in range(WAYS_OUT):
+                        heading = 2.0 * math.pi * way / WAYS_OUT
+                        along = run * radius * np.array([math.cos(heading), math.sin(heading)])
+                        contact = rest.ends[1] - along if at_goal else rest.ends[0] + along
+                        for sense in (1.0, -1.0):
+                            yield inserted(rest, len(rest.sense) if at_goal else 0, contact, heading, sense)
+
+
+def _kicks(here: Tried, rng: np.random.Generator) -> Iterator[Belt]:
+    """The discs near the worst place moved at random, near and far in turn."""
+    near = _near(here)
+    for k in range(KICKS if near else 0):
+        wide = here.belt.radius_m * (0.02, 0.1, 0.4, 1.0)[k % 4]
+        centre = here.belt.centre.copy()
+        centre[near] += rng.normal(0.0, wide, (len(near), 2))
+        yield tight(replace(here.belt, centre=centre))
+
+
+def _broken(problem: Problem, track: Track) -> tuple[float, float]:
+    tube, limits = track.tube, problem.limits
+    out = np.empty(3)
+    pinched(
+        tube.s_m, tube.floor_m, tube.ceiling_m, problem.start[2], problem.goal[2],
+        limits.max_climb_slope, limits.max_descent_slope, out,
+    )  # fmt: skip
+    total, worst, by = out.tolist()
+    for b in tube.bands:
+        shut(tube.s_m, tube.floor_m, tube.ceiling_m, b.s_m, b.bottom_m, b.top_m, out)
+        length, middle = float(out[0]), float(out[1])
+        total += ZONE_M * length
+        if length > by:
+            worst, by = middle, length
+    return total, worst
