@@ -26,7 +26,7 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import load_mission
 from gcsplan.pipeline import make_problem, world_of
 from gcsplan.planners.problem import Problem, Solution
-from gcsplan.planners.table import get as get_planner
+from gcsplan.planners.registry import get as get_planner
 
 COUNT = 100
 KILL_MB, KILL_S = 6000.0, 120.0

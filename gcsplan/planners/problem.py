@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners.budget import Budget
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
@@ -58,6 +59,8 @@ class Problem:
     seed: int = 1
     gap_percent: float = 0.1
     budget_s: float = 10.0
+    budget_mb: float = 1024.0
+    budget: Budget = field(default_factory=Budget.endless)
     progress: Callable[[Progress], None] | None = None
     options: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
@@ -74,6 +77,19 @@ class Problem:
         if self.objective == "energy":
             return path.energy_j(self.vertical_j_per_m, self.horizontal_j_per_m)
         return path.length_m
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One search of a plan: its name, seconds by the clock and megabytes by count, and by how many percent the best
+    path became cheaper and the bound higher through it. ``refused``: it did not fit into what was left."""
+
+    name: str
+    s: float
+    mb: float
+    gained_percent: float = 0.0
+    bound_percent: float = 0.0
+    refused: bool = False
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -96,3 +112,4 @@ class Solution:
     flown: Path | None = None
     raw_violations: int | None = None
     repaired: bool | None = None
+    search: tuple[Step, ...] = ()

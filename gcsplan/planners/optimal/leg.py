@@ -9,6 +9,7 @@ be short enough.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,9 @@ Bools = NDArray[np.bool_]
 Spare = tuple[float, float]
 """Metres that a path may fly in laps near its start and near its goal."""
 
-DETOURS = (1.25, 2.5, math.inf)
-"""How long tracks may be, in times the straight way, before the lattice must be widened."""
+DETOURS, LEAST_DETOUR = (1.25, 2.5, math.inf), 1.02
+"""How long tracks may be, in times the straight way, before the lattice must be widened; and how long they may be in
+the narrowest one."""
 MUCH = 0.5
 """What part of the terrain model is so much that all of it may be looked at as well."""
 COARSE_M = 100.0
@@ -36,6 +38,8 @@ COARSE_M = 100.0
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 """Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
 
+MOST_FIRST, NODE_BYTES = 1.5e6, 400.0
+"""Nodes of the first look's lattice, at most, and what one takes with its mesh and a search over that."""
 MOST_NODES, MOST_BESIDE, LARGE = 16e6, 6e6, 4e6
 """Nodes of the finest lattice, at most, in the box around a corridor: so many, and fewer beside a terrain model of more
 nodes than that, to need no more than half a gigabyte besides."""
@@ -51,6 +55,16 @@ RAISED, WORTHWHILE = 4, 0.05
 """Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Exactly:
+    """Tracks are looked for where nodes are legal, though what is between them may not be by a little; ``closely``:
+    along the track of the last flood or bound, in cells as small as can be. ``shut``: where tracks lacked so many
+    metres all the same."""
+
+    closely: bool
+    shut: list[tuple[Floats, float]]
+
+
 class Leg:
     """One leg of a problem, from stop to stop, under caps of at most ``top_m``."""
 
@@ -59,6 +73,8 @@ class Leg:
         self.straight_m = math.dist(start.place, goal.place)
         self.length_m = math.inf
         """A lower bound of every track's length below the highest cap; inf: there is none, proved."""
+        self.seen = False
+        """Whether the leg was flooded."""
         self.reach_m = 0.0
         """Tracks shorter than this lie within the lattice, and within what the flood has seen."""
         self.farthest = math.inf
@@ -72,8 +88,22 @@ class Leg:
         self.last_way = np.array([start.place, goal.place])  # of flood or bound
         self._close: Nearby | None = None
         self._reached: tuple[Nearby, Reached] | None = None
-        cell_m = float(problem.airspace.surface.grid.metres_per_cell(*start.place).max())
+        self._resolve(DETOURS[0])
+        self.sheets = False
+        """Whether bounds hold tracks to pass each zone that has a floor and a ceiling over or under all of it."""
+        self.closer = 1
+        """Into how many parts a side the finer lattice's cells are cut once more, see `look_closer`."""
+
+    def _resolve(self, detour: float) -> None:
+        """Choose the cells for tracks so many times as long as the straight line: as small as leg and zones want them,
+        and no more of them than memory allows."""
+        problem = self.problem
+        cell_m = float(problem.airspace.surface.grid.metres_per_cell(*self.start.place).max())
         wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
+        area_m2 = self._area_m2(detour)
+        most = min(MOST_FIRST, 1e6 * problem.budget.room_mb / NODE_BYTES)
+        wanted_m = max(wanted_m, math.sqrt(area_m2 / most))
+        finest_m = max(finest_m, wanted_m / MOST_FINE)
         self.parts = max(1, round(cell_m / wanted_m))
         """Parts a side that the terrain model's cells are cut into, where they are large beside leg or zones."""
         # Between nodes that are left out heights are guessed, so few are better kept.
@@ -86,17 +116,22 @@ class Leg:
         self._cut = 1
         if self._stride == 1:
             self._ratio = self._cut = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
-        self.sheets = False
-        """Whether bounds hold tracks to pass each zone that has a floor and a ceiling over or under all of it."""
-        self.closer = 1
-        """Into how many parts a side the finer lattice's cells are cut once more, see `look_closer`."""
-        self.exact = self.closely = False
-        """Whether tracks are looked for where nodes are legal, though what is between them may not be by a little; and
-        that along the way of the last flood or bound, in cells as small as can be."""
-        self.shut: list[tuple[Floats, float]] = []
-        """Where tracks lacked so many metres all the same."""
         self.has_fine = self._ratio > 1
         """Whether there is a lattice finer than that of the first look."""
+        self.nodes = area_m2 / (cell_m / self.parts * self._stride) ** 2
+        """Of the first look's lattice, about."""
+
+    @property
+    def lower_m(self) -> float:
+        """No track is shorter, as far as is known."""
+        return self.length_m if self.seen else self.straight_m
+
+    def _area_m2(self, detour: float) -> float:
+        """Of what tracks so many times as long as the straight line may meet, as far as the terrain is known."""
+        surface = self.problem.airspace.surface
+        col0, row0, col1, row1 = extent(self.problem, self._box(detour))
+        size = surface.grid.metres_per_cell(*self.start.place)
+        return float((col1 - col0) * (row1 - row0) * size[0] * size[1])
 
     def _cell_m(self) -> float:
         """How large cells may be for the first look."""
@@ -109,22 +144,32 @@ class Leg:
         ]
         return max(least, min([most, *(r / 3.0 for r in radii)]))
 
-    def flood(self, slack: float) -> None:
-        """Look at all that is free below the highest cap, as far as ways ``slack`` longer than the shortest lead.
+    def flood(self, slack: float, within_m: float = math.inf) -> None:
+        """Look at all that is free below the highest cap, as far as tracks ``slack`` longer than the shortest lead, and
+        no farther than tracks of ``within_m``.
 
-        Widens the lattice until that way lies within it.
+        Widens the lattice until that track lies within it.
         """
         self._ahead = self._close = self._reached = None
         self.closer = 1
-        for detour in DETOURS:
+        self.seen = True
+        detours: tuple[float, ...] = DETOURS
+        limited = math.isfinite(within_m)
+        if limited:
+            asked = max(within_m / self.straight_m, LEAST_DETOUR) * (1.0 + 1e-9)
+            much = asked > DETOURS[0] and self._is_most(asked)
+            detours = (self._detour if self._detour >= asked else math.inf if much else asked,)
+        for detour in detours:
             if detour > self.farthest:
                 break
-            if math.isfinite(detour) and detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
-                continue
-            if detour != self._detour and DETOURS[0] < detour < math.inf and self._is_most(detour):
-                continue
-            within = detour * self.straight_m if math.isfinite(detour) else math.inf
+            if not limited and math.isfinite(detour):
+                if detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
+                    continue
+                if detour != self._detour and detour > DETOURS[0] and self._is_most(detour):
+                    continue
+            within = min(detour * self.straight_m if math.isfinite(detour) else math.inf, within_m)
             if detour != self._detour:
+                self._resolve(detour)
                 self.plane, self._twin = self._lattice(detour), None
                 self._detour = detour
                 self._mesh = self.plane.mesh(self.top_m, True)
@@ -139,6 +184,9 @@ class Leg:
             if way is not None:
                 self.length_m, self.last_way = way.length_m, way.points
                 self.reach_m = min(within, way.length_m * (1.0 + slack))
+                return
+            if limited:
+                self.length_m = self.reach_m = within_m  # no track is shorter
                 return
 
     def _relief(
@@ -174,6 +222,7 @@ class Leg:
         under: Bools | None,
         spare_m: Spare = (0.0, 0.0),
         over: Bools | None = None,
+        exactly: Exactly | None = None,
     ) -> Way | None:
         """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``, if it is shorter than
         ``limit_m``, and than `reach_m`.
@@ -183,15 +232,15 @@ class Leg:
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
-        if within is not None and self.closely:
+        if within is not None and exactly is not None and exactly.closely:
             within = self._along(within)
-        relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, self.exact)
-        for place, by in self.shut if self.exact else ():
+        relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, exactly is not None)
+        for place, by in exactly.shut if exactly is not None else ():
             relief.lift(place[None], np.array([by]))
         try:
-            for _ in range(LEARNT if self.exact else 1):
+            for _ in range(LEARNT if exactly is not None else 1):
                 way = relief.mesh().way(self.start.place, self.goal.place, limit, guide)
-                if way is None or not self.exact or not relief.learn(way.points):
+                if way is None or exactly is None or not relief.learn(way.points):
                     return way
         except Exhausted:
             pass

@@ -10,18 +10,17 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.leg import Leg
+from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.optimal.sources.detours import joined
 from gcsplan.planners.profile.track import distances
 from gcsplan.world.path import Path
 
-if TYPE_CHECKING:
-    from gcsplan.planners.optimal.incumbent import Below
-    from gcsplan.planners.optimal.leg import Leg
 
 Floats = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -48,23 +47,24 @@ AT_ONCE = 512
 """Places whose distance from a track is worked out at once."""
 
 
-def follow(below: Below) -> bool:
+def follow(plane: PlaneSearch) -> bool:
     """Where the ways of the last bounds leave the best path, look for a path along them; True if one is the best so
     far."""
-    assert below.best is not None
-    stops = [0, len(below.best) - 1] if below.pinned is None else np.flatnonzero(below.pinned).tolist()
-    if len(stops) != len(below.legs) + 1:
+    incumbent = plane.incumbent
+    assert incumbent.best is not None
+    stops = [0, len(incumbent.best) - 1] if incumbent.pinned is None else np.flatnonzero(incumbent.pinned).tolist()
+    if len(stops) != len(plane.legs) + 1:
         return False
-    parts = [below.best[a : b + 1] for a, b in pairwise(stops)]
-    found = [_nearer(below, leg, part) for leg, part in zip(below.legs, parts, strict=True)]
+    parts = [incumbent.best[a : b + 1] for a, b in pairwise(stops)]
+    found = [_nearer(plane, leg, part) for leg, part in zip(plane.legs, parts, strict=True)]
     if all(new is None for new in found):
         return False
     paths = [part if new is None else new for part, new in zip(parts, found, strict=True)]
     points, pinned, _ = joined(paths, [None] * (len(paths) - 1))
-    return not below.judge.violations(points) and below.take_simpler(points, pinned, fine=True, longer=False)
+    return not incumbent.judge.violations(points) and incumbent.take_simpler(points, pinned, fine=True, longer=False)
 
 
-def _nearer(below: Below, leg: Leg, path: Floats) -> Floats | None:
+def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
     """(N, 3) a cheaper path of a leg than a known one, which it leaves where the way of the last bound does; None where
     none was found."""
     way = leg.last_way
@@ -77,12 +77,12 @@ def _nearer(below: Below, leg: Leg, path: Floats) -> Floats | None:
         low, high = max(first - 1, 0), min(last + 1, len(s) - 1)
         a, b = nearest[low], nearest[high]
         begun = better[-1][1] if better else 0.0
-        if a < begun or (b - a) - (s[high] - s[low]) < WORTH * (below.longest() - at[-1]):
+        if a < begun or (b - a) - (s[high] - s[low]) < WORTH * (plane.longest() - at[-1]):
             continue
         ends = [np.array([np.interp(x, on_path, path[:, k]) for k in range(3)]) for x in (a, b)]
-        part = _along(below, leg, ends, places[low : high + 1], s[low : high + 1], at[-1])
+        part = _along(plane, leg, ends, places[low : high + 1], s[low : high + 1], at[-1])
         known = np.vstack([ends[0], path[(on_path > a) & (on_path < b)], ends[1]])
-        if part is not None and below.problem.cost(Path(part)) < below.problem.cost(Path(known)):
+        if part is not None and plane.problem.cost(Path(part)) < plane.problem.cost(Path(known)):
             better.append((a, b, part))
     out, begin = [], -math.inf
     for a, b, part in better:
@@ -91,12 +91,12 @@ def _nearer(below: Below, leg: Leg, path: Floats) -> Floats | None:
     return np.vstack([*out, path[on_path > begin + APART_M]]) if out else None
 
 
-def _along(below: Below, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float) -> Floats | None:
+def _along(plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float) -> Floats | None:
     """(N, 3) way points from one end to the other along a way, led past what is shut on it; None where that fails.
 
     ``places`` (N, 2) of the way, ``s`` (N,) how far along it they are; ``whole_m`` how long all of it is.
     """
-    over = below.problem.airspace.floor_amsl(places[:, 0], places[:, 1], below.problem.limits) - below.top_m
+    over = plane.problem.airspace.floor_amsl(places[:, 0], places[:, 1], plane.problem.limits) - plane.top_m
     stretches = _stretches(over)
     if len(stretches) > MOST:
         return None
@@ -106,19 +106,23 @@ def _along(below: Below, leg: Leg, ends: list[Floats], places: Floats, s: Floats
     for first, last in pairwise(cuts):
         goal = ends[1]
         if last < len(s) - 1:
-            height = _height(below, leg, *map(float, (s[last], whole_m - s[last], over[last])))
+            height = _height(plane, leg, *map(float, (s[last], whole_m - s[last], over[last])))
             goal = np.array([*places[last], height])
-        part = replace(below.problem, start=_point(start), goal=_point(goal), via=(), progress=None, objective="length")
-        found = type(below)(part, below.begun_s)
+        part = replace(plane.problem, start=_point(start), goal=_point(goal), via=(), progress=None, objective="length")
+        sub = Incumbent(part)
+        found = PlaneSearch(sub)
         for piece in found.legs:
             piece.farthest = FARTHEST
         if (first, last) not in stretches:
-            found.take_along(joined([np.vstack([start[:2], places[first + 1 : last], goal[:2]])], []))
-        if found.best is None:
-            found.look(SLACKS, (False,))
-        if found.best is None or not below.in_time():
+            sub.take_along(joined([np.vstack([start[:2], places[first + 1 : last], goal[:2]])], []))
+        if sub.best is None:
+            for _ in found.first_looks(SLACKS):
+                pass
+        if sub.best is None and not sub.proved_shut and found.legs:
+            found.squeeze(closely=False)
+        if sub.best is None or not plane.incumbent.budget.goes_on():
             return None
-        out.append(found.best if not out else found.best[1:])
+        out.append(sub.best if not out else sub.best[1:])
         start = goal
     return np.vstack(out)
 
@@ -161,11 +165,11 @@ def _stretches(over: Floats) -> list[tuple[int, int]]:
     return out
 
 
-def _height(below: Below, leg: Leg, from_start_m: float, to_goal_m: float, over_m: float) -> float:
+def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float, over_m: float) -> float:
     """How high a path goes on at a place: below the cap by half of what there is to spare, or less; that of the goal
     there; and what can be reached from start and goal."""
-    limits = below.problem.limits
-    z = below.top_m - min(UNDER_M, max(-0.5 * over_m, 0.0))
+    limits = plane.problem.limits
+    z = plane.top_m - min(UNDER_M, max(-0.5 * over_m, 0.0))
     for stop, way_m, slope in (
         (leg.start, from_start_m, limits.max_climb_slope),
         (leg.goal, to_goal_m, limits.max_descent_slope),

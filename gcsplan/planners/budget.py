@@ -1,0 +1,101 @@
+"""What one plan may take: counted work, counted bytes, and the clock as a last stop.
+
+Work is counted in seconds of a plain processor, by the sizes of what is worked on (`RATES`), so that the same question
+stops at the same place on every machine and beside any load. A budget in seconds buys a part of itself in counted work
+(`COUNTED`): a machine that is that much slower, or that busy, still ends within it. The clock stops only a plan that is
+slower yet; then the result depends on the machine and says so (``stopped_by: time``).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+
+RATES = {
+    "node": 0.35e-6,
+    "portal": 1.2e-6,
+    "leg": 9e-6,
+    "place": 0.6e-6,
+    "corner": 25e-6,
+    "label": 6e-6,
+}
+"""Counted seconds: a lattice's node made ready, a mesh's portal searched, a leg under the exact check, a place whose
+floor is read, a corner of an outline triangulated, a label of the lattice search."""
+COUNTED = 0.35
+"""What part of the budget's seconds may be spent as counted work."""
+FIRST = 3.0
+"""How many times ``budget_s`` the search for a first path may take."""
+SPARE_S = 0.5
+"""Taken off the clock's last stop, for what is under way when it comes."""
+
+
+@dataclass(eq=False)
+class Budget:
+    """Of one plan: seconds and megabytes that are allowed, and what has been spent."""
+
+    seconds: float
+    megabytes: float
+    begun_s: float = field(default_factory=time.perf_counter)
+    spent: float = 0.0
+    """Counted seconds so far."""
+    held_mb: float = 0.0
+    """What the searches keep between each other, counted."""
+    clocked_out: bool = False
+    """Whether the clock stopped something, so that another run may end elsewhere."""
+    ran_out: bool = False
+    """Whether counted work ran out."""
+    _first_s: float | None = None
+    _first_spent: float = 0.0
+
+    def spend(self, what: str, count: float) -> None:
+        """Count work: so many of what `RATES` names."""
+        self.spent += RATES[what] * count
+
+    def found_first(self) -> None:
+        """From here on the budget counts for what comes after the first path."""
+        if self._first_s is None:
+            self._first_s, self._first_spent = time.perf_counter(), self.spent
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds by the clock since the plan began."""
+        return time.perf_counter() - self.begun_s
+
+    @property
+    def left(self) -> float:
+        """Counted seconds left."""
+        allowed = COUNTED * self.seconds * (FIRST if self._first_s is None else 1.0)
+        return allowed - (self.spent - self._first_spent)
+
+    @property
+    def deadline_s(self) -> float:
+        """The clock's last stop, as `time.perf_counter` gives it."""
+        if self._first_s is None:
+            return self.begun_s + FIRST * self.seconds
+        return self._first_s + max(self.seconds - SPARE_S, 0.5 * self.seconds)
+
+    def goes_on(self, part: float = 1.0) -> bool:
+        """Whether there is work and time left; ``part`` of what is allowed after the first path may be spent by now."""
+        allowed = COUNTED * self.seconds
+        if self.left <= (1.0 - part) * allowed:
+            self.ran_out = True
+            return False
+        if time.perf_counter() > self.deadline_s:
+            self.clocked_out = True
+            return False
+        return True
+
+    def fits(self, seconds: float, megabytes: float) -> bool:
+        """Whether so much counted work and memory is left."""
+        return seconds <= self.left and megabytes <= self.room_mb
+
+    @property
+    def room_mb(self) -> float:
+        """Megabytes that the next search may take."""
+        return max(self.megabytes - self.held_mb, 0.0)
+
+    @classmethod
+    def endless(cls) -> Budget:
+        """For a problem that nobody set limits for."""
+        return cls(math.inf, math.inf)

@@ -1,0 +1,252 @@
+"""Zones as outlines in the plane: the exact shortest track around those that can be passed neither over nor under.
+
+A zone grows by what must be kept from it, with its corners round. A polygon inside that shape gives a bound, and one
+around it gives a path; their arcs are drawn more finely where a track touches them. The free plane between the
+polygons is cut into triangles, and Polyanya finds the shortest track over those (`polyanya`).
+
+Zones are added one by one: the shortest track past the zones that are known is a bound for all of them, and as soon as
+it meets no other zone it is the answer. So the work follows the zones that matter, however many there are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from gcsplan.planners.budget import Budget
+from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
+from gcsplan.planners.optimal.navmesh.polyanya import search
+from gcsplan.world.zones import Circle, Zone
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Place = tuple[float, float]
+
+COARSE, FINE = 4, 40
+"""Chords of a quarter circle: of every arc at first, and of an arc that a track touches."""
+TOUCH_M = 0.1
+"""A track touches an outline from which it is no farther than this, and a corner of it where it turns so near."""
+ROUNDS = 300
+"""Times that a track is looked for with more zones, or finer arcs."""
+MOST_CORNERS = 12_000
+"""Corners of all outlines of one mesh: beyond this the triangulation takes seconds."""
+BEYOND_M = 1.0
+"""How far the mesh reaches beyond the outlines and the places."""
+MOST_OPENED = 1_000_000
+
+
+class TooLarge(Exception):
+    """A mesh would have more corners than `MOST_CORNERS`."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Track:
+    """A shortest track: ``points`` (N, 2), metres, and its length."""
+
+    points: Floats
+    length_m: float
+
+
+@dataclass(eq=False, slots=True)
+class Outline:
+    """One zone grown by ``reach_m``: its polygon for paths (``outer``) or for bounds, drawn as finely as is asked.
+
+    ``fine``: places near which arcs are drawn finely.
+    """
+
+    zone: Zone
+    reach_m: float
+    scale: float
+    outer: bool
+    hair_m: float
+    fine: list[float] = field(default_factory=list)
+    rounded: int = COARSE
+    _shape: shapely.Polygon | None = None
+
+    @property
+    def shape(self) -> shapely.Polygon:
+        """The polygon."""
+        if self._shape is None:
+            self._shape = self._disc() if isinstance(self.zone.shape, Circle) else self._grown()
+        return self._shape
+
+    def _disc(self) -> shapely.Polygon:
+        circle = self.zone.shape
+        assert isinstance(circle, Circle)
+        radius = circle.radius_m * self.scale + self.reach_m + (self.hair_m if self.outer else -self.hair_m)
+        angle = np.arange(4 * COARSE) * (0.5 * math.pi / COARSE)
+        if self.fine:
+            step = 0.5 * math.pi / FINE
+            sectors = sorted({math.floor(a / (0.5 * math.pi / COARSE)) % (4 * COARSE) for a in self.fine})
+            parts = [s * (0.5 * math.pi / COARSE) + np.arange(1, FINE // COARSE) * step for s in sectors]
+            angle = np.sort(np.concatenate([angle, *parts]))
+        corner = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        if self.outer:
+            # Where neighbouring tangents meet: outside the disc, as near to it as the chords are short.
+            half = 0.5 * np.diff(np.append(angle, angle[0] + 2.0 * math.pi))
+            middle = angle + half
+            corner = np.stack([np.cos(middle), np.sin(middle)], axis=-1) / np.cos(half)[:, None]
+        return shapely.Polygon(np.array([circle.east_m, circle.north_m]) + max(radius, 0.0) * corner)
+
+    def _grown(self) -> shapely.Polygon:
+        assert not isinstance(self.zone.shape, Circle)
+        bare = shapely.Polygon(self.zone.shape.vertices)
+        if self.outer:
+            reach = (self.reach_m + self.hair_m) / math.cos(0.25 * math.pi / self.rounded)
+            return bare.buffer(reach, quad_segs=self.rounded)
+        if self.reach_m <= self.hair_m:
+            # What is left of a zone when a hair is taken off may be nothing, or several parts.
+            return bare.buffer(self.reach_m - self.hair_m, join_style="mitre")
+        return bare.buffer(self.reach_m - self.hair_m, quad_segs=self.rounded)
+
+    def touch(self, places: Floats) -> bool:
+        """Draw the arcs more finely at ``places`` (N, 2) where a track turns around them; whether anything changes."""
+        shape = self.zone.shape
+        if isinstance(shape, Circle):
+            d = places - np.array([shape.east_m, shape.north_m])
+            width = 0.5 * math.pi / COARSE
+            known = {math.floor(a / width) for a in self.fine}
+            # A track that turns at a corner may turn in the sector beside it when that is drawn finely.
+            angles = np.arctan2(d[:, 1], d[:, 0]) % (2.0 * math.pi)
+            sectors = {math.floor((a + off) / width) % (4 * COARSE) for a in angles.tolist() for off in (-1e-3, 1e-3)}
+            new = sorted(sectors - known)
+            self.fine += [(s + 0.5) * width for s in new]
+            if new:
+                self._shape = None
+            return bool(new)
+        if self.rounded == FINE or self.reach_m <= self.hair_m:
+            return False
+        self.rounded, self._shape = FINE, None
+        return True
+
+
+class Mesh:
+    """The free plane between polygons, in triangles, as far as the shortest track between two places can go."""
+
+    def __init__(self, a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> None:
+        places = np.array([a, b])
+        bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
+        box = shapely.box(*(bounds[:, :2].min(axis=0) - BEYOND_M), *(bounds[:, 2:].max(axis=0) + BEYOND_M))
+        free = box.difference(shapely.union_all(shapes)) if shapes else box
+        if shapely.get_num_coordinates(free) > MOST_CORNERS:
+            raise TooLarge
+        parts = [p for p in shapely.get_parts(free) if shapely.dwithin(p, shapely.points(places), 1e-6).all()]
+        self.joined = bool(parts)
+        """Whether the places lie in one part of the free plane."""
+        if not parts:
+            return
+        corner = shapely.get_coordinates(shapely.get_parts(shapely.constrained_delaunay_triangles(parts[0])))
+        corner = corner.reshape(-1, 4, 2)[:, :3]
+        u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+        twice = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+        corner[twice < 0.0] = corner[twice < 0.0, ::-1]
+        if not math.isclose(0.5 * float(np.abs(twice).sum()), parts[0].area, rel_tol=1e-9, abs_tol=1e-6):
+            raise TooLarge  # the triangles are not the free plane: nothing is known
+        self.corner = corner
+        _, name = np.unique(corner.reshape(-1, 2).view(np.complex128).ravel(), return_inverse=True)
+        name = name.reshape(-1, 3)
+        self.named = int(name.max()) + 1
+        first, second = name.ravel(), np.roll(name, -1, axis=1).ravel()
+        key, back = first * self.named + second, second * self.named + first
+        order = np.argsort(key)
+        at = np.searchsorted(key[order], back).clip(0, len(key) - 1)
+        other = order[at]
+        here = np.flatnonzero((key[other] == back) & (first < second))
+        other = other[here]
+        ends = np.concatenate([corner.reshape(-1, 2)[here], corner.reshape(-1, 2)[other]], axis=1)
+        self.ends = np.ascontiguousarray(ends)
+        self.names = np.ascontiguousarray(np.stack([first[here], second[here]], axis=-1), np.int64)
+        self.joins = np.ascontiguousarray(np.stack([here // 3, other // 3], axis=-1), np.int32)
+        self.start, self.order = np.zeros(len(corner) + 1, np.int32), np.empty(2 * len(here), np.int32)
+        sort_portals(self.joins, self.start, self.order)
+
+    def pieces_at(self, place: Place) -> NDArray[np.int32]:
+        """The triangles that a place lies in, or on the border of."""
+        d = np.array(place) - self.corner
+        e = np.roll(self.corner, -1, axis=1) - self.corner
+        left = (e[..., 0] * d[..., 1] - e[..., 1] * d[..., 0]) / np.maximum(np.hypot(e[..., 0], e[..., 1]), 1e-12)
+        return np.flatnonzero((left >= -1e-6).all(axis=1)).astype(np.int32)
+
+    def way(self, a: Place, b: Place) -> Track | None:
+        """The shortest track; None where there is none. Raises TooLarge where the search would open too much."""
+        if not self.joined:
+            return None
+        pieces, goal_pieces = self.pieces_at(a), self.pieces_at(b)
+        if not len(pieces) or not len(goal_pieces):
+            return None
+        portals, room, none = len(self.joins), 1 << 16, np.zeros(0)
+        while True:
+            n = search(
+                self.start, self.ends, self.names, self.joins, self.order, np.zeros(self.named),
+                np.zeros(self.named, np.int64), np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32),
+                np.empty((portals, 2)), np.array([(*a, 0.0)] * len(pieces)), pieces, np.array(b, np.float64),
+                goal_pieces, math.inf, -1.0, MOST_OPENED, none, none, np.empty((room, 8)), np.empty((room, 6), np.int32),
+                np.empty((room, 3), np.int64), np.empty(room), np.empty(room, np.int32),
+                out := np.empty((1 << 14, 3)), np.zeros((0, 8)),
+            )  # fmt: skip
+            if n != -1:
+                break
+            room *= 4
+        if n == -2:
+            raise TooLarge
+        if n <= 0:
+            return None
+        points = out[:n][::-1, :2].copy()
+        keep = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
+        keep[-1] = True
+        return Track(points[keep], float(out[1, 2]))
+
+
+class Solids:
+    """Zones that nobody enters, and the shortest tracks around them; what a track met is known to the next one.
+
+    ``outer``: for paths, which keep ``hair_m`` more from every zone; else for bounds, which keep so much less. Raises
+    TooLarge where the meshes, or the work, would be beyond bounds.
+    """
+
+    def __init__(
+        self, zones: Iterable[Zone], reach_m: float, scale: float, hair_m: float, budget: Budget, *, outer: bool
+    ) -> None:
+        self.outlines = [Outline(zone, reach_m, scale, outer, hair_m) for zone in zones]
+        self._budget = budget
+        self._tree = shapely.STRtree([o.shape for o in self.outlines])
+        self._known: set[int] = set()
+
+    def shortest(self, a: Place, b: Place, which: NDArray[np.bool_]) -> Track | None:
+        """The shortest track from ``a`` to ``b`` past those zones; None where they enclose one of the places."""
+        for _ in range(ROUNDS):
+            known = [k for k in sorted(self._known) if which[k]]
+            track = self._past(a, b, known)
+            if track is None:
+                return None
+            line = shapely.LineString(track.points)
+            near = [k for k in self._tree.query(line).tolist() if which[k] and k not in self._known]
+            met = {k for k in near if shapely.relate_pattern(self.outlines[k].shape, line, "T********")}
+            self._known |= met
+            if not met and not self._refined(track, known):
+                return track
+            if not self._budget.goes_on():
+                break
+        raise TooLarge
+
+    def _refined(self, track: Track, known: list[int]) -> bool:
+        """Draw arcs finely where a track turns around them; whether any were not."""
+        turns, finer = track.points[1:-1], False
+        if len(turns):
+            places = shapely.points(turns)
+            for k in known:
+                near = shapely.distance(self.outlines[k].shape, places) < TOUCH_M
+                finer |= bool(near.any()) and self.outlines[k].touch(turns[near])
+        return finer
+
+    def _past(self, a: Place, b: Place, known: list[int]) -> Track | None:
+        if not known:
+            return Track(np.array([a, b]), math.dist(a, b))
+        shapes = [s for k in known if not (s := self.outlines[k].shape).is_empty]
+        self._budget.spend("corner", sum(shapely.get_num_coordinates(s) for s in shapes))
+        return Mesh(a, b, shapes).way(a, b)

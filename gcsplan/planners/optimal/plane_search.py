@@ -1,0 +1,224 @@
+"""Tracks over the lattices of a problem's legs, and the bounds that those give; see `planner`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.lattice.lattice import terminals
+from gcsplan.planners.optimal.cap_search import above_all
+from gcsplan.planners.optimal.corridor import End
+from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.leg import Exactly, Leg
+from gcsplan.planners.optimal.sources.detours import Choice, Search, Stops, joined
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.track import Flown, fly, make_track
+
+Floats = NDArray[np.float64]
+
+SLACKS = (0.008, 0.15, 0.6)
+"""How much longer than the shortest the tracks are that are looked at, as a part of it, until a path is known."""
+ZONES_SHUT = 8
+"""Tracks that are looked at below a cap where a zone can be passed neither over nor under on the first."""
+PAST = 12
+"""Tracks past what is in the way that are looked at."""
+DARED_M, PINCHED_M = (0.05, 0.1, 0.2, 0.4), 1.0
+"""By how much more than it lacked the nodes beside a track through a slit are raised, one after the other, and what it
+may lack for another to be looked for."""
+NODE_S, NODE_MB = 2e-6, 3e-4
+"""Counted seconds and megabytes of a node that is looked at, with what a search over it keeps."""
+SMALL = 50.0
+"""A world is small where the straight lines between terminals are so many cells of the terrain model long, at most."""
+
+
+class PlaneSearch:
+    """The legs of one problem in the plane; what is found goes to the incumbent.
+
+    ``problem``: the incumbent's own, or the same over other cells.
+    """
+
+    def __init__(self, incumbent: Incumbent, problem: Problem | None = None) -> None:
+        self.incumbent = incumbent
+        self.problem = problem = incumbent.problem if problem is None else problem
+        limits = problem.limits
+        top_m = limits.max_amsl_m
+        self.top_m = above_all(problem) if top_m is None else top_m - limits.altitude_error_m
+        places = terminals(problem)
+        heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
+        ends = [End(*place, z) for place, z in zip(places, heights, strict=True)]
+        self.legs = [Leg(problem, a, b, self.top_m) for a, b in pairwise(ends) if math.dist(a.place, b.place) > 1e-3]
+        self.by_intervals = False
+        """Whether bounds ask where tracks can get to by what they climb and descend on their way."""
+        self.in_space = False
+        zones = len(problem.airspace.zones)
+        self._open = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
+        self.choice = self._open
+        """With what shut the last tracks were found that had to go past something."""
+
+    # -------------------------------------------------------------------- what a search of detours asks (its Seeker)
+
+    @property
+    def cost(self) -> float:
+        """Of the best path."""
+        return self.incumbent.cost
+
+    @property
+    def bound(self) -> float:
+        """Of all paths."""
+        return self.incumbent.bound
+
+    @property
+    def wanted(self) -> float:
+        """How far they may be apart, as a part."""
+        return self.incumbent.wanted
+
+    def least(self, track_m: float) -> float:
+        """What a path costs at least whose track is so long."""
+        return self.incumbent.least(track_m)
+
+    def take_longer(self, stops: Stops, fine: bool) -> bool:
+        """Look for a path over a track, with laps where it is too steep."""
+        return self.incumbent.take_longer(stops, fine)
+
+    def goes_on(self) -> bool:
+        """Whether a better path is wanted, and there is work left for it."""
+        return self.incumbent.goes_on()
+
+    def stops(self, choice: Choice, cap_m: float, fine: bool, exactly: Exactly | None = None) -> Stops | None:
+        """The shortest track of a choice below a cap, from terminal to terminal; see `Leg.track`."""
+        ways = []
+        for leg in self.legs:
+            limit = self.limit(leg)
+            wanted = leg.corridor(limit) if fine and leg.has_fine else None
+            spare_m = choice.most_m
+            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, spare_m, choice.over, exactly)
+            if way is None:
+                return None
+            ways.append(way.points)
+        return joined(ways, [leg.goal.amsl_m for leg in self.legs[:-1]])
+
+    # -------------------------------------------------------------------- paths
+
+    def first_looks(self, slacks: tuple[float, ...] = SLACKS) -> Iterator[None]:
+        """Look for the first path, over tracks that are so much longer than the shortest at most, once for each; the
+        legs are flooded so far. Ends where there is no path, proved, or one was found."""
+        for slack in slacks:
+            if not self.flood(slack):
+                return
+            self.raise_tracks()
+            # Tracks that the first look misses are short, or there are no others.
+            patient = slack in (slacks[0], slacks[-1])
+            if self.try_below(self.top_m, fine=False) or (patient and self.try_below(self.top_m, fine=True)):
+                return
+            if self.past(PAST, fine=False, first=True):
+                return
+            yield
+
+    def flood(self, slack: float) -> bool:
+        """Look how far all is from the goals, for tracks so much longer than the shortest; False where a leg has none,
+        proved."""
+        for leg in self.legs:
+            leg.flood(slack)
+            if math.isinf(leg.length_m):
+                self.incumbent.proved_shut = True
+                return False
+        return True
+
+    def reach_longest(self) -> bool:
+        """Look at whatever is not longer than the best path, where there is one; False where that proves it the best,
+        or that there is none."""
+        incumbent = self.incumbent
+        if incumbent.best is None:
+            return all(leg.seen for leg in self.legs) or self.flood(SLACKS[-1])
+        for leg in self.legs:
+            limit = self.limit(leg)
+            if not leg.seen:
+                leg.flood(SLACKS[0], limit)
+                self.raise_tracks()
+                limit = self.limit(leg)
+            if limit > leg.reach_m:
+                leg.flood((limit / leg.length_m - 1.0) * (1.0 + 1e-9), limit)
+        return not incumbent.done()
+
+    def try_below(self, cap_m: float, *, fine: bool, exactly: Exactly | None = None) -> bool:
+        """Look for a path below a cap; True if it is the best so far."""
+        incumbent = self.incumbent
+        incumbent.unsettled = None
+        stops = self.stops(self.choice, cap_m, fine, exactly)
+        if stops is None:
+            return False
+        track = make_track(incumbent.problem, *stops)
+        flown = fly(incumbent.problem, track)
+        if isinstance(flown, Flown) or flown.kind == "pinched":  # by centimetres, or tracks would not lead there
+            found = incumbent.exact(track, flown)
+            if found is not None or isinstance(flown, Flown):
+                return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)
+        past = flown.kind == "zone" or incumbent.best is None
+        return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
+
+    def squeeze(self, *, closely: bool) -> bool:
+        """Look for a path through what is open for the exact check alone: a lattice keeps as much beside its tracks as
+        the ground may rise there. ``closely``: along the track of the bound, in cells as small as can be. True if it is
+        the best so far."""
+        exactly = Exactly(closely, [])
+        for more_m in DARED_M:
+            if self.try_below(self.top_m, fine=True, exactly=exactly):
+                return True
+            lacks = self.incumbent.unsettled
+            if lacks is None or lacks.kind != "pinched" or not lacks.by < PINCHED_M or not self.goes_on():
+                break
+            exactly.shut.append((lacks.place, lacks.by + more_m))
+        return False
+
+    def past(
+        self, most: int, *, fine: bool, first: bool = False, cap_m: float | None = None, given: Stops | None = None
+    ) -> bool:
+        """Look for tracks past what is in the way, at ``most`` of them; True if a path over one is the best so far.
+
+        ``cap_m``: below that cap, the first, which needs no laps where a path is known, from a ``given`` track on;
+        else, ``first``, the first, or the best, with metres to spare for laps near the ends.
+        """
+        incumbent = self.incumbent
+        laps = incumbent.climbs and (incumbent.best is None or (incumbent.laps and cap_m is None))
+        spare_m = self.longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
+        search = Search(self, self.top_m if cap_m is None else cap_m, fine)
+        roots = [self.choice]
+        if cap_m is None:
+            roots = [replace(c, most_m=(spare_m, spare_m)) for c in dict.fromkeys([self._open, self.choice])]
+            if laps:
+                roots.append(self.choice)  # a climb far from the ends takes laps there, and none near them
+        found = search.run(roots, most, first=first or cap_m is not None, laps=laps, given=given)
+        if found is not None:
+            self.choice = replace(found, least_m=(0.0, 0.0), most_m=(0.0, 0.0))
+        return found is not None
+
+    # -------------------------------------------------------------------- bounds
+
+    def size(self, looks: float) -> tuple[float, float]:
+        """Counted seconds and megabytes of so many looks at the lattices of all legs."""
+        nodes = sum(leg.nodes for leg in self.legs)
+        return looks * nodes * NODE_S, max((leg.nodes for leg in self.legs), default=0.0) * NODE_MB
+
+    def longest(self) -> float:
+        """No track of a path that is better than the best is longer."""
+        return self.incumbent.longest(sum(leg.reach_m for leg in self.legs))
+
+    def limit(self, leg: Leg) -> float:
+        """The same for one leg, the others as short as they can be."""
+        return self.longest() - sum(other.lower_m for other in self.legs if other is not leg)
+
+    def raise_tracks(self) -> None:
+        """What the shortest tracks alone tell of the cost."""
+        self.incumbent.raise_track_bound(sum(leg.lower_m for leg in self.legs))
+
+    @property
+    def is_small(self) -> bool:
+        """Whether every leg is so short that a search among few places costs little beside all else."""
+        cell_m = float(self.problem.airspace.surface.grid.metres_per_cell(*self.problem.start[:2]).max())
+        short = [leg for leg in self.legs if leg.straight_m <= SMALL * cell_m]
+        return len(short) == len(self.problem.via) + 1  # legs from a place to itself are not among the legs

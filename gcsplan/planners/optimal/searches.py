@@ -1,0 +1,293 @@
+"""The table of all searches of the default planner, and the worlds that they work on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.lattice.lattice import terminals
+from gcsplan.planners.lattice.planner import plan_band
+from gcsplan.planners.optimal.bounds.shorter import NEARER, bound_by_caps, halve, raise_climb
+from gcsplan.planners.optimal.governor import Search, Size
+from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.leg import LARGE
+from gcsplan.planners.optimal.level_world import in_window
+from gcsplan.planners.optimal.plane_search import PAST, SLACKS, PlaneSearch
+from gcsplan.planners.optimal.sources.bound_corridor import follow
+from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
+from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
+from gcsplan.planners.profile.track import Flown, Obstruction, fly, make_track
+from gcsplan.planners.refusal import Refusal
+
+Floats = NDArray[np.float64]
+
+FAR, MUCH, WIDE, SLANTED, NEAR = 5e-3, 5e-2, 2e-2, 1e-2, 5e-2
+"""Gaps, as parts: beyond which other ways to find a path are asked for a better one; beyond which small worlds are
+searched before time is spent on a bound; beyond which slits are looked for in cells as small as can be; beyond which
+slopes of large terrain models are climbed aslant; and up to which cells are cut once more."""
+TWICE = 2.0
+"""From so many times the wanted gap on bounds that cost more are asked for."""
+PAST_FINE, ROUNDS = 9, 2
+"""Tracks past what is in the way that are looked at on the finer lattice; and how often."""
+FINER = 4
+"""Into how many parts a side cells are cut once more, for walls and zones that the first lattice rounds off."""
+MOST_CELLS = 50_000
+"""Cells of all corridors whose altitude intervals are looked at, at most."""
+
+
+class Searches:
+    """The searches of one problem; each looks at the incumbent, and leaves there what it finds."""
+
+    def __init__(self, incumbent: Incumbent) -> None:
+        self.incumbent, self.problem = incumbent, incumbent.problem
+        self.refusal: Refusal | None = None
+        """What the last search for a first path said when it found none."""
+        self._straight: Obstruction | None = None
+        self._plane: PlaneSearch | None = None
+        self._lacked_path = True
+
+    @property
+    def plane(self) -> PlaneSearch:
+        """The lattices of the legs, made when they are first asked for."""
+        if self._plane is None:
+            self._plane = PlaneSearch(self.incumbent, in_window(self.incumbent))
+        return self._plane
+
+    def table(self) -> list[Search]:
+        """All of them: name, share of the gap that it closes, when it applies, what it costs, what it does."""
+        band = self.problem.limits.max_agl_m is not None
+        energy = self.problem.objective == "energy"
+        i = self.incumbent
+
+        def gap(beyond: float) -> Callable[[], bool]:
+            return lambda: i.best is not None and i.gap > beyond
+
+        def missing() -> bool:
+            return i.best is None
+
+        def known() -> bool:
+            return i.best is not None
+
+        twice = TWICE * i.wanted
+        rows = [
+            Search("straight", 1.0, lambda: self._straight is None, self._of(2e-3, 0.0), self._fly_straight),
+            Search("outlines", 1.0, self._has_outlines, self._of(3e-3, 2e-3), self._look_at_outlines),
+        ]
+        if band:
+            return [
+                *rows[:1],
+                Search("track_bound", 1.0, lambda: i.bound < i.cost, self._nodes(1.0), self._bound_tracks),
+                Search("lattice", 0.5, lambda: True, self._of(1.0, 0.0), self._search_lattice),
+            ]
+        rows += [
+            Search("cap_search", 1.0, missing, self._nodes(1.0), self._look_first),
+            Search("narrow_first", 0.5, missing, self._nodes(4.0), self._over(self._squeeze_first)),
+            Search("lattice_first", 0.5, missing, self._of(1.0, 0.0), self._search_lattice),
+            Search("roadmap_first", 0.1, self._small_lacks, self._of(1.0, 0.0), self._search_small),
+            Search("roadmap_3d", 0.9, self._is_high, self._of(0.5, 0.0), self._search_space),
+            Search("roadmap_near", 0.5, lambda: gap(MUCH)() and self.plane.is_small, self._of(0.5, 0.0), self._search_small),
+            Search("fine_tracks", 0.9, known, self._nodes(0.5), self._over(self._look_finely), nearer=True),
+            Search("detours", 0.8, gap(FAR), self._nodes(2.0), self._over(lambda: self.plane.past(PAST, fine=False))),
+        ]
+        if energy:
+            rows += [
+                Search("cap_pairs", 0.5, known, self._nodes(3.0), self._over(self._bound_caps), again=True),
+                Search("detours_fine", 0.3, gap(FAR), self._nodes(4.0), self._over(lambda: self.plane.past(PAST_FINE, fine=True))),
+            ]
+        else:
+            rows += [
+                Search("length_bound", 0.9, known, self._nodes(1.0), self._over(lambda: halve(self.plane)), again=True, nearer=True),
+                Search("space_bound", 0.3, lambda: self.plane.in_space, self._nodes(2.0), self._over(lambda: bound_by_caps(self.plane))),
+                Search("detours_fine", 0.3, known, self._nodes(4.0), self._over(self._past_finely)),
+            ]
+        rows += [
+            Search("bound_corridor", 0.2, gap(twice), self._nodes(3.0), self._over(lambda: follow(self.plane))),
+            Search("narrow_passage", 0.15, gap(FAR), self._nodes(5.0), self._over(lambda: self.plane.squeeze(closely=False))),
+            Search("narrow_closely", 0.15, gap(WIDE), self._nodes(6.0), self._over(lambda: self.plane.squeeze(closely=True))),
+            Search("contour_climb", 0.1, self._is_slanted, self._nodes(8.0), self._over(self._climb_aslant)),
+        ]
+        if not energy:
+            rows += [
+                Search("sheets", 0.09, gap(twice), self._nodes(8.0), self._over(self._part_sheets)),
+                Search("altitude_intervals", 0.08, self._has_intervals, self._nodes(8.0), self._over(self._bound_by_intervals)),
+                Search("refinement", 0.07, self._is_near, self._nodes(8.0), self._over(self._refine)),
+            ]
+        rows += [
+            Search("lattice", 0.02, self._wants_lattice, self._of(0.5, 0.0), self._search_lattice_again),
+            Search("local_roadmap", 0.01, lambda: gap(FAR)() and self.plane.is_small, self._of(0.5, 0.0), self._search_small),
+        ]
+        return rows
+
+    def _over(self, run: Callable[[], object]) -> Callable[[], object]:
+        """A search over the legs' lattices, once those hold whatever is not longer than the best path."""
+        return lambda: self.plane.reach_longest() and run()
+
+    # -------------------------------------------------------------------- what they cost
+
+    def _of(self, seconds: float, per_zone_s: float) -> Callable[[], Size]:
+        zones = len(self.problem.airspace.zones)
+        return lambda: (seconds + per_zone_s * zones, 40.0)
+
+    def _nodes(self, looks: float) -> Callable[[], Size]:
+        """So many looks at the lattices of all legs."""
+        return lambda: self.plane.size(looks)
+
+    # -------------------------------------------------------------------- first paths
+
+    def _fly_straight(self) -> None:
+        p, incumbent = self.problem, self.incumbent
+        places = np.array(terminals(p))
+        apart = np.concatenate([[True], np.hypot(*np.diff(places, axis=0).T) > 1e-3])
+        pin_m = np.array([math.nan, *(math.nan if v.amsl_m is None else v.amsl_m for v in p.via), math.nan])[apart]
+        track = make_track(p, places[apart], np.ones(int(apart.sum()), np.bool_), pin_m)
+        flown = fly(p, track)
+        if isinstance(flown, Obstruction):
+            self._straight = flown
+            return
+        self._straight = Obstruction("zone", 0.0, 0.0, 0.0)  # what is dearer than the straight line, zones make dear
+        found = incumbent.exact(track, flown)
+        if found is not None:
+            incumbent.take(*found)
+
+    def _has_outlines(self) -> bool:
+        """Zones may be what is in the way of the straight line, or what makes it dearer."""
+        air = self.problem.airspace
+        if self._straight is None or not air.zones:
+            return False
+        far = self.incumbent.best is not None and self.incumbent.gap > FAR
+        return far or self._straight.kind != "pinched"
+
+    def _look_at_outlines(self) -> None:
+        from gcsplan.planners.optimal.cap_search import above_all
+
+        limits = self.problem.limits
+        top_m = above_all(self.problem) if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
+        OutlineTracks(self.incumbent, top_m).look()
+
+    def _bound_tracks(self) -> None:
+        if self.plane.flood(SLACKS[0]):
+            self.plane.raise_tracks()
+
+    def _look_first(self) -> None:
+        for _ in self.plane.first_looks():
+            if not self.incumbent.budget.goes_on():
+                break
+
+    def _squeeze_first(self) -> None:
+        for closely in (False, True):
+            if self._may_squeeze() and self.plane.squeeze(closely=closely):
+                break
+
+    def _may_squeeze(self) -> bool:
+        limits = self.problem.limits
+        return max(limits.track_error_m, limits.horizontal_clearance_m) > 0.0
+
+    def _search_lattice(self, *, known: bool = False) -> None:
+        incumbent = self.incumbent
+        try:
+            found = plan_band(self.problem, incumbent.tell, incumbent.budget.begun_s, known=known)
+        except Refusal as refusal:
+            self.refusal = refusal
+            return
+        if found.lower_bound is not None:
+            incumbent.raise_bound(min(found.lower_bound, self.problem.cost(found.path)))
+        incumbent.take(found.path.points)
+
+    # -------------------------------------------------------------------- better paths, and bounds
+
+    def _small_lacks(self) -> bool:
+        return self.incumbent.best is None and self.plane.is_small
+
+    def _search_small(self) -> None:
+        from gcsplan.planners.optimal.sources.local_roadmap import small_path  # most missions are longer
+
+        incumbent = self.incumbent
+        incumbent.offer(small_path(self.problem, incumbent.best, incumbent.budget.goes_on))
+
+    def _is_high(self) -> bool:
+        incumbent = self.incumbent
+        far = incumbent.best is not None and incumbent.gap > FAR
+        return far and (self.problem.objective == "energy" or incumbent.is_steep())
+
+    def _search_space(self) -> None:
+        from gcsplan.planners.optimal.sources.roadmap_3d import is_steep, steep_path  # few worlds are as high as wide
+
+        incumbent = self.incumbent
+        assert incumbent.best is not None
+        self.plane.in_space = is_steep(self.problem, incumbent.best)
+        if self.plane.in_space:
+            incumbent.offer(steep_path(self.problem, incumbent.best, incumbent.budget.goes_on))
+
+    def _look_finely(self) -> None:
+        self.plane.try_below(self.plane.top_m, fine=True)
+
+    def _past_finely(self) -> None:
+        for _ in range(ROUNDS):
+            if not self.incumbent.goes_on() or not self.plane.past(PAST_FINE, fine=True):
+                break
+
+    def _bound_caps(self) -> None:
+        bound_by_caps(self.plane)
+        raise_climb(self.plane)
+
+    def _is_slanted(self) -> bool:
+        incumbent, energy = self.incumbent, self.problem.objective == "energy"
+        large = self.problem.airspace.surface.ground_m.size >= LARGE
+        far = incumbent.best is not None and incumbent.gap > (SLANTED if large and not energy else FAR)
+        return far and incumbent.climbs
+
+    def _climb_aslant(self) -> None:
+        incumbent, energy = self.incumbent, self.problem.objective == "energy"
+        found = traverse(self.problem, self.plane.longest())
+        if found is not None:
+            incumbent.take_longer(found, fine=True)
+        # Where finer lines are better, yet finer ones may be, too; for length that is hardly worth the work.
+        for level in (0, 1) if energy else (0,):
+            if incumbent.best is None or incumbent.gap <= TWICE * incumbent.wanted or not incumbent.budget.goes_on():
+                break
+            tight = pulled_tight(self.problem, incumbent.best, level, incumbent.budget.deadline_s)
+            if tight is None or not incumbent.take_simpler(*tight, fine=True, longer=True):
+                break
+
+    def _part_sheets(self) -> None:
+        plane = self.plane
+        if sum(leg.part_sheets(plane.limit(leg)) for leg in plane.legs):
+            halve(plane)
+
+    def _has_intervals(self) -> bool:
+        incumbent = self.incumbent
+        return incumbent.best is not None and incumbent.gap > TWICE * incumbent.wanted and incumbent.climbs
+
+    def _bound_by_intervals(self) -> None:
+        plane = self.plane
+        cells = sum(int(leg.corridor(plane.limit(leg)).cells.sum()) for leg in plane.legs)
+        plane.by_intervals = cells <= MOST_CELLS
+        if plane.by_intervals:
+            halve(plane)
+
+    def _is_near(self) -> bool:
+        incumbent = self.incumbent
+        return (
+            incumbent.best is not None and not self.plane.in_space and TWICE * incumbent.wanted < incumbent.gap <= NEAR
+        )
+
+    def _refine(self) -> None:
+        plane, incumbent = self.plane, self.incumbent
+        cut = 2 if incumbent.gap > FAR else 1
+        if sum(leg.look_closer(plane.limit(leg), FINER, cut) for leg in plane.legs):
+            plane.try_below(plane.top_m, fine=True)
+            halve(plane, far=True)
+            if incumbent.gap > TWICE * incumbent.wanted and incumbent.budget.goes_on() and follow(plane):
+                halve(plane, far=True)
+
+    def _wants_lattice(self) -> bool:
+        incumbent = self.incumbent
+        far = incumbent.best is not None and incumbent.gap > FAR
+        return far and (self.problem.objective == "energy" or self.plane.in_space)
+
+    def _search_lattice_again(self) -> None:
+        self._search_lattice(known=True)

@@ -1,0 +1,139 @@
+"""Tracks around the zones' own outlines: exact where zones alone are in the way, and a bound wherever they are.
+
+Zones that can be passed neither over nor under stand in the plane as they are (`outlines`). The shortest track around
+them is a bound for every path. A track past them, and past zones that are shut because the profile over it would cost
+more, gives paths (`detours`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.lattice.lattice import terminals
+from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.navmesh.outlines import Solids, TooLarge
+from gcsplan.planners.optimal.sources.detours import Choice, Search, Stops, joined
+from gcsplan.world.zones import Zone
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+TRACKS = 24
+"""Tracks that are looked at, at most."""
+HAIR_M, HAIR_BENT_M = 2e-3, 0.07
+"""Kept from outlines for rounding; and where the terrain model's lines are bent in the plane, as the check has them."""
+
+
+class OutlineTracks:
+    """The plane of one problem with its zones alone; paths and bounds go to the incumbent."""
+
+    def __init__(self, incumbent: Incumbent, top_m: float) -> None:
+        self.incumbent, self.problem = incumbent, incumbent.problem
+        places = terminals(self.problem)
+        heights = [*(v.amsl_m for v in self.problem.via), self.problem.goal[2]]
+        self.legs = [
+            (a, b, z) for (a, b), z in zip(pairwise(places), heights, strict=True) if math.dist(a, b) > 1e-3
+        ]
+        self.under, self.over = _sides(self.problem.airspace.zones, incumbent, top_m)
+        self._solids: dict[bool, Solids] = {}
+
+    @property
+    def cost(self) -> float:
+        """Of the best path."""
+        return self.incumbent.cost
+
+    @property
+    def bound(self) -> float:
+        """Of all paths."""
+        return self.incumbent.bound
+
+    @property
+    def wanted(self) -> float:
+        """How far they may be apart, as a part."""
+        return self.incumbent.wanted
+
+    def least(self, track_m: float) -> float:
+        """What a path costs at least whose track is so long."""
+        return self.incumbent.least(track_m)
+
+    def take_longer(self, stops: Stops, fine: bool) -> bool:
+        """Look for a path over a track, with laps where it is too steep."""
+        return self.incumbent.take_longer(stops, fine)
+
+    def goes_on(self) -> bool:
+        """Whether a better path is wanted, and there is work left for it."""
+        return self.incumbent.goes_on()
+
+    def stops(self, choice: Choice, cap_m: float, fine: bool) -> Stops | None:
+        """The shortest track past the zones that a choice shuts; None where there is none, or too much to look at."""
+        which = ~((choice.under & self.under) | (choice.over & self.over))
+        try:
+            tracks = self._tracks(which, outer=True)
+        except TooLarge:
+            return None
+        if tracks is None:
+            return None
+        return joined(tracks, [z for _, _, z in self.legs[:-1]])
+
+    def look(self) -> None:
+        """Raise the bound by the shortest track around what nobody passes, and look for paths."""
+        incumbent = self.incumbent
+        try:
+            tracks = self._tracks(~(self.under | self.over), outer=False)
+        except TooLarge:
+            tracks = []
+        if tracks is None:
+            incumbent.proved_shut = True
+            return
+        if tracks:
+            length_m = sum(float(np.hypot(*np.diff(t, axis=0).T).sum()) for t in tracks)
+            incumbent.raise_track_bound(length_m * (1.0 - 1e-9))
+        zones = len(self.under)
+        root = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
+        roots = [root]
+        if incumbent.climbs and incumbent.laps and math.isfinite(incumbent.cost):
+            roots = [replace(root, most_m=(incumbent.cost - incumbent.bound,) * 2), root]
+        Search(self, math.inf, False).run(roots, TRACKS, first=False, laps=incumbent.climbs and incumbent.laps)
+
+    def _tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
+        """The shortest track of each leg past some zones; None where one has none. Raises TooLarge."""
+        if outer not in self._solids:
+            air, limits = self.problem.airspace, self.problem.limits
+            hair_m = HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M
+            reach_m = air.beside_m(limits)
+            self._solids[outer] = Solids(air.zones, reach_m, air.scale, hair_m, self.incumbent.budget, outer=outer)
+        tracks = []
+        for a, b, _ in self.legs:
+            found = self._solids[outer].shortest(a, b, which)
+            if found is None:
+                return None
+            tracks.append(found.points)
+        return tracks
+
+
+def _sides(zones: tuple[Zone, ...], incumbent: Incumbent, top_m: float) -> tuple[Bools, Bools]:
+    """(zones,) which may perhaps be passed under, and over, somewhere."""
+    limits, surface = incumbent.problem.limits, incumbent.problem.airspace.surface
+    high = float(np.nanmax(surface.ground_m)) if any(_over_ground(z) for z in zones) else 0.0
+    low = float(np.nanmin(surface.ground_m))
+    lowest = limits.min_agl_m + limits.altitude_error_m
+    under, over = np.zeros(len(zones), np.bool_), np.zeros(len(zones), np.bool_)
+    for k, zone in enumerate(zones):
+        if zone.floor is not None:
+            room = zone.floor.value_m - limits.altitude_error_m - lowest
+            # Over ground, the same ground bears the zone's floor and what may be flown lowest, but for what is beside.
+            beside = high - low if incumbent.problem.airspace.beside_m(limits) > 0.0 else 0.0
+            under[k] = room - (low if zone.floor.datum == "amsl" else -beside) >= -0.1
+        if zone.ceiling is not None:
+            top = zone.ceiling.value_m + limits.altitude_error_m + (low if zone.ceiling.datum == "agl" else 0.0)
+            over[k] = top <= top_m + 0.1
+    return under, over
+
+
+def _over_ground(zone: Zone) -> bool:
+    return any(level is not None and level.datum == "agl" for level in (zone.floor, zone.ceiling))
