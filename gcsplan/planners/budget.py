@@ -13,15 +13,20 @@ import time
 from dataclasses import dataclass, field
 
 RATES = {
-    "node": 0.35e-6,
-    "portal": 1.2e-6,
-    "leg": 9e-6,
-    "place": 0.6e-6,
-    "corner": 25e-6,
-    "label": 6e-6,
+    "node": 0.15e-6,
+    "portal": 0.2e-6,
+    "opened": 0.4e-6,
+    "leg": 12e-6,
+    "cell": 0.02e-6,
+    "piece": 0.8e-6,
+    "place": 0.3e-6,
+    "corner": 15e-6,
+    "label": 5e-6,
+    "pull": 150e-6,
 }
-"""Counted seconds: a lattice's node made ready, a mesh's portal searched, a leg under the exact check, a place whose
-floor is read, a corner of an outline triangulated, a label of the lattice search."""
+"""Counted seconds of a lattice's node made ready, a mesh's portal and an interval opened on one, a leg under the exact
+check and a cell of terrain that it crosses, a piece of a tube, a place whose floor is read, a corner of an outline
+triangulated, a label of the lattice search, and a point of a line that is pulled, for each size of move."""
 COUNTED = 0.35
 """What part of the budget's seconds may be spent as counted work."""
 FIRST = 3.0

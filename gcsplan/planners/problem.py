@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.budget import Budget
-from gcsplan.world.airspace import Airspace
+from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 
@@ -71,6 +71,21 @@ class Problem:
         if self.objective == "energy":
             return np.asarray(self.horizontal_j_per_m * flat + self.vertical_j_per_m * np.abs(d[..., 2]))
         return np.asarray(np.hypot(flat, d[..., 2]))
+
+    def legal(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(N,) whether straight legs from ``start`` (N, 3) to ``end`` pass the exact check; counted as work."""
+        if not len(start):
+            return np.zeros(0, np.bool_)
+        grid = self.airspace.surface.grid
+        metres = float(np.abs(end[:, :2] - start[:, :2]).sum())
+        self.budget.spend("leg", len(start))
+        self.budget.spend("cell", metres / float(grid.metres_per_cell(*self.start[:2]).min()))
+        return self.airspace.clear(Legs.between(start, end, self.limits), self.limits)
+
+    def floors(self, east_m: NDArray[np.float64], north_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Lowest legal altitudes over places, as `Airspace.floor_amsl` has them; counted as work."""
+        self.budget.spend("place", np.size(east_m))
+        return self.airspace.floor_amsl(east_m, north_m, self.limits)
 
     def cost(self, path: Path) -> float:
         """Metres or joules of ``path``, by the objective."""

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.problem import Problem
-from gcsplan.world.airspace import Legs
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -67,8 +66,8 @@ def _move(problem: Problem, points: Floats, pinned: Bools, still: Bools, parity:
     gain = old[:, None] - new
     row, column = np.nonzero(gain > 1e-9 * old[:, None])
     place = places[row, column]
-    legal = _clear(problem, before[row], place)
-    legal[legal] = _clear(problem, place[legal], after[row[legal]])
+    legal = problem.legal(before[row], place)
+    legal[legal] = problem.legal(place[legal], after[row[legal]])
     row, column = row[legal], column[legal]
     legally = np.full(gain.shape, -np.inf)
     legally[row, column] = gain[row, column]
@@ -183,15 +182,10 @@ def _look(problem: Problem, points: Floats, choices: _Choices, asked: Bools, mar
     first, last, place = choices.first[row], choices.last[row], choices.mids[row, column]
     legal = np.ones(len(row), np.bool_)
     two = last - first == 3
-    legal[two] = _clear(problem, points[first[two]], place[two])
-    legal[legal] = _clear(problem, place[legal], points[last[legal]])
+    legal[two] = problem.legal(points[first[two]], place[two])
+    legal[legal] = problem.legal(place[legal], points[last[legal]])
     marks[row, column] = np.where(legal, LEGAL, SHUT)
 
-
-def _clear(problem: Problem, start: Floats, end: Floats) -> Bools:
-    if not len(start):
-        return np.zeros(0, np.bool_)
-    return problem.airspace.clear(Legs.between(start, end, problem.limits), problem.limits)
 
 
 def _cost(problem: Problem, points: Floats) -> float:

@@ -121,6 +121,7 @@ class Guide:
                 p.airspace.beside_m(p.limits),
             ]
         )
+        p.budget.spend("pull", n * len(steps_m))
         count = pull_kernels.pull(
             points, pinned, pin_m, amsl, n, float(p.start[2]), float(p.goal[2]), self.floor_m, self.ceiling_m,
             self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, AROUND_M, *self.work,
@@ -175,7 +176,7 @@ def make_guide(
                 near[max(j - r, 0) : j + r + 1, max(i - r, 0) : i + r + 1] = True
     jj, ii = np.nonzero(near)
     floor, ceiling = np.full(near.shape, SHUT_M), np.full(near.shape, -SHUT_M)
-    floor[jj, ii] = np.minimum(air.floor_amsl(x[ii], y[jj], limits), SHUT_M)
+    floor[jj, ii] = np.minimum(problem.floors(x[ii], y[jj]), SHUT_M)
     ceiling[jj, ii] = np.clip(air.ceiling_amsl(x[ii], y[jj], limits), -SHUT_M, SHUT_M)
     circles, edges = [], []
     for number, zone in enumerate(air.zones):

@@ -95,7 +95,7 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
     ceiling = np.full(shape, -np.inf)
     jj, ii = np.nonzero(wanted)
     air, limits = problem.airspace, problem.limits
-    floor[jj, ii] = air.floor_amsl(x[ii], y[jj], limits)
+    floor[jj, ii] = problem.floors(x[ii], y[jj])
     ceiling[jj, ii] = air.ceiling_amsl(x[ii], y[jj], limits)
     reach = air.beside_m(limits)
     ground = _ground_of_zones(problem, x, y, wanted, reach + 2.0 * step_m)

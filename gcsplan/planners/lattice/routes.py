@@ -124,6 +124,7 @@ class Router:
             most_opened=most_opened,
         )
         self.opened += found.opened
+        p.budget.spend("label", found.opened)
         self.opened_last = found.opened
         return found.labels
 
@@ -153,6 +154,7 @@ class Router:
             )
             labels = found.labels
             self.opened += found.opened
+            p.budget.spend("label", found.opened)
             self.opened_last = found.opened
             if not labels:
                 break

@@ -57,6 +57,7 @@ class Judge:
         new = np.array([k for k, leg in enumerate(legs) if leg.tobytes() not in self.passed], np.intp)
         if not len(new):
             return ()
+        self.problem.budget.spend("leg", len(new))
         found = self.problem.airspace.examine(self._legs(legs[new]), self.problem.limits).violations
         bad = {v.leg for v in found}
         self.passed.update(legs[k].tobytes() for i, k in enumerate(new) if i not in bad)
@@ -67,7 +68,7 @@ class Judge:
         keys = [leg.tobytes() for leg in legs]
         new = np.array([k for k, key in enumerate(keys) if key not in self.passed and key not in self.failed], np.intp)
         if len(new):
-            good = self.problem.airspace.clear(self._legs(legs[new]), self.problem.limits)
+            good = self.problem.legal(legs[new, :3], legs[new, 3:])
             for k, ok in zip(new, good, strict=True):
                 (self.passed if ok else self.failed).add(keys[k])
         return np.array([key in self.passed for key in keys], bool)
@@ -162,7 +163,7 @@ def _room(problem: Problem, track: Track, s_m: Floats) -> tuple[Floats, Floats]:
     """Floor and ceiling at places along a track, zones left aside."""
     east, north = (np.interp(s_m, track.s_m, track.points[:, k]) for k in range(2))
     air, limits = problem.airspace, problem.limits
-    return np.asarray(air.floor_amsl(east, north, limits)), np.asarray(air.ceiling_amsl(east, north, limits))
+    return np.asarray(problem.floors(east, north)), np.asarray(air.ceiling_amsl(east, north, limits))
 
 
 def thinned(problem: Problem, judge: Judge, points: Floats, pinned: Bools, worth: float) -> Floats:

@@ -132,6 +132,7 @@ def make_track(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_
             last = i
     points, pinned, pin_m = points[keep], pinned[keep], pin_m[keep]
     tube = problem.airspace.tube(points, problem.limits)
+    problem.budget.spend("piece", len(tube.s_m))
     s = distances(points)
     return Track(points, pinned, pin_m, s * (tube.s_m[-1] / s[-1]), tube)
 

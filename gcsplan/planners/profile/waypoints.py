@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import Flown, Track
-from gcsplan.world.airspace import Legs
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +50,7 @@ def thin(problem: Problem, points: Floats, pinned: NDArray[np.bool_], worth: flo
 
 def clear(problem: Problem, points: Floats) -> NDArray[np.bool_]:
     """(N - 1,) which legs between neighbours are legal."""
-    return problem.airspace.clear(Legs.of_path(points, problem.limits), problem.limits)
+    return problem.legal(points[:-1], points[1:])
 
 
 def _cost(problem: Problem, points: Floats) -> float:
@@ -68,8 +67,7 @@ def _drop(
         if n < 3:
             break
         inner = np.arange(1, n - 1)
-        direct = Legs.between(points[:-2], points[2:], problem.limits)
-        legal = problem.airspace.clear(direct, problem.limits) & ~pinned[inner]
+        legal = problem.legal(points[:-2], points[2:]) & ~pinned[inner]
         now = problem.leg_costs(points[:-1], points[1:])
         rise = problem.leg_costs(points[:-2], points[2:]) - now[:-1] - now[1:]
         drop = np.zeros(n, bool)

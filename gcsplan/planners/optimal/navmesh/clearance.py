@@ -82,6 +82,8 @@ class Relief:
         self._span = _spans(wanted[inner], fineness)
         self._around = np.tile(np.array([0, cols], np.int32), (rows, 1)) if whole else _around(self._span, cols)
         self._diagonal = np.zeros((rows - 1) * (cols - 1), np.int8)
+        looked_at = float((self._around[:, 1] - self._around[:, 0]).clip(0).sum())
+        plane.problem.budget.spend("node", looked_at)
         more = limits.min_agl_m + limits.altitude_error_m
         if low:
             more -= plane.fit.spare_m
@@ -122,7 +124,7 @@ class Relief:
 
     def _too_high(self, east_m: Floats, north_m: Floats) -> Floats:
         """What floors of the exact check are over the cap."""
-        floor = self.plane.problem.airspace.floor_amsl(east_m, north_m, self.plane.problem.limits)
+        floor = self.plane.problem.floors(east_m, north_m)
         return np.asarray(floor) - self.cap_m
 
     def learn(self, track: Floats) -> bool:

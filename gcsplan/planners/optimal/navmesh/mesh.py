@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners.budget import RATES
 from gcsplan.planners.optimal.navmesh.mesh_kernels import in_reach, least_of_cells, least_of_portals, within
 from gcsplan.planners.optimal.navmesh.polyanya import search
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE
@@ -30,6 +31,10 @@ MOST_OPENED, ANYHOW, OF_PORTAL = 3_000_000, 100_000, 64
 is farther than the limit, and there are many ways around many corners, they would be many times that."""
 MOST_OF_SHEETS = 300_000
 """The same where some cells are there twice."""
+
+
+NODE_BYTES = 200.0
+"""What an opened interval takes, with those that it leaves unopened."""
 
 
 class Exhausted(Exception):
@@ -182,12 +187,14 @@ class Mesh:
         guide: Guide | None,
         met: Floats,
     ) -> Way | None:
+        budget = self.plane.problem.budget
         pieces, goal_pieces = self.pieces_at(start), self.pieces_at(goal)
         if not pieces or not goal_pieces:
             return None
         sources = np.array([(*start, 0.0)] * len(pieces))
         remaining = np.zeros(0) if guide is None else guide.over(self)
         most = min(MOST_OPENED, ANYHOW + OF_PORTAL * len(self.joins)) if self.sheets == 1 else MOST_OF_SHEETS
+        most = int(min(most, budget.room_mb * 1e6 / NODE_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
         room = max(1 << 19, 8 * len(self.start))  # what is not touched costs nothing
         while True:
             best, origin = np.zeros(self.named), np.zeros(self.named, np.int64)  # cost nothing until they are touched
@@ -206,6 +213,8 @@ class Mesh:
                 break
             room *= 4
             met[:] = np.inf
+        budget.spend("portal", portals)
+        budget.spend("opened", float(out[2, 2]))
         if n == -2:
             raise Exhausted(float(out[0, 0]))
         if n <= 0:

@@ -187,7 +187,7 @@ class Mesh:
                 np.empty((portals, 2)), np.array([(*a, 0.0)] * len(pieces)), pieces, np.array(b, np.float64),
                 goal_pieces, math.inf, -1.0, MOST_OPENED, none, none, np.empty((room, 8)), np.empty((room, 6), np.int32),
                 np.empty((room, 3), np.int64), np.empty(room), np.empty(room, np.int32),
-                out := np.empty((1 << 14, 3)), np.zeros((0, 8)),
+                out := np.zeros((1 << 14, 3)), np.zeros((0, 8)),
             )  # fmt: skip
             if n != -1:
                 break

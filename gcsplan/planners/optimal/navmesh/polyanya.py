@@ -81,7 +81,8 @@ def search(
     is shorter. ``slack`` >= 0: go on after the goal is reached, as far as that much (as a part of the length) beyond
     it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. ``spokes`` (portals,
     8), zeros, where portals of a piece may lie on each other, from sheet to sheet, or else empty. Returns the number of
-    corners, ends included, with ``out[0, 2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than
+    corners, ends included, with ``out[0, 2]`` the source's number, ``out[1, 2]`` the length and ``out[2, 2]`` how many nodes were
+    opened; 0: no path of less than
     ``limit``; -1: no room left; -2: more than ``most`` nodes were opened, paths shorter than ``out[0, 0]`` all of them.
     """
     room = len(heap)
@@ -142,7 +143,7 @@ def search(
             all_round = False
             opened += 1
             if opened > most:
-                out[0, 0] = math.floor(key / BANDS) * band
+                out[0, 0], out[2, 2] = math.floor(key / BANDS) * band, opened
                 return -2
         width_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
         width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
@@ -331,6 +332,7 @@ def search(
                     size = push(heap, ids, size, math.floor((ncost + ahead) / band) * BANDS + near, count)
                 count += 1
     if reached < 0:
+        out[2, 2] = opened
         return 0
     # Corners from the goal back.
     current = reached
@@ -349,5 +351,5 @@ def search(
             n += 1
             number = -2 - last
         at = link[at, PARENT]
-    out[0, 2], out[1, 2] = number, length
+    out[0, 2], out[1, 2], out[2, 2] = number, length, opened
     return n

@@ -96,7 +96,7 @@ def _along(plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: 
 
     ``places`` (N, 2) of the way, ``s`` (N,) how far along it they are; ``whole_m`` how long all of it is.
     """
-    over = plane.problem.airspace.floor_amsl(places[:, 0], places[:, 1], plane.problem.limits) - plane.top_m
+    over = plane.problem.floors(places[:, 0], places[:, 1]) - plane.top_m
     stretches = _stretches(over)
     if len(stretches) > MOST:
         return None

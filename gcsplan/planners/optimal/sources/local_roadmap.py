@@ -177,7 +177,7 @@ def _heights(problem: Problem, ends: Floats, low: Floats, high: Floats) -> tuple
     limits, surface = problem.limits, problem.airspace.surface
     error = limits.altitude_error_m + HAIR_M
     east, north = (a.ravel() for a in np.meshgrid(*(np.linspace(low[k], high[k], 40) for k in range(2))))
-    floor = problem.airspace.floor_amsl(east, north, limits)
+    floor = problem.floors(east, north)
     floor = floor[np.isfinite(floor)]
     bottom_m = min(float(floor.min(initial=math.inf)), float(ends[:, 2].min()))
     top_m = max(float(floor.max(initial=-math.inf)), float(ends[:, 2].max()))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from gcsplan.planners.optimal.sources.section_dp import FIXED, FREE, UPRIGHT, cheapest, clear, cost_of, drawn
+from gcsplan.planners.optimal.sources.section_dp import FIXED, FREE, UPRIGHT, cheapest, cost_of, drawn
 from gcsplan.planners.problem import Problem
 
 Floats = NDArray[np.float64]
@@ -185,8 +185,8 @@ class Lattice:
         """The lattice of what is legal of ``pairs`` (2, E) of ``nodes``, there and back."""
         a, b = pairs
         limits = problem.limits
-        there = clear(problem, nodes[a], nodes[b])
-        back = there if limits.max_climb_deg == limits.max_descent_deg else clear(problem, nodes[b], nodes[a])
+        there = problem.legal(nodes[a], nodes[b])
+        back = there if limits.max_climb_deg == limits.max_descent_deg else problem.legal(nodes[b], nodes[a])
         cost = problem.leg_costs(nodes[a], nodes[b])
         rows, columns = np.concatenate([a[there], b[back]]), np.concatenate([b[there], a[back]])
         graph = csr_array((np.concatenate([cost[there], cost[back]]), (rows, columns)), shape=(len(nodes), len(nodes)))
@@ -252,7 +252,7 @@ def _lattice(problem: Problem, starts: Floats, goals: Floats, limit: float) -> L
         step_m = max(step_m * coarser, finest_m)
         axes = [np.arange(low[i], high[i], step_m * scale[i]) for i in range(3)]
         east, north = (a.ravel() for a in np.meshgrid(axes[0], axes[1], indexing="ij"))
-        floor = problem.airspace.floor_amsl(east, north, limits)
+        floor = problem.floors(east, north)
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         shape = nodes.shape[:3]
         cost = np.min([problem.leg_costs(a, nodes) for a in starts], axis=0)

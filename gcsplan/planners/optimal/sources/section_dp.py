@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import divided
-from gcsplan.world.airspace import Legs
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -67,7 +66,7 @@ def cheapest(problem: Problem, points: Floats, kinds: Ints) -> tuple[Floats, Int
     near = (stops[last] == stops[first + 1]) & (last - first <= FAR_AHEAD)
     first, last = first[near], last[near]
     legal = last == first + 1
-    legal[~legal] = clear(problem, points[first[~legal]], points[last[~legal]])
+    legal[~legal] = problem.legal(points[first[~legal]], points[last[~legal]])
     first, last = first[legal], last[legal]
     leg = np.full((n, n), np.inf)
     leg[first, last] = problem.leg_costs(points[first], points[last])
@@ -106,7 +105,7 @@ def _moved(problem: Problem, points: Floats, kinds: Ints, move_m: float) -> Floa
     start = np.concatenate([np.repeat(points[:1], w, axis=0), np.repeat(places[:-1], w, axis=1).reshape(-1, 3)])
     end = np.concatenate([places[0], np.tile(places[1:], (1, w, 1)).reshape(-1, 3)])
     start, end = np.concatenate([start, places[-1]]), np.concatenate([end, np.repeat(points[-1:], w, axis=0)])
-    legs = np.where(clear(problem, start, end), problem.leg_costs(start, end), np.inf)
+    legs = np.where(problem.legal(start, end), problem.leg_costs(start, end), np.inf)
     cost, before = legs[:w], []
     for step in legs[w:-w].reshape(n - 1, w, w):
         over = cost[:, None] + step
@@ -131,10 +130,6 @@ def _divided(points: Floats, kinds: Ints, step_m: float) -> tuple[Floats, Ints]:
     inner = points[leg] + t * (points[leg + 1] - points[leg])
     return np.vstack([inner, points[-1:]]), np.append(np.where(part == 0, kinds[leg], FREE), kinds[-1])
 
-
-def clear(problem: Problem, start: Floats, end: Floats) -> Bools:
-    """(N,) whether legs from ``start`` (N, 3) to ``end`` pass the exact check."""
-    return problem.airspace.clear(Legs.between(start, end, problem.limits), problem.limits)
 
 
 def cost_of(problem: Problem, points: Floats) -> float:
