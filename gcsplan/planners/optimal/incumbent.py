@@ -10,13 +10,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.lattice.lattice import terminals
 from gcsplan.planners.lattice.planner import straight_bound
 from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.corridor import End
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.sources.detours import Choice, Search, Stops, joined
-from gcsplan.planners.problem import Problem, Progress, Solution
+from gcsplan.planners.problem import Problem, Progress, Solution, terminals
 from gcsplan.planners.profile.climb_laps import with_laps
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track

@@ -41,12 +41,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
-from gcsplan.planners.lattice.lattice import terminals
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.bounds.refine import tighten
 from gcsplan.planners.optimal.incumbent import FAR, Below
-from gcsplan.planners.problem import Problem, Solution
-from gcsplan.planners.refusal import Refusal, check_ends, explain
+from gcsplan.planners.problem import Problem, Refusal, Solution, terminals
+from gcsplan.planners.refusal import check_ends, explain
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
