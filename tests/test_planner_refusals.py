@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.optimal.planner import plan
-from gcsplan.planners.problem import Problem, Via
-from gcsplan.planners.refusal import Refusal
+from gcsplan.planners.problem import Problem, Refusal, Via
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface

@@ -1,21 +1,28 @@
-"""What every planner is asked, and what it answers."""
+"""What every planner is asked, what it answers, and the refusal where it has no answer."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.errors import NoMission, NoMissionReason
 from gcsplan.planners.budget import Budget
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 
 Objective = Literal["length", "energy"]
+
+ENDS_M = 25.0
+"""Bounds over a line are conservative, in rough ground by this much at worst; so whether start and goal themselves are
+legal is not read from them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,3 +135,22 @@ class Solution:
     raw_violations: int | None = None
     repaired: bool | None = None
     search: tuple[Step, ...] = ()
+
+
+class Refusal(NoMission):
+    """No mission, and where: ``east_m``, ``north_m`` of the binding place, None where there is no one place."""
+
+    def __init__(self, message: str, *, reason: NoMissionReason, place: tuple[float, float] | None = None) -> None:
+        super().__init__(message, reason=reason)
+        self.east_m = None if place is None else float(place[0])
+        self.north_m = None if place is None else float(place[1])
+
+
+def terminals(problem: Problem) -> list[tuple[float, float]]:
+    """Start, every via, goal: (east_m, north_m)."""
+    return [problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]]
+
+
+def straight_way_m(problem: Problem) -> float:
+    """Metres of the straight track from terminal to terminal."""
+    return sum(math.dist(a, b) for a, b in pairwise(terminals(problem)))

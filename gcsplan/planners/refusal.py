@@ -15,10 +15,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.errors import NoMission, NoMissionReason
-from gcsplan.planners.lattice.lattice import levels_of, near_zone, terminals
+from gcsplan.errors import NoMissionReason
+from gcsplan.planners.lattice.lattice import levels_of, near_zone
 from gcsplan.planners.lattice.routes import Level, Router
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.problem import Problem, Refusal, terminals
 from gcsplan.planners.profile.track import Obstruction
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
@@ -29,15 +29,6 @@ Floats = NDArray[np.float64]
 LEVEL = Level(math.inf, 40_000)
 """Lattice on which limits are lifted one at a time: coarse, for these are words, not paths."""
 NAMES = 5
-
-
-class Refusal(NoMission):
-    """No mission, and where: ``east_m``, ``north_m`` of the binding place, None where there is no one place."""
-
-    def __init__(self, message: str, *, reason: NoMissionReason, place: tuple[float, float] | None = None) -> None:
-        super().__init__(message, reason=reason)
-        self.east_m = None if place is None else float(place[0])
-        self.north_m = None if place is None else float(place[1])
 
 
 def check_ends(problem: Problem) -> None:

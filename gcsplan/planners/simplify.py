@@ -187,6 +187,5 @@ def _look(problem: Problem, points: Floats, choices: _Choices, asked: Bools, mar
     marks[row, column] = np.where(legal, LEGAL, SHUT)
 
 
-
 def _cost(problem: Problem, points: Floats) -> float:
     return float(problem.leg_costs(points[:-1], points[1:]).sum())

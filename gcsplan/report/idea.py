@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path as FilePath
 from typing import IO
 
@@ -13,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from gcsplan.planners.optimal.bounds.refine import tighten
-from gcsplan.planners.optimal.incumbent import Below
+from gcsplan.planners.optimal.planner import search
 from gcsplan.planners.problem import Problem
 
 WALL, ROOM = "#b04a3a", "#2c7fb8"
@@ -22,14 +20,14 @@ WALL, ROOM = "#b04a3a", "#2c7fb8"
 
 def draw(problem: Problem) -> Figure:
     """The plane of a problem's first leg: walls below the cap, the path, and the cells that a shorter one may meet."""
-    below = Below(problem, time.perf_counter())
-    below.look()
-    tighten(below)
-    solution = below.solution()
+    searches = search(problem)
+    below, incumbent = searches.plane, searches.incumbent
+    below.reach_longest()
+    solution = incumbent.solution()
     leg = below.legs[0]
     plane = leg.plane
     walls = plane.mesh(below.top_m, True).piece.max(axis=1).reshape(plane.inside.shape) < 0
-    room = leg.corridor(below.cost)
+    room = leg.corridor(incumbent.cost)
     points = solution.path.points
     figure = Figure(figsize=(9.5, 5.6), layout="constrained")
     FigureCanvasAgg(figure)
@@ -50,17 +48,17 @@ def draw(problem: Problem) -> Figure:
     low, high = (points[:, :2].min(axis=0) - far) / 1000.0, (points[:, :2].max(axis=0) + far) / 1000.0
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="east, km", ylabel="north, km")
     ax.set_aspect("equal")
-    gap = 100.0 * (below.cost / below.bound - 1.0)
+    gap = 100.0 * (incumbent.cost / incumbent.bound - 1.0)
     ax.legend(
         handles=[
             Patch(fc=WALL, alpha=0.45, label=f"no path below {below.top_m:,.0f} m AMSL can be here"),
             Patch(fc=ROOM, alpha=0.75, label="a shorter path would have to stay here"),
-            Line2D([], [], color="#111111", marker=".", label=f"path, {below.cost:,.0f} m"),
+            Line2D([], [], color="#111111", marker=".", label=f"path, {incumbent.cost:,.0f} m"),
         ],
         loc="upper right",
         fontsize=8,
     )
-    ax.set_title(f"no path is shorter than {below.bound:,.0f} m: gap {gap:.2f} %", loc="left", fontsize=10)
+    ax.set_title(f"no path is shorter than {incumbent.bound:,.0f} m: gap {gap:.2f} %", loc="left", fontsize=10)
     return figure
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.lattice import pull_kernels
-from gcsplan.planners.lattice.lattice import near_zone, terminals
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.lattice.lattice import near_zone
+from gcsplan.planners.problem import Problem, terminals
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.problem import ENDS_M, Problem, terminals
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
@@ -25,10 +25,6 @@ Ints = NDArray[np.int64]
 
 STEPS = np.array([(1, 0), (0, 1), (1, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1)], dtype=np.int64)
 """Half of the 16 directions; edge ``node * 8 + k`` goes from ``node`` by ``STEPS[k]``."""
-
-ENDS_M = 25.0
-"""Bounds over a line are conservative, in rough ground by this much at worst; so whether start and goal themselves are
-legal is not read from them."""
 
 LINK_DOORS = 9
 """Places at which an edge between a terminal and a node is looked at."""
@@ -105,11 +101,6 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
     return Lattice(west, south, step_m, nx, ny, floor, ceiling, ground, at, low, high, agl, reach)
 
 
-def straight_way_m(problem: Problem) -> float:
-    """How long the straight way from stop to stop is."""
-    return sum(math.dist(a, b) for a, b in pairwise(terminals(problem)))
-
-
 def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: NDArray[np.bool_], beside_m: float) -> Floats:
     """The ground where it is ``wanted`` and a zone with a level over ground may come near; 0 elsewhere."""
     asked = np.zeros(wanted.shape, np.bool_)
@@ -135,11 +126,6 @@ def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_
         to = np.hypot(x[None, :] - a[0], y[:, None] - a[1]) + np.hypot(x[None, :] - b[0], y[:, None] - b[1])
         out |= to <= detour * math.hypot(b[0] - a[0], b[1] - a[1]) + 2.0 * slack_m
     return out
-
-
-def terminals(problem: Problem) -> list[tuple[float, float]]:
-    """Start, every via, goal: (east_m, north_m)."""
-    return [problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]]
 
 
 def _edge_bands(

@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
-from gcsplan.planners.lattice.lattice import straight_way_m, terminals
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
-from gcsplan.planners.problem import Problem, Solution
+from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m, terminals
 from gcsplan.planners.profile.climb_laps import pins_of, ways_up, with_climbs
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle, thinned
 from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, make_track
-from gcsplan.planners.refusal import Refusal, explain
+from gcsplan.planners.refusal import explain
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.lattice.lattice import Lattice, Links, make_lattice, make_links, terminals
+from gcsplan.planners.lattice.lattice import Lattice, Links, make_lattice, make_links
 from gcsplan.planners.lattice.search import Found, Label, search
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.problem import Problem, terminals
 from gcsplan.planners.profile.track import Obstruction, Track, make_track
 
 Floats = NDArray[np.float64]

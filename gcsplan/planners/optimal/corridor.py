@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,10 @@ from gcsplan.planners.optimal.navmesh.mesh import Guide
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Spare = tuple[float, float]
+"""Metres that a path may fly in laps near its start and near its goal."""
+Stops = tuple[Floats, Bools, Floats]
+"""A track (N, 2), which of its points are terminals, and their altitudes (NaN free)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,3 +62,16 @@ class Nearby:
     high_m: Floats
     away_m: Floats
     left_m: Floats
+
+
+def joined(ways: list[Floats], heights: list[float | None]) -> Stops:
+    """One track of those from stop to stop (N, 2), of which the ``heights`` of all but the ends are told."""
+    points = np.vstack([ways[0], *(w[1:] for w in ways[1:])])
+    pinned, pin_m = np.zeros(len(points), np.bool_), np.full(len(points), math.nan)
+    pinned[0] = pinned[-1] = True
+    at = 0
+    for way, height in zip(ways[:-1], heights, strict=True):
+        at += len(way) - 1
+        pinned[at] = True
+        pin_m[at] = math.nan if height is None else height
+    return points, pinned, pin_m

@@ -57,7 +57,8 @@ def govern(incumbent: Incumbent, searches: list[Search], without: Collection[str
     """
     names = {s.name for s in searches}
     if not names.issuperset(without):
-        raise InputError(f"the searches are {', '.join(sorted(names))}, given {', '.join(sorted(set(without) - names))}")
+        unknown = ", ".join(sorted(set(without) - names))
+        raise InputError(f"the searches of this kind of mission are {', '.join(sorted(names))}, given {unknown}")
     left = [s for s in searches if s.name not in without]
     budget = incumbent.budget
     for _ in range(MOST_STEPS):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.planner import straight_bound
-from gcsplan.planners.optimal.sources.detours import Stops
+from gcsplan.planners.optimal.corridor import Stops
 from gcsplan.planners.problem import Problem, Progress, Solution, Step
 from gcsplan.planners.profile.climb_laps import with_laps
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle
@@ -43,7 +43,7 @@ class Incumbent:
         self.pinned: Bools | None = None
         """(N,) which points of the best path are terminals; None where that is not known."""
         self.cost = math.inf
-        self.bound = straight_bound(problem)
+        self.bound = straight_bound(problem) * (1.0 - 1e-12)
         self.first_s = math.inf
         self.proved_shut = False
         """Whether it is proved that there is no path."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, Reached, Stop, Storeys
-from gcsplan.planners.optimal.corridor import Corridor, End, Nearby
+from gcsplan.planners.optimal.corridor import Corridor, End, Nearby, Spare
 from gcsplan.planners.optimal.navmesh.clearance import Cone, Relief, box_of, sampled
 from gcsplan.planners.optimal.navmesh.grid import Box, Plane, extent, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Exhausted, Guide, Mesh, Way
@@ -25,8 +25,6 @@ from gcsplan.world.zones import Circle
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Spare = tuple[float, float]
-"""Metres that a path may fly in laps near its start and near its goal."""
 
 DETOURS, LEAST_DETOUR = (1.25, 2.5, math.inf), 1.02
 """How long tracks may be, in times the straight way, before the lattice must be widened; and how long they may be in

@@ -1,4 +1,4 @@
-"""Level ground as a lattice wants it: a terrain model of two by two nodes has no cells that could be looked at alone."""
+"""Level ground cut into cells: a terrain model of two by two nodes has none that a lattice could look at alone."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gcsplan.planners.lattice.lattice import terminals
 from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.problem import Problem, terminals
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.surface import GridMap, Surface
 
@@ -44,5 +43,7 @@ def in_window(incumbent: Incumbent) -> Problem:
     grid = GridMap.affine(float(low[0]), float(high[1]), float(step[0]), float(step[1]))
     heights = np.full((NODES, NODES), float(ground[0, 0]))
     tops = heights if top is ground else np.full((NODES, NODES), float(top[0, 0]))
-    air = Airspace(Surface(heights, tops, grid, dict(surface.info)), problem.airspace.zones, scale=problem.airspace.scale)
+    air = Airspace(
+        Surface(heights, tops, grid, dict(surface.info)), problem.airspace.zones, scale=problem.airspace.scale
+    )
     return replace(problem, airspace=air)

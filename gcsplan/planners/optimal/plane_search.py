@@ -10,13 +10,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.lattice.lattice import terminals
 from gcsplan.planners.optimal.cap_search import above_all
-from gcsplan.planners.optimal.corridor import End
+from gcsplan.planners.optimal.corridor import End, Stops, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Exactly, Leg
-from gcsplan.planners.optimal.sources.detours import Choice, Search, Stops, joined
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
+from gcsplan.planners.problem import Problem, terminals
 from gcsplan.planners.profile.track import Flown, fly, make_track
 
 Floats = NDArray[np.float64]
@@ -59,35 +58,6 @@ class PlaneSearch:
         self._open = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
         self.choice = self._open
         """With what shut the last tracks were found that had to go past something."""
-
-    # -------------------------------------------------------------------- what a search of detours asks (its Seeker)
-
-    @property
-    def cost(self) -> float:
-        """Of the best path."""
-        return self.incumbent.cost
-
-    @property
-    def bound(self) -> float:
-        """Of all paths."""
-        return self.incumbent.bound
-
-    @property
-    def wanted(self) -> float:
-        """How far they may be apart, as a part."""
-        return self.incumbent.wanted
-
-    def least(self, track_m: float) -> float:
-        """What a path costs at least whose track is so long."""
-        return self.incumbent.least(track_m)
-
-    def take_longer(self, stops: Stops, fine: bool) -> bool:
-        """Look for a path over a track, with laps where it is too steep."""
-        return self.incumbent.take_longer(stops, fine)
-
-    def goes_on(self) -> bool:
-        """Whether a better path is wanted, and there is work left for it."""
-        return self.incumbent.goes_on()
 
     def stops(self, choice: Choice, cap_m: float, fine: bool, exactly: Exactly | None = None) -> Stops | None:
         """The shortest track of a choice below a cap, from terminal to terminal; see `Leg.track`."""
@@ -170,7 +140,7 @@ class PlaneSearch:
             if self.try_below(self.top_m, fine=True, exactly=exactly):
                 return True
             lacks = self.incumbent.unsettled
-            if lacks is None or lacks.kind != "pinched" or not lacks.by < PINCHED_M or not self.goes_on():
+            if lacks is None or lacks.kind != "pinched" or not lacks.by < PINCHED_M or not self.incumbent.goes_on():
                 break
             exactly.shut.append((lacks.place, lacks.by + more_m))
         return False
@@ -186,7 +156,8 @@ class PlaneSearch:
         incumbent = self.incumbent
         laps = incumbent.climbs and (incumbent.best is None or (incumbent.laps and cap_m is None))
         spare_m = self.longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
-        search = Search(self, self.top_m if cap_m is None else cap_m, fine)
+        below_m = self.top_m if cap_m is None else cap_m
+        search = DetourSearch(incumbent, lambda choice: self.stops(choice, below_m, fine), fine)
         roots = [self.choice]
         if cap_m is None:
             roots = [replace(c, most_m=(spare_m, spare_m)) for c in dict.fromkeys([self._open, self.choice])]

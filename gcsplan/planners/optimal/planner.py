@@ -32,13 +32,12 @@ from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.lattice.lattice import terminals
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.governor import govern
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.searches import Searches
-from gcsplan.planners.problem import Problem, Solution
-from gcsplan.planners.refusal import Refusal, check_ends, explain
+from gcsplan.planners.problem import Problem, Refusal, Solution, terminals
+from gcsplan.planners.refusal import check_ends, explain
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -62,16 +61,22 @@ def plan(problem: Problem) -> Solution:
     return _sharp(problem)
 
 
-def _sharp(problem: Problem, laps: bool = True) -> Solution:
-    check_ends(problem)
+def search(problem: Problem, laps: bool = True) -> Searches:
+    """Everything that is known about the best path of a problem, and where it was looked for."""
     incumbent = Incumbent(problem, laps)
     incumbent.tell("search")
-    begun = problem.budget.begun_s
-    if all(math.dist(terminals(problem)[0], x) < 1e-3 for x in terminals(problem)):
-        return plan_band(problem, incumbent.tell, begun)  # a climb on the spot
     searches = Searches(incumbent)
     without = problem.options.get("without", ())
     govern(incumbent, searches.table(), without if isinstance(without, tuple) else ())
+    return searches
+
+
+def _sharp(problem: Problem, laps: bool = True) -> Solution:
+    check_ends(problem)
+    if all(math.dist(terminals(problem)[0], x) < 1e-3 for x in terminals(problem)):
+        return plan_band(problem, Incumbent(problem).tell, problem.budget.begun_s)  # a climb on the spot
+    searches = search(problem, laps)
+    incumbent = searches.incumbent
     if incumbent.best is None:
         raise searches.refusal or explain(problem, proved=True if incumbent.proved_shut else None)
     found = incumbent.solution()

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.lattice.lattice import terminals
 from gcsplan.planners.lattice.planner import plan_band
-from gcsplan.planners.optimal.bounds.shorter import NEARER, bound_by_caps, halve, raise_climb
+from gcsplan.planners.optimal.bounds.shorter import bound_by_caps, halve, raise_climb
 from gcsplan.planners.optimal.governor import Search, Size
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import LARGE
@@ -20,8 +18,8 @@ from gcsplan.planners.optimal.plane_search import PAST, SLACKS, PlaneSearch
 from gcsplan.planners.optimal.sources.bound_corridor import follow
 from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
 from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
-from gcsplan.planners.profile.track import Flown, Obstruction, fly, make_track
-from gcsplan.planners.refusal import Refusal
+from gcsplan.planners.problem import Refusal, terminals
+from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
 Floats = NDArray[np.float64]
 
@@ -72,55 +70,54 @@ class Searches:
         def known() -> bool:
             return i.best is not None
 
-        twice = TWICE * i.wanted
+        def small(beyond: float) -> Callable[[], bool]:
+            return lambda: i.best is not None and i.gap > beyond and self.plane.is_small
+
+        def on(run: Callable[[PlaneSearch], object]) -> Callable[[], object]:
+            return self._over(lambda: run(self.plane))
+
+        nodes, of, far, twice = self._nodes, self._of, gap(FAR), gap(TWICE * i.wanted)
         rows = [
-            Search("straight", 1.0, lambda: self._straight is None, self._of(2e-3, 0.0), self._fly_straight),
-            Search("outlines", 1.0, self._has_outlines, self._of(3e-3, 2e-3), self._look_at_outlines),
+            Search("straight", 1.0, lambda: self._straight is None, of(2e-3, 0.0), self._fly_straight),
+            Search("outlines", 1.0, self._has_outlines, of(3e-3, 2e-3), self._look_at_outlines),
         ]
         if band:
             return [
                 *rows[:1],
-                Search("track_bound", 1.0, lambda: i.bound < i.cost, self._nodes(1.0), self._bound_tracks),
-                Search("lattice", 0.5, lambda: True, self._of(1.0, 0.0), self._search_lattice),
+                Search("track_bound", 1.0, lambda: i.bound < i.cost, nodes(1.0), self._bound_tracks),
+                Search("lattice", 0.5, lambda: True, of(1.0, 0.0), self._search_lattice),
             ]
         rows += [
-            Search("cap_search", 1.0, missing, self._nodes(1.0), self._look_first),
-            Search("narrow_first", 0.5, missing, self._nodes(4.0), self._over(self._squeeze_first)),
-            Search("lattice_first", 0.5, missing, self._of(1.0, 0.0), self._search_lattice),
-            Search("roadmap_first", 0.1, self._small_lacks, self._of(1.0, 0.0), self._search_small),
-            Search("roadmap_3d", 0.9, self._is_high, self._of(0.5, 0.0), self._search_space),
-            Search("roadmap_near", 0.5, lambda: gap(MUCH)() and self.plane.is_small, self._of(0.5, 0.0), self._search_small),
-            Search("fine_tracks", 0.9, known, self._nodes(0.5), self._over(self._look_finely), nearer=True),
-            Search("detours", 0.8, gap(FAR), self._nodes(2.0), self._over(lambda: self.plane.past(PAST, fine=False))),
+            Search("cap_search", 1.0, missing, nodes(1.0), self._look_first),
+            Search("narrow_first", 0.5, missing, nodes(4.0), self._over(self._squeeze_first)),
+            Search("lattice_first", 0.5, missing, of(1.0, 0.0), self._search_lattice),
+            Search("roadmap_first", 0.1, self._small_lacks, of(1.0, 0.0), self._search_small),
+            Search("roadmap_3d", 0.9, self._is_high, of(0.5, 0.0), self._search_space),
+            Search("roadmap_near", 0.5, small(MUCH), of(0.5, 0.0), self._search_small),
+            Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
+            Search("detours", 0.8, far, nodes(2.0), on(lambda plane: plane.past(PAST, fine=False))),
+            Search("bound_corridor", 0.2, twice, nodes(3.0), on(follow)),
+            Search("narrow_passage", 0.15, far, nodes(5.0), on(lambda plane: plane.squeeze(closely=False))),
+            Search("narrow_closely", 0.15, gap(WIDE), nodes(6.0), on(lambda plane: plane.squeeze(closely=True))),
+            Search("contour_climb", 0.1, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
+            Search("lattice", 0.02, self._wants_lattice, of(0.5, 0.0), self._search_lattice_again),
+            Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
         ]
         if energy:
-            rows += [
-                Search("cap_pairs", 0.5, known, self._nodes(3.0), self._over(self._bound_caps), again=True),
-                Search("detours_fine", 0.3, gap(FAR), self._nodes(4.0), self._over(lambda: self.plane.past(PAST_FINE, fine=True))),
+            return [
+                *rows,
+                Search("cap_pairs", 0.5, known, nodes(3.0), self._over(self._bound_caps), again=True),
+                Search("detours_fine", 0.3, far, nodes(4.0), on(lambda plane: plane.past(PAST_FINE, fine=True))),
             ]
-        else:
-            rows += [
-                Search("length_bound", 0.9, known, self._nodes(1.0), self._over(lambda: halve(self.plane)), again=True, nearer=True),
-                Search("space_bound", 0.3, lambda: self.plane.in_space, self._nodes(2.0), self._over(lambda: bound_by_caps(self.plane))),
-                Search("detours_fine", 0.3, known, self._nodes(4.0), self._over(self._past_finely)),
-            ]
-        rows += [
-            Search("bound_corridor", 0.2, gap(twice), self._nodes(3.0), self._over(lambda: follow(self.plane))),
-            Search("narrow_passage", 0.15, gap(FAR), self._nodes(5.0), self._over(lambda: self.plane.squeeze(closely=False))),
-            Search("narrow_closely", 0.15, gap(WIDE), self._nodes(6.0), self._over(lambda: self.plane.squeeze(closely=True))),
-            Search("contour_climb", 0.1, self._is_slanted, self._nodes(8.0), self._over(self._climb_aslant)),
+        return [
+            *rows,
+            Search("length_bound", 0.9, known, nodes(1.0), on(halve), again=True, nearer=True),
+            Search("space_bound", 0.3, lambda: self.plane.in_space, nodes(2.0), on(bound_by_caps)),
+            Search("detours_fine", 0.3, known, nodes(4.0), self._over(self._past_finely)),
+            Search("sheets", 0.09, twice, nodes(8.0), self._over(self._part_sheets)),
+            Search("altitude_intervals", 0.08, self._has_intervals, nodes(8.0), self._over(self._bound_by_intervals)),
+            Search("refinement", 0.07, self._is_near, nodes(8.0), self._over(self._refine)),
         ]
-        if not energy:
-            rows += [
-                Search("sheets", 0.09, gap(twice), self._nodes(8.0), self._over(self._part_sheets)),
-                Search("altitude_intervals", 0.08, self._has_intervals, self._nodes(8.0), self._over(self._bound_by_intervals)),
-                Search("refinement", 0.07, self._is_near, self._nodes(8.0), self._over(self._refine)),
-            ]
-        rows += [
-            Search("lattice", 0.02, self._wants_lattice, self._of(0.5, 0.0), self._search_lattice_again),
-            Search("local_roadmap", 0.01, lambda: gap(FAR)() and self.plane.is_small, self._of(0.5, 0.0), self._search_small),
-        ]
-        return rows
 
     def _over(self, run: Callable[[], object]) -> Callable[[], object]:
         """A search over the legs' lattices, once those hold whatever is not longer than the best path."""

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
-from gcsplan.planners.lattice.lattice import ENDS_M
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.problem import ENDS_M, Problem
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle, thinned
 from gcsplan.planners.profile.track import Flown, Lacking, Shut, Track, distances, fly, lacking
 from gcsplan.world.path import Path

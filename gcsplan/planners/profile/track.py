@@ -15,8 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.lattice.lattice import ENDS_M
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.problem import ENDS_M, Problem
 from gcsplan.planners.profile.taut_kernels import edge
 from gcsplan.planners.profile.taut_string import NO_LIMIT, Blocked, Profile, taut_string
 from gcsplan.world.airspace import Tube

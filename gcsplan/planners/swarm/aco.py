@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import unknown_name
-from gcsplan.planners.problem import Problem, Progress, Solution
-from gcsplan.planners.refusal import Refusal, check_ends
+from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
+from gcsplan.planners.refusal import check_ends
 from gcsplan.planners.swarm import scene_kernels as k
 from gcsplan.planners.swarm.encodings import LATERAL, Code
 from gcsplan.planners.swarm.objectives import Cost, Earlier, get_objective

@@ -109,7 +109,7 @@ def _least_of_pieces(
     that of those between least and greatest lengths."""
     found = math.inf
     for least, most in _pieces(tracks_m, spare_m):
-        if plane.least(sum(least)) >= found:
+        if plane.incumbent.least(sum(least)) >= found:
             break  # longer tracks cost no less
         found = min(found, cost(least, most))
     return found
@@ -128,7 +128,7 @@ def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float]
 def raise_climb(plane: PlaneSearch) -> None:
     """Raise a bound of energy by what tracks that are short enough must climb and descend, a few lengths at a time."""
     p, legs = plane.problem, plane.legs
-    if plane.incumbent.gap <= NEARER * plane.wanted or not plane.incumbent.budget.goes_on():
+    if plane.incumbent.gap <= NEARER * plane.incumbent.wanted or not plane.incumbent.budget.goes_on():
         return
     limits = [plane.limit(leg) for leg in legs]
     known = [leg.bound(plane.top_m, leg.corridor(m), m, True) for leg, m in zip(legs, limits, strict=True)]

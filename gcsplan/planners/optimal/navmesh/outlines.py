@@ -179,15 +179,16 @@ class Mesh:
         pieces, goal_pieces = self.pieces_at(a), self.pieces_at(b)
         if not len(pieces) or not len(goal_pieces):
             return None
-        portals, room, none = len(self.joins), 1 << 16, np.zeros(0)
+        portals, room, none, none_at = len(self.joins), 1 << 16, np.zeros(0), np.zeros((0, 8))
+        sources = np.array([(*a, 0.0)] * len(pieces))
         while True:
+            node, link, name = np.empty((room, 8)), np.empty((room, 6), np.int32), np.empty((room, 3), np.int64)
+            best, origin, out = np.zeros(self.named), np.zeros(self.named, np.int64), np.zeros((1 << 14, 3))
+            first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
             n = search(
-                self.start, self.ends, self.names, self.joins, self.order, np.zeros(self.named),
-                np.zeros(self.named, np.int64), np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32),
-                np.empty((portals, 2)), np.array([(*a, 0.0)] * len(pieces)), pieces, np.array(b, np.float64),
-                goal_pieces, math.inf, -1.0, MOST_OPENED, none, none, np.empty((room, 8)), np.empty((room, 6), np.int32),
-                np.empty((room, 3), np.int64), np.empty(room), np.empty(room, np.int32),
-                out := np.zeros((1 << 14, 3)), np.zeros((0, 8)),
+                self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span, sources,
+                pieces, np.array(b, np.float64), goal_pieces, math.inf, -1.0, MOST_OPENED, none, none, node, link, name,
+                np.empty(room), np.empty(room, np.int32), out, none_at,
             )  # fmt: skip
             if n != -1:
                 break

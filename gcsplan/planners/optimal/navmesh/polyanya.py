@@ -81,9 +81,9 @@ def search(
     is shorter. ``slack`` >= 0: go on after the goal is reached, as far as that much (as a part of the length) beyond
     it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. ``spokes`` (portals,
     8), zeros, where portals of a piece may lie on each other, from sheet to sheet, or else empty. Returns the number of
-    corners, ends included, with ``out[0, 2]`` the source's number, ``out[1, 2]`` the length and ``out[2, 2]`` how many nodes were
-    opened; 0: no path of less than
+    corners, ends included, with ``out[0, 2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than
     ``limit``; -1: no room left; -2: more than ``most`` nodes were opened, paths shorter than ``out[0, 0]`` all of them.
+    ``out[2, 2]`` is how many were opened.
     """
     room = len(heap)
     gx, gy = goal[0], goal[1]

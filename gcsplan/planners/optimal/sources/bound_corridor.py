@@ -14,13 +14,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.planners.optimal.corridor import joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.plane_search import PlaneSearch
-from gcsplan.planners.optimal.sources.detours import joined
 from gcsplan.planners.profile.track import distances
 from gcsplan.world.path import Path
-
 
 Floats = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -91,7 +90,9 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
     return np.vstack([*out, path[on_path > begin + APART_M]]) if out else None
 
 
-def _along(plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float) -> Floats | None:
+def _along(
+    plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float
+) -> Floats | None:
     """(N, 3) way points from one end to the other along a way, led past what is shut on it; None where that fails.
 
     ``places`` (N, 2) of the way, ``s`` (N,) how far along it they are; ``whole_m`` how long all of it is.

@@ -10,11 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.lattice.lattice import straight_way_m
 from gcsplan.planners.lattice.planner import pulled
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
-from gcsplan.planners.optimal.sources.detours import Stops
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.optimal.corridor import Stops
+from gcsplan.planners.problem import Problem, straight_way_m
 from gcsplan.planners.profile.climb_laps import pins_of
 
 Floats = NDArray[np.float64]

@@ -16,20 +16,18 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.optimal.leg import Spare
+from gcsplan.planners.optimal.corridor import Spare, Stops
+from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import sampled_track
 from gcsplan.planners.profile.track import Lacking, Shut, distances, lacking
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Stops = tuple[Floats, Bools, Floats]
-"""A track (N, 2), which of its points are stops, and their altitudes (NaN free)."""
 
 LACKING_M, HAIR_M = 3.0, 0.2
 """So little room is missing because cells are more lenient than the check, about terrain that is kept clear of
@@ -63,33 +61,13 @@ _Open = tuple[float, int, float, Choice, Lacking | None, Stops | None]
 is known; and that track, where a path over it is to be looked for."""
 
 
-class Seeker(Protocol):
-    """Who asks for a search, and keeps the best path.
-
-    ``cost``, ``bound``: of the best path, and of all paths; ``wanted``: how far the one may be from the other, as a
-    part. ``stops``: the shortest track of a choice's zones and most metres, below a cap, on the finer lattice or on
-    that of the first look; ``least``: what a path costs at least whose track is so long; ``take_longer``: look for a
-    path over a track, with laps where it is too steep, and keep it if it is the best; ``goes_on``: whether a better one
-    is wanted, and there is time.
-    """
-
-    problem: Problem
-    cost: float
-    bound: float
-    wanted: float
-
-    def stops(self, choice: Choice, cap_m: float, fine: bool) -> Stops | None: ...
-    def least(self, track_m: float) -> float: ...
-    def take_longer(self, stops: Stops, fine: bool) -> bool: ...
-    def goes_on(self) -> bool: ...
-
-
 @dataclass(frozen=True, eq=False, slots=True)
-class Search:
-    """A search below a cap, on the finer lattice (``fine``) or on that of the first look."""
+class DetourSearch:
+    """Tracks past what is in the way. ``stops``: the shortest track of a choice's zones and most metres, from terminal
+    to terminal; ``fine``: whether that is of a fine lattice. What is found goes to the ``incumbent``."""
 
-    ask: Seeker
-    cap_m: float
+    incumbent: Incumbent
+    stops: Callable[[Choice], Stops | None]
     fine: bool
 
     def run(
@@ -106,24 +84,24 @@ class Search:
         flat: set[tuple[bytes, bytes, Lacking]] = set()
         done: set[tuple[bytes, bytes, Spare, float]] = set()
         looked = taken = pushed = 0
-        hoped = self.ask.cost
+        hoped = self.incumbent.cost
 
         def push(length_m: float, choice: Choice, found: Lacking | None = None, over: Stops | None = None) -> None:
             nonlocal pushed
             pushed += 1
-            key = self.ask.least(length_m + 0.5 * (sum(choice.least_m) + sum(choice.most_m)))
+            key = self.incumbent.least(length_m + 0.5 * (sum(choice.least_m) + sum(choice.most_m)))
             if over is not None and found is not None:
-                key = found.cost if found.cost > self.ask.bound * (1.0 + self.ask.wanted) else 0.0
+                key = found.cost if found.cost > self.incumbent.bound * (1.0 + self.incumbent.wanted) else 0.0
             heappush(open_set, (key, pushed, length_m, choice, found, over))
 
         for root in roots:
             push(0.0, root)
-        while open_set and taken < TAKEN and self.ask.goes_on():
+        while open_set and taken < TAKEN and self.incumbent.goes_on():
             key, _, length_m, choice, found, over = heappop(open_set)
             if over is not None:
-                if key < self.ask.cost:
+                if key < self.incumbent.cost:
                     taken += 1
-                    if self.ask.take_longer(over, self.fine):
+                    if self.incumbent.take_longer(over, self.fine):
                         best = choice
                         if first:
                             return best
@@ -141,7 +119,7 @@ class Search:
             done.add(asked)
             looked += 1
             known_stops = given if choice is roots[0] else None
-            stops = known_stops or self.ask.stops(choice, self.cap_m, self.fine)
+            stops = known_stops or self.stops(choice)
             if stops is None:
                 continue
             length_m = float(distances(stops[0])[-1])
@@ -150,7 +128,7 @@ class Search:
             name = stops[0].tobytes()
             seen = name in known
             if not seen:
-                known[name] = lacking(self.ask.problem, sampled_track(self.ask.problem, *stops))
+                known[name] = lacking(self.incumbent.problem, sampled_track(self.incumbent.problem, *stops))
             lack = known[name]
             if isinstance(lack, Shut):
                 if not seen and lack.by < LACKING_M:
@@ -158,7 +136,7 @@ class Search:
                 self._shut(length_m, choice, lack.zones, push)
                 continue
             if not seen and (laps or not lack.steep):
-                push(length_m, replace(choice, most_m=_needed(self.ask.problem, choice, lack)), lack, stops)
+                push(length_m, replace(choice, most_m=_needed(self.incumbent.problem, choice, lack)), lack, stops)
                 hoped = min(hoped, lack.cost)
             self._shut(length_m, choice, lack.zones, push)
             if lack.laps_m > MORE * sum(choice.most_m):
@@ -169,14 +147,14 @@ class Search:
 
     def _may_help(self, length_m: float, choice: Choice) -> bool:
         """Whether a choice whose track is so long may hold something that is better by more than a little."""
-        cost = self.ask.cost
-        little = min(NARROW * (cost - self.ask.bound), LITTLE * cost) if math.isfinite(cost) else 0.0
-        return self.ask.least(length_m + sum(choice.least_m)) < cost - little
+        cost = self.incumbent.cost
+        little = min(NARROW * (cost - self.incumbent.bound), LITTLE * cost) if math.isfinite(cost) else 0.0
+        return self.incumbent.least(length_m + sum(choice.least_m)) < cost - little
 
     def _shut(self, length_m: float, choice: Choice, zones: tuple[int, ...], push: Callable[..., None]) -> None:
         """The same with a side of one of the ``zones`` shut."""
         for zone in zones:
-            levels, more = self.ask.problem.airspace.zones[zone], replace(choice, tried=frozenset())
+            levels, more = self.incumbent.problem.airspace.zones[zone], replace(choice, tried=frozenset())
             if zone not in choice.tried and levels.floor is not None and choice.under[zone]:
                 push(length_m, replace(more, under=_without(choice.under, zone)))
             if zone not in choice.tried and levels.ceiling is not None and choice.over[zone]:
@@ -184,10 +162,10 @@ class Search:
 
     def _split(self, length_m: float, choice: Choice, lack: Lacking, hoped: float, push: Callable[..., None]) -> None:
         """Fewer spare metres than this track takes, and as many; ``hoped``: what the best path is taken to cost."""
-        most = _needed(self.ask.problem, choice, lack)
+        most = _needed(self.incumbent.problem, choice, lack)
         wide = [b - a for a, b in zip(choice.least_m, most, strict=True)]
         k = int(np.argmax(wide))
-        if wide[k] * (self.ask.least(1.0) - self.ask.least(0.0)) <= NARROW * (hoped - self.ask.bound):
+        if wide[k] * (self.incumbent.least(1.0) - self.incumbent.least(0.0)) <= NARROW * (hoped - self.incumbent.bound):
             return
         less, more = list(most), list(choice.least_m)
         less[k] = more[k] = choice.least_m[k] + 0.5 * wide[k]
@@ -208,16 +186,3 @@ def _without(which: Bools, zone: int) -> Bools:
     out = which.copy()
     out[zone] = False
     return out
-
-
-def joined(ways: list[Floats], heights: list[float | None]) -> Stops:
-    """One track of those from stop to stop (N, 2), of which the ``heights`` of all but the ends are told."""
-    points = np.vstack([ways[0], *(w[1:] for w in ways[1:])])
-    pinned, pin_m = np.zeros(len(points), np.bool_), np.full(len(points), math.nan)
-    pinned[0] = pinned[-1] = True
-    at = 0
-    for way, height in zip(ways[:-1], heights, strict=True):
-        at += len(way) - 1
-        pinned[at] = True
-        pin_m[at] = math.nan if height is None else height
-    return points, pinned, pin_m

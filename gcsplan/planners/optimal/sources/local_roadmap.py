@@ -15,10 +15,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.lattice.lattice import terminals
 from gcsplan.planners.optimal.sources.roadmap_3d import Lattice, path_of, stops_of
 from gcsplan.planners.optimal.sources.section_dp import cost_of
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.problem import Problem, terminals
 from gcsplan.world.zones import Circle
 
 Floats = NDArray[np.float64]

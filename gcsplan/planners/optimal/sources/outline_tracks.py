@@ -14,10 +14,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.lattice.lattice import terminals
+from gcsplan.planners.optimal.corridor import Stops, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.navmesh.outlines import Solids, TooLarge
-from gcsplan.planners.optimal.sources.detours import Choice, Search, Stops, joined
+from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
+from gcsplan.planners.problem import terminals
 from gcsplan.world.zones import Zone
 
 Floats = NDArray[np.float64]
@@ -36,40 +37,11 @@ class OutlineTracks:
         self.incumbent, self.problem = incumbent, incumbent.problem
         places = terminals(self.problem)
         heights = [*(v.amsl_m for v in self.problem.via), self.problem.goal[2]]
-        self.legs = [
-            (a, b, z) for (a, b), z in zip(pairwise(places), heights, strict=True) if math.dist(a, b) > 1e-3
-        ]
+        self.legs = [(a, b, z) for (a, b), z in zip(pairwise(places), heights, strict=True) if math.dist(a, b) > 1e-3]
         self.under, self.over = _sides(self.problem.airspace.zones, incumbent, top_m)
         self._solids: dict[bool, Solids] = {}
 
-    @property
-    def cost(self) -> float:
-        """Of the best path."""
-        return self.incumbent.cost
-
-    @property
-    def bound(self) -> float:
-        """Of all paths."""
-        return self.incumbent.bound
-
-    @property
-    def wanted(self) -> float:
-        """How far they may be apart, as a part."""
-        return self.incumbent.wanted
-
-    def least(self, track_m: float) -> float:
-        """What a path costs at least whose track is so long."""
-        return self.incumbent.least(track_m)
-
-    def take_longer(self, stops: Stops, fine: bool) -> bool:
-        """Look for a path over a track, with laps where it is too steep."""
-        return self.incumbent.take_longer(stops, fine)
-
-    def goes_on(self) -> bool:
-        """Whether a better path is wanted, and there is work left for it."""
-        return self.incumbent.goes_on()
-
-    def stops(self, choice: Choice, cap_m: float, fine: bool) -> Stops | None:
+    def stops(self, choice: Choice) -> Stops | None:
         """The shortest track past the zones that a choice shuts; None where there is none, or too much to look at."""
         which = ~((choice.under & self.under) | (choice.over & self.over))
         try:
@@ -95,10 +67,11 @@ class OutlineTracks:
             incumbent.raise_track_bound(length_m * (1.0 - 1e-9))
         zones = len(self.under)
         root = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
+        laps = incumbent.climbs and incumbent.laps
         roots = [root]
-        if incumbent.climbs and incumbent.laps and math.isfinite(incumbent.cost):
-            roots = [replace(root, most_m=(incumbent.cost - incumbent.bound,) * 2), root]
-        Search(self, math.inf, False).run(roots, TRACKS, first=False, laps=incumbent.climbs and incumbent.laps)
+        if laps and math.isfinite(incumbent.cost):
+            roots.insert(0, replace(root, most_m=(incumbent.cost - incumbent.bound,) * 2))
+        DetourSearch(incumbent, self.stops, False).run(roots, TRACKS, first=False, laps=laps)
 
     def _tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
         """The shortest track of each leg past some zones; None where one has none. Raises TooLarge."""

@@ -131,7 +131,6 @@ def _divided(points: Floats, kinds: Ints, step_m: float) -> tuple[Floats, Ints]:
     return np.vstack([inner, points[-1:]]), np.append(np.where(part == 0, kinds[leg], FREE), kinds[-1])
 
 
-
 def cost_of(problem: Problem, points: Floats) -> float:
     """Metres or joules of a path (N, 3)."""
     return float(problem.leg_costs(points[:-1], points[1:]).sum())
