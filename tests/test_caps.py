@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -16,10 +15,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.planners.optimal.bounds.climb_bound import _least, climb_bound, rise_bound, rooms
-from gcsplan.planners.optimal.bounds.refine import tighten
 from gcsplan.planners.optimal.cap_search import MOST_CAPS, Layer, search_caps
 from gcsplan.planners.optimal.corridor import End
-from gcsplan.planners.optimal.incumbent import Below
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.problem import Objective, Problem, Via
 from gcsplan.planners.profile.track import Flown, fly, make_track
@@ -27,6 +24,7 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Zone
+from tests.planes import improve, looked
 from tests.planner_worlds import ground
 
 Floats = NDArray[np.float64]
@@ -289,11 +287,11 @@ def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb
             if not inside:
                 via.append(Via(e, n, z if kind == "fixed" or (kind == "both" and k == 0) else None))
         problem = replace(problem, via=tuple(via))
-        below = Below(problem, time.perf_counter())
-        below.look()
+        plane = looked(problem)
+        below = plane.incumbent
         assert not below.proved_shut
         if below.best is not None:
-            tighten(below)
+            improve(plane)
         assert 0.0 < below.bound <= below.cost
         costs = []
         for track in tracks(problem, rng, 25, 0.04):

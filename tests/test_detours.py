@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise, product
@@ -15,8 +14,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.bench.terrain_problems import problems
-from gcsplan.planners.optimal.bounds.refine import PAST_FINE, tighten
-from gcsplan.planners.optimal.incumbent import PAST, Below
+from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.plane_search import PAST, PlaneSearch
+from gcsplan.planners.optimal.searches import PAST_FINE
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.climb_laps import extend
 from gcsplan.planners.profile.exact import sampled_track
@@ -26,6 +26,7 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.planes import improve, looked, plane_of
 from tests.planner_worlds import Floats, faults, ground
 
 TENTH = Limits(10.0, max_climb_deg=math.degrees(math.atan(0.1)), max_descent_deg=math.degrees(math.atan(0.1)))
@@ -62,26 +63,24 @@ def met(p: Problem, points: Floats) -> list[int]:
     return out
 
 
-def past(below: Below) -> None:
-    """Past what is in the way, more closely: `tighten` without the bound, and without the lattice for slopes."""
-    for leg in below.legs:
-        leg.flood(max(below.limit(leg), leg.reach_m) / leg.length_m - 1.0)
-    below.try_below(below.top_m, fine=True)
-    below.past(PAST, fine=False)
-    below.past(PAST_FINE, fine=True)
+def past(plane: PlaneSearch) -> None:
+    """Past what is in the way, more closely: without the bound, and without the lattice for slopes."""
+    plane.reach_longest()
+    plane.try_below(plane.top_m, fine=True)
+    plane.past(PAST, fine=False)
+    plane.past(PAST_FINE, fine=True)
 
 
-def looked(p: Problem, closer: Callable[[Below], None] = past) -> Below:
+def found_in(p: Problem, closer: Callable[[PlaneSearch], None] = past) -> Incumbent:
     """What is found below the ceiling alone."""
-    below = Below(p, time.perf_counter())
-    below.look()
+    plane = looked(p)
+    below = plane.incumbent
     for again in (False, True):
         if again:
-            closer(below)
+            closer(plane)
         assert below.best is not None
         assert faults(replace(p, airspace=Airspace(p.airspace.surface)), Path(below.best)) == []
         assert met(p, below.best) == []
-    assert not below.timed_out
     assert below.bound <= below.cost
     return below
 
@@ -171,14 +170,14 @@ def test_a_little_way_is_won_by_a_bend_and_not_by_laps() -> None:
 def test_laps_lead_over_a_zone_that_cannot_be_passed_otherwise() -> None:
     # From border to border, and too near to be climbed over straight on.
     p = crossing(box(400.0, 0.0, 600.0, 2000.0, None, 90.0))
-    below = looked(p)
+    below = found_in(p)
     best = climbing_m(200.0, 80.0) + 200.0 + climbing_m(1200.0, 80.0)
     assert best - 1.0 <= below.cost <= 1.005 * best
 
 
 @pytest.mark.slow
 def test_with_laps_the_bound_rises_and_stays_below_the_best_path() -> None:
-    below = looked(crossing(box(400.0, 0.0, 600.0, 2000.0, None, 90.0)), tighten)
+    below = found_in(crossing(box(400.0, 0.0, 600.0, 2000.0, None, 90.0)), improve)
     best = climbing_m(200.0, 80.0) + 200.0 + climbing_m(1200.0, 80.0)
     assert best - 1.0 <= below.cost <= 1.005 * best
     assert 1700.0 < below.bound <= best
@@ -193,7 +192,7 @@ def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_w
 
     zone = box(300.0, 1000.0 - half_m, 700.0, 1000.0 + half_m, 40.0, 100.0)
     p = replace(crossing(), airspace=Airspace(ground(hill, step_m=10.0), [zone]))
-    below = looked(p)
+    below = found_in(p)
     assert below.best is not None
     aside = float(np.abs(below.best[:, 1] - 1000.0).max())
     over = climbing_m(100.0, 90.0) + 400.0 + climbing_m(1100.0, 90.0)
@@ -211,7 +210,7 @@ def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_w
 def test_laps_are_flown_under_one_zone_to_get_over_another() -> None:
     # A roof over the start leaves room for laps below it; past it, the wall is too near.
     roof, wall = box(100.0, 0.0, 450.0, 2000.0, 80.0, None), box(500.0, 0.0, 600.0, 2000.0, None, 78.0)
-    below = looked(crossing(roof, wall))
+    below = found_in(crossing(roof, wall))
     best = climbing_m(300.0, 68.0) + 100.0 + climbing_m(1200.0, 68.0)
     assert best - 1.0 <= below.cost <= 1.005 * best
 
@@ -219,15 +218,14 @@ def test_laps_are_flown_under_one_zone_to_get_over_another() -> None:
 def test_what_is_shut_for_one_cap_is_looked_at_again_for_the_best_path() -> None:
     # Around both is shorter than over either, but over one of them, with laps, is shorter than that.
     p = crossing(box(300.0, 0.0, 400.0, 1900.0, None, 40.0), box(1500.0, 300.0, 1600.0, 2000.0, None, 70.0))
-    below = looked(p)
+    below = found_in(p)
     assert below.cost <= 1.005 * (climbing_m(100.0, 30.0) + 1100.0 + climbing_m(200.0, 60.0) + 200.0)
 
 
 def test_a_track_a_hand_too_high_is_looked_at_again_a_hand_lower() -> None:
     # Over real ground: the ceiling leaves no more than a saddle over the lid of a zone.
     (p,) = (named.problem for named in problems("main", 201, count=4) if named.name == "main 201/02, 40 zones")
-    below = Below(p, time.perf_counter())
-    below.look()
+    below = looked(p).incumbent
     assert below.cost < 1.02 * below.bound
 
 
@@ -246,7 +244,7 @@ def test_a_zones_ceiling_that_is_shut_is_none() -> None:
     p, other = crossing(lid), crossing(replace(lid, ceiling=None))
     lengths = []
     for problem, over in ((p, None), (p, np.zeros(1, bool)), (other, None)):
-        below = Below(problem, time.perf_counter())
+        below = plane_of(problem)
         leg = below.legs[0]
         leg.flood(1.0)
         way = leg.track(below.top_m, None, math.inf, None, (0.0, 0.0), over)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -13,56 +12,57 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.planners.lattice.planner import plan_band
-from gcsplan.planners.optimal.bounds.refine import tighten
-from gcsplan.planners.optimal.incumbent import Below
+from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.optimal.sources import bound_corridor
 from gcsplan.planners.problem import Via
 from gcsplan.world.path import Path
+from tests.planes import improve, looked
 from tests.planner_worlds import faults
 from tests.test_slits import MIDDLE_M, ROUND_M, STRAIGHT_M, ridge
 
 Floats = NDArray[np.float64]
 
 
-def looked(over_m: float, **more: object) -> Below:
+def through(over_m: float, **more: object) -> PlaneSearch:
     """With a path round the ridge, and the way of a bound through its notch."""
     problem = replace(ridge(over_m, 0.2, 80.0, True), **more)  # type: ignore[arg-type]
-    begun_s = time.perf_counter()
-    below = Below(problem, begun_s)
-    below.look(dares=())
+    plane = looked(problem)
+    below = plane.incumbent
     assert below.best is None
-    below.take(plan_band(problem, below.tell, begun_s).path.points)
+    below.take(plan_band(problem, below.tell, below.budget.begun_s).path.points)
     assert below.cost > ROUND_M
-    for leg in below.legs:
+    for leg in plane.legs:
         limit_m = 1.05 * leg.straight_m
-        leg.bound(below.top_m, leg.corridor(limit_m), limit_m)
-    return below
+        leg.bound(plane.top_m, leg.corridor(limit_m), limit_m)
+    return plane
 
 
 def test_a_path_leads_through_a_notch_that_was_passed_by() -> None:
-    below = looked(0.1)
-    assert bound_corridor.follow(below)
+    plane = through(0.1)
+    below = plane.incumbent
+    assert bound_corridor.follow(plane)
     assert below.best is not None
     assert below.cost < STRAIGHT_M
     assert faults(below.problem, Path(below.best)) == []
-    assert not bound_corridor.follow(below)  # there is no other
+    assert not bound_corridor.follow(plane)  # there is no other
 
 
 def test_a_notch_that_is_shut_is_left_alone() -> None:
-    below = looked(-0.3)
-    before = below.cost
-    assert not bound_corridor.follow(below)
-    assert below.cost == before
+    plane = through(-0.3)
+    before = plane.incumbent.cost
+    assert not bound_corridor.follow(plane)
+    assert plane.incumbent.cost == before
 
 
 def test_stops_are_passed_as_before() -> None:
-    below = looked(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
+    plane = through(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
+    below = plane.incumbent
     assert below.best is not None
-    assert not bound_corridor.follow(below)  # nobody knows where on the path its stops are
+    assert not bound_corridor.follow(plane)  # nobody knows where on the path its stops are
     stop = np.array([500.0, MIDDLE_M + 30.0, 82.0])
     below.pinned = (np.abs(below.best - stop) < 1e-6).all(axis=1)
     below.pinned[[0, -1]] = True
-    assert bound_corridor.follow(below)
+    assert bound_corridor.follow(plane)
     assert below.best is not None
     assert below.cost < STRAIGHT_M + 10.0
     assert below.pinned.sum() == 3
@@ -71,11 +71,10 @@ def test_stops_are_passed_as_before() -> None:
 
 
 def test_the_planner_asks_for_it() -> None:
-    below = looked(0.1)
-    below.dare = lambda *, closely=False: False  # type: ignore[method-assign]
-    tighten(below)
-    assert below.cost < STRAIGHT_M
-    assert below.gap < 0.003
+    plane = through(0.1)
+    improve(plane, ("narrow_passage", "narrow_closely"))
+    assert plane.incumbent.cost < STRAIGHT_M
+    assert plane.incumbent.gap < 0.003
 
 
 places = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), min_size=2, max_size=6, unique=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.optimal import planner as optimal
-from gcsplan.planners.optimal.incumbent import Below
+from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
@@ -50,7 +50,7 @@ def test_a_path_leads_through_what_is_open_by_centimetres(
     assert found.lower_bound is not None
     assert problem.cost(found.path) < 1.003 * found.lower_bound
     assert faults(problem, found.path) == []
-    monkeypatch.setattr(Below, "dare", lambda self, closely=False: False)
+    monkeypatch.setattr(PlaneSearch, "squeeze", lambda self, closely=False: False)
     assert problem.cost(optimal.plan(problem).path) > ROUND_M, "the notch is too wide to show anything"
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.planners.optimal.incumbent import Below
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.sources.local_roadmap import small_path
 from gcsplan.planners.problem import Problem, Via
@@ -21,6 +20,7 @@ from tests.optima_campaign import faults
 from tests.optima_polish import cost_of
 from tests.optima_witnesses import known
 from tests.optima_worlds import Case, make, plane_ground
+from tests.planes import plane_of
 from tests.planner_worlds import Floats, random_mission
 
 
@@ -122,9 +122,9 @@ def test_worlds_with_very_many_zones_are_searched_as_well() -> None:
 
 
 def test_long_missions_and_stops_in_one_place_are_left_alone() -> None:
-    assert not Below(random_mission(0), 0.0).is_small
-    assert not Below(flat([], (Via(700.0, 1000.0),)).problem, 0.0).is_small
-    assert Below(flat([]).problem, 0.0).is_small
+    assert not plane_of(random_mission(0)).is_small
+    assert not plane_of(flat([], (Via(700.0, 1000.0),)).problem).is_small
+    assert plane_of(flat([]).problem).is_small
 
 
 def test_the_planner_finds_passes_exactly_as_high_as_the_ceiling() -> None:

@@ -13,13 +13,13 @@ from gcsplan.planners.lattice.corridor_raster import make_guide
 from gcsplan.planners.lattice.planner import _sides, pulled
 from gcsplan.planners.lattice.routes import LEVELS
 from gcsplan.planners.optimal import planner as optimal
-from gcsplan.planners.optimal.incumbent import Below
 from gcsplan.planners.optimal.sources.contour import traverse
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Zone
+from tests.planes import looked
 from tests.planner_worlds import Floats, faults, ground
 
 SLOPE, ROOM_M = 0.35, 15.0
@@ -91,8 +91,7 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
 
 def test_a_path_over_such_a_track_is_better_than_one_with_laps() -> None:
     p = under_a_lid()
-    below = Below(p, time.perf_counter())
-    below.look()
+    below = looked(p).incumbent
     found = traverse(p, 2200.0)
     assert found is not None
     assert below.take_longer(found, fine=True)

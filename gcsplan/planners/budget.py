@@ -29,8 +29,8 @@ check and a cell of terrain that it crosses, a piece of a tube, a place whose fl
 triangulated, a label of the lattice search, and a point of a line that is pulled, for each size of move."""
 COUNTED = 0.35
 """What part of the budget's seconds may be spent as counted work."""
-FIRST = 3.0
-"""How many times ``budget_s`` the search for a first path may take."""
+FIRST, FIRST_S = 3.0, 0.5
+"""How many times ``budget_s`` the search for a first path may take, and how many seconds on top."""
 SPARE_S = 0.5
 """Taken off the clock's last stop, for what is under way when it comes."""
 
@@ -70,14 +70,14 @@ class Budget:
     @property
     def left(self) -> float:
         """Counted seconds left."""
-        allowed = COUNTED * self.seconds * (FIRST if self._first_s is None else 1.0)
-        return allowed - (self.spent - self._first_spent)
+        allowed = self.seconds if self._first_s is not None else FIRST * self.seconds + FIRST_S
+        return COUNTED * allowed - (self.spent - self._first_spent)
 
     @property
     def deadline_s(self) -> float:
         """The clock's last stop, as `time.perf_counter` gives it."""
         if self._first_s is None:
-            return self.begun_s + FIRST * self.seconds
+            return self.begun_s + FIRST * self.seconds + FIRST_S
         return self._first_s + max(self.seconds - SPARE_S, 0.5 * self.seconds)
 
     def goes_on(self, part: float = 1.0) -> bool:

@@ -101,7 +101,6 @@ class Leg:
         area_m2 = self._area_m2(detour)
         most = min(MOST_FIRST, 1e6 * problem.budget.room_mb / NODE_BYTES)
         wanted_m = max(wanted_m, math.sqrt(area_m2 / most))
-        finest_m = max(finest_m, wanted_m / MOST_FINE)
         self.parts = max(1, round(cell_m / wanted_m))
         """Parts a side that the terrain model's cells are cut into, where they are large beside leg or zones."""
         # Between nodes that are left out heights are guessed, so few are better kept.

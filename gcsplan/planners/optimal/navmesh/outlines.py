@@ -27,8 +27,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Place = tuple[float, float]
 
-COARSE, FINE = 4, 40
-"""Chords of a quarter circle: of every arc at first, and of an arc that a track touches."""
+COARSE, FINE, FINE_OUTER = 4, 40, 24
+"""Chords of a quarter circle: of every arc at first, and of an arc that a track touches; of those for paths fewer, for
+each is a way point."""
 TOUCH_M = 0.1
 """A track touches an outline from which it is no farther than this, and a corner of it where it turns so near."""
 ROUNDS = 300
@@ -81,9 +82,10 @@ class Outline:
         radius = circle.radius_m * self.scale + self.reach_m + (self.hair_m if self.outer else -self.hair_m)
         angle = np.arange(4 * COARSE) * (0.5 * math.pi / COARSE)
         if self.fine:
-            step = 0.5 * math.pi / FINE
+            fine = FINE_OUTER if self.outer else FINE
+            step = 0.5 * math.pi / fine
             sectors = sorted({math.floor(a / (0.5 * math.pi / COARSE)) % (4 * COARSE) for a in self.fine})
-            parts = [s * (0.5 * math.pi / COARSE) + np.arange(1, FINE // COARSE) * step for s in sectors]
+            parts = [s * (0.5 * math.pi / COARSE) + np.arange(1, fine // COARSE) * step for s in sectors]
             angle = np.sort(np.concatenate([angle, *parts]))
         corner = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         if self.outer:
@@ -119,9 +121,10 @@ class Outline:
             if new:
                 self._shape = None
             return bool(new)
-        if self.rounded == FINE or self.reach_m <= self.hair_m:
+        fine = FINE_OUTER if self.outer else FINE
+        if self.rounded == fine or self.reach_m <= self.hair_m:
             return False
-        self.rounded, self._shape = FINE, None
+        self.rounded, self._shape = fine, None
         return True
 
 
