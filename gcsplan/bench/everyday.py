@@ -25,6 +25,7 @@ from gcsplan.bench.terrain_measure import Memory, passes, percentile
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import load_mission
 from gcsplan.pipeline import make_problem, world_of
+from gcsplan.planners.optimal.searches import require_names
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner
 
@@ -92,6 +93,7 @@ def run(
     for kind in kinds:
         if kind not in KINDS:
             raise InputError(f"the kinds of missions are {', '.join(KINDS)}, given {kind!r}")
+    require_names(without)
     outcomes = []
     _solve(problem_of(draw(1, KINDS.index("discs"))))  # machine code is made before anything is timed
     for seed in seeds:

@@ -19,6 +19,7 @@ from gcsplan.bench import terrain_rivals as others
 from gcsplan.bench.terrain_measure import OURS, OURS_LONG, Outcome
 from gcsplan.bench.terrain_problems import KINDS, NamedProblem, problems
 from gcsplan.errors import InputError
+from gcsplan.planners.optimal.searches import require_names
 
 ANSWERS = "rivals.jsonl"
 GAP_PERCENT = 0.1
@@ -67,13 +68,14 @@ def run(
     count: int | None = None,
     planner: str = "optimal",
     gap_percent: float = GAP_PERCENT,
+    without: Sequence[str] = (),
     tell: Callable[[str], None] = lambda words: None,
 ) -> Result:
     """Measure and write the report to ``directory``; ``tell`` hears what is being done.
 
     ``seconds``: of OMPL's planners; ``long``: ours again with a minute for each problem; ``errors``: problems with the
     clearance and errors of a real mission; ``count``: only so many problems of each group; ``gap_percent``: the
-    certified gap at which ours may stop. Rivals' answers are kept in
+    certified gap at which ours may stop; ``without``: searches that ours does without. Rivals' answers are kept in
     ``directory`` and not asked for again; ``kept_only``: nor are any others. However it ends, what there is by then is
     written. Raises InputError for unknown kinds and where a rival is not installed.
     """
@@ -87,6 +89,8 @@ def run(
     asked = others.rivals(seconds, swarms=swarms) if rivals else []
     if rivals and not kept_only:
         others.require(asked)
+    require_names(without)
+    options = {"without": tuple(without)} if without else {}
     result = Result()
     redraws: list[tuple[int, int]] = []
     warm_s = 0.0
@@ -101,7 +105,7 @@ def run(
         for kind in kinds:
             tell(f"{kind}: making the problems")
             named = [
-                replace(one, problem=replace(one.problem, gap_percent=gap_percent))
+                replace(one, problem=replace(one.problem, gap_percent=gap_percent, options=options))
                 for one in problems(kind, seed, errors=errors, count=count)
             ]
             redraws += [one.redraws for one in named]

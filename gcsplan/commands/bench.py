@@ -17,6 +17,12 @@ bench_app = typer.Typer(
 )
 
 
+WithoutOption = Annotated[
+    list[str] | None,
+    typer.Option("--without", metavar="NAME", help="A search that the default planner does without; repeatable."),
+]
+
+
 def _tell(result: dict[str, Any], report: Callable[[Any], str], as_json: bool) -> None:
     if as_json:
         emit(result)
@@ -98,6 +104,7 @@ def bench_terrain(
     errors: Annotated[bool, typer.Option("--errors", help="With the clearance and errors of a real mission.")] = False,
     gap: Annotated[float, typer.Option("--gap", metavar="PERCENT", help="Certified gap at which ours may stop.")] = 0.1,
     count: Annotated[int | None, typer.Option(metavar="N", help="Problems of each group [default: all]")] = None,
+    without: WithoutOption = None,
 ) -> None:
     """A set of planning problems made by a seed; every planner held to the same exact check."""
     from rich.console import Console
@@ -112,6 +119,7 @@ def bench_terrain(
     result = terrain.run(
         out, seed=seed, kinds=kinds.split(","), runs=runs, seconds=budgets, rivals=rivals, swarms=swarms,
         kept_only=kept, long=minute, errors=errors, count=count, tell=say, gap_percent=gap,
+        without=without or (),
     )  # fmt: skip
     Console(width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
 
@@ -122,6 +130,7 @@ def bench_everyday(
     seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds of the missions.")] = "1",
     count: Annotated[int, typer.Option(metavar="N", help="Missions of each seed.")] = 100,
     kinds: Annotated[str | None, typer.Option(metavar="LIST", help="Kinds of missions [default: all]")] = None,
+    without: WithoutOption = None,
 ) -> None:
     """Short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat ground, hills, the sample DEM."""
     from gcsplan.bench import everyday
@@ -133,7 +142,8 @@ def bench_everyday(
     except ValueError:
         raise UsageError(f"--seeds takes whole numbers such as 1,2,3, given {seeds!r}") from None
     asked = KINDS if kinds is None else kinds.split(",")
-    put(everyday.report(everyday.run(out, seeds=numbers, count=count, kinds=asked, tell=lambda words: say(words))))
+    outcomes = everyday.run(out, seeds=numbers, count=count, kinds=asked, without=without or (), tell=say)
+    put(everyday.report(outcomes))
 
 
 @bench_app.command("papers", short_help="The five papers' tables run again.")

@@ -22,8 +22,8 @@ ORDER: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Order of the known keys of each object, by the key that it stands under; others follow as they come."""
 
-CLOCKS = frozenset({"planning_s", "first_path_s", "upload"})
-"""Clock readings: different each time, so they stand in ``--json`` and upload.json only."""
+CLOCKS = frozenset({"planning_s", "first_path_s", "search", "upload"})
+"""Clock readings, and what holds some: different each time, so they stand in ``--json`` and upload.json only."""
 
 DECIMALS = (
     ("lat_deg", 7),

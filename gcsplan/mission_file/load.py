@@ -232,9 +232,11 @@ class _Reading:
         if keys.name not in known:
             near = nearest(keys.name, known) or f"; known are {', '.join(known)}"
             self.problems.append(Problem(f"{self.where}planner.name", f"no planner is named {keys.name[:64]!r}{near}"))
-        plain = ("name", "objective", "seed", "gap_percent", "budget_s")
+        plain = ("name", "objective", "seed", "gap_percent", "budget_s", "budget_mb")
         extras = {k: v for k, v in keys.given.items() if k not in plain and v is not None}
-        return PlannerRequest(keys.name, keys.objective, keys.seed, keys.gap_percent, keys.budget_s, extras)
+        return PlannerRequest(
+            keys.name, keys.objective, keys.seed, keys.gap_percent, keys.budget_s, keys.budget_mb, extras
+        )
 
     def _vehicles(self, terrain: TerrainKeys | None, altitude_frame: AltitudeFrame) -> list[Stops]:
         where = f"{self.where}vehicles"

@@ -72,6 +72,7 @@ class PlannerRequest:
     seed: int = 1
     gap_percent: float = 0.1
     budget_s: float = 10.0
+    budget_mb: float = 1024.0
     extras: dict[str, Any] = field(default_factory=dict)
 
 

@@ -215,13 +215,14 @@ def _plain_values(parameters: dict[str, Any]) -> dict[str, Any]:
 
 
 class PlannerKeys(_Section):
-    """``planner:``; the keys below ``budget_s`` belong to planners that search with a swarm."""
+    """``planner:``; the keys below ``budget_mb`` belong to planners that search with a swarm."""
 
     name: Text = "optimal"
     objective: Literal["length", "energy"] = "length"
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 1
     gap_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
     budget_s: Annotated[float, Field(gt=0.0, le=86400.0)] = 10.0
+    budget_mb: Annotated[float, Field(ge=64.0, le=1e6)] = 1024.0
     encoding: Encoding | None = None
     cost: SwarmCost | None = None
     points: Annotated[int, Field(ge=1, le=1000)] | None = None

@@ -170,6 +170,7 @@ def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, delivery: Delivery | None)
         "planning_s": v.solution.planning_s,
         "first_path_s": v.solution.first_path_s,
         "stopped_by": v.solution.stopped_by,
+        "search": [asdict(step) for step in v.solution.search],
         "safe": verdict.safe,
         "not_judged": list(verdict.not_judged),
         "hold_s": slot.hold_s if slot else 0.0,

@@ -247,6 +247,7 @@ def make_problem(
         seed=seed,
         gap_percent=asked.gap_percent,
         budget_s=asked.budget_s,
+        budget_mb=asked.budget_mb,
         progress=progress,
         options=dict(asked.extras if options is None else options),
     )

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, Reached, Stop, Storeys
+from gcsplan.planners.optimal.cells import MOST_FINE, choose, has_room
 from gcsplan.planners.optimal.corridor import Corridor, End, Nearby, Spare
 from gcsplan.planners.optimal.navmesh.clearance import Cone, Relief, box_of, sampled
 from gcsplan.planners.optimal.navmesh.grid import Box, Plane, extent, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Exhausted, Guide, Mesh, Way
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
 from gcsplan.planners.problem import Problem
-from gcsplan.world.zones import Circle
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -31,13 +31,6 @@ DETOURS, LEAST_DETOUR = (1.25, 2.5, math.inf), 1.02
 the narrowest one."""
 MUCH = 0.5
 """What part of the terrain model is so much that all of it may be looked at as well."""
-COARSE_M = 100.0
-"""Cells of the first look are no larger, if the terrain model's are not."""
-FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
-"""Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
-
-MOST_FIRST, NODE_BYTES = 1.5e6, 400.0
-"""Nodes of the first look's lattice, at most, and what one takes with its mesh and a search over that."""
 MOST_NODES, MOST_BESIDE, LARGE = 16e6, 6e6, 4e6
 """Nodes of the finest lattice, at most, in the box around a corridor: so many, and fewer beside a terrain model of more
 nodes than that, to need no more than half a gigabyte besides."""
@@ -86,60 +79,16 @@ class Leg:
         self.last_way = np.array([start.place, goal.place])  # of flood or bound
         self._close: Nearby | None = None
         self._reached: tuple[Nearby, Reached] | None = None
-        self._resolve(DETOURS[0])
+        self.cells_of = choose(problem, start.place, self.straight_m, self._box(DETOURS[0]))
         self.sheets = False
         """Whether bounds hold tracks to pass each zone that has a floor and a ceiling over or under all of it."""
         self.closer = 1
         """Into how many parts a side the finer lattice's cells are cut once more, see `look_closer`."""
 
-    def _resolve(self, detour: float) -> None:
-        """Choose the cells for tracks so many times as long as the straight line: as small as leg and zones want them,
-        and no more of them than memory allows."""
-        problem = self.problem
-        cell_m = float(problem.airspace.surface.grid.metres_per_cell(*self.start.place).max())
-        wanted_m, finest_m = self._cell_m(), min(FINE_M, self.straight_m / FINE_PARTS)
-        area_m2 = self._area_m2(detour)
-        most = min(MOST_FIRST, 1e6 * problem.budget.room_mb / NODE_BYTES)
-        wanted_m = max(wanted_m, math.sqrt(area_m2 / most))
-        self.parts = max(1, round(cell_m / wanted_m))
-        """Parts a side that the terrain model's cells are cut into, where they are large beside leg or zones."""
-        # Between nodes that are left out heights are guessed, so few are better kept.
-        self._fine_stride = 1 if self.parts > 1 or finest_m < 2.0 * cell_m else round(finest_m / cell_m)
-        self._stride = self._fine_stride * max(1, round(wanted_m / cell_m / self._fine_stride))
-        if self.parts > 1 or self._stride < 3:
-            self._stride = self._fine_stride = 1
-        # How many parts a side the first look's cells are cut into where it matters, of the plane or of its finer twin.
-        self._ratio = self._stride // self._fine_stride
-        self._cut = 1
-        if self._stride == 1:
-            self._ratio = self._cut = max(1, min(MOST_FINE, round(cell_m / self.parts / finest_m)))
-        self.has_fine = self._ratio > 1
-        """Whether there is a lattice finer than that of the first look."""
-        self.nodes = area_m2 / (cell_m / self.parts * self._stride) ** 2
-        """Of the first look's lattice, about."""
-
     @property
     def lower_m(self) -> float:
         """No track is shorter, as far as is known."""
         return self.length_m if self.seen else self.straight_m
-
-    def _area_m2(self, detour: float) -> float:
-        """Of what tracks so many times as long as the straight line may meet, as far as the terrain is known."""
-        surface = self.problem.airspace.surface
-        col0, row0, col1, row1 = extent(self.problem, self._box(detour))
-        size = surface.grid.metres_per_cell(*self.start.place)
-        return float((col1 - col0) * (row1 - row0) * size[0] * size[1])
-
-    def _cell_m(self) -> float:
-        """How large cells may be for the first look."""
-        least, most = self.straight_m / 250.0, min(self.straight_m / 60.0, COARSE_M)
-        radii = [
-            z.shape.radius_m
-            if isinstance(z.shape, Circle)
-            else 0.5 * min(z.bounds[2] - z.bounds[0], z.bounds[3] - z.bounds[1])
-            for z in self.problem.airspace.zones
-        ]
-        return max(least, min([most, *(r / 3.0 for r in radii)]))
 
     def flood(self, slack: float, within_m: float = math.inf) -> None:
         """Look at all that is free below the highest cap, as far as tracks ``slack`` longer than the shortest lead, and
@@ -166,7 +115,7 @@ class Leg:
                     continue
             within = min(detour * self.straight_m if math.isfinite(detour) else math.inf, within_m)
             if detour != self._detour:
-                self._resolve(detour)
+                self.cells_of = choose(self.problem, self.start.place, self.straight_m, self._box(detour))
                 self.plane, self._twin = self._lattice(detour), None
                 self._detour = detour
                 self._mesh = self.plane.mesh(self.top_m, True)
@@ -205,9 +154,13 @@ class Leg:
         else:
             plane, guide, cells = within.guide.mesh.plane, within.guide, within.cells
             fineness = within.parts or self.closer
-            if plane is self.plane and self._stride == 1:
-                fineness *= self._cut
-            elif plane is self.plane and self.has_fine:
+            if plane is self.plane and self.cells_of.stride == 1:
+                fineness *= self.cells_of.cut
+            elif (
+                plane is self.plane
+                and self.cells_of.has_fine
+                and has_room(self.problem, cells, BESIDE, self.cells_of.ratio)
+            ):
                 plane, cells = self._over(cells)
         return Relief(plane, cap_m, low, fineness, cells, ends, under, over, exact=exact), guide
 
@@ -231,10 +184,10 @@ class Leg:
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
         if within is not None and exactly is not None and exactly.closely:
             within = self._along(within)
-        relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, exactly is not None)
-        for place, by in exactly.shut if exactly is not None else ():
-            relief.lift(place[None], np.array([by]))
         try:
+            relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, exactly is not None)
+            for place, by in exactly.shut if exactly is not None else ():
+                relief.lift(place[None], np.array([by]))
             for _ in range(LEARNT if exactly is not None else 1):
                 way = relief.mesh().way(self.start.place, self.goal.place, limit, guide)
                 if way is None or exactly is None or not relief.learn(way.points):
@@ -249,8 +202,11 @@ class Leg:
         ``climbs``: near the ends hold tracks to what they can climb to, if they are shorter than ``limit_m``.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
-        relief, guide = self._relief(cap_m, True, within, limit)
         known = self.length_m
+        try:
+            relief, guide = self._relief(cap_m, True, within, limit)
+        except Exhausted:
+            return known
         for _ in range(RAISED):
             spare = max(limit - known, 0.0)
             cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare) if climbs else []
@@ -288,7 +244,10 @@ class Leg:
             return False
         spare = max(limit - self.length_m, 0.0)
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare)
-        relief, _ = self._relief(self.top_m, True, self.corridor(limit), limit)
+        try:
+            relief, _ = self._relief(self.top_m, True, self.corridor(limit), limit)
+        except Exhausted:
+            return False
         relief.hold(cones)
         self.sheets = relief.mesh(sheets=True).sheets > 1
         return self.sheets
@@ -307,14 +266,18 @@ class Leg:
         wanted = close.away.between(close.left, limit)
         row, col, last_row, last_col = box_of(wanted)
         most = MOST_NODES if self.problem.airspace.surface.ground_m.size < LARGE else MOST_BESIDE
-        if (last_row - row) * (last_col - col) * (self._ratio * parts) ** 2 > most:
+        if (last_row - row) * (last_col - col) * (self.cells_of.ratio * parts) ** 2 > most:
             return False
-        if self._fine_stride > 1 or np.count_nonzero(wanted) * self._ratio**2 > MOST_ALONE:
+        if not has_room(self.problem, wanted, 0, self.cells_of.ratio * parts):
+            return False
+        if self.cells_of.fine_stride > 1 or np.count_nonzero(wanted) * self.cells_of.ratio**2 > MOST_ALONE:
             cut = 1
-        finer = cut * (self.parts * self._cut if self._stride == 1 else self.parts)
+        finer = cut * (self.cells_of.parts * self.cells_of.cut if self.cells_of.stride == 1 else self.cells_of.parts)
         # Nodes lie elsewhere by as much as the other lattice is bent.
         more = limit + 2.0 * LOOSE.bent_m
-        found = self._each_cell(*finer_plane(self.plane, wanted, finer, self._fine_stride, CLOSE), more, close.away)
+        found = self._each_cell(
+            *finer_plane(self.plane, wanted, finer, self.cells_of.fine_stride, CLOSE), more, close.away
+        )
         if found is None:
             return False
         self._close, self.reach_m, self.closer = found, limit, parts // cut
@@ -328,7 +291,7 @@ class Leg:
         for i, j in np.unique(plane.all_at(sampled(self.last_way, cell_m)).astype(np.intp), axis=0).tolist():
             near[max(j - ALONG, 0) : j + ALONG + 1, max(i - ALONG, 0) : i + ALONG + 1] = True
         near &= within.cells
-        parts = math.isqrt(MOST_OFTEN // max(int(near.sum()) * self._ratio**2, 1))
+        parts = math.isqrt(MOST_OFTEN // max(int(near.sum()) * self.cells_of.ratio**2, 1))
         return Corridor(near, within.guide, max(1, min(MOST_FINE, parts)))
 
     def corridor(self, limit_m: float) -> Corridor:
@@ -409,7 +372,7 @@ class Leg:
             row, col, last_row, last_col = box_of(cells)
             wide = np.zeros(cells.shape, np.bool_)
             wide[max(row - BESIDE, 0) : last_row + BESIDE, max(col - BESIDE, 0) : last_col + BESIDE] = True
-            self._twin = finer_plane(self.plane, wide, self.parts, self._fine_stride, LOOSE)[0], wide
+            self._twin = finer_plane(self.plane, wide, self.cells_of.parts, self.cells_of.fine_stride, LOOSE)[0], wide
         plane = self._twin[0]
         return plane, on_finer(self.plane, cells, plane)
 
@@ -436,9 +399,11 @@ class Leg:
         reach = None
         if math.isfinite(detour):
             a, b = self.start.place, self.goal.place
-            cell = self._stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
+            cell = self.cells_of.stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
             reach = a, b, detour * self.straight_m + 4.0 * cell
-        return make_plane(self.problem, self._box(detour), self.parts, self._stride, self._stride, reach)
+        return make_plane(
+            self.problem, self._box(detour), self.cells_of.parts, self.cells_of.stride, self.cells_of.stride, reach
+        )
 
     def _box(self, detour: float) -> Box:
         """What tracks may meet that are so many times as long as the straight way."""

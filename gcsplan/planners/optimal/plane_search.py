@@ -64,7 +64,7 @@ class PlaneSearch:
         ways = []
         for leg in self.legs:
             limit = self.limit(leg)
-            wanted = leg.corridor(limit) if fine and leg.has_fine else None
+            wanted = leg.corridor(limit) if fine and leg.cells_of.has_fine else None
             spare_m = choice.most_m
             way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, spare_m, choice.over, exactly)
             if way is None:
@@ -172,8 +172,8 @@ class PlaneSearch:
 
     def size(self, looks: float) -> tuple[float, float]:
         """Counted seconds and megabytes of so many looks at the lattices of all legs."""
-        nodes = sum(leg.nodes for leg in self.legs)
-        return looks * nodes * NODE_S, max((leg.nodes for leg in self.legs), default=0.0) * NODE_MB
+        nodes = sum(leg.cells_of.nodes for leg in self.legs)
+        return looks * nodes * NODE_S, max((leg.cells_of.nodes for leg in self.legs), default=0.0) * NODE_MB
 
     def longest(self) -> float:
         """No track of a path that is better than the best is longer."""

@@ -35,7 +35,7 @@ from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.governor import govern
 from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.searches import Searches
+from gcsplan.planners.optimal.searches import Searches, left_out
 from gcsplan.planners.problem import Problem, Refusal, Solution, terminals
 from gcsplan.planners.refusal import check_ends, explain
 from gcsplan.world.path import Path
@@ -66,8 +66,7 @@ def search(problem: Problem, laps: bool = True) -> Searches:
     incumbent = Incumbent(problem, laps)
     incumbent.tell("search")
     searches = Searches(incumbent)
-    without = problem.options.get("without", ())
-    govern(incumbent, searches.table(), without if isinstance(without, tuple) else ())
+    govern(incumbent, searches.table(), left_out(problem))
     return searches
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.errors import InputError
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.bounds.shorter import bound_by_caps, halve, raise_climb
 from gcsplan.planners.optimal.governor import Search, Size
@@ -18,7 +19,7 @@ from gcsplan.planners.optimal.plane_search import PAST, SLACKS, PlaneSearch
 from gcsplan.planners.optimal.sources.bound_corridor import follow
 from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
 from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
-from gcsplan.planners.problem import Refusal, terminals
+from gcsplan.planners.problem import Problem, Refusal, terminals
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
 Floats = NDArray[np.float64]
@@ -35,6 +36,30 @@ FINER = 4
 """Into how many parts a side cells are cut once more, for walls and zones that the first lattice rounds off."""
 MOST_CELLS = 50_000
 """Cells of all corridors whose altitude intervals are looked at, at most."""
+
+
+NAMES = (
+    "straight", "outlines", "track_bound", "cap_search", "narrow_first", "lattice_first", "roadmap_first",
+    "roadmap_3d", "roadmap_near", "fine_tracks", "detours", "detours_fine", "bound_corridor", "narrow_passage",
+    "narrow_closely", "contour_climb", "lattice", "local_roadmap", "cap_pairs", "length_bound", "space_bound", "sheets",
+    "altitude_intervals", "refinement",
+)  # fmt: skip
+"""Of all searches; which a mission has depends on its objective and limits."""
+
+
+def left_out(problem: Problem) -> tuple[str, ...]:
+    """The searches that a problem's options ask to do without. Raises InputError for a name that there is not."""
+    asked = problem.options.get("without", ())
+    names = tuple(str(n) for n in asked) if isinstance(asked, tuple | list) else (str(asked),)
+    require_names(names)
+    return names
+
+
+def require_names(names: Sequence[str]) -> None:
+    """Raise InputError for a name that no search has."""
+    unknown = [name for name in names if name not in NAMES]
+    if unknown:
+        raise InputError(f"the searches are {', '.join(NAMES)}; given {', '.join(unknown)}")
 
 
 class Searches:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.clearance_kernels import fill
 from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, look_around, walk_around
-from gcsplan.planners.optimal.navmesh.mesh import Mesh
+from gcsplan.planners.optimal.navmesh.mesh import Exhausted, Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners.optimal.navmesh.zone_kernels import lift_lids, own_zones, stamp_zones
 from gcsplan.planners.profile.track import divided
@@ -38,6 +38,8 @@ ALIKE = 12.0
 """How many times as large as the error of tracks cells may be for bounds to make use of it."""
 LEARN_M, LEARN_HAIR_M = 2.0, 0.05
 """How closely a track is looked at, and by how much more than is missing nodes are raised."""
+NODE_BYTES = 150.0
+"""What a node takes that is looked at, with the cells and pieces beside it."""
 MANY = 8
 """Names a portal from which on a mesh's are numbered one by one, for searches have room for every name."""
 
@@ -49,7 +51,8 @@ class Relief:
     ``cap_m``, ``low`` as in `Plane.mesh`; ``ends``: where paths climb from, see `clearance_kernels.fill`; ``under``,
     ``over`` (zones,): which zones may be passed below their floors, above their ceilings; None for all. ``whole``: such
     meshes are asked for places all over them, and kept; others last until the plane's next relief. ``exact``: nodes are
-    as high as the exact check has them, and not higher for what may be between them.
+    as high as the exact check has them, and not higher for what may be between them. Raises Exhausted
+    where the nodes take more memory than the budget leaves.
     """
 
     def __init__(
@@ -84,6 +87,8 @@ class Relief:
         self._diagonal = np.zeros((rows - 1) * (cols - 1), np.int8)
         looked_at = float((self._around[:, 1] - self._around[:, 0]).clip(0).sum())
         plane.problem.budget.spend("node", looked_at)
+        if looked_at * NODE_BYTES > 1e6 * plane.problem.budget.room_mb:
+            raise Exhausted(0.0)
         more = limits.min_agl_m + limits.altitude_error_m
         if low:
             more -= plane.fit.spare_m

@@ -27,11 +27,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Place = tuple[float, float]
 
-COARSE, FINE, FINE_OUTER = 4, 40, 24
-"""Chords of a quarter circle: of every arc at first, and of an arc that a track touches; of those for paths fewer, for
-each is a way point."""
-TOUCH_M = 0.1
-"""A track touches an outline from which it is no farther than this, and a corner of it where it turns so near."""
+COARSE = 4
+"""Chords of a quarter circle of every arc at first."""
+OFF_M, OFF_OUTER_M = 5e-3, 2e-2
+"""How far chords may be off where a track comes near: for bounds, and for paths, of which each chord is a leg."""
+NEAR = 1.03
+"""Where a track comes nearer than that times what it must keep, coarse arcs may stand in its way that fine ones do not,
+or leave a slit that fine ones shut: chords of `COARSE` are off by two percent of the radius."""
 ROUNDS = 300
 """Times that a track is looked for with more zones, or finer arcs."""
 MOST_CORNERS = 12_000
@@ -57,7 +59,8 @@ class Track:
 class Outline:
     """One zone grown by ``reach_m``: its polygon for paths (``outer``) or for bounds, drawn as finely as is asked.
 
-    ``fine``: places near which arcs are drawn finely.
+    ``sectors``: of a circle, those that are drawn finely, each as wide as a coarse chord; ``fine``: whether the corners
+    of a polygon are.
     """
 
     zone: Zone
@@ -65,67 +68,92 @@ class Outline:
     scale: float
     outer: bool
     hair_m: float
-    fine: list[float] = field(default_factory=list)
-    rounded: int = COARSE
-    _shape: shapely.Polygon | None = None
+    sectors: set[int] = field(default_factory=set)
+    fine: bool = False
+    _shape: shapely.Geometry | None = None
 
     @property
-    def shape(self) -> shapely.Polygon:
-        """The polygon."""
+    def shape(self) -> shapely.Geometry:
+        """The polygon, or several where a hair less than a zone is in parts; perhaps empty."""
         if self._shape is None:
-            self._shape = self._disc() if isinstance(self.zone.shape, Circle) else self._grown()
+            self._shape = self._disc() if isinstance(self.zone.shape, Circle) else self._grown(self.zone.shape.vertices)
         return self._shape
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """West, south, east, north of a box that holds the shape, however it is drawn."""
+        west, south, east, north = self.zone.bounds
+        radius = max(east - west, north - south)
+        more = (self.reach_m + self.hair_m + (self.scale - 1.0) * radius) * NEAR + (NEAR - 1.0) * radius
+        return west - more, south - more, east + more, north + more
+
+    def refine(self, track: Floats) -> bool:
+        """Draw the arcs finely where a track (N, 2) comes so near that it matters; whether anything changes."""
+        shape = self.zone.shape
+        if not isinstance(shape, Circle):
+            if self.fine or self.reach_m <= self.hair_m:
+                return False
+            line = shapely.LineString(track)
+            self.fine = bool(shapely.dwithin(shapely.Polygon(shape.vertices), line, NEAR * self.reach_m))
+            new = {0} if self.fine else set()
+        else:
+            middle, radius = np.array([shape.east_m, shape.north_m]), shape.radius_m * self.scale + self.reach_m
+            a, d = track[:-1], np.diff(track, axis=0)
+            t = ((middle - a) * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-12)
+            off = np.vstack([a + t.clip(0.0, 1.0)[:, None] * d, track]) - middle
+            off = off[np.hypot(*off.T) < NEAR * radius]
+            angles = np.arctan2(off[:, 1], off[:, 0]) % (2.0 * math.pi)
+            # A track that turns at a corner may turn in the sector beside it when that is drawn finely.
+            at = {math.floor((x + more) / WIDTH) % (4 * COARSE) for x in angles.tolist() for more in (-1e-3, 1e-3)}
+            new = at - self.sectors
+            self.sectors |= new
+        if new:
+            self._shape = None
+        return bool(new)
 
     def _disc(self) -> shapely.Polygon:
         circle = self.zone.shape
         assert isinstance(circle, Circle)
-        radius = circle.radius_m * self.scale + self.reach_m + (self.hair_m if self.outer else -self.hair_m)
-        angle = np.arange(4 * COARSE) * (0.5 * math.pi / COARSE)
-        if self.fine:
-            fine = FINE_OUTER if self.outer else FINE
-            step = 0.5 * math.pi / fine
-            sectors = sorted({math.floor(a / (0.5 * math.pi / COARSE)) % (4 * COARSE) for a in self.fine})
-            parts = [s * (0.5 * math.pi / COARSE) + np.arange(1, fine // COARSE) * step for s in sectors]
-            angle = np.sort(np.concatenate([angle, *parts]))
-        corner = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        if self.outer:
-            # Where neighbouring tangents meet: outside the disc, as near to it as the chords are short.
-            half = 0.5 * np.diff(np.append(angle, angle[0] + 2.0 * math.pi))
-            middle = angle + half
-            corner = np.stack([np.cos(middle), np.sin(middle)], axis=-1) / np.cos(half)[:, None]
-        return shapely.Polygon(np.array([circle.east_m, circle.north_m]) + max(radius, 0.0) * corner)
+        radius = max(circle.radius_m * self.scale + self.reach_m + (self.hair_m if self.outer else -self.hair_m), 0.0)
+        corners = _around(self._angles(radius, self.sectors), radius, outer=self.outer)
+        return shapely.Polygon(np.array([circle.east_m, circle.north_m]) + corners)
 
-    def _grown(self) -> shapely.Polygon:
-        assert not isinstance(self.zone.shape, Circle)
-        bare = shapely.Polygon(self.zone.shape.vertices)
-        if self.outer:
-            reach = (self.reach_m + self.hair_m) / math.cos(0.25 * math.pi / self.rounded)
-            return bare.buffer(reach, quad_segs=self.rounded)
-        if self.reach_m <= self.hair_m:
-            # What is left of a zone when a hair is taken off may be nothing, or several parts.
-            return bare.buffer(self.reach_m - self.hair_m, join_style="mitre")
-        return bare.buffer(self.reach_m - self.hair_m, quad_segs=self.rounded)
+    def _angles(self, radius: float, sectors: Iterable[int]) -> Floats:
+        """Where the chords of a circle begin, rising; some ``sectors`` drawn finely."""
+        step = math.sqrt(8.0 * (OFF_OUTER_M if self.outer else OFF_M) / max(radius, 1e-3))
+        parts = max(math.ceil(WIDTH / step), 2)
+        more = [s * WIDTH + np.arange(1, parts) * (WIDTH / parts) for s in sectors]
+        return np.sort(np.concatenate([np.arange(4 * COARSE) * WIDTH, *more]))
 
-    def touch(self, places: Floats) -> bool:
-        """Draw the arcs more finely at ``places`` (N, 2) where a track turns around them; whether anything changes."""
-        shape = self.zone.shape
-        if isinstance(shape, Circle):
-            d = places - np.array([shape.east_m, shape.north_m])
-            width = 0.5 * math.pi / COARSE
-            known = {math.floor(a / width) for a in self.fine}
-            # A track that turns at a corner may turn in the sector beside it when that is drawn finely.
-            angles = np.arctan2(d[:, 1], d[:, 0]) % (2.0 * math.pi)
-            sectors = {math.floor((a + off) / width) % (4 * COARSE) for a in angles.tolist() for off in (-1e-3, 1e-3)}
-            new = sorted(sectors - known)
-            self.fine += [(s + 0.5) * width for s in new]
-            if new:
-                self._shape = None
-            return bool(new)
-        fine = FINE_OUTER if self.outer else FINE
-        if self.rounded == fine or self.reach_m <= self.hair_m:
-            return False
-        self.rounded, self._shape = fine, None
-        return True
+    def _grown(self, vertices: Floats) -> shapely.Geometry:
+        """The polygon with its edges and corners grown, each edge by itself: `shapely.buffer` smooths what it grows."""
+        bare = shapely.Polygon(vertices)
+        reach = self.reach_m + (self.hair_m if self.outer else -self.hair_m)
+        if reach <= 0.0:
+            return bare.buffer(reach, join_style="mitre")
+        angle = self._angles(reach, range(4 * COARSE) if self.fine else ())
+        following = np.roll(vertices, -1, axis=0)
+        turn = np.arctan2(*(following - vertices).T[::-1])
+        # Each edge with half a circle around both its ends is convex: the hull of two circles' corners.
+        parts = [
+            shapely.MultiPoint(np.vstack([p + corners, q + corners])).convex_hull
+            for p, q, first in zip(vertices, following, turn.tolist(), strict=True)
+            for corners in (_around(np.sort((angle + first) % (2.0 * math.pi)), reach, outer=self.outer),)
+        ]
+        return shapely.union_all([bare, *parts])
+
+
+WIDTH = 0.5 * math.pi / COARSE
+"""Radians of a coarse chord."""
+
+
+def _around(angle: Floats, radius: float, *, outer: bool) -> Floats:
+    """(N, 2) corners of a circle's polygon with chords from angle to angle: inside it, or (``outer``) around it."""
+    if not outer:
+        return radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    # Where neighbouring tangents meet: as near to the circle as the chords are short.
+    half = 0.5 * np.diff(np.append(angle, angle[0] + 2.0 * math.pi))
+    return radius * np.stack([np.cos(angle + half), np.sin(angle + half)], axis=-1) / np.cos(half)[:, None]
 
 
 class Mesh:
@@ -218,8 +246,15 @@ class Solids:
     ) -> None:
         self.outlines = [Outline(zone, reach_m, scale, outer, hair_m) for zone in zones]
         self._budget = budget
-        self._tree = shapely.STRtree([o.shape for o in self.outlines])
+        self._tree = shapely.STRtree(shapely.box(*np.array([o.bounds for o in self.outlines]).reshape(-1, 4).T))
         self._known: set[int] = set()
+
+    def look_along(self, track: Floats, which: NDArray[np.bool_]) -> None:
+        """Know the zones that a track (N, 2) meets, and their outlines finely there, before any track is looked for."""
+        line = shapely.LineString(track)
+        for k in self._tree.query(line).tolist():
+            if which[k] and self.outlines[k].refine(track):
+                self._known.add(k)
 
     def shortest(self, a: Place, b: Place, which: NDArray[np.bool_]) -> Track | None:
         """The shortest track from ``a`` to ``b`` past those zones; None where they enclose one of the places."""
@@ -232,21 +267,12 @@ class Solids:
             near = [k for k in self._tree.query(line).tolist() if which[k] and k not in self._known]
             met = {k for k in near if shapely.relate_pattern(self.outlines[k].shape, line, "T********")}
             self._known |= met
-            if not met and not self._refined(track, known):
+            finer = [k for k in known if self.outlines[k].refine(track.points)]
+            if not met and not finer:
                 return track
             if not self._budget.goes_on():
                 break
         raise TooLarge
-
-    def _refined(self, track: Track, known: list[int]) -> bool:
-        """Draw arcs finely where a track turns around them; whether any were not."""
-        turns, finer = track.points[1:-1], False
-        if len(turns):
-            places = shapely.points(turns)
-            for k in known:
-                near = shapely.distance(self.outlines[k].shape, places) < TOUCH_M
-                finer |= bool(near.any()) and self.outlines[k].touch(turns[near])
-        return finer
 
     def _past(self, a: Place, b: Place, known: list[int]) -> Track | None:
         if not known:

@@ -40,6 +40,8 @@ class OutlineTracks:
         self.legs = [(a, b, z) for (a, b), z in zip(pairwise(places), heights, strict=True) if math.dist(a, b) > 1e-3]
         self.under, self.over = _sides(self.problem.airspace.zones, incumbent, top_m)
         self._solids: dict[bool, Solids] = {}
+        self._hints: list[Floats] = []
+        """The tracks of the bound: paths may lead along them through slits that coarse outlines shut."""
 
     def stops(self, choice: Choice) -> Stops | None:
         """The shortest track past the zones that a choice shuts; None where there is none, or too much to look at."""
@@ -63,6 +65,7 @@ class OutlineTracks:
             incumbent.proved_shut = True
             return
         if tracks:
+            self._hints = tracks
             length_m = sum(float(np.hypot(*np.diff(t, axis=0).T).sum()) for t in tracks)
             incumbent.raise_track_bound(length_m * (1.0 - 1e-9))
         zones = len(self.under)
@@ -79,7 +82,10 @@ class OutlineTracks:
             air, limits = self.problem.airspace, self.problem.limits
             hair_m = HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M
             reach_m = air.beside_m(limits)
-            self._solids[outer] = Solids(air.zones, reach_m, air.scale, hair_m, self.incumbent.budget, outer=outer)
+            solids = Solids(air.zones, reach_m, air.scale, hair_m, self.incumbent.budget, outer=outer)
+            for hint in self._hints:
+                solids.look_along(hint, which)
+            self._solids[outer] = solids
         tracks = []
         for a, b, _ in self.legs:
             found = self._solids[outer].shortest(a, b, which)

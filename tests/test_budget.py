@@ -1,0 +1,118 @@
+"""Budgets: counted work decides, the clock is a last stop, and memory is asked for before it is taken."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+
+from gcsplan.bench import everyday
+from gcsplan.bench.everyday_missions import KINDS, draw
+from gcsplan.errors import InputError
+from gcsplan.planners.budget import COUNTED, FIRST, FIRST_S, Budget
+from gcsplan.planners.optimal import planner
+from gcsplan.planners.optimal.governor import Search, govern
+from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.searches import NAMES, Searches
+from gcsplan.planners.problem import Problem
+
+
+def mission(kind: str, seed: int = 1) -> Problem:
+    return everyday.problem_of(draw(seed, KINDS.index(kind)))
+
+
+def test_work_before_the_first_path_is_counted_by_itself() -> None:
+    budget = Budget(10.0, 100.0)
+    assert budget.left == pytest.approx(COUNTED * (FIRST * 10.0 + FIRST_S))
+    budget.spend("leg", 1000.0)
+    before = budget.left
+    budget.found_first()
+    assert budget.left == pytest.approx(COUNTED * 10.0)
+    assert before < COUNTED * (FIRST * 10.0 + FIRST_S)
+    assert budget.fits(1.0, 99.0)
+    assert not budget.fits(1.0, 101.0)
+    budget.spend("pull", 1e9)
+    assert not budget.goes_on()
+    assert budget.ran_out
+    assert not budget.clocked_out
+
+
+def test_a_search_that_does_not_fit_is_refused_before_it_runs_and_recorded() -> None:
+    p = mission("wall")
+    p = replace(p, budget=Budget(10.0, 100.0))
+    ran: list[str] = []
+
+    def search(name: str, share: float, seconds: float, megabytes: float) -> Search:
+        return Search(name, share, lambda: True, lambda: (seconds, megabytes), lambda: ran.append(name))
+
+    incumbent = Incumbent(p)
+    govern(incumbent, [search("a", 0.1, 0.1, 1.0), search("b", 1.0, 0.1, 200.0), search("c", 1.0, 0.2, 1.0)])
+    assert ran == ["c", "a"]  # by what they promise for their cost
+    assert [(s.name, s.refused) for s in incumbent.steps] == [("b", True), ("c", False), ("a", False)]
+
+
+@pytest.mark.parametrize("kind", ["hook", "levels", "peaks", "sample"])
+def test_a_clock_that_runs_faster_changes_nothing(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    p = replace(mission(kind), budget_s=4.0)
+    first = planner.plan(p)
+    real, begun = time.perf_counter, time.perf_counter()
+    monkeypatch.setattr("gcsplan.planners.budget.time.perf_counter", lambda: begun + 1.8 * (real() - begun))
+    second = planner.plan(p)
+    if "time" not in (first.stopped_by, second.stopped_by):
+        assert first.path.points.tobytes() == second.path.points.tobytes()
+        assert first.lower_bound == second.lower_bound
+        assert first.stopped_by == second.stopped_by
+    assert first.stopped_by != "time"
+
+
+def test_searches_are_told_with_what_they_gained() -> None:
+    found = planner.plan(mission("hook"))
+    assert [step.name for step in found.search][:2] == ["straight", "outlines"]
+    assert all(step.s >= 0.0 and step.mb >= 0.0 for step in found.search)
+
+
+def test_every_name_of_a_search_is_known_and_others_are_refused() -> None:
+    p = mission("wall")
+    seen = set()
+    for objective in ("length", "energy"):
+        for max_agl_m in (None, 300.0):
+            limits = replace(p.limits, max_agl_m=max_agl_m)
+            seen |= {s.name for s in Searches(Incumbent(replace(p, objective=objective, limits=limits))).table()}
+    assert seen == set(NAMES)
+    with pytest.raises(InputError, match="outlines"):
+        planner.plan(replace(p, options={"without": ("outline",)}))
+    found = planner.plan(replace(p, options={"without": ("outlines",)}))
+    assert "outlines" not in [step.name for step in found.search]
+
+
+RUN = """
+import resource, sys
+from dataclasses import replace
+from gcsplan.bench import everyday
+from gcsplan.bench.everyday_missions import KINDS, draw
+from gcsplan.planners.optimal.planner import plan
+kind, without, megabytes = sys.argv[1], tuple(sys.argv[2].split(",")), float(sys.argv[3])
+plan(everyday.problem_of(draw(1, 0)))
+p = everyday.problem_of(draw(1, KINDS.index(kind)))
+p = replace(p, budget_s=2.0, budget_mb=megabytes, options={"without": without})
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+try:
+    plan(p)
+except Exception as why:
+    print(type(why).__name__, file=sys.stderr)
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["tiny", "wall", "detour", "comb", "sample"])
+@pytest.mark.parametrize("megabytes", [64.0, 300.0])
+def test_memory_stays_within_its_budget_even_without_outlines(kind: str, megabytes: float) -> None:
+    told = subprocess.run(
+        [sys.executable, "-c", RUN, kind, "outlines,straight", str(megabytes)],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    assert float(told.stdout) < megabytes + 60.0, told.stderr
