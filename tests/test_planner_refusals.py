@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gcsplan.planners.cures import with_cures
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Refusal, Via
 from gcsplan.world.airspace import Airspace
@@ -35,7 +36,7 @@ def refused(
     p = replace(Problem(Airspace(surface, zones), limits, start, goal), **more)  # type: ignore[arg-type]
     with pytest.raises(Refusal) as caught:
         plan(p)
-    return caught.value
+    return with_cures(p, caught.value, plan)
 
 
 def test_ceiling_under_the_lowest_pass_names_the_pass_and_the_limit_that_would_do() -> None:
