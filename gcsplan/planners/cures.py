@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.errors import NoMission
+from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.lattice.routes import Level, Router
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.world.airspace import Airspace, Legs
@@ -95,27 +95,27 @@ def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
 class Trials:
     """Plans of changes to one problem: at most `TRIES`, and none begun later than a share of ``budget_s``."""
 
-    def __init__(self, problem: Problem, plan: Plan, clock: Callable[[], float] = time.perf_counter) -> None:
-        self.problem, self._plan, self._clock = problem, plan, clock
+    def __init__(self, problem: Problem, plan: Plan) -> None:
+        self.problem, self._plan = problem, plan
         self.share_s = max(SHARE * problem.budget_s, LEAST_S)
-        self._begun_s = clock()
+        self._begun_s = time.perf_counter()
         self._left = TRIES
 
     @property
     def spent(self) -> bool:
         """Whether nothing more is tried."""
-        return self._left <= 0 or self._clock() - self._begun_s >= self.share_s
+        return self._left <= 0 or time.perf_counter() - self._begun_s >= self.share_s
 
     def path(self, changed: Problem, what: str) -> Floats | None:
         """(N, 3) points of a path of a changed problem; None where the planner refuses. ``what`` is changed."""
         self._left -= 1
         if self.problem.progress is not None:
             words = f"no path; tries {what}"
-            self.problem.progress(Progress(self._clock() - self._begun_s, None, None, words))
+            self.problem.progress(Progress(time.perf_counter() - self._begun_s, None, None, words))
         budget_s = min(self.problem.budget_s, self.share_s / PARTS)
         try:
             solution = self._plan(replace(changed, gap_percent=ANY_PERCENT, budget_s=budget_s, progress=None))
-        except NoMission:
+        except (NoMission, InputError):
             return None
         return solution.path.points
 
@@ -222,10 +222,10 @@ def _ceiling(trials: Trials, path: Floats) -> Cure:
     found = trials.least("max_amsl_m", lambda m: _limited(problem, max_amsl_m=m), given, enough, values)
     if found.path is None:
         return Cure(f"without max_amsl_m there is a path{_no_value(found)}")
-    high_m, place = _highest_floor(problem, found.path)
+    amsl_m, place = _over_highest_ground(problem, found.path)
     return Cure(
-        f"max_amsl_m {found.value:g} would do {found.words(f'{given:g} is given')}: the path crosses ground that needs "
-        f"{rounded_up(high_m):.1f} m AMSL ({floor_words(limits)})",
+        f"max_amsl_m {found.value:g} would do {found.words(f'{given:g} is given')}: the path crosses its highest "
+        f"ground at {amsl_m:.1f} m AMSL ({floor_words(limits)})",
         place,
         "that ground",
     )
@@ -379,17 +379,16 @@ def _list(names: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
 
 
-def _highest_floor(problem: Problem, path: Floats) -> tuple[float, Place]:
-    """The highest floor under a path, metres AMSL, and where it is."""
+def _over_highest_ground(problem: Problem, path: Floats) -> tuple[float, Place]:
+    """Where a path has the highest ground under it, and its altitude there."""
     step_m = 0.25 * float(problem.airspace.surface.grid.metres_per_cell(*problem.start[:2]).min())
-    pieces = [path[:1, :2]]
-    for a, b in pairwise(path[:, :2]):
-        n = min(max(1, math.ceil(math.dist(a, b) / step_m)), PIECES)
+    pieces = [path[:1]]
+    for a, b in pairwise(path):
+        n = min(max(1, math.ceil(math.dist(a[:2], b[:2]) / step_m)), PIECES)
         pieces.append(a + np.linspace(0.0, 1.0, n + 1)[1:, None] * (b - a))
     at = np.vstack(pieces)
-    floor = np.asarray(problem.airspace.floor_amsl(at[:, 0], at[:, 1], problem.limits))
-    k = int(np.argmax(floor))
-    return float(floor[k]), (float(at[k, 0]), float(at[k, 1]))
+    k = int(np.nanargmax(problem.airspace.surface.ground_at(at[:, 0], at[:, 1])))
+    return float(at[k, 2]), (float(at[k, 0]), float(at[k, 1]))
 
 
 def _middle(zone: Zone) -> Place:

@@ -57,7 +57,7 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
     high = float(air.ceiling_amsl(*place, limits))
 
     def refuse(words: str, *, untried: bool = False) -> Refusal:
-        return Refusal(f"no mission: {words}", reason="infeasible", place=place, untried=untried)
+        return Refusal(f"no mission: {words}", reason="infeasible", place=place, place_of=name, untried=untried)
 
     if not math.isfinite(low):
         raise refuse(f"the ground at {name}, or within reach of it, is unknown to the terrain model")
