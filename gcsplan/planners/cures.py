@@ -120,19 +120,20 @@ class Trials:
         return solution.path.points
 
     def least(self, name: str, at: Callable[[float], Problem], given: float, enough: float, values: Values) -> Least:
-        """The least value over ``given`` that was found to do, beginning with ``enough``, which may or may not."""
+        """The least value over ``given`` that was found to do; ``enough`` may or may not."""
         bad, good, found = given, enough, Least()
+        wanted = [values.guess, enough] if given < values.guess < enough else [enough]
         for _ in range(VALUES):
-            value = good if found.path is None else values.between(bad, good)
+            value = wanted.pop(0) if wanted else values.between(bad, good)
             if self.spent or not bad < value <= values.most or (found.path is not None and value >= good):
                 break
             path = self.path(at(value), f"{name} {value:g}")
             if path is not None:
-                good, found.value, found.path = value, value, path
+                good, found.value, found.path, wanted = value, value, path, []
             else:
                 bad, found.in_vain = value, value
-                if found.path is None:
-                    good = min(values.beyond(given, value), values.most)
+                if found.path is None and not wanted:
+                    wanted = [min(values.beyond(given, value), values.most)]
         return found
 
 
@@ -151,19 +152,25 @@ class Least:
 
 @dataclass(frozen=True, slots=True)
 class Values:
-    """Which values of a limit are tried: ``between`` two, the first of which does not do, and ``beyond`` the last."""
+    """Which values of a limit are tried: ``between`` two, the first of which does not do, and ``beyond`` the last.
+
+    ``guess``: what may be the least that does, and is tried first; 0: nobody knows.
+    """
 
     between: Callable[[float, float], float]
     beyond: Callable[[float, float], float]
     most: float
+    guess: float = 0.0
 
 
 def metres_from(guess: float) -> Values:
-    """Whole metres: no lower than a ``guess``, and close to it rather than half-way."""
+    """Whole metres: no lower than a ``guess``, and close to it rather than half-way; 0: nobody knows."""
+    part = 0.25 if guess > 0.0 else 0.5
     return Values(
-        between=lambda bad, good: max(float(math.floor(0.75 * bad + 0.25 * good)), bad + 1.0, guess),
+        between=lambda bad, good: float(max(math.floor(bad + part * (good - bad)), math.floor(bad) + 1, guess)),
         beyond=lambda given, value: float(math.ceil(given + 3.0 * (value - given))),
         most=HIGHEST_M,
+        guess=guess,
     )
 
 
@@ -283,7 +290,7 @@ def _above_ground(trials: Trials, path: Floats) -> Cure:
     assert given is not None
     report = problem.airspace.examine(Legs.of_path(path, limits), limits)
     enough = _metres_over(given, float(np.nanmax(report.max_agl_m)) + limits.altitude_error_m)
-    values = metres_from(math.floor(given) + 1.0)
+    values = metres_from(0.0)
     found = trials.least("max_agl_m", lambda m: _limited(problem, max_agl_m=m), given, enough, values)
     if found.path is None:
         return Cure(f"without max_agl_m there is a path{_no_value(found)}")
