@@ -12,9 +12,10 @@ import pytest
 
 from gcsplan import pipeline
 from gcsplan.errors import NoMission
-from gcsplan.planners.cures import LEAST_S, SHARE, TRIES, with_cures
+from gcsplan.planners.cures import with_cures
 from gcsplan.planners.optimal.planner import plan
-from gcsplan.planners.problem import Problem, Refusal, Solution, Via
+from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
+from gcsplan.planners.trials import GRACE_S, LEAST_S, SHARE, TRIES
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
@@ -138,18 +139,25 @@ def test_what_is_reported_to_help_does(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "given"), [("max_amsl_m", "600.5"), pytest.param("max_climb_deg", "0.1", marks=pytest.mark.slow)]
+    ("file", "key", "given"),
+    [
+        ("jacksboro.yaml", "max_amsl_m", "600.5"),
+        pytest.param("jacksboro.yaml", "max_climb_deg", "0.1", marks=pytest.mark.slow),
+        pytest.param("jacksboro-wing.yaml", "max_amsl_m", "500.5", marks=pytest.mark.slow),
+    ],
 )
-def test_a_mission_file_with_the_reported_value_has_a_mission(tmp_path: FilePath, key: str, given: str) -> None:
-    text = (MISSIONS / "jacksboro.yaml").read_text(encoding="utf-8")
-    file = tmp_path / "mission.yaml"
-    file.write_text(re.sub(rf"{key}: [\d.]+", f"{key}: {given}", text), encoding="utf-8")
+def test_a_mission_file_with_the_reported_value_has_a_mission(
+    tmp_path: FilePath, file: str, key: str, given: str
+) -> None:
+    text = (MISSIONS / file).read_text(encoding="utf-8")
+    mission = tmp_path / "mission.yaml"
+    mission.write_text(re.sub(rf"{key}: [\d.]+", f"{key}: {given}", text), encoding="utf-8")
     with pytest.raises(NoMission) as caught:
-        pipeline.plan(file)
+        pipeline.plan(mission)
     values = [value for found, value in LIMIT.findall(caught.value.message) if found == key]
     assert len(values) == 1, caught.value.message
-    file.write_text(re.sub(rf"{key}: [\d.]+", f"{key}: {values[0]}", text), encoding="utf-8")
-    assert pipeline.plan(file).vehicles[0].verdict.safe
+    mission.write_text(re.sub(rf"{key}: [\d.]+", f"{key}: {values[0]}", text), encoding="utf-8")
+    assert pipeline.plan(mission).vehicles[0].verdict.safe is not False
 
 
 def test_a_ceiling_is_reported_close_to_the_lowest_that_does() -> None:
@@ -188,7 +196,7 @@ def many_limits() -> Problem:
 
 
 def cures_of(problem: Problem, slow: SlowPlan, monkeypatch: pytest.MonkeyPatch) -> Refusal:
-    monkeypatch.setattr("gcsplan.planners.cures.time.perf_counter", lambda: slow.now_s)
+    monkeypatch.setattr("gcsplan.planners.trials.time.perf_counter", lambda: slow.now_s)
     return with_cures(problem, BARE, slow)
 
 
@@ -201,6 +209,22 @@ def test_nothing_is_begun_after_its_share_of_the_budget(monkeypatch: pytest.Monk
     assert slow.now_s <= LEAST_S + 3.0
     assert "would do" not in refusal.message
     assert "not tried in 1 s: without max_agl_m, the no-fly zones or max_amsl_m" in refusal.message
+
+
+def test_a_plan_that_runs_on_is_stopped_when_it_reports_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Endless(SlowPlan):
+        def __call__(self, problem: Problem) -> Solution:
+            assert problem.progress is not None
+            for _ in range(100):
+                self.now_s += 0.25
+                problem.progress(Progress(self.now_s, None, None, "search"))
+            return super().__call__(problem)
+
+    slow = Endless(0.0, lambda p: True)
+    message = cures_of(many_limits(), slow, monkeypatch).message
+    assert slow.now_s <= SHARE * 10.0 + GRACE_S + 0.25
+    assert "none is found" not in message
+    assert "not tried in 3 s: without max_climb_deg and max_descent_deg, max_agl_m, the no-fly zones or" in message
 
 
 @pytest.mark.parametrize("opens", [lambda p: True, lambda p: False, lambda p: p.limits.max_amsl_m is None])

@@ -1,41 +1,26 @@
 """What would help where there is no path: one thing is changed at a time, and the changed problem is planned.
 
-A limit's value is reported only if the planner found a path with it. `Trials` bounds the number and the time of these
-plans.
+A limit's value is reported only if the planner found a path with it. `Trials` bounds number and time of the plans.
 """
 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.lattice.routes import Level, Router
-from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
+from gcsplan.planners.problem import Problem, Refusal
+from gcsplan.planners.trials import DEGREES, LEAST_DEG, Floats, Least, Plan, Trials, metres_from, two_digits
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Zone
 
-Floats = NDArray[np.float64]
-Plan = Callable[[Problem], Solution]
 Place = tuple[float, float]
 
-TRIES = 32
-"""Plans of changed problems, at most."""
-SHARE, LEAST_S = 0.3, 1.0
-"""No plan begins after this part of ``budget_s``, or after this time where that is more."""
-PARTS = 12
-"""One plan's ``budget_s`` is this part of that time."""
-VALUES = 9
-"""Values of one limit that are tried, at most."""
-ANY_PERCENT = 1e6
-"""Gap with which the first path is good enough."""
 NAMES, SINGLES = 5, 8
 """No-fly zones that are named, and that are tried alone, at most."""
 STEEPEST_DEG, STEEPEST_TURNING_DEG = 90.0, 45.0
@@ -44,8 +29,6 @@ ROUNDED_M = 0.05
 """What the rounding of way points to whole centimetres may take from a ceiling, with room to spare."""
 LEVEL = Level(math.inf, 40_000)
 """Lattice on which the height of the lowest pass is guessed."""
-HIGHEST_M, LEAST_DEG = 9500.0, 0.05
-"""No higher ceiling and no smaller climb limit is tried."""
 PIECES = 2_000
 """Places along one leg at which the floor is read, at most."""
 
@@ -53,8 +36,8 @@ PIECES = 2_000
 def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
     """``bare``, the refusal of ``problem``, and what would help: that is planned with ``plan`` before it is reported.
 
-    ``plan`` returns a solution of a changed problem or raises NoMission. It should keep ``budget_s``, for only
-    between two plans the time is looked at.
+    ``plan`` returns a solution of a changed problem or raises NoMission. The time is looked at between two plans, and
+    when one reports progress: a planner that keeps ``budget_s`` keeps the whole short.
     """
     if not bare.untried:
         return bare
@@ -68,10 +51,10 @@ def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
         if trials.spent:
             break
         path = trials.path(lift.lifted(problem), f"without {lift.name}")
-        if path is None:
-            in_vain.append(lift)
-        else:
+        if path is not None:
             cures.append(lift.cure(trials, path))
+        elif not trials.stopped:
+            in_vain.append(lift)
     untried = lifts[len(cures) + len(in_vain) :]
     words = [bare.message, *(cure.words for cure in cures)]
     if not cures and not untried:
@@ -90,102 +73,6 @@ def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
         place=None if shown is None else shown.place,
         place_of="" if shown is None else shown.place_of,
     )
-
-
-class Trials:
-    """Plans of changes to one problem: at most `TRIES`, and none begun later than a share of ``budget_s``."""
-
-    def __init__(self, problem: Problem, plan: Plan) -> None:
-        self.problem, self._plan = problem, plan
-        self.share_s = max(SHARE * problem.budget_s, LEAST_S)
-        self._begun_s = time.perf_counter()
-        self._left = TRIES
-
-    @property
-    def spent(self) -> bool:
-        """Whether nothing more is tried."""
-        return self._left <= 0 or time.perf_counter() - self._begun_s >= self.share_s
-
-    def path(self, changed: Problem, what: str) -> Floats | None:
-        """(N, 3) points of a path of a changed problem; None where the planner refuses. ``what`` is changed."""
-        self._left -= 1
-        if self.problem.progress is not None:
-            words = f"no path; tries {what}"
-            self.problem.progress(Progress(time.perf_counter() - self._begun_s, None, None, words))
-        budget_s = min(self.problem.budget_s, self.share_s / PARTS)
-        try:
-            solution = self._plan(replace(changed, gap_percent=ANY_PERCENT, budget_s=budget_s, progress=None))
-        except (NoMission, InputError):
-            return None
-        return solution.path.points
-
-    def least(self, name: str, at: Callable[[float], Problem], given: float, enough: float, values: Values) -> Least:
-        """The least value over ``given`` that was found to do; ``enough`` may or may not."""
-        bad, good, found = given, enough, Least()
-        wanted = [values.guess, enough] if given < values.guess < enough else [enough]
-        for _ in range(VALUES):
-            value = wanted.pop(0) if wanted else values.between(bad, good)
-            if self.spent or not bad < value <= values.most or (found.path is not None and value >= good):
-                break
-            path = self.path(at(value), f"{name} {value:g}")
-            if path is not None:
-                good, found.value, found.path, wanted = value, value, path, []
-            else:
-                bad, found.in_vain = value, value
-                if found.path is None and not wanted:
-                    wanted = [min(values.beyond(given, value), values.most)]
-        return found
-
-
-@dataclass(slots=True)
-class Least:
-    """The least value that did, with its path, and the largest under it that did not; NaN, None: there is none."""
-
-    value: float = math.nan
-    path: Floats | None = None
-    in_vain: float = math.nan
-
-    def words(self, given: str) -> str:
-        """What was given, and what does not do."""
-        return f"({given}" + ("" if math.isnan(self.in_vain) else f", with {self.in_vain:g} none is found") + ")"
-
-
-@dataclass(frozen=True, slots=True)
-class Values:
-    """Which values of a limit are tried: ``between`` two, the first of which does not do, and ``beyond`` the last.
-
-    ``guess``: what may be the least that does, and is tried first; 0: nobody knows.
-    """
-
-    between: Callable[[float, float], float]
-    beyond: Callable[[float, float], float]
-    most: float
-    guess: float = 0.0
-
-
-def metres_from(guess: float) -> Values:
-    """Whole metres: no lower than a ``guess``, and close to it rather than half-way; 0: nobody knows."""
-    part = 0.25 if guess > 0.0 else 0.5
-    return Values(
-        between=lambda bad, good: float(max(math.floor(bad + part * (good - bad)), math.floor(bad) + 1, guess)),
-        beyond=lambda given, value: float(math.ceil(given + 3.0 * (value - given))),
-        most=HIGHEST_M,
-        guess=guess,
-    )
-
-
-# From the side that does: values just over the given one are those that take a planner longest to refuse.
-DEGREES = Values(
-    between=lambda bad, good: bad if good <= 1.1 * bad else _two_digits(max(0.5 * good, math.sqrt(bad * good))),
-    beyond=lambda given, value: _two_digits(2.0 * value),
-    most=89.0,
-)
-
-
-def _two_digits(value: float) -> float:
-    """``value`` rounded up to two digits that count."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return round(math.ceil(value / unit - 1e-9) * unit, 9)
 
 
 # -- what may be lifted --------------------------------------------------------------------------------------------
@@ -261,7 +148,7 @@ def _climbing(trials: Trials, path: Floats) -> Cure:
     steep = float(np.degrees(np.arctan2(np.abs(np.diff(path[:, 2])), run)).max())
     given = min(up, down)
     values = replace(DEGREES, most=min(DEGREES.most, _steepest_deg(problem)))
-    enough = min(_two_digits(max(steep, 1.1 * given, LEAST_DEG)), values.most)
+    enough = min(two_digits(max(steep, 1.1 * given, LEAST_DEG)), values.most)
     found = trials.least("max_climb_deg", at, given, enough, values)
     if found.path is None:
         return Cure(f"without max_climb_deg and max_descent_deg there is a path{_no_value(found)}")
@@ -342,7 +229,7 @@ def _together(trials: Trials, lifts: Sequence[Lift]) -> Cure:
     if trials.spent:
         return Cure(alone)
     if not opens(lifts):
-        return Cure(f"{alone}, nor without all of them together")
+        return Cure(alone if trials.stopped else f"{alone}, nor without all of them together")
     needed = list(lifts)
     for lift in lifts:
         fewer = [other for other in needed if other is not lift]

@@ -11,9 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.planners.cures import Plan, floor_words, rounded_up, with_cures
+from gcsplan.planners.cures import floor_words, rounded_up, with_cures
 from gcsplan.planners.lattice.lattice import levels_of, near_zone
 from gcsplan.planners.problem import Problem, Refusal, terminals
+from gcsplan.planners.trials import Plan
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 

@@ -54,7 +54,7 @@ def _explained(
             world=World(brief.world.frame, changed.airspace),
         )
         asked = replace(request, vehicle=replace(vehicle, limits=changed.limits))
-        return plan_vehicle(tried, asked, options=options).solution
+        return plan_vehicle(tried, asked, changed.progress, options=options).solution
 
     problem, _ = make_problem(
         brief.source, request, brief.world, brief.objective, brief.seed, progress=progress, options=options

@@ -60,7 +60,6 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     goal; ``known``: there is a path already, and one more try is all that another is worth. Raises Refusal where no
     path is found.
     """
-    tell("search", None)
     bound = straight_bound(problem)
     stops = terminals(problem)
     if all(math.dist(stops[0], x) < 1e-3 for x in stops):
@@ -76,6 +75,7 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     for level in LEVELS[:1] if known else LEVELS if climbs else LEVELS[:2]:
         if best is None and time.perf_counter() > given_up_s:
             break
+        tell("search", None if best is None else problem.cost(Path(best)))
         work = _Work.at(problem, level, way)
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
