@@ -19,7 +19,7 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 
 
-def explain(problem: Problem, *, proved: bool = False, plan: Plan | None = None) -> Refusal:
+def explain(problem: Problem, *, proved: bool | None = None, plan: Plan | None = None) -> Refusal:
     """The refusal for a problem whose ends are legal and for which there is no path; ``proved``: that is known.
 
     With ``plan``, the refusal says what would help, see `with_cures`; without, whoever receives it may ask for that.
