@@ -11,13 +11,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from gcsplan.native import notice
-
 if TYPE_CHECKING:
     from gcsplan.check.verdict import Verdict
     from gcsplan.mavlink.machine import Progress as Transfer
     from gcsplan.pipeline import FleetPlan, Plan, VehiclePlan
-    from gcsplan.planners.problem import Progress
     from gcsplan.steps.delivery import Delivery
     from gcsplan.steps.gate import GateTime
     from gcsplan.way_home.verdict import WayHome
@@ -256,28 +253,6 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
             bars.update(tasks[name], completed=told.done, total=told.total, phase=ended or told.phase)
             if ended:
                 bars.stop_task(tasks[name])
-
-        yield update
-
-
-@contextmanager
-def planning_status() -> Iterator[Callable[[str, Progress], None]]:
-    """A status line while planning, on a terminal only: call the result with (vehicle, progress).
-
-    That kernels are being compiled, which happens once, is said in a log too: the first run takes longer.
-    """
-    if not console.is_terminal:
-        with notice.told(say):
-            yield lambda who, told: None
-        return
-    with console.status("planning…") as status, notice.told(lambda words: status.update(f"{words}…")):
-
-        def update(who: str, told: Progress) -> None:
-            cost = f", best {number(told.cost)}" if told.cost is not None else ""
-            bound = f", bound {number(told.lower_bound)}" if told.lower_bound is not None else ""
-            both = told.cost is not None and told.lower_bound
-            gap = f", gap {100.0 * ((told.cost or 0.0) / (told.lower_bound or 1.0) - 1.0):.2f} %" if both else ""
-            status.update(f"planning {who}: {told.phase}{cost}{bound}{gap}")
 
         yield update
 

@@ -18,7 +18,8 @@ from gcsplan.planners.registry import VOLUME_KEYS
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.steps.fleeting import FleetPlan, fleet_of
 from gcsplan.steps.gate import GateTime
-from gcsplan.steps.planning import Brief, VehiclePlan, make_problem, plan_vehicle
+from gcsplan.steps.planning import Brief, VehiclePlan, make_problem
+from gcsplan.steps.refusals import plan_or_explain
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.world import World
 
@@ -94,7 +95,7 @@ def _one_by_one(brief: Brief, progress: Callable[[str, Progress], None] | None) 
         if brief.by_priority:
             earlier = tuple(plan.solution.path.points for plan in plans.values())
             more = {"earlier": earlier, "speed_m_s": request.vehicle.speed_max_m_s}
-        plans[name] = plan_vehicle(brief, request, tell, options=more)
+        plans[name] = plan_or_explain(brief, request, tell, options=more)
     return [plans[name] for name in requests]
 
 

@@ -94,11 +94,11 @@ def plan(
     exists, earlier outputs are moved to DIR/previous, so that no old mission is flown by mistake.
     """
     from gcsplan import pipeline
+    from gcsplan.commands.planning_display import planning_display
     from gcsplan.console import (
         delivery_table,
         homes_table,
         plan_table,
-        planning_status,
         release_table,
         say,
         say_notes_of,
@@ -129,7 +129,8 @@ def plan(
             from gcsplan.steps import delivery, fencing
 
             targets = delivery.targets(upload or [], [r.vehicle for r in source.vehicles])
-        with planning_status() as tell:
+        names = [r.vehicle.name for r in source.vehicles]
+        with planning_display(names, objective or source.planner.objective) as tell:
             told = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
             planned = pipeline.plan(
                 source,

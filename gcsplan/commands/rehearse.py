@@ -60,7 +60,8 @@ def rehearse(
     planned them. Exit code 4 where a limit was broken, the order or the separation was lost.
     """
     from gcsplan import pipeline, rehearsing
-    from gcsplan.console import planning_status, say, say_notes
+    from gcsplan.commands.planning_display import planning_display
+    from gcsplan.console import say, say_notes
     from gcsplan.sim.wind import Weather
 
     weather = Weather(wind, wind_from, gusts, noise_m)
@@ -74,7 +75,7 @@ def rehearse(
     source = pipeline.load_mission(mission)
     names = [r.vehicle.name for r in source.vehicles]
     addresses = rehearsing.seats_of(sitl or [], names)
-    with planning_status() as tell:
+    with planning_display(names, source.planner.objective) as tell:
         planned = pipeline.plan(source, planner=planner, progress=tell)
     pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
     if in_sitl:

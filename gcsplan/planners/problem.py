@@ -138,12 +138,26 @@ class Solution:
 
 
 class Refusal(NoMission):
-    """No mission, and where: ``east_m``, ``north_m`` of the binding place, None where there is no one place."""
+    """No mission, and where: ``east_m``, ``north_m`` of the binding place, None where there is no one place.
 
-    def __init__(self, message: str, *, reason: NoMissionReason, place: tuple[float, float] | None = None) -> None:
+    ``place_of``: what is at that place, where the message does not say so.
+    ``untried``: another limit, or fewer zones, may help, and none has been tried yet (`refusal.with_cures` does).
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        reason: NoMissionReason,
+        place: tuple[float, float] | None = None,
+        place_of: str = "",
+        untried: bool = False,
+    ) -> None:
         super().__init__(message, reason=reason)
         self.east_m = None if place is None else float(place[0])
         self.north_m = None if place is None else float(place[1])
+        self.place_of = place_of
+        self.untried = untried
 
 
 def terminals(problem: Problem) -> list[tuple[float, float]]:

@@ -15,7 +15,7 @@ from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.build import LONGEST_LEG_M, MARGINS, Margins, Order, build_mission
 from gcsplan.mavlink.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
-from gcsplan.planners.problem import Problem, Progress, Solution, Via
+from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
@@ -300,11 +300,16 @@ def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: Mi
 def run_planner(run: Callable[[Problem], Solution], problem: Problem, vehicle: Vehicle, world: World) -> Solution:
     try:
         return run(problem)
+    except Refusal as refusal:
+        raise in_degrees(refusal, vehicle, world) from refusal
     except NoMission as refusal:
-        place = ""
-        east, north = getattr(refusal, "east_m", None), getattr(refusal, "north_m", None)
-        if east is not None and north is not None:
-            lat, lon = (float(x) for x in world.frame.to_degrees(east, north))
-            place = f" (at {lat:.6f}, {lon:.6f})"
-        reason = refusal.reason
-        raise NoMission(f"{vehicle.name}: {refusal.message}{place}", reason=reason) from refusal  # type: ignore[arg-type]
+        raise NoMission(f"{vehicle.name}: {refusal.message}", reason=refusal.reason) from refusal  # type: ignore[arg-type]
+
+
+def in_degrees(refusal: Refusal, vehicle: Vehicle, world: World) -> NoMission:
+    """A planner's refusal as the user reads it: whose it is, and its place in degrees."""
+    place = ""
+    if refusal.east_m is not None and refusal.north_m is not None:
+        lat, lon = (float(x) for x in world.frame.to_degrees(refusal.east_m, refusal.north_m))
+        place = f" ({refusal.place_of + ' ' if refusal.place_of else ''}at {lat:.6f}, {lon:.6f})"
+    return NoMission(f"{vehicle.name}: {refusal.message}{place}", reason=refusal.reason)  # type: ignore[arg-type]

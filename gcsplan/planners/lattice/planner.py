@@ -23,7 +23,6 @@ from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m,
 from gcsplan.planners.profile.climb_laps import pins_of, ways_up, with_climbs
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle, thinned
 from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, make_track
-from gcsplan.planners.refusal import explain
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -44,6 +43,8 @@ MOST_OPENED = 200_000
 """Labels taken up on one lattice, beyond which it is given up: they wind up and down to gain height."""
 DETOURS, DETOUR_STEPS = (0.2, 0.4, 0.6, 0.8), 4.0
 """Where along the first way a disc is shut to find others, and its radius in lattice steps."""
+WITHOUT = 3.0
+"""After that many times ``budget_s`` no further search for a first path begins."""
 KICKS = 10
 KICK_PARTS = (0.02, 0.05)
 
@@ -54,11 +55,11 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     """A path under a maximum AGL and the climb limit that `Airspace.examine` passes.
 
     Start, goal and vias are known to be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
-    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s``, for all that comes after the
-    first path, is a backstop. ``climbs``: may climb on the spot over start and goal; ``known``: there is a path
-    already, and one more try is all that another is worth. Raises Refusal where no path is found.
+    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s`` is a backstop for all that comes
+    after the first path, and `WITHOUT` times that where there is none. ``climbs``: may climb on the spot over start and
+    goal; ``known``: there is a path already, and one more try is all that another is worth. Raises Refusal where no
+    path is found.
     """
-    tell("search", None)
     bound = straight_bound(problem)
     stops = terminals(problem)
     if all(math.dist(stops[0], x) < 1e-3 for x in stops):
@@ -70,12 +71,15 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     first_s = math.inf if best is None else time.perf_counter() - begun
     router: Router | None = None
     timed_out = False
-    deadline_s = begun + problem.budget_s
+    deadline_s, given_up_s = begun + problem.budget_s, begun + WITHOUT * problem.budget_s
     for level in LEVELS[:1] if known else LEVELS if climbs else LEVELS[:2]:
+        if best is None and time.perf_counter() > given_up_s:
+            break
+        tell("search", None if best is None else problem.cost(Path(best)))
         work = _Work.at(problem, level, way)
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
-        found = None if any(cut) else work.first(1 if known else SEARCHES)
+        found = None if any(cut) else work.first(1 if known else SEARCHES, given_up_s)
         if found is None and climbs and best is None and not known and (any(cut) or level is LEVELS[0]):
             ends = cut if any(cut) else (True, True)
             found = with_climbs(problem, ends, lambda p: plan_band(p, tell, begun, climbs=False).path.points)
@@ -91,9 +95,29 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
                     best = better
             break
     if best is None:
-        raise explain(problem, router) if climbs and not known else Refusal("no way was found", reason="not_found")
+        raise _not_found(problem, router)
     tell("done", problem.cost(Path(best)))
     return _solution(problem, best, bound, begun, first_s, timed_out)
+
+
+def _not_found(problem: Problem, router: Router | None) -> Refusal:
+    """The refusal after the last lattice: how finely it was searched, and what stopped the last track, and where."""
+    words, place, at = "", None, ""
+    if router is not None:
+        words = f" on a grid of {router.lattice.step_m:.0f} m"
+    if router is not None and router.last is not None and router.last_place is not None:
+        words += f"; the last track that was looked at is stopped by {_stopped_by(problem, router.last)}"
+        place, at = (float(router.last_place[0]), float(router.last_place[1])), "stopped"
+    return Refusal(f"no mission: no path was found{words}", reason="not_found", place=place, place_of=at, untried=True)
+
+
+def _stopped_by(problem: Problem, why: Obstruction) -> str:
+    if why.kind == "zone":
+        return f"no-fly zone {problem.airspace.zones[why.zone].name!r}"
+    if why.kind == "pinched":
+        return f"ground that comes too near to the ceiling, by {why.by:.1f} m"
+    run_m = why.s1_m - why.s0_m
+    return f"a {why.kind} steeper than max_{why.kind}_deg, by {why.by:.1f} m of height in {run_m:.0f} m"
 
 
 def _solution(
@@ -220,10 +244,10 @@ class _Work:
         """Build the lattice of ``level``."""
         return cls(problem, Router.at(problem, level), way_m)
 
-    def first(self, searches: int) -> Floats | None:
-        """Way points of the first way that could be made to hold, of so many."""
+    def first(self, searches: int, deadline_s: float = math.inf) -> Floats | None:
+        """Way points of the first way that could be made to hold, of so many; none is searched after a deadline."""
         for _ in range(searches):
-            if self.router.opened > MOST_OPENED:
+            if self.router.opened > MOST_OPENED or time.perf_counter() > deadline_s:
                 return None
             way = self.router.way()
             if way is None:

@@ -1,0 +1,292 @@
+"""What would help where there is no path: one thing is changed at a time, and the changed problem is planned.
+
+A limit's value is reported only if the planner found a path with it. `Trials` bounds number and time of the plans.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from gcsplan.planners.lattice.routes import Level, Router
+from gcsplan.planners.problem import Problem, Refusal
+from gcsplan.planners.trials import DEGREES, LEAST_DEG, Floats, Least, Plan, Trials, metres_from, two_digits
+from gcsplan.world.airspace import Airspace, Legs
+from gcsplan.world.limits import Limits
+from gcsplan.world.zones import Circle, Zone
+
+Place = tuple[float, float]
+
+NAMES, SINGLES = 5, 8
+"""No-fly zones that are named, and that are tried alone, at most."""
+STEEPEST_DEG, STEEPEST_TURNING_DEG = 90.0, 45.0
+"""No climb limit; and what the mission file allows a fixed wing at most."""
+ROUNDED_M = 0.05
+"""What the rounding of way points to whole centimetres may take from a ceiling, with room to spare."""
+LEVEL = Level(math.inf, 40_000)
+"""Lattice on which the height of the lowest pass is guessed."""
+PIECES = 2_000
+"""Places along one leg at which the floor is read, at most."""
+
+
+def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
+    """``bare``, the refusal of ``problem``, and what would help: that is planned with ``plan`` before it is reported.
+
+    ``plan`` returns a solution of a changed problem or raises NoMission. The time is looked at between two plans, and
+    when one reports progress: a planner that keeps ``budget_s`` keeps the whole short.
+    """
+    if not bare.untried:
+        return bare
+    trials = Trials(problem, plan)
+    # Searches in the plane prove that ceilings and zones shut every path; of climbs they know little.
+    order = LIFTS if bare.reason == "infeasible" else LIFTS[::-1]
+    lifts = [lift for lift in order if lift.binds(problem)]
+    cures: list[Cure] = []
+    in_vain: list[Lift] = []
+    for lift in lifts:
+        if trials.spent:
+            break
+        path = trials.path(lift.lifted(problem), f"without {lift.name}")
+        if path is not None:
+            cures.append(lift.cure(trials, path))
+        elif not trials.stopped:
+            in_vain.append(lift)
+    untried = lifts[len(cures) + len(in_vain) :]
+    words = [bare.message, *(cure.words for cure in cures)]
+    if not cures and not untried:
+        cures = [_together(trials, lifts)]
+        words.append(cures[0].words)
+    elif in_vain:
+        words.append(f"without {_list([lift.name for lift in in_vain], 'or')} alone none is found")
+    if untried:
+        words.append(f"not tried in {trials.share_s:.0f} s: without {_list([lift.name for lift in untried], 'or')}")
+    shown = next((cure for cure in cures if cure.place is not None), None)
+    if bare.east_m is not None and bare.north_m is not None:  # what the search itself ran into comes first
+        shown = Cure("", (bare.east_m, bare.north_m), bare.place_of)
+    return Refusal(
+        "; ".join(words),
+        reason="infeasible" if bare.reason == "infeasible" else "not_found",
+        place=None if shown is None else shown.place,
+        place_of="" if shown is None else shown.place_of,
+    )
+
+
+# -- what may be lifted --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Cure:
+    """What helps, in words, and the place where."""
+
+    words: str
+    place: Place | None = None
+    place_of: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Lift:
+    """A limit, or the zones: whether it ``binds`` at all, the problem without it, and what of it would do."""
+
+    name: str
+    binds: Callable[[Problem], bool]
+    lifted: Callable[[Problem], Problem]
+    cure: Callable[[Trials, Floats], Cure]
+    """From a path without it."""
+
+
+def _limited(problem: Problem, **changed: float | None) -> Problem:
+    return replace(problem, limits=replace(problem.limits, **changed))  # type: ignore[arg-type]
+
+
+def _zoned(problem: Problem, zones: Sequence[Zone]) -> Problem:
+    air = problem.airspace
+    return replace(problem, airspace=Airspace(air.surface, zones, scale=air.scale))
+
+
+def _ceiling(trials: Trials, path: Floats) -> Cure:
+    problem, limits = trials.problem, trials.problem.limits
+    given = limits.max_amsl_m
+    assert given is not None
+    enough = _metres_over(given, float(path[:, 2].max()) + limits.altitude_error_m)
+    values = metres_from(_lowest_pass(problem, enough))
+    found = trials.least("max_amsl_m", lambda m: _limited(problem, max_amsl_m=m), given, enough, values)
+    if found.path is None:
+        return Cure(f"without max_amsl_m there is a path{_no_value(found)}")
+    amsl_m, place = _over_highest_ground(problem, found.path)
+    return Cure(
+        f"max_amsl_m {found.value:g} would do {found.words(f'{given:g} is given')}: the path crosses its highest "
+        f"ground at {amsl_m:.1f} m AMSL ({floor_words(limits)})",
+        place,
+        "that ground",
+    )
+
+
+def _lowest_pass(problem: Problem, enough: float) -> float:
+    """Whole metres: the lowest max_amsl_m under which a coarse lattice without climb limits holds a way; a guess."""
+    free = _limited(problem, max_amsl_m=None, max_climb_deg=STEEPEST_DEG, max_descent_deg=STEEPEST_DEG)
+    router = Router.at(free, LEVEL)
+    low = max(float(problem.limits.max_amsl_m or 0.0) - problem.limits.altitude_error_m, 0.0)
+    high = enough
+    while high - low > 0.5:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if router.way(middle) is not None else (middle, high)
+    return float(math.ceil(high + problem.limits.altitude_error_m + ROUNDED_M))
+
+
+def _climbing(trials: Trials, path: Floats) -> Cure:
+    problem, limits = trials.problem, trials.problem.limits
+    up, down = limits.max_climb_deg, limits.max_descent_deg
+
+    def at(angle: float) -> Problem:
+        return _limited(problem, max_climb_deg=max(up, angle), max_descent_deg=max(down, angle))
+
+    run = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    steep = float(np.degrees(np.arctan2(np.abs(np.diff(path[:, 2])), run)).max())
+    given = min(up, down)
+    values = replace(DEGREES, most=min(DEGREES.most, _steepest_deg(problem)))
+    enough = min(two_digits(max(steep, 1.1 * given, LEAST_DEG)), values.most)
+    found = trials.least("max_climb_deg", at, given, enough, values)
+    if found.path is None:
+        return Cure(f"without max_climb_deg and max_descent_deg there is a path{_no_value(found)}")
+    raised = [(key, was) for key, was in (("max_climb_deg", up), ("max_descent_deg", down)) if was < found.value]
+    would = " and ".join(f"{key} {found.value:g}" for key, _ in raised)
+    was = " and ".join(f"{was:g}" for was in dict.fromkeys(was for _, was in raised))
+    return Cure(f"{would} would do {found.words(f'{was} is given')}")
+
+
+def _steepest_deg(problem: Problem) -> float:
+    return STEEPEST_TURNING_DEG if problem.turn_radius_m > 0.0 else STEEPEST_DEG
+
+
+def _metres_over(given: float, needed_m: float) -> float:
+    """Whole metres that hold what is needed, and are more than is given."""
+    return float(max(math.ceil(needed_m + ROUNDED_M), math.floor(given) + 1))
+
+
+def _no_value(found: Least) -> str:
+    return "" if math.isnan(found.in_vain) else f", but with {found.in_vain:g} none is found"
+
+
+def _above_ground(trials: Trials, path: Floats) -> Cure:
+    problem, limits = trials.problem, trials.problem.limits
+    given = limits.max_agl_m
+    assert given is not None
+    report = problem.airspace.examine(Legs.of_path(path, limits), limits)
+    enough = _metres_over(given, float(np.nanmax(report.max_agl_m)) + limits.altitude_error_m)
+    values = metres_from(0.0)
+    found = trials.least("max_agl_m", lambda m: _limited(problem, max_agl_m=m), given, enough, values)
+    if found.path is None:
+        return Cure(f"without max_agl_m there is a path{_no_value(found)}")
+    return Cure(f"max_agl_m {found.value:g} would do {found.words(f'{given:g} is given')}")
+
+
+def _fewer_zones(trials: Trials, path: Floats) -> Cure:
+    """Zones that a path without any breaks into: which of them alone, or else all of them, must go."""
+    problem, zones = trials.problem, trials.problem.airspace.zones
+    broken = problem.airspace.examine(Legs.of_path(path, problem.limits), problem.limits).violations
+    crossed = sorted({v.zone for v in broken if v.zone >= 0})
+    alone = []
+    for k in crossed[:SINGLES]:
+        if trials.spent:
+            break
+        if trials.path(_zoned(problem, zones[:k] + zones[k + 1 :]), f"without zone {zones[k].name}") is not None:
+            alone.append(k)
+    first = zones[(alone or crossed or [0])[0]]
+    at = _middle(first), repr(first.name)
+    if len(alone) == 1:
+        return Cure(f"without no-fly zone {zones[alone[0]].name!r} there is a path", *at)
+    if alone:
+        words = _list([repr(zones[k].name) for k in alone], "or")
+        return Cure(f"without any one of the no-fly zones {words} there is a path", *at)
+    kept = [zone for k, zone in enumerate(zones) if k not in crossed]
+    if crossed and kept and not trials.spent and trials.path(_zoned(problem, kept), "without several zones") is None:
+        crossed = []
+    if not crossed:
+        return Cure("without the no-fly zones there is a path")
+    words = _list([repr(zones[k].name) for k in crossed])
+    return Cure(f"without the no-fly zones {words} together there is a path", *at)
+
+
+def _together(trials: Trials, lifts: Sequence[Lift]) -> Cure:
+    """What must be lifted together, where nothing alone helps."""
+    names = _list([lift.name for lift in lifts], "or")
+    if not lifts:
+        return Cure("no limit and no zone is in the way: unknown ground, or the edge of the known terrain, is")
+    if len(lifts) == 1:
+        return Cure(f"without {names} none is found either")
+
+    def opens(some: Sequence[Lift]) -> bool:
+        problem = trials.problem
+        for lift in some:
+            problem = lift.lifted(problem)
+        return trials.path(problem, f"without {_list([lift.name for lift in some])}") is not None
+
+    alone = f"without {names} alone none is found"
+    if trials.spent:
+        return Cure(alone)
+    if not opens(lifts):
+        return Cure(alone if trials.stopped else f"{alone}, nor without all of them together")
+    needed = list(lifts)
+    for lift in lifts:
+        fewer = [other for other in needed if other is not lift]
+        if len(fewer) > 1 and not trials.spent and opens(fewer):
+            needed = fewer
+    return Cure(f"{alone}; without {_list([lift.name for lift in needed])} together there is a path")
+
+
+LIFTS = (
+    Lift("max_amsl_m", lambda p: p.limits.max_amsl_m is not None, lambda p: _limited(p, max_amsl_m=None), _ceiling),
+    Lift("the no-fly zones", lambda p: len(p.airspace.zones) > 0, lambda p: _zoned(p, ()), _fewer_zones),
+    Lift("max_agl_m", lambda p: p.limits.max_agl_m is not None, lambda p: _limited(p, max_agl_m=None), _above_ground),
+    Lift(
+        "max_climb_deg and max_descent_deg",
+        lambda p: min(p.limits.max_climb_deg, p.limits.max_descent_deg) < _steepest_deg(p),
+        lambda p: _limited(p, max_climb_deg=_steepest_deg(p), max_descent_deg=_steepest_deg(p)),
+        _climbing,
+    ),
+)
+"""What is tried, in this order where it is proved that there is no path; else from the last to the first."""
+
+
+# -- words ---------------------------------------------------------------------------------------------------------
+
+
+def floor_words(limits: Limits) -> str:
+    words = f"ground + min_agl_m {limits.min_agl_m:g}"
+    if limits.horizontal_clearance_m:
+        words += f", terrain clearance {limits.horizontal_clearance_m:g} m"
+    return words + (f", altitude error {limits.altitude_error_m:g} m" if limits.altitude_error_m else "")
+
+
+def rounded_up(metres: float) -> float:
+    """To a tenth, never down: what is set to the value must do."""
+    return float(np.ceil(metres * 10.0 - 1e-6)) / 10.0
+
+
+def _list(names: Sequence[str], last: str = "and") -> str:
+    """``a, b and c``; no more than `NAMES`."""
+    shown = [*names[:NAMES], f"{len(names) - NAMES} more"] if len(names) > NAMES + 1 else list(names)
+    return f" {last} ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
+
+
+def _over_highest_ground(problem: Problem, path: Floats) -> tuple[float, Place]:
+    """Where a path has the highest ground under it, and its altitude there."""
+    step_m = 0.25 * float(problem.airspace.surface.grid.metres_per_cell(*problem.start[:2]).min())
+    pieces = [path[:1]]
+    for a, b in pairwise(path):
+        n = min(max(1, math.ceil(math.dist(a[:2], b[:2]) / step_m)), PIECES)
+        pieces.append(a + np.linspace(0.0, 1.0, n + 1)[1:, None] * (b - a))
+    at = np.vstack(pieces)
+    k = int(np.nanargmax(problem.airspace.surface.ground_at(at[:, 0], at[:, 1])))
+    return float(at[k, 2]), (float(at[k, 0]), float(at[k, 1]))
+
+
+def _middle(zone: Zone) -> Place:
+    if isinstance(zone.shape, Circle):
+        return zone.shape.east_m, zone.shape.north_m
+    west, south, east, north = zone.bounds
+    return 0.5 * (west + east), 0.5 * (south + north)
