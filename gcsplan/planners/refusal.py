@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission, NoMissionReason
+from gcsplan.planners.border import enclosed, goes_on, within_m
 from gcsplan.planners.lattice.lattice import levels_of, near_zone, terminals
 from gcsplan.planners.lattice.routes import Level, Router
 from gcsplan.planners.problem import Problem
@@ -38,6 +39,14 @@ class Refusal(NoMission):
         super().__init__(message, reason=reason)
         self.east_m = None if place is None else float(place[0])
         self.north_m = None if place is None else float(place[1])
+
+
+class Unexplained(Refusal):
+    """The refusal of a problem that is ``terse``: ``explained()`` is the one that says why."""
+
+    def __init__(self, reason: NoMissionReason, explained: Callable[[], Refusal]) -> None:
+        super().__init__("no mission over the terrain that was looked at", reason=reason)
+        self.explained = explained
 
 
 def check_ends(problem: Problem) -> None:
@@ -125,17 +134,27 @@ def _ceiling_words(limits: Limits, air: Airspace, place: tuple[float, float]) ->
 def explain(problem: Problem, router: Router | None = None, *, proved: bool | None = None) -> Refusal:
     """The refusal for a problem whose ends are legal and for which no route was found.
 
-    ``proved``: that there is none is known already; None: see whether the raster's cells prove it.
+    ``proved``: that there is none is known already; None: see whether the raster's cells prove it. Where the terrain
+    goes on beyond the surface, it is proved only if no path can get there from both ends.
     """
-    if proved is None:
+    reason: NoMissionReason
+    if problem.terse:
+        proved = _proved_shut(problem) if proved is None else proved
+        reason = "infeasible" if proved else "not_found"
+        return Unexplained(reason, lambda: explain(replace(problem, terse=False), router, proved=proved))
+    beyond = ""
+    if goes_on(problem):
+        proved = enclosed(problem)
+        beyond = "" if proved else f"; not found within {within_m(problem) / 1000.0:.1f} km of the straight way"
+    elif proved is None:
         proved = _proved_shut(problem)
-    reason: NoMissionReason = "infeasible" if proved else "not_found"
+    reason = "infeasible" if proved else "not_found"
     place = None if router is None or router.last_place is None else (router.last_place[0], router.last_place[1])
     grid = "" if proved or router is None else f" (searched on a grid of {router.lattice.step_m:.0f} m)"
     if not proved and router is not None and router.last is not None and _finds(problem)[1] is not None:
         return Refusal(
             f"no mission: ways that the search saw{grid} did not pass the exact test, the last one because of "
-            f"{_blocked_words(problem, router.last)}",
+            f"{_blocked_words(problem, router.last)}{beyond}",
             reason=reason,
             place=place,
         )
@@ -144,10 +163,10 @@ def explain(problem: Problem, router: Router | None = None, *, proved: bool | No
         if found is not None:
             words, place = found
             sure = "; that there is none is proved" if proved else ""
-            return Refusal(f"no mission: {words}{grid}{sure}", reason=reason, place=place)
+            return Refusal(f"no mission: {words}{grid}{sure}{beyond}", reason=reason, place=place)
     return Refusal(
         f"no mission: no way from start to goal was found{grid}, nor with any one limit lifted: limits, zones and the "
-        f"edge of the known terrain bind together",
+        f"edge of the known terrain bind together{beyond}",
         reason=reason,
         place=place,
     )

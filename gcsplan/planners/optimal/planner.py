@@ -45,6 +45,7 @@ from gcsplan.planners.lattice.lattice import terminals
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.bounds.refine import tighten
 from gcsplan.planners.optimal.incumbent import FAR, Below
+from gcsplan.planners.optimal.window import plan_over
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.refusal import Refusal, check_ends, explain
 from gcsplan.world.path import Path
@@ -67,6 +68,11 @@ def plan(problem: Problem) -> Solution:
     Raises Refusal (a NoMission) that names the binding constraint where no path is found, and says whether that is
     proved.
     """
+    return plan_over(problem, _within)
+
+
+def _within(problem: Problem) -> Solution:
+    """The same over the problem's surface alone."""
     begun = time.perf_counter()
     if problem.turn_radius_m > 0.0:
         return _turning(problem, begun)
