@@ -27,6 +27,13 @@ MOST_LEVELS = 24
 """Windows of one mission: the last would be wider than the frame by far."""
 
 
+EDGE_M = 100.0
+"""So far beyond the terrain's edges the last window goes: its corners are known to a few metres alone."""
+
+QUICK_CELLS = 1_000_000
+"""Of a window that is looked at without need to look at a smaller one first."""
+
+
 @dataclass(frozen=True, eq=False)
 class Ground:
     """One window: its surface, and what the ground decides about zones and stops."""
@@ -49,6 +56,7 @@ class Site:
     stops: Sequence[Stops]
     good: Collection[Place]
     local: bool
+    _extent: Box | None = None
     _loaded: WeakValueDictionary[int, MissionFile] = field(default_factory=WeakValueDictionary)
 
     def load(self, problems: list[Problem]) -> Ground | None:
@@ -56,8 +64,18 @@ class Site:
         return self._ground(self.box, None, problems, spare_m=0.0)
 
     def wider(self, source: MissionFile, margin_m: float, most_cells: int) -> MissionFile | None:
-        """See `MissionFile.wider`. A window that is too large gives way to the widest one that is not."""
-        wanted = self._level_for(margin_m, source.level)
+        """See `MissionFile.wider`. A window that is too large gives way to the widest one that is not.
+
+        With no margin to go by, all that is quickly looked at is taken at once.
+        """
+        at = source.level
+        if math.isinf(margin_m):
+            most = min(most_cells, max(4 * source.surface.ground_m.size, QUICK_CELLS))
+            return self._widest(source, MOST_LEVELS, most) or self._widest(source, at + 1, most_cells)
+        return self._widest(source, self._level_for(margin_m, at), most_cells)
+
+    def _widest(self, source: MissionFile, wanted: int, most_cells: int) -> MissionFile | None:
+        """The widest window after the source's, up to level ``wanted``, that has no more than ``most_cells``."""
         for level in range(wanted, source.level, -1):
             known = self._loaded.get(level)
             if known is not None and known.surface.ground_m.size <= most_cells:
@@ -88,11 +106,9 @@ class Site:
 
     def _level_for(self, margin_m: float, level: int) -> int:
         """The first window after ``level`` that is so wide around all stops, or so many times the first one."""
-        if math.isinf(margin_m):
-            return level + 1
         east, north = zip(*(p.in_plane(self.frame) for p in self.good), strict=True)
         least, most = (min(east), min(north)), (max(east), max(north))
-        need = _within_frame((*(x - margin_m for x in least), *(x + margin_m for x in most)))  # type: ignore[arg-type]
+        need = self._clipped((*(x - margin_m for x in least), *(x + margin_m for x in most)))
         for further in range(level + 1, MOST_LEVELS):
             box = self._box(further)
             if box[0] <= need[0] and box[1] <= need[1] and box[2] >= need[2] and box[3] >= need[3]:
@@ -109,7 +125,20 @@ class Site:
             more = (LOCAL_MARGIN_M if self.local else MARGIN_M) * 2.0 ** (level - 1)
             return _past_zones((west - more, south - more, east + more, north + more), self.placed, more)
         more = 0.5 * max(east - west, north - south) * (2.0**level - 1.0)
-        return _within_frame((west - more, south - more, east + more, north + more))
+        return self._clipped((west - more, south - more, east + more, north + more))
+
+    def _clipped(self, box: Box) -> Box:
+        """``box`` as far as there is terrain, within the frame, and no smaller than the first window."""
+        if self._extent is None:
+            self._extent = self.terrain.extent(self.frame, self.box)
+        # The edge itself lies inside, so that terrain that ends here is not taken for terrain that goes on.
+        w, s, e, n = self._extent
+        more = EDGE_M
+        held = (max(box[0], w - more), max(box[1], s - more), min(box[2], e + more), min(box[3], n + more))
+        west, south, east, north = _within_frame(held)
+        return (
+            min(west, self.box[0]), min(south, self.box[1]), max(east, self.box[2]), max(north, self.box[3])
+        )  # fmt: skip
 
 
 def _past_zones(box: Box, placed: Placed, spare_m: float) -> Box:

@@ -84,7 +84,7 @@ def within_m(problem: Problem) -> float:
     lines, _ = border(problem)
     stops = terminals(problem)
     way = shapely.LineString(stops) if len(set(stops)) > 1 else shapely.Point(stops[0])
-    return float(shapely.MultiLineString(list(lines)).distance(way))
+    return float(shapely.distance(shapely.MultiLineString(list(lines)), way))
 
 
 def margin_for(problem: Problem, cost: float) -> float:

@@ -163,8 +163,10 @@ def rebuilt(
 
 @dataclass(frozen=True, eq=False)
 class Wider:
-    """A problem's ``widen``: the same question over more terrain of its mission file. ``source`` and ``world`` are those
-    that the problem is of; ``zones``: those of the search alone."""
+    """A problem's ``widen``: the same question over more terrain of its mission file.
+
+    ``source`` and ``world`` are those that the problem is of; ``zones``: those of the search alone.
+    """
 
     source: MissionFile
     world: World

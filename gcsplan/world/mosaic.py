@@ -208,6 +208,16 @@ class Mosaic:
         goes_on = (c0 > first_col, r0 > first_row, c1 < last_col, r1 < last_row)
         return Window(heights, grid, x, y, tuple(notes), goes_on)
 
+    def extent(self, frame: Frame, box: Box) -> Box:
+        """West, south, east, north of all tiles in the plane, as far as the plane reaches; ``box`` is the mission's."""
+        there, _ = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
+        layout = self._layout(float(frame.to_degrees(0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))[1]))
+        cols = [c for p in layout.tiles for c in (p.col, p.col + p.raster.cols - 1)]
+        rows = [r for p in layout.tiles for r in (p.row, p.row + p.raster.rows - 1)]
+        x = layout.x0 + layout.dx * np.linspace(min(cols), max(cols), 33)
+        y = layout.y0 - layout.dy * np.linspace(min(rows), max(rows), 33)
+        return _plane_box(there, x, y)
+
     def _near(self, x: Floats, lon_deg: float) -> Floats:
         """Longitudes within half a turn of ``lon_deg``, so that the antimeridian is no edge; else as they are."""
         return np.asarray(lon_deg + (x - lon_deg + 180.0) % 360.0 - 180.0) if self.crs.geographic else x

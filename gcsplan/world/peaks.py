@@ -50,9 +50,7 @@ def flat_grid(base_m: float, box: Box) -> tuple[Floats, GridMap]:
     return np.full((2, 2), base_m), GridMap.affine(west, north, east - west, north - south)
 
 
-def peaks_grid(
-    base_m: float, peaks: Sequence[Peak], box: Box, most_nodes: int | None = None
-) -> tuple[Floats, GridMap]:
+def peaks_grid(base_m: float, peaks: Sequence[Peak], box: Box, most_nodes: int | None = None) -> tuple[Floats, GridMap]:
     """Heights (rows, cols) and grid of ``base_m`` plus the peaks over ``box``.
 
     Between the nodes the bilinear surface is never below the true one: a chord lies below a concave curve by at most

@@ -68,6 +68,9 @@ class Terrain(Protocol):
     def is_flat(self) -> bool:
         """True where the ground has one height everywhere."""
 
+    def extent(self, frame: Frame, box: Box) -> Box:
+        """A box of the plane that holds all of the terrain, as far as the plane reaches; ``box`` is the mission's."""
+
     def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
         """The surface over ``box`` (west, south, east, north, plane metres).
 
@@ -125,6 +128,9 @@ class _RasterTerrain:
     @property
     def is_flat(self) -> bool:
         return False
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        return self._mosaic.extent(frame, box)
 
     def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
         spec, rasters = self._spec, self._mosaic.rasters
@@ -191,6 +197,9 @@ class _LocalTerrain:
     @property
     def is_flat(self) -> bool:
         return not self._spec.peaks
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        return -FARTHEST_M, -FARTHEST_M, FARTHEST_M, FARTHEST_M
 
     def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
         spec = self._spec
