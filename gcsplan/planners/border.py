@@ -68,11 +68,10 @@ def exit_cost(problem: Problem) -> float:
     track_m = float(legs.sum()) + max(more_m - 4.0 * bow_m, 0.0)
     heights = [problem.start[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None), problem.goal[2]]
     rise_m = sum(abs(b - a) for a, b in pairwise(heights))
+    exact = 1.0 - 1e-9  # arithmetic is rounded
     if problem.objective == "energy":
-        cost = problem.horizontal_j_per_m * track_m + problem.vertical_j_per_m * rise_m
-    else:
-        cost = math.hypot(track_m, rise_m)
-    return cost * (1.0 - 1e-9)  # rounded arithmetic
+        return exact * (problem.horizontal_j_per_m * track_m + problem.vertical_j_per_m * rise_m)
+    return exact * math.hypot(track_m, rise_m)
 
 
 def within_m(problem: Problem) -> float:

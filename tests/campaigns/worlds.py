@@ -25,7 +25,6 @@ import rasterio
 import yaml
 from numpy.typing import NDArray
 from pyproj import Transformer
-from rasterio.transform import from_origin
 from scipy.ndimage import binary_erosion, gaussian_filter, maximum_filter
 
 from gcsplan.bench.everyday_oracle import Plane, Unreachable
@@ -149,9 +148,8 @@ def _over_raster(
     names = []
     for k, (rows, cols) in enumerate(pieces):
         part = ground[rows, cols]
-        corner = from_origin(
-            WEST_M + (cols.start - 0.5) * cell_m, NORTH_M - (rows.start - 0.5) * cell_m, cell_m, cell_m
-        )
+        west, north = WEST_M + (cols.start - 0.5) * cell_m, NORTH_M - (rows.start - 0.5) * cell_m
+        corner = rasterio.Affine(cell_m, 0.0, west, 0.0, -cell_m, north)
         names.append(f"tile{k}.tif")
         with rasterio.open(
             folder / names[-1], "w", driver="GTiff", width=part.shape[1], height=part.shape[0], count=1,
