@@ -22,7 +22,7 @@ from gcsplan.world.zones import Circle, Zone
 
 Floats = NDArray[np.float64]
 
-PIECES = 32
+PIECES = 8
 """Straight pieces of one side of a window, which the plane bends."""
 INSET_CELLS = 1.0
 """Cells at the border that count as beyond it, besides what a path keeps to unknown ground."""
@@ -68,10 +68,10 @@ def exit_cost(problem: Problem) -> float:
     track_m = float(legs.sum()) + max(more_m - 4.0 * bow_m, 0.0)
     heights = [problem.start[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None), problem.goal[2]]
     rise_m = sum(abs(b - a) for a, b in pairwise(heights))
-    exact = 1.0 - 1e-9  # arithmetic is rounded
+    cost = math.hypot(track_m, rise_m)
     if problem.objective == "energy":
-        return exact * (problem.horizontal_j_per_m * track_m + problem.vertical_j_per_m * rise_m)
-    return exact * math.hypot(track_m, rise_m)
+        cost = problem.horizontal_j_per_m * track_m + problem.vertical_j_per_m * rise_m
+    return float(cost * (1.0 - 1e-9))  # arithmetic is rounded
 
 
 def within_m(problem: Problem) -> float:
@@ -111,17 +111,13 @@ def border(problem: Problem) -> tuple[Floats, float]:
     c0, r0 = np.minimum(keep, 0.49 * np.array([cols - 1, rows - 1])).tolist()
     c1, r1 = cols - 1 - c0, rows - 1 - r0
     f = np.linspace(0.0, 1.0, 2 * PIECES + 1)
-    along_c, along_r = f * (cols - 1), f * (rows - 1)
-    sides = [(c0 + 0.0 * f, along_r), (along_c, r0 + 0.0 * f), (c1 + 0.0 * f, along_r), (along_c, r1 + 0.0 * f)]
-    lines, bow_m = [], 0.0
-    for (c, r), more in zip(sides, surface.goes_on, strict=True):
-        if not more:
-            continue
-        at = surface.grid.to_plane(c, r)
-        ends = np.stack([at[:-2:2], at[2::2]], axis=1)
-        bow_m = max(bow_m, 1.1 * float(np.hypot(*(at[1::2] - ends.mean(axis=1)).T).max()) + surface.grid.error_m)
-        lines.append(ends)
-    return np.concatenate(lines), bow_m
+    along_c, along_r, one = f * (cols - 1), f * (rows - 1), np.ones_like(f)
+    sides = [(c0 * one, along_r), (along_c, r0 * one), (c1 * one, along_r), (along_c, r1 * one)]
+    met = np.array([side for side, more in zip(sides, surface.goes_on, strict=True) if more])
+    at = surface.grid.to_plane(met[:, 0], met[:, 1])
+    lines = np.stack([at[:, :-2:2], at[:, 2::2]], axis=2)
+    off_m = np.hypot(*np.moveaxis(at[:, 1::2] - lines.mean(axis=2), -1, 0)).max()
+    return lines.reshape(-1, 2, 2), 1.1 * float(off_m) + surface.grid.error_m
 
 
 def enclosed(problem: Problem) -> bool:
@@ -189,7 +185,7 @@ def _by_zones(problem: Problem) -> bool:
 
 def _is_wall(zone: Zone, top_m: float) -> bool:
     high = zone.ceiling
-    return zone.floor is None and (high is None or (high.datum == "amsl" and high.value_m >= top_m))
+    return zone.floor is None and (high is None or (high.datum == "amsl" and high.value_m > top_m))
 
 
 def _shape(zone: Zone, reach_m: float) -> Any:

@@ -349,9 +349,12 @@ FAMILIES: dict[str, Callable[[np.random.Generator, Path], Case]] = {
 
 
 def judge(
-    family: str, seed: int, planner: Callable[[Problem], Solution] = plan, budget_mb: float | None = None
+    family: str,
+    seed: int,
+    planner: Callable[[Problem], Solution] = plan,
+    **changes: float,
 ) -> Outcome:
-    """Plan one mission, and hold the answer to what is known of it; ``budget_mb`` None: as much memory as usual."""
+    """Plan one mission, and hold the answer to what is known of it; ``changes``: of the problem, a budget or two."""
     rng = np.random.default_rng([seed, *family.encode()])
     with tempfile.TemporaryDirectory() as name:
         case = FAMILIES[family](rng, Path(name))
@@ -361,8 +364,8 @@ def judge(
         objective = "energy" if rng.random() < 0.2 else "length"
         said: list[Progress] = []
         problem = make_problem(source, source.vehicles[0], world_of(source), objective, 1, progress=said.append)[0]
-        windows = []
-        problem = _counting(problem, windows, budget_mb)
+        windows: list[float] = []
+        problem = replace(_counting(problem, windows), **changes)  # type: ignore[arg-type]
         out = Outcome(family, seed, "solved", known=case.known(problem), objective=objective)
         begun = time.perf_counter()
         try:
@@ -388,7 +391,9 @@ def judge(
         return out
 
 
-def _counting(problem: Problem, windows: list[float], budget_mb: float | None) -> Problem:
+def _counting(problem: Problem, windows: list[float]) -> Problem:
+    """The same problem, which writes down how often it is asked over more terrain."""
+
     def counted(of: Problem) -> Problem:
         inner = of.widen
 
@@ -401,7 +406,7 @@ def _counting(problem: Problem, windows: list[float], budget_mb: float | None) -
 
         return replace(of, widen=widen)
 
-    return replace(counted(problem), **({} if budget_mb is None else {"budget_mb": budget_mb}))
+    return counted(problem)
 
 
 def summary(outcomes: list[Outcome]) -> str:

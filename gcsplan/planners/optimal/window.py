@@ -17,7 +17,7 @@ import numpy as np
 
 from gcsplan.planners.border import enclosed, exit_cost, goes_on, margin_for, within_m
 from gcsplan.planners.problem import Problem, Progress, Solution
-from gcsplan.planners.refusal import Refusal, Unexplained
+from gcsplan.planners.refusal import Refusal, Unexplained, check_ends
 from gcsplan.world.airspace import Legs
 
 Window = Callable[[Problem], Solution]
@@ -42,7 +42,8 @@ def plan_over(problem: Problem, plan_window: Window) -> Solution:
     for _ in range(MOST_WINDOWS):
         spent_s = time.perf_counter() - begun
         left_s = problem.budget_s if now is problem else max(problem.budget_s - spent_s, 0.1 * problem.budget_s)
-        asked = replace(now, budget_s=left_s, terse=goes_on(now), progress=_reported(now, begun))
+        leaving = exit_cost(now)
+        asked = replace(now, budget_s=left_s, terse=math.isfinite(leaving), progress=_reported(now, begun, leaving))
         try:
             found = plan_window(asked)
         except Unexplained as no_path:
@@ -53,13 +54,19 @@ def plan_over(problem: Problem, plan_window: Window) -> Solution:
             if best is None:
                 raise
             break
+        except MemoryError:
+            if best is None and refused is None:
+                raise
+            break  # what is known of the smaller window stands
         else:
             refused = None
-            best = better(now, best, held_to_border(now, found if now is problem else replace(found, problem=now)))
-            if best.problem is not (None if now is problem else now) or not binds(now, best):
+            found = held_to_border(now, found, leaving)
+            best = better(now, best, found if now is problem else replace(found, problem=now))
+            if best.problem is not (None if now is problem else now) or not binds(now, best, leaving):
                 break
         spent_s = time.perf_counter() - begun
         if spent_s > problem.budget_s * (PATIENCE if best is None else 1.0):
+            best = None if best is None else replace(best, stopped_by="time")
             break
         wider = widened(now, math.inf if best is None else now.cost(best.path))
         if wider is None:
@@ -71,9 +78,9 @@ def plan_over(problem: Problem, plan_window: Window) -> Solution:
     return replace(best, planning_s=time.perf_counter() - begun)
 
 
-def _reported(now: Problem, begun: float) -> Callable[[Progress], None] | None:
+def _reported(now: Problem, begun: float, leaving: float) -> Callable[[Progress], None] | None:
     """Where progress is reported, if anywhere: seconds since ``begun``, and bounds that hold beyond the border too."""
-    report, leaving = now.progress, exit_cost(now)
+    report = now.progress
     if report is None:
         return None
 
@@ -92,7 +99,12 @@ def widened(now: Problem, cost: float) -> Problem | None:
     if wide is None:
         return None
     ends = [_end(old, new) for old, new in ((now.start, wide.start), (now.goal, wide.goal))]
-    return replace(now, airspace=wide.airspace, limits=wide.limits, start=ends[0], goal=ends[1], widen=wide.widen)
+    wide = replace(now, airspace=wide.airspace, limits=wide.limits, start=ends[0], goal=ends[1], widen=wide.widen)
+    try:
+        check_ends(wide)
+    except Refusal:  # an end that is legal by a hair here is not there
+        return None
+    return wide
 
 
 def _end(old: tuple[float, float, float], new: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -101,9 +113,8 @@ def _end(old: tuple[float, float, float], new: tuple[float, float, float]) -> tu
     return (*old[:2], max(old[2], new[2])) if same else old
 
 
-def held_to_border(problem: Problem, found: Solution) -> Solution:
-    """``found`` with the bound that holds for paths which leave the surface, too."""
-    leaving = exit_cost(problem)
+def held_to_border(problem: Problem, found: Solution, leaving: float) -> Solution:
+    """``found`` with the bound that holds for paths which leave the surface, too, and cost ``leaving`` at least."""
     if found.lower_bound is None or found.lower_bound <= leaving:
         return found
     cost = problem.cost(found.path)
@@ -118,11 +129,10 @@ def held_to_border(problem: Problem, found: Solution) -> Solution:
     return replace(found, lower_bound=leaving, stopped_by=stopped, notes=(*found.notes, note))
 
 
-def binds(problem: Problem, found: Solution) -> bool:
+def binds(problem: Problem, found: Solution, leaving: float) -> bool:
     """Whether the bound is that of paths which leave the surface, and too low."""
     if found.lower_bound is None:
         return False
-    leaving = exit_cost(problem)
     return found.lower_bound >= leaving and problem.cost(found.path) - leaving > problem.gap_percent / 100.0 * leaving
 
 
