@@ -321,7 +321,7 @@ def test_bounds_and_proofs_hold_for_the_world_beyond_the_window(first: int) -> N
     for seed in range(first, first + 50):
         zones = random_walls(seed)
         rng = np.random.default_rng([seed, 1])
-        ends = [(*rng.uniform(-1500.0, 1500.0, 2).tolist(), 60.0) for _ in range(2)]
+        ends = [(*rng.uniform(-1500.0, 1500.0, 2).tolist(), 100.0) for _ in range(2)]
         most = WORLD_M if rng.random() < 0.7 else 8000.0  # what memory allows
         said: list[Progress] = []
 
