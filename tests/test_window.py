@@ -104,6 +104,7 @@ def test_every_vehicle_is_judged_over_the_widest_terrain_that_one_of_them_needed
     assert {v.brief.world for v in done.vehicles if v.brief is not None} == {done.world}
 
 
+@pytest.mark.slow
 def test_two_plans_are_the_same_to_the_last_bit() -> None:
     one, other = (planner.plan(problem_of(source_of(ROW_4))) for _ in range(2))
     assert one.path.points.tobytes() == other.path.points.tobytes()
