@@ -18,7 +18,7 @@ from gcsplan.planners.registry import VOLUME_KEYS
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.steps.fleeting import FleetPlan, fleet_of
 from gcsplan.steps.gate import GateTime
-from gcsplan.steps.planning import Brief, VehiclePlan, make_problem
+from gcsplan.steps.planning import Brief, VehiclePlan, make_problem, over_one_terrain
 from gcsplan.steps.refusals import plan_or_explain
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.world import World
@@ -74,7 +74,8 @@ def plan(
     told = _options(source, name) | dict(options or {})
     by_priority = bool(entry.optimiser) and (told.get("cost") or entry.defaults.get("cost")) == "msfoa"
     brief = Brief(source, world_of(source), entry.plan, goal, number, told, by_priority and len(source.vehicles) > 1)
-    vehicles = _one_by_one(brief, progress)
+    brief, vehicles = over_one_terrain(brief, _one_by_one(brief, progress), progress)
+    source = brief.source
     flown, fleet = fleet_of(vehicles, brief, None if gate_utc is None else GateTime(gate_utc))
     notes = list(source.notes)
     if len(flown) > 1 and source.arrival is None:

@@ -11,10 +11,12 @@ import os
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.mission_file.ground import Ground, Site
 from gcsplan.mission_file.request import AltitudeFrame, ArrivalRequest, MissionFile, PlannerRequest, VehicleRequest
 from gcsplan.mission_file.schema import (
     TOP_KEYS,
@@ -30,7 +32,7 @@ from gcsplan.mission_file.schema import (
     shown,
     unknown_keys,
 )  # fmt: skip
-from gcsplan.mission_file.stops import Stops, make_request
+from gcsplan.mission_file.stops import Stops
 from gcsplan.mission_file.strict_yaml import MAX_BYTES, read_yaml
 from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle
 from gcsplan.mission_file.world import (
@@ -40,13 +42,10 @@ from gcsplan.mission_file.world import (
     make_place,
     make_spec,
     make_zones,
-    settle_zones,
 )  # fmt: skip
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zones_sha256
 from gcsplan.world.frame import FARTHEST_M, Frame
-from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
-from gcsplan.world.zones import Zone
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
 
@@ -142,40 +141,30 @@ class _Reading:
         frame: Frame | None = None
         if places and (frame_keys is not None or not self.local):
             frame = make_frame(places, frame_keys, problems, self.where)
-        zones: list[Zone] = []
-        requests: list[VehicleRequest] = []
-        surface: Surface | None = None
-        scale = 1.0
+        site: Site | None = None
+        ground: Ground | None = None
         if frame is not None and terrain is not None:
             placed, far = place_zones(drafts, frame)
             self._far(far, frame)
             others = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in self.around if terrain.covers(*p))]
             others = [p for p in others if math.hypot(*p) <= FARTHEST_M]
             box = make_box([*(p.in_plane(frame) for p in places), *others], [z for _, z in placed], local=self.local)
-            scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
-            try:
-                surface = terrain.load(frame, box)
-            except InputError as why:
-                problems += why.problems
-            if surface is not None:
-                zones = settle_zones(placed, surface, problems)
-                good = set(places)
-                for s in stops:
-                    request = make_request(s, frame, surface, zones, good, problems)
-                    requests += [request] if request is not None else []
-        if problems or frame is None or surface is None:
+            site = Site(terrain, frame, box, placed, stops, set(places), self.local)
+            ground = site.load(problems)
+        if problems or frame is None or site is None or ground is None:
             raise InputError.of(problems)
-        info = surface.info
+        info = ground.surface.info
         notes = info.get("notes", ())
         self.notes += [str(n) for n in notes] if isinstance(notes, tuple) else []
         inputs = {k: v for k, v in info.items() if k not in ("notes", "source")}
         inputs["zones_sha256"] = zones_sha256(drafts)
-        return MissionFile(
-            name=name, path=self.file, stem=self.file.stem, frame=frame, surface=surface, zones=tuple(zones),
-            airspace_scale=scale, vehicles=tuple(requests), arrival=arrival, planner=planner,
+        source = MissionFile(
+            name=name, path=self.file, stem=self.file.stem, frame=frame, surface=ground.surface, zones=ground.zones,
+            airspace_scale=ground.scale, vehicles=ground.vehicles, arrival=arrival, planner=planner,
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
             notes=tuple(dict.fromkeys(self.notes)),
         )  # fmt: skip
+        return replace(source, wider=partial(site.wider, source))
 
     # -- the plain keys ------------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -81,7 +82,10 @@ class MissionFile:
     """A mission file, read and found good; metres inside.
 
     ``airspace_scale``: largest scale of the plane over the terrain that was loaded. ``inputs`` is what the outputs
-    say of the sources; ``notes`` are said to the user.
+    say of the sources; ``notes`` are said to the user. ``wider(margin_m, most_cells)``: the same file with more terrain
+    loaded, so far around all stops or at least twice as far as here, or what there is of it; None where that would take
+    more cells, or there is no more. ``level`` counts the times that it was: the terrain of each holds that of the one
+    before.
     """
 
     name: str
@@ -99,3 +103,5 @@ class MissionFile:
     local: bool
     inputs: dict[str, object]
     notes: tuple[str, ...]
+    wider: Callable[[float, int], MissionFile | None] | None = None
+    level: int = 0

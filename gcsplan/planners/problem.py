@@ -52,6 +52,9 @@ class Problem:
     passes the final check too. Metres only: a planner never sees a degree. ``options`` are what only some planners
     know: the swarms' ``encoding``, ``cost``, ``points``, ``population``, ``iterations``, ``evaluations`` and
     ``parameters``.
+
+    ``widen(margin_m, budget_mb)``: the same question over more terrain, at least so far around all stops (inf: twice as
+    far as here) if memory allows; None where it does not, or where there is no more; `Surface.goes_on` tells which.
     """
 
     airspace: Airspace
@@ -70,6 +73,7 @@ class Problem:
     budget: Budget = field(default_factory=Budget.endless)
     progress: Callable[[Progress], None] | None = None
     options: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
+    widen: Callable[[float, float], Problem | None] | None = None
 
     def leg_costs(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
         """(...) cost of straight legs between points (..., 3), as `cost` sums them."""
@@ -123,6 +127,7 @@ class Solution:
     ``flown``: the track that ``path``'s points are flown by on, where there is a turn radius; None where corners are
     flown as they are. Of planners that search by samples: ``raw_violations``, how many limits the exact check found
     broken in the result of the search itself, and whether it was ``repaired``; None of all others.
+    ``problem``: what was answered, where that is the problem over more terrain than it was asked for.
     """
 
     path: Path
@@ -135,6 +140,7 @@ class Solution:
     raw_violations: int | None = None
     repaired: bool | None = None
     search: tuple[Step, ...] = ()
+    problem: Problem | None = None
 
 
 class Refusal(NoMission):

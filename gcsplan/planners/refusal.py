@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from gcsplan.planners.border import enclosed, goes_on, within_m
 from gcsplan.planners.cures import floor_words, rounded_up, with_cures
 from gcsplan.planners.lattice.lattice import levels_of, near_zone
 from gcsplan.planners.problem import Problem, Refusal, terminals
@@ -19,13 +20,23 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 
 
+class NoPath(Refusal):
+    """A search found no path over the terrain that it looked at; over more of it there may be one."""
+
+
 def explain(problem: Problem, *, proved: bool | None = None, plan: Plan | None = None) -> Refusal:
     """The refusal for a problem whose ends are legal and for which there is no path; ``proved``: that is known.
 
-    With ``plan``, the refusal says what would help, see `with_cures`; without, whoever receives it may ask for that.
+    Where the terrain goes on beyond the surface, it is proved only if no path can get there from both ends. With
+    ``plan``, the refusal says what would help, see `with_cures`; without, whoever receives it may ask for that.
     """
-    words = "there is no path within the limits, which is proved" if proved else "no path was found"
-    bare = Refusal(f"no mission: {words}", reason="infeasible" if proved else "not_found", untried=True)
+    words = "no path was found"
+    if goes_on(problem):
+        proved = enclosed(problem)
+        words = f"no path was found within {within_m(problem) / 1000.0:.1f} km of the straight track"
+    if proved:
+        words = "there is no path within the limits, which is proved"
+    bare = NoPath(f"no mission: {words}", reason="infeasible" if proved else "not_found", untried=True)
     return bare if plan is None else with_cures(problem, bare, plan)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,8 +20,12 @@ from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
+from gcsplan.world.zones import Zone
 
-__all__ = ["Brief", "VehiclePlan", "make_problem", "plan_vehicle", "rebuilt"]
+__all__ = ["Brief", "VehiclePlan", "make_problem", "over_one_terrain", "plan_vehicle", "rebuilt"]
+
+BYTES_PER_NODE = 64.0
+"""What a wider window takes in memory for each of its nodes, terrain included: 58 bytes were measured."""
 
 ATTEMPTS = 4
 """Plans for one vehicle, each with larger margins than the one before, until the decoded mission passes."""
@@ -45,7 +49,7 @@ class Brief:
 
 @dataclass(frozen=True, eq=False)
 class VehiclePlan:
-    """One vehicle's request and everything that became of it."""
+    """One vehicle's request and everything that became of it; ``brief``: over which terrain it was planned."""
 
     request: VehicleRequest
     problem: Problem
@@ -55,6 +59,7 @@ class VehiclePlan:
     speed_m_s: float
     notes: tuple[str, ...] = ()
     order: Order = field(default_factory=Order)
+    brief: Brief | None = None
 
     @property
     def name(self) -> str:
@@ -99,11 +104,14 @@ def plan_vehicle(
     for _ in range(ATTEMPTS):
         problem, notes = make_problem(source, asked, world, brief.objective, brief.seed, margins, progress, told)
         solution = run_planner(brief.run, problem, vehicle, world)
+        over = looked_over(brief, solution)
         for spaced in (True, False):  # way points nearer than the acceptance radii are dropped where that is legal
             order = Order(request.end, source.altitude_frame, spaced=spaced)
-            mission, verdict = built(brief, request, solution, order)
+            mission, verdict = built(over, request, solution, order)
             if not verdict.findings:
-                return VehiclePlan(request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order)
+                return VehiclePlan(
+                    request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order, over
+                )
         failed = verdict
         if not any(f.seq > mission.first_seq for f in verdict.findings if f.kind != "battery"):
             break  # no margin mends a battery or a take-off column
@@ -111,6 +119,25 @@ def plan_vehicle(
         margins = _larger(margins, verdict, all_along=all_along)
     assert failed is not None
     raise unsafe(failed, vehicle)
+
+
+def over_one_terrain(
+    brief: Brief, vehicles: Sequence[VehiclePlan], progress: Callable[[str, Progress], None] | None = None
+) -> tuple[Brief, list[VehiclePlan]]:
+    """All vehicles over the widest terrain that any of them needed, each judged there; planned anew where it fails."""
+    wide = widest(brief, vehicles)
+    out = []
+    for v in vehicles:
+        if v.brief is None or v.brief.source is wide.source:
+            out.append(v)
+            continue
+        mission, verdict = built(wide, v.request, v.solution, v.order)
+        if not verdict.findings:
+            out.append(replace(v, mission=mission, verdict=verdict, brief=wide))
+            continue
+        tell = None if progress is None else lambda what, who=v.name: progress(who, what)
+        out.append(plan_vehicle(wide, v.request, tell))
+    return wide, out
 
 
 def rebuilt(
@@ -128,10 +155,58 @@ def rebuilt(
     order = replace(v.order, speed_m_s=speed_m_s, hold_s=0 if gate_utc else round(hold_s), gate_utc=gate_utc)
     if order == v.order:
         return v
-    mission, verdict = built(brief, v.request, v.solution, order)
+    mission, verdict = built(widest(brief, [v]), v.request, v.solution, order)
     if verdict.findings:
         raise unsafe(verdict, v.request.vehicle)
     return replace(v, mission=mission, verdict=verdict, speed_m_s=speed_m_s, order=order)
+
+
+@dataclass(frozen=True, eq=False)
+class Wider:
+    """A problem's ``widen``: the same question over more terrain of its mission file.
+
+    ``source`` and ``world`` are those that the problem is of; ``zones``: those of the search alone.
+    """
+
+    source: MissionFile
+    world: World
+    request: VehicleRequest
+    zones: tuple[Zone, ...]
+    objective: str
+    seed: int
+    margins: Margins
+
+    def __call__(self, margin_m: float, budget_mb: float) -> Problem | None:
+        """See `Problem.widen`."""
+        cells = math.floor(budget_mb * 2**20 / BYTES_PER_NODE)
+        wide = None if self.source.wider is None else self.source.wider(margin_m, cells)
+        if wide is None:
+            return None
+        there = next(r for r in wide.vehicles if r.vehicle.name == self.request.vehicle.name)
+        request = replace(self.request, start=there.start, goal=there.goal)
+        air = Airspace(wide.surface, (*wide.zones, *self.zones), scale=wide.airspace_scale)
+        world = World(wide.frame, air)
+        try:
+            return make_problem(wide, request, world, self.objective, self.seed, self.margins)[0]
+        except (InputError, NoMission):
+            return None  # an end that is legal by a hair here is not there
+
+
+def looked_over(brief: Brief, solution: Solution) -> Brief:
+    """``brief`` over the terrain that a solution was found in: more than it was asked for, where that was needed."""
+    over = None if solution.problem is None else solution.problem.widen
+    if not isinstance(over, Wider):
+        return brief
+    world = over.world
+    if over.zones:  # a search's own zones are nobody else's
+        air = Airspace(world.airspace.surface, over.source.zones, scale=over.source.airspace_scale)
+        world = World(world.frame, air)
+    return replace(brief, source=over.source, world=world)
+
+
+def widest(brief: Brief, plans: Sequence[VehiclePlan]) -> Brief:
+    """Of ``brief`` and those that vehicles were planned under the one that looks over the most terrain."""
+    return max([brief, *(v.brief for v in plans if v.brief is not None)], key=lambda b: b.source.level)
 
 
 def built(brief: Brief, request: VehicleRequest, solution: Solution, order: Order) -> tuple[Mission, Verdict]:
@@ -193,7 +268,7 @@ def make_problem(
     not the slope of the ground within the track error is raised, and a note says so; a lower one is bad input.
     """
     vehicle = request.vehicle
-    margins = replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
+    given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
     limits = _with_margins(vehicle.limits, margins, terrain=source.altitude_frame == "terrain", source=source)
     air = world.airspace
     datum = request.start[2]
@@ -234,6 +309,8 @@ def make_problem(
         Via(e, n, None if agl is None else float(air.surface.ground_at(e, n)) + agl) for e, n, agl in request.via
     )
     asked = source.planner
+    own = world.airspace.zones[len(source.zones) :]
+    wider = Wider(source, world, request, own, objective, seed, given)
     problem = Problem(
         airspace=air,
         limits=limits,
@@ -250,6 +327,7 @@ def make_problem(
         budget_mb=asked.budget_mb,
         progress=progress,
         options=dict(asked.extras if options is None else options),
+        widen=None if source.wider is None else wider,
     )
     if vehicle.autopilot is Autopilot.ARDUPLANE and vehicle.turn_radius_m <= 0.0:
         notes.append(

@@ -25,7 +25,7 @@ from gcsplan.mavlink.build import MARGINS, Margins, Order
 from gcsplan.mavlink.wings import Wing, flown_m, tangents_m, thinned
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Solution
-from gcsplan.steps.planning import Brief, VehiclePlan, built, make_problem, run_planner, unsafe
+from gcsplan.steps.planning import Brief, VehiclePlan, built, looked_over, make_problem, run_planner, unsafe
 from gcsplan.steps.wing_ends import FlightEnd, circle_m, goals, starts
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
@@ -97,11 +97,12 @@ def _joined(
         order = _order(brief, asked, start, goal)
         if not _fits(solution.path.points, order, vehicle.turn_radius_m):
             continue
-        mission, verdict = built(brief, request, solution, order)
+        over = looked_over(brief, solution)
+        mission, verdict = built(over, request, solution, order)
         if any(words.endswith(UNFITTING) for words in verdict.not_judged):
             continue
         speed = vehicle.speed_max_m_s
-        return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_words(start, goal)), order)
+        return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_words(start, goal)), order, over)
     raise NoMission(
         f"{vehicle.name}: paths with turns of turn_radius_m {vehicle.turn_radius_m:g} were found, but none that joins "
         f"the climb-out and the approach: give another takeoff_heading_deg, or move start or goal",

@@ -14,7 +14,7 @@ from gcsplan.errors import InputError
 from gcsplan.world.datum import plane_to_raster, to_wgs84
 from gcsplan.world.frame import Frame
 from gcsplan.world.raster import MAX_CELLS, Raster
-from gcsplan.world.surface import GridMap
+from gcsplan.world.surface import NO_SIDES, GridMap, Sides
 
 Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -32,7 +32,8 @@ _SPARE_CELLS = 3
 class Window:
     """A rectangle of nodes: ``heights_m`` (rows, cols), NaN unknown; ``grid`` maps the plane to them.
 
-    ``x``, ``y``: coordinates of the columns and rows in the raster's own units.
+    ``x``, ``y``: coordinates of the columns and rows in the raster's own units. ``goes_on``: past which sides (first
+    column, first row, last column, last row) the tiles hold more.
     """
 
     heights_m: Floats
@@ -40,6 +41,7 @@ class Window:
     x: Floats
     y: Floats
     notes: tuple[str, ...]
+    goes_on: Sides = NO_SIDES
 
     @property
     def plane_box(self) -> Box:
@@ -135,12 +137,12 @@ class Mosaic:
         lon, lat = self._degrees.transform(x, y)
         return np.asarray(lat, float), np.asarray(lon, float)
 
-    def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0) -> Window:
+    def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0, most_cells: int | None = None) -> Window:
         """Nodes that cover ``box`` (west, south, east, north, plane metres) and ``spare_m`` around it.
 
         Clipped to what the tiles hold; gaps between them are NaN, and where two of them hold one node the higher
-        height counts. Raises InputError where no tile meets the box, beyond `MAX_CELLS`, and where the plane cannot
-        be fitted to `FIT_ERROR_M`.
+        height counts. Raises InputError where no tile meets the box, beyond ``most_cells`` (`MAX_CELLS`), and where the
+        plane cannot be fitted to `FIT_ERROR_M`.
         """
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         there, accuracy_m = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
@@ -161,10 +163,11 @@ class Mosaic:
                 "made for this place",
                 where=self.where,
             )
-        c0 = max(math.floor(col.min()) - _SPARE_CELLS, min(p.col for p in tiles))
-        c1 = min(math.ceil(col.max()) + _SPARE_CELLS + 1, max(p.col + p.raster.cols for p in tiles))
-        r0 = max(math.floor(row.min()) - _SPARE_CELLS, min(p.row for p in tiles))
-        r1 = min(math.ceil(row.max()) + _SPARE_CELLS + 1, max(p.row + p.raster.rows for p in tiles))
+        first_col, last_col = min(p.col for p in tiles), max(p.col + p.raster.cols for p in tiles)
+        first_row, last_row = min(p.row for p in tiles), max(p.row + p.raster.rows for p in tiles)
+        c0, c1 = max(math.floor(col.min()) - _SPARE_CELLS, first_col), math.ceil(col.max()) + _SPARE_CELLS + 1
+        r0, r1 = max(math.floor(row.min()) - _SPARE_CELLS, first_row), math.ceil(row.max()) + _SPARE_CELLS + 1
+        c1, r1 = min(c1, last_col), min(r1, last_row)
         parts = [(p, o) for p in tiles if c1 - c0 > 1 and r1 - r0 > 1 and (o := p.overlap(c0, r0, c1 - c0, r1 - r0))]
         if not parts or max(o[2] for _, o in parts) < 2 or max(o[3] for _, o in parts) < 2:
             raise InputError(
@@ -173,9 +176,10 @@ class Mosaic:
                 "the tiles of this place",
                 where=self.where,
             )
-        if (c1 - c0) * (r1 - r0) > MAX_CELLS:
+        most_cells = min(MAX_CELLS, MAX_CELLS if most_cells is None else most_cells)
+        if (c1 - c0) * (r1 - r0) > most_cells:
             raise InputError(
-                f"the mission needs {c1 - c0} × {r1 - r0} cells of the DEM, more than {MAX_CELLS // 10**6} million; "
+                f"the mission needs {c1 - c0} × {r1 - r0} cells of the DEM, more than {most_cells / 1e6:.3g} million; "
                 "use a coarser DEM (gdalwarp -tr) or a smaller mission",
                 where=self.where,
             )
@@ -201,7 +205,18 @@ class Mosaic:
                 f"the accuracy of the datum shift between WGS84 and {self.crs.horizontal.name} is {good}; "
                 "track_error_m should hold it"
             )
-        return Window(heights, grid, x, y, tuple(notes))
+        goes_on = (c0 > first_col, r0 > first_row, c1 < last_col, r1 < last_row)
+        return Window(heights, grid, x, y, tuple(notes), goes_on)
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        """West, south, east, north of all tiles in the plane, as far as the plane reaches; ``box`` is the mission's."""
+        there, _ = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
+        layout = self._layout(float(frame.to_degrees(0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))[1]))
+        cols = [c for p in layout.tiles for c in (p.col, p.col + p.raster.cols - 1)]
+        rows = [r for p in layout.tiles for r in (p.row, p.row + p.raster.rows - 1)]
+        x = layout.x0 + layout.dx * np.linspace(min(cols), max(cols), 33)
+        y = layout.y0 - layout.dy * np.linspace(min(rows), max(rows), 33)
+        return _plane_box(there, x, y)
 
     def _near(self, x: Floats, lon_deg: float) -> Floats:
         """Longitudes within half a turn of ``lon_deg``, so that the antimeridian is no edge; else as they are."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gcsplan.errors import InputError
 from gcsplan.world.surface import GridMap
 
 Floats = NDArray[np.float64]
@@ -49,11 +50,12 @@ def flat_grid(base_m: float, box: Box) -> tuple[Floats, GridMap]:
     return np.full((2, 2), base_m), GridMap.affine(west, north, east - west, north - south)
 
 
-def peaks_grid(base_m: float, peaks: Sequence[Peak], box: Box) -> tuple[Floats, GridMap]:
+def peaks_grid(base_m: float, peaks: Sequence[Peak], box: Box, most_nodes: int | None = None) -> tuple[Floats, GridMap]:
     """Heights (rows, cols) and grid of ``base_m`` plus the peaks over ``box``.
 
     Between the nodes the bilinear surface is never below the true one: a chord lies below a concave curve by at most
-    ``h²/8`` times its curvature, so each node is raised by that bound over the cells around it.
+    ``h²/8`` times its curvature, so each node is raised by that bound over the cells around it. Where that would take
+    more than `MAX_NODES`, the grid is coarser; with ``most_nodes`` InputError is raised instead, beyond so many.
     """
     west, south, east, north = box
     width, height = east - west, north - south
@@ -67,6 +69,8 @@ def peaks_grid(base_m: float, peaks: Sequence[Peak], box: Box) -> tuple[Floats, 
     spacing = math.sqrt(8.0 * WANTED_ERROR_M / sharpest) if sharpest > 0.0 else math.inf
     spacing = min(spacing, min(width, height) / _COARSEST)
     cols, rows = math.ceil(width / spacing), math.ceil(height / spacing)
+    if most_nodes is not None and (cols + 1) * (rows + 1) > min(most_nodes, MAX_NODES):
+        raise InputError(f"the peaks need {cols + 1} × {rows + 1} nodes, more than {min(most_nodes, MAX_NODES)}")
     if (cols + 1) * (rows + 1) > MAX_NODES:
         shrink = math.sqrt(MAX_NODES / ((cols + 1) * (rows + 1)))
         cols, rows = max(1, math.floor((cols + 1) * shrink) - 1), max(1, math.floor((rows + 1) * shrink) - 1)

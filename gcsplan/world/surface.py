@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
+Sides = tuple[bool, bool, bool, bool]
+NO_SIDES: Sides = (False, False, False, False)
 DEGREE = 6
 TERMS = tuple((i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i))
 
@@ -102,13 +104,15 @@ class Surface:
     ``ground_m`` (rows, cols): height of each node, AMSL metres; NaN is unknown, never ground; bilinear between
     nodes. ``top_m``: ground plus obstacles (trees, buildings), the same array where there are none; it counts
     for min AGL and clearance, not for max AGL. ``grid`` maps the plane to nodes. ``info`` is what the outputs
-    say of the source (``dem_sha256``, ``vertical_datum``, ``resolution_m``, ``bare_dem``).
+    say of the source (``dem_sha256``, ``vertical_datum``, ``resolution_m``, ``bare_dem``). ``goes_on``: past which
+    sides (first column, first row, last column, last row) the terrain is known too, but not loaded here.
     """
 
     ground_m: Floats
     top_m: Floats
     grid: GridMap
     info: dict[str, object] = field(default_factory=dict)
+    goes_on: Sides = NO_SIDES
 
     def __post_init__(self) -> None:
         for name in ("ground_m", "top_m"):

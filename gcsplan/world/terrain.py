@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gcsplan.errors import InputError
 from gcsplan.world.datum import GeoidGrid, VerticalDatum, vertical_datum
-from gcsplan.world.frame import Frame
+from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.mosaic import Mosaic, Window
 from gcsplan.world.obstacles import canopy_on
 from gcsplan.world.peaks import Peak, flat_grid, peaks_grid
@@ -64,8 +64,19 @@ class Terrain(Protocol):
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
         """True where a place lies on the terrain (which may still be void there)."""
 
-    def load(self, frame: Frame, box: Box) -> Surface:
-        """The surface over ``box`` (west, south, east, north, plane metres)."""
+    @property
+    def is_flat(self) -> bool:
+        """True where the ground has one height everywhere."""
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        """A box of the plane that holds all of the terrain, as far as the plane reaches; ``box`` is the mission's."""
+
+    def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
+        """The surface over ``box`` (west, south, east, north, plane metres).
+
+        ``most_cells``: raise InputError beyond so many, and where the grid would have to be coarser than it ought to
+        be; None: as many as there is room for.
+        """
 
 
 def load_terrain(spec: TerrainSpec, frame: Frame, box: Box, *, where: str) -> Surface:
@@ -114,9 +125,16 @@ class _RasterTerrain:
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
         return self._mosaic.covers(lat_deg, lon_deg)
 
-    def load(self, frame: Frame, box: Box) -> Surface:
+    @property
+    def is_flat(self) -> bool:
+        return False
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        return self._mosaic.extent(frame, box)
+
+    def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
         spec, rasters = self._spec, self._mosaic.rasters
-        window = self._mosaic.window(frame, box, spare_m=RASTER_SPARE_M)
+        window = self._mosaic.window(frame, box, spare_m=RASTER_SPARE_M, most_cells=most_cells)
         ground = window.heights_m
         if np.isnan(ground).all():
             raise InputError(
@@ -158,7 +176,7 @@ class _RasterTerrain:
                 )
             info["canopy_sha256"] = self._canopy.rasters[0].sha256()
         info["notes"] = tuple(notes)
-        return Surface(ground, top, window.grid, info)
+        return Surface(ground, top, window.grid, info, window.goes_on)
 
 
 class _LocalTerrain:
@@ -176,10 +194,17 @@ class _LocalTerrain:
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
         return True
 
-    def load(self, frame: Frame, box: Box) -> Surface:
+    @property
+    def is_flat(self) -> bool:
+        return not self._spec.peaks
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        return -FARTHEST_M, -FARTHEST_M, FARTHEST_M, FARTHEST_M
+
+    def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
         spec = self._spec
         base = frame.amsl_m + (spec.flat_m or 0.0)
-        heights, grid = peaks_grid(base, spec.peaks, box) if spec.peaks else flat_grid(base, box)
+        heights, grid = peaks_grid(base, spec.peaks, box, most_cells) if spec.peaks else flat_grid(base, box)
         canonical = json.dumps(
             {"flat_m": spec.flat_m or 0.0, "peaks": [asdict(p) for p in spec.peaks], "amsl_m": frame.amsl_m},
             sort_keys=True,
@@ -193,7 +218,9 @@ class _LocalTerrain:
             "notes": (self._datum.note,) if self._datum.note else (),
         }
         top = heights + spec.obstacle_height_m if spec.obstacle_height_m > 0.0 else heights
-        return Surface(heights, top, grid, info)
+        west, south, east, north = box
+        goes_on = (west > -FARTHEST_M, north < FARTHEST_M, east < FARTHEST_M, south > -FARTHEST_M)
+        return Surface(heights, top, grid, info, goes_on)
 
 
 def _open(path: str, spec: TerrainSpec, where: str, index: int, count: int) -> Raster:

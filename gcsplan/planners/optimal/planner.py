@@ -36,6 +36,7 @@ from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.governor import govern
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.searches import Searches, left_out
+from gcsplan.planners.optimal.window import plan_over
 from gcsplan.planners.problem import Problem, Refusal, Solution, terminals
 from gcsplan.planners.refusal import check_ends, explain
 from gcsplan.world.path import Path
@@ -56,6 +57,11 @@ def plan(problem: Problem) -> Solution:
     the binding constraint where no path is found, and says whether that is proved.
     """
     problem = replace(problem, budget=Budget(problem.budget_s, problem.budget_mb))
+    return plan_over(problem, _within)
+
+
+def _within(problem: Problem) -> Solution:
+    """The same over the problem's surface alone."""
     if problem.turn_radius_m > 0.0:
         return _turning(problem)
     return _sharp(problem)
@@ -77,7 +83,7 @@ def _sharp(problem: Problem, laps: bool = True) -> Solution:
     searches = search(problem, laps)
     incumbent = searches.incumbent
     if incumbent.best is None:
-        raise searches.refusal or explain(problem, proved=True if incumbent.proved_shut else None)
+        raise explain(problem, proved=True if incumbent.proved_shut else None)
     found = incumbent.solution()
     if problem.limits.max_agl_m is not None and found.stopped_by != "gap":
         found = replace(found, notes=(BAND_NOTE,))

@@ -67,11 +67,8 @@ class Searches:
 
     def __init__(self, incumbent: Incumbent) -> None:
         self.incumbent, self.problem = incumbent, incumbent.problem
-        self.refusal: Refusal | None = None
-        """What the last search for a first path said when it found none."""
         self._straight: Obstruction | None = None
         self._plane: PlaneSearch | None = None
-        self._lacked_path = True
 
     @property
     def plane(self) -> PlaneSearch:
@@ -212,8 +209,7 @@ class Searches:
         incumbent = self.incumbent
         try:
             found = plan_band(self.problem, incumbent.tell, incumbent.budget.begun_s, known=known)
-        except Refusal as refusal:
-            self.refusal = refusal
+        except Refusal:
             return
         if found.lower_bound is not None:
             incumbent.raise_bound(min(found.lower_bound, self.problem.cost(found.path)))

@@ -1,0 +1,229 @@
+"""The border of the terrain that was looked at: what a path that leaves it must cost, and whether any path can.
+
+A surface is a window of the terrain that a mission knows (`Surface.goes_on`). What is found out within the window holds
+for all paths if those that cross its border cost no less.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.problem import Problem, terminals
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.surface import Surface
+from gcsplan.world.zones import Circle, Zone
+
+Floats = NDArray[np.float64]
+
+PIECES = 8
+"""Straight pieces of one side of a window, which the plane bends."""
+INSET_CELLS = 1.0
+"""Cells at the border that count as beyond it, besides what a path keeps to unknown ground."""
+TOUCH_M = 0.01
+"""What zones are taken for smaller by, where it is asked whether they shut a place in."""
+
+
+def goes_on(problem: Problem) -> bool:
+    """Whether the terrain goes on beyond the surface, in a way that may matter to ``problem``.
+
+    Over flat ground it does not where no zone lies across the border: the parts of a path beyond it can be laid along
+    the border, at the same heights and no longer, and as long as they were by waving beside it.
+    """
+    surface = problem.airspace.surface
+    if not any(surface.goes_on):
+        return False
+    if surface.ground_m.size > 4 or np.ptp(surface.ground_m) != 0.0 or np.ptp(surface.top_m) != 0.0:
+        return True
+    reach = _reach_m(problem.airspace, problem.limits)
+    corners = surface.grid.to_plane([0, surface.ground_m.shape[1] - 1], [surface.ground_m.shape[0] - 1, 0])
+    low, high = corners.min(axis=0) + reach, corners.max(axis=0) - reach
+    stops = np.array(terminals(problem))
+    if not ((stops > low) & (stops < high)).all():
+        return True
+    for zone in problem.airspace.zones:
+        west, south, east, north = _bounds(zone, problem.airspace, problem.limits)
+        within = west > low[0] and south > low[1] and east < high[0] and north < high[1]
+        beyond = west > high[0] or south > high[1] or east < low[0] or north < low[1]
+        if not within and not beyond:
+            return True
+    return False
+
+
+def exit_cost(problem: Problem) -> float:
+    """What a path that leaves the surface where the terrain goes on costs at least, metres or joules by the objective;
+    inf where it goes on nowhere that matters."""
+    if not goes_on(problem):
+        return math.inf
+    lines, bow_m = border(problem)
+    stops = np.array(terminals(problem))
+    legs = np.hypot(*np.diff(stops, axis=0).T)
+    more_m = min(_past(a, b, lines) - leg for a, b, leg in zip(stops[:-1], stops[1:], legs.tolist(), strict=True))
+    track_m = float(legs.sum()) + max(more_m - 4.0 * bow_m, 0.0)
+    heights = [problem.start[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None), problem.goal[2]]
+    rise_m = sum(abs(b - a) for a, b in pairwise(heights))
+    cost = math.hypot(track_m, rise_m)
+    if problem.objective == "energy":
+        cost = problem.horizontal_j_per_m * track_m + problem.vertical_j_per_m * rise_m
+    return float(cost * (1.0 - 1e-9))  # arithmetic is rounded
+
+
+def within_m(problem: Problem) -> float:
+    """Metres from the straight way to the nearest border where the terrain goes on; inf without one."""
+    if not goes_on(problem):
+        return math.inf
+    import shapely  # for words alone
+
+    lines, _ = border(problem)
+    stops = terminals(problem)
+    way = shapely.LineString(stops) if len(set(stops)) > 1 else shapely.Point(stops[0])
+    return float(shapely.distance(shapely.MultiLineString(list(lines)), way))
+
+
+def margin_for(problem: Problem, cost: float) -> float:
+    """How far around the stops a path may lead that costs ``cost``; inf for all costs."""
+    if math.isinf(cost):
+        return math.inf
+    legs = [math.dist(a, b) for a, b in pairwise(terminals(problem))]
+    straight_m, track_m = sum(legs), cost
+    if problem.objective == "energy":
+        if problem.horizontal_j_per_m <= 0.0:
+            return math.inf
+        track_m = cost / problem.horizontal_j_per_m
+    off_m = 0.5 * math.sqrt(max(track_m**2 - straight_m**2, 0.0))
+    return off_m + 2.0 * _reach_m(problem.airspace, problem.limits) + 1.0
+
+
+def border(problem: Problem) -> tuple[Floats, float]:
+    """(K, 2, 2) lines of the plane that every path crosses which leaves the surface where the terrain goes on, and how
+    far the true ones may bow away from them, metres."""
+    surface = problem.airspace.surface
+    rows, cols = surface.ground_m.shape
+    keep = np.full(2, _reach_m(problem.airspace, problem.limits)) / _least_step_m(surface)
+    if surface.ground_m.size > 4:  # cells, not flat ground
+        keep += INSET_CELLS
+    c0, r0 = np.minimum(keep, 0.49 * np.array([cols - 1, rows - 1])).tolist()
+    c1, r1 = cols - 1 - c0, rows - 1 - r0
+    f = np.linspace(0.0, 1.0, 2 * PIECES + 1)
+    along_c, along_r, one = f * (cols - 1), f * (rows - 1), np.ones_like(f)
+    sides = [(c0 * one, along_r), (along_c, r0 * one), (c1 * one, along_r), (along_c, r1 * one)]
+    met = np.array([side for side, more in zip(sides, surface.goes_on, strict=True) if more])
+    at = surface.grid.to_plane(met[:, 0], met[:, 1])
+    lines = np.stack([at[:, :-2:2], at[:, 2::2]], axis=2)
+    off_m = np.hypot(*np.moveaxis(at[:, 1::2] - lines.mean(axis=2), -1, 0)).max()
+    return lines.reshape(-1, 2, 2), 1.1 * float(off_m) + surface.grid.error_m
+
+
+def enclosed(problem: Problem) -> bool:
+    """True if start, vias and goal are shut off from each other, and at least one of each two from the border: then no
+    ground beyond joins them.
+
+    Walls are ground over max AMSL, cell by cell, and zones that can be passed neither over nor under, by their shapes.
+    """
+    return _by_ground(problem) or _by_zones(problem)
+
+
+def _by_ground(problem: Problem) -> bool:
+    """The same for cells of the raster alone: one is shut if its lowest corner with min AGL is over max AMSL, or if one
+    is unknown. Cells that touch at a corner are joined."""
+    from scipy.ndimage import label
+
+    surface, limits = problem.airspace.surface, problem.limits
+    top = surface.top_m
+    lowest = np.minimum(np.minimum(top[:-1, :-1], top[:-1, 1:]), np.minimum(top[1:, :-1], top[1:, 1:]))
+    lowest[np.isnan(top[:-1, :-1] + top[:-1, 1:] + top[1:, :-1] + top[1:, 1:])] = np.nan
+    ceiling = math.inf if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
+    is_open = lowest + limits.min_agl_m + limits.altitude_error_m <= ceiling + 1e-6
+    parts, _ = label(is_open, structure=np.ones((3, 3)))
+    rows, cols = top.shape
+    at = surface.grid(*np.array(terminals(problem)).T)
+    cells = np.clip(np.floor(at).astype(int), 0, [cols - 2, rows - 2])
+    # What keeps off the border is not seen to reach it: a few cells more are looked at.
+    reach = _reach_m(problem.airspace, limits) / _least_step_m(surface)
+    c, r = (min(math.ceil(v) + 2, n - 1) for v, n in zip(reach, (cols, rows), strict=True))
+    west, north, east, south = surface.goes_on
+    sides = [parts[:, :c] if west else parts[:, :0], parts[:r] if north else parts[:0]]
+    sides += [parts[:, -c:] if east else parts[:, :0], parts[-r:] if south else parts[:0]]
+    outside = {int(k) for side in sides for k in np.unique(side)} - {0}
+    numbers = {-1 if int(parts[r, c]) in outside else int(parts[r, c]) for c, r in cells}
+    return 0 in numbers or len(numbers) > 1
+
+
+def _by_zones(problem: Problem) -> bool:
+    """The same for zones alone, over ground of any height."""
+    import shapely  # where no path was found alone
+
+    air, limits = problem.airspace, problem.limits
+    top = math.inf if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
+    reach = limits.horizontal_clearance_m + limits.track_error_m - TOUCH_M
+    walls = [_shape(z, reach) for z in air.zones if _is_wall(z, top)]
+    if not walls:
+        return False
+    surface = air.surface
+    rows, cols = surface.ground_m.shape
+    f = np.linspace(0.0, 1.0, PIECES + 1)[:-1]
+    c = np.concatenate([f, 1.0 + 0.0 * f, 1.0 - f, 0.0 * f]) * (cols - 1)
+    r = np.concatenate([0.0 * f, f, 1.0 + 0.0 * f, 1.0 - f]) * (rows - 1)
+    window = shapely.Polygon(surface.grid.to_plane(c, r))
+    free = [p for p in shapely.get_parts(window.difference(shapely.union_all(walls))) if p.area > 0.0]
+    lines = shapely.MultiLineString(list(border(problem)[0]))
+    leaves = [bool(p.intersects(lines)) for p in free]
+    numbers = set()
+    for stop in shapely.points(terminals(problem)):
+        at = [k for k, p in enumerate(free) if p.intersects(stop)]
+        if not at:
+            return False  # in a wall by rounding alone: its refusal is another one
+        numbers.add(-1 if any(leaves[k] for k in at) else at[0])
+    return len(numbers) > 1
+
+
+def _is_wall(zone: Zone, top_m: float) -> bool:
+    high = zone.ceiling
+    return zone.floor is None and (high is None or (high.datum == "amsl" and high.value_m > top_m))
+
+
+def _shape(zone: Zone, reach_m: float) -> Any:
+    """A zone grown by ``reach_m``, or a little less: chords lie within their arcs."""
+    import shapely
+
+    if isinstance(zone.shape, Circle):
+        return shapely.Point(zone.shape.east_m, zone.shape.north_m).buffer(zone.shape.radius_m + reach_m, quad_segs=64)
+    shape = shapely.make_valid(shapely.Polygon(zone.shape.vertices))
+    return shape.buffer(reach_m, quad_segs=16) if reach_m > 0.0 else shape
+
+
+def _bounds(zone: Zone, air: Airspace, limits: Limits) -> tuple[float, float, float, float]:
+    """A zone's box with all that paths keep from it."""
+    west, south, east, north = zone.bounds
+    more = _reach_m(air, limits) + (air.scale - 1.0) * max(east - west, north - south)
+    return west - more, south - more, east + more, north + more
+
+
+def _reach_m(air: Airspace, limits: Limits) -> float:
+    """What paths keep from unknown ground, and a little."""
+    return air.beside_m(limits) * 1.01 + TOUCH_M
+
+
+def _least_step_m(surface: Surface) -> Floats:
+    """(2,) the shortest column and row steps of a surface, metres."""
+    rows, cols = surface.ground_m.shape
+    at = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
+    return np.asarray(0.999 * np.min([surface.grid.metres_per_cell(*p) for p in at.tolist()], axis=0))
+
+
+def _past(a: Floats, b: Floats, lines: Floats) -> float:
+    """The shortest way from ``a`` over one of ``lines`` (K, 2, 2) to ``b``: straight to the line, mirrored on."""
+    p, d = lines[:, 0], lines[:, 1] - lines[:, 0]
+    length = np.maximum(np.hypot(*d.T), 1e-9)
+    u = d / length[:, None]
+    ta, tb = (((x - p) * u).sum(axis=1) for x in (a, b))
+    ya, yb = (np.abs((x - p)[:, 0] * u[:, 1] - (x - p)[:, 1] * u[:, 0]) for x in (a, b))
+    both = ya + yb
+    t = np.where(both > 1e-9, ta + (tb - ta) * ya / np.maximum(both, 1e-9), 0.5 * (ta + tb)).clip(0.0, length)
+    at = p + t[:, None] * u
+    return float((np.hypot(*(at - a).T) + np.hypot(*(at - b).T)).min())
