@@ -72,6 +72,11 @@ class _Pilot(Aboard):
         return self.landed
 
     @property
+    def stays(self) -> bool:
+        last = self.flight.stretches[-1] if self.flight.stretches else None
+        return last is not None and last.kind == "loiter" and math.isinf(last.hold_s)
+
+    @property
     def state(self) -> Hashable:
         return self.at, self.airborne, self.known, self.pace, self.circle_m, str(self.direction)
 

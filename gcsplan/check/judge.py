@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcsplan.check.arcs import bend
 from gcsplan.check.climb_out import slant_findings
+from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
 from gcsplan.check.misses import nearest_misses
 from gcsplan.check.stretch import Flight, Stretch
+from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.mission import Mission
@@ -55,10 +56,12 @@ def judge(
     rtl_rel_home_m: float | None = None,
     terrain_error_m: float = TERRAIN_ERROR_M,
     misses: bool = False,
+    tuning: Tuning = DEFAULTS,
 ) -> Verdict:
     """Judge ``mission`` for ``vehicle`` in ``world``; never raises for a mission that is merely unsafe.
 
-    ``misses``: look too how near it comes to each limit (half as much work again).
+    ``misses``: look too how near it comes to each limit (half as much work again). ``tuning``: the parameters that
+    decide where the autopilot turns, where they were read from the vehicle.
     """
     table = manner(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
@@ -72,14 +75,15 @@ def judge(
                 float(count), float(table.max_items), float(count - table.max_items), "items",
             )
         )  # fmt: skip
+    findings += _refused(mission) + _unreached(flight)
     if not flight.stretches:
         flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle")
         return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
     far = [_too_far(s) for s in (*flight.stretches, *flight.instead) if _is_too_far(s, world)]
     if far:  # the plane does not reach there, and neither does any terrain model that could be loaded
         return Verdict(mission, (), tuple(findings + far), tuple(flight.not_judged), tuple(flight.notes))
+    round_corners(flight, stored, vehicle, world.frame, tuning)
     if vehicle.turn_radius_m > 0.0:
-        bend(flight, stored, vehicle, world.frame)
         findings += slant_findings([*flight.stretches, *flight.instead], vehicle, world)
     plane = legs_in_plane(flight.stretches, vehicle.limits, world, terrain_error_m)
     report = world.airspace.examine(plane.legs, vehicle.limits)
@@ -97,7 +101,25 @@ def judge(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged with {terrain_error_m:g} m of error"
         )
     verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near)
-    return _with_battery(verdict, vehicle)
+    return _with_battery(verdict, vehicle, flight)
+
+
+def _refused(mission: Mission) -> list[Finding]:
+    """The items that the autopilot will not take: the upload would end there."""
+    refuses, found = manner(mission.autopilot).refuses, []
+    for seq, item in enumerate(mission.items, mission.first_seq):
+        if why := refuses(item):
+            words = f"item {seq} (command {item.command}): is refused on upload: {why}"
+            found.append(_finding(seq, "refused", words, float(item.frame), math.nan, math.nan, ""))
+    return found
+
+
+def _unreached(flight: Flight) -> list[Finding]:
+    """Items behind a hold or a loop without end."""
+    return [
+        _finding(u.first, "unreachable", u.describe(), float(u.last - u.first + 1), 0.0, math.nan, "items")
+        for u in flight.unreached
+    ]
 
 
 def _is_too_far(stretch: Stretch, world: World) -> bool:
@@ -267,21 +289,44 @@ def _findings(stretches: Sequence[Stretch], plane: PlaneLegs, report: LegReport,
     return found
 
 
-def _with_battery(verdict: Verdict, vehicle: Vehicle) -> Verdict:
+def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict:
     energy = vehicle.energy
     if energy.battery_j is None:
         return verdict
     used, usable = verdict.energy_j, (1.0 - energy.reserve) * energy.battery_j
     verdict = replace(verdict, battery_used_percent=100.0 * used / energy.battery_j)
-    if used <= usable:
-        return verdict
     last = verdict.legs[-1]
-    message = (
-        f"battery: the flight needs {used:.0f} J and {usable:.0f} J may be used "
-        f"({energy.battery_j:.0f} J less {100 * energy.reserve:g} % reserve)"
-    )
-    finding = _finding(last.seq, "battery", message, used, usable, used - usable, "J")
-    return replace(verdict, findings=(*verdict.findings, finding))
+    if used > usable:
+        message = (
+            f"battery: the flight needs {used:.0f} J and {usable:.0f} J may be used "
+            f"({energy.battery_j:.0f} J less {100 * energy.reserve:g} % reserve)"
+        )
+        finding = _finding(last.seq, "battery", message, used, usable, used - usable, "J")
+        return replace(verdict, findings=(*verdict.findings, finding))
+    power_w = _power_w(verdict, vehicle, flight)
+    if power_w is None:
+        return verdict
+    if power_w <= 0.0:
+        words = f"item {last.seq}: how long the battery lasts there is not known, for hover_w is 0"
+        return replace(verdict, notes=(*verdict.notes, words))
+    left_s = (usable - used) / power_w
+    what = "its round" if flight.loop_seq is not None else "its hold"
+    words = f"item {last.seq}: {what} has no end: the battery comes to its reserve after {left_s:.0f} s of it"
+    return replace(verdict, notes=(*verdict.notes, words), until_reserve_s=left_s)
+
+
+def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None:
+    """What it takes, J/s, to go on without end where the mission does; None where it ends."""
+    if flight.loop_seq is not None:
+        begun = max((i for i, leg in enumerate(verdict.legs) if leg.jumped_from == flight.loop_seq), default=0)
+        round_ = verdict.legs[begun:]
+        seconds = math.fsum(leg.time_s * leg.times for leg in round_)
+        return math.fsum(leg.energy_j * leg.times for leg in round_) / seconds if seconds > 0.0 else 0.0
+    last = flight.stretches[-1]
+    if not math.isinf(last.hold_s):
+        return None
+    circling = last.reach_m > 0.0
+    return vehicle.energy.horizontal_j_per_m * last.speed_m_s if circling else vehicle.energy.hover_w
 
 
 def _finding(seq: int, kind: str, message: str, value: float, limit: float, by: float, unit: str) -> Finding:

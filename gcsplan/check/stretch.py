@@ -37,14 +37,33 @@ class Stretch:
     jumped_from: int | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Unreached:
+    """Items ``first`` to ``last``, which are never flown, for ``seq`` holds or jumps back without end."""
+
+    seq: int
+    first: int
+    last: int
+    loop: bool = False
+
+    def describe(self) -> str:
+        """One line."""
+        does = "jumps back" if self.loop else "holds"
+        behind = f"item {self.first} is" if self.first == self.last else f"items {self.first} to {self.last} are"
+        return f"item {self.seq} {does} without end: {behind} never reached"
+
+
 @dataclass(slots=True)
 class Flight:
     """All stretches in order, what could not be followed, and what is assumed.
 
     ``instead``: stretches that another version flies in place of one of the ``stretches``; they must be legal too.
+    ``loop_seq``: the jump that leads back without end, None where there is none.
     """
 
     stretches: list[Stretch] = field(default_factory=list)
     instead: list[Stretch] = field(default_factory=list)
     not_judged: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    unreached: list[Unreached] = field(default_factory=list)
+    loop_seq: int | None = None
