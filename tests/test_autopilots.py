@@ -284,7 +284,7 @@ def test_what_is_refused_is_just_what_the_simulated_vehicle_refuses(autopilot: A
     known = set(PX4_LOCATED) | set(PX4_PLACELESS) if autopilot is PX4 else set(RULES)
     ours_alone = {80, 201, 212, 400, 531} if autopilot is PX4 else {94}  # versions differ
     seen = set()
-    for command in sorted(known - ours_alone - set(range(5000, 5101))) + [9, 31_000]:
+    for command in [*sorted(known - ours_alone - set(range(5000, 5101))), 9, 31000]:
         for frame in (0, 1, 2, 3, 4, 5, 6, 7, 10, 11):
             for params in ((0.0,) * 4, (0.0, 0.0, 0.0, math.nan), (0.0, math.inf, 0.0, 0.0)):
                 one = MissionItem(command, frame, params, X, Y, 60.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -167,9 +168,7 @@ def test_no_straight_line_from_where_it_turns_leaves_what_is_judged(autopilot: A
                 here = here + (p - here) * (far - r) / far
             flown.append(here)
         flown.append(np.array([2000.0, 2000.0]))
-        track = np.concatenate(
-            [a + np.linspace(0, 1, 400)[:, None] * (b - a) for a, b in zip(flown, flown[1:], strict=False)]
-        )
+        track = np.concatenate([a + np.linspace(0, 1, 400)[:, None] * (b - a) for a, b in itertools.pairwise(flown)])
         middle = track[int(rng.integers(0, len(track)))] + rng.normal(0, 60.0, 2)
         low, high = 0.0, 3000.0
         for _ in range(18):
