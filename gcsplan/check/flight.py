@@ -212,9 +212,9 @@ class _Pilot(Aboard):
         for leaves, fly in ((before, self.add), (np.zeros(3), self.instead)):
             if fly == self.instead and not before.any():
                 break
-            places, bulge_m = chords(here, target, leaves, arrives)
-            for a, b in pairwise(places):
-                fly(seq, "cruise", a, b, band_m=bulge_m, reach_m=bulge_m, on_path=True)
+            places, bulge_m, steep = chords(here, target, leaves, arrives)
+            for (a, b), slopes in zip(pairwise(places), steep, strict=True):
+                fly(seq, "cruise", a, b, band_m=bulge_m, reach_m=bulge_m, on_path=True, steep=slopes)
         self.at, self.direction = target, None if self.hold(item) else arrives
         if hold_s := self.hold(item):
             self.add(seq, "loiter", target, target, hold_s=hold_s)

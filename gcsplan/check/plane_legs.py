@@ -58,7 +58,7 @@ def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, te
         if s.terrain:
             points, off_m, slopes = follow_ground(plane[i], world.airspace.surface)
         else:
-            points, off_m, slopes = plane[i], np.zeros(1), np.full((1, 2), np.nan)
+            points, off_m, slopes = plane[i], np.zeros(1), np.array([s.steep or (np.nan, np.nan)])
         starts.append(points[:-1])
         ends.append(points[1:])
         counts.append(len(points) - 1)

@@ -18,7 +18,8 @@ class Stretch:
     ``band_m`` widens the altitude error (altitude is known only within a band), ``reach_m`` the track error (a
     loiter's circle). ``on_path``: counts for the path's length, from the top of the take-off to the approach.
     ``rates_m_s``: of climb and descent, None the vehicle's own. ``times``: how often it is flown, by a jump that leads
-    back. ``jumped_from``: the jump that led to it, where it is the first after one.
+    back. ``jumped_from``: the jump that led to it, where it is the first after one. ``steep``: of a chord, rise over
+    run of what is flown over it at its steepest, up and down (negative); None: it is flown as it is.
     """
 
     seq: int
@@ -35,6 +36,7 @@ class Stretch:
     rates_m_s: tuple[float, float] | None = None
     times: int = 1
     jumped_from: int | None = None
+    steep: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
