@@ -15,12 +15,12 @@ from collections.abc import Hashable
 from dataclasses import replace
 from typing import Protocol
 
+from gcsplan.check.commands import LAND_STARTS
 from gcsplan.check.stretch import Flight, Unreached
 from gcsplan.mavlink import mission as m
 from gcsplan.mavlink.mission import Mission, MissionItem
 
 JUMP_TAG, DO_JUMP_TAG = 600, 601
-LAND_STARTS = (188, 189)  # DO_RETURN_PATH_START, DO_LAND_START
 MOST_JUMPS = 15  # AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS on small boards, 100 on large ones; the rest count as used up
 MOST_STEPS = 100_000
 """Items flown one after the other, rounds that repeat others aside, before a mission is given up as endless."""

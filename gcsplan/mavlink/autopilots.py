@@ -38,9 +38,10 @@ ALTITUDE_LIMIT_M = 83_000.0
 class Manner:
     """One autopilot's manners.
 
-    ``max_items`` counts wire items, home included where it is one.
-    ``stored(item)`` is what reads back; ``refuses(item)`` says why it is not taken, empty where it is. ``atomic``: a mission is swapped in whole at the end of an upload, so that
-    a broken upload leaves the old one. ``holds_s``: how long a broken upload keeps the vehicle busy.
+    ``max_items`` counts wire items, home included where it is one. ``stored(item)`` is what reads back;
+    ``refuses(item)`` says why it is not taken, empty where it is. ``atomic``: a mission is swapped in whole at the end
+    of an upload, so that a broken upload leaves the old one. ``holds_s``: how long a broken upload keeps the vehicle
+    busy.
     """
 
     autopilot: Autopilot

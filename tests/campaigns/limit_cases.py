@@ -86,7 +86,9 @@ def make_ground(rng: np.random.Generator, size_m: float) -> Ground:
     half = 0.5 * (n - 1) * cell
     if rng.random() < 0.5:
         box = (-half, -half, half, half)
-        return Ground(z, GridMap.affine(-half, half, cell, cell), lambda e, n: ((e + half) / cell, (half - n) / cell), box, cell)
+        return Ground(
+            z, GridMap.affine(-half, half, cell, cell), lambda e, n: ((e + half) / cell, (half - n) / cell), box, cell
+        )
     a = rng.uniform(0.0, 2.0 * np.pi)
     cos, sin = math.cos(a) / cell, math.sin(a) / cell
     middle = 0.5 * (n - 1)
@@ -125,10 +127,22 @@ def make_case(rng: np.random.Generator, family: str) -> Case | None:
     case = Case(family, ground, surface, (), frame, craft, mission)
     if case.verdict().safe is not True:
         return None
-    for zone in random_zones(rng, ground):
+    for zone in (*random_zones(rng, ground), *corner_zones(rng, case)):
         more = replace(case, zones=(*case.zones, zone))
         case = more if more.verdict().safe is True else case
     return case
+
+
+def corner_zones(rng: np.random.Generator, case: Case) -> list[Zone]:
+    """Small circles on the inside of corners, where a vehicle that turns early comes by."""
+    places = [case.frame.to_plane(i.lat_deg, i.lon_deg) for i in case.mission.items if i.command == m.WAYPOINT]
+    found = []
+    for a, b, c in zip(places, places[1:], places[2:], strict=False):
+        ways = [(p - b) / max(float(np.hypot(*(p - b))), 1e-6) for p in (a, c)]
+        off = float(rng.choice([2.0, 6.0, 20.0, 60.0])) * float(rng.uniform(0.5, 1.5))
+        inside = b + off * (ways[0] + ways[1])
+        found.append(Zone(f"corner {len(found)}", Circle(float(inside[0]), float(inside[1]), 0.1 * off)))
+    return found[:2]
 
 
 # -- missions ------------------------------------------------------------------------------------------------------
@@ -179,7 +193,7 @@ def make_mission(
     elif family == "wing":
         items = _wing_items(points, item, ground)
     elif family == "battery":
-        items.append(MissionItem(m.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(20, 400)), 0, 0)))
+        items.append(MissionItem(m.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(20, 2500)), 0, 0)))
     elif family == "jump":
         items.insert(-1, MissionItem(m.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(0, 4)), 0, 0)))
     if family not in ("return", "wing"):

@@ -1,8 +1,8 @@
 """What a case's mission makes a vehicle fly, and how deep that breaks a limit: point by point, 0.25 m apart.
 
-It shares no code with the check but the door to degrees. Items are read from their wire numbers, legs are flown straight
-in the plane or in degrees, corners are cut as each autopilot may, and every point is held against the surface and the
-zones as far around it as errors and clearance reach. Sampling can only miss: what it finds is a violation.
+It shares no code with the check but the door to degrees. Items are read from their wire numbers, legs are flown
+straight in the plane or in degrees, corners are cut as each autopilot may, and every point is held against the surface
+and the zones as far around it as errors and clearance reach. Sampling can only miss: what it finds is a violation.
 """
 
 from __future__ import annotations
@@ -65,6 +65,11 @@ class Flight:
     def place(self, x: int, y: int) -> Floats:
         return np.asarray(self.case.frame.to_plane(x / 1e7, y / 1e7))
 
+    def climbs_m(self, item: MissionItem) -> float:
+        """A take-off's height above home: a metre at least on ArduCopter, MIS_TAKEOFF_ALT on PX4."""
+        least = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}.get(self.autopilot, -math.inf)
+        return max(stored_m(item, self.autopilot), least)
+
     def ground(self, en: Floats) -> float:
         return float(self.oracle.height(self.case.surface.ground_m, en[:1], en[1:2])[0])
 
@@ -99,7 +104,7 @@ class Flight:
         stops, circle = True, 0.0
         for item, after in self.in_order():
             if item.command in TAKE_OFFS:
-                up = np.array([*self.home, self.datum + stored_m(item, self.autopilot)])
+                up = np.array([*self.home, self.datum + self.climbs_m(item)])
                 yield Line(self.straight(here, up), track, high, column=True)
                 here = begun = up
             elif item.command == 20:
@@ -175,9 +180,7 @@ class Flight:
         if both > room:
             leaves, beyond = leaves * (room / both), beyond * (room / both)
         t = np.linspace(0.0, 1.0, max(50, math.ceil(6.0 * float(np.linalg.norm(way)) / STEP_M)))[:, None]
-        return np.asarray(
-            a + leaves * t + (3 * way - 2 * leaves - beyond) * t**2 + (leaves + beyond - 2 * way) * t**3
-        )
+        return np.asarray(a + leaves * t + (3 * way - 2 * leaves - beyond) * t**2 + (leaves + beyond - 2 * way) * t**3)
 
     def home_again(self, here: Floats) -> Iterator[Line]:
         """A copter's or PX4's return: up, straight home, down; within the cone it may climb less."""
@@ -383,7 +386,7 @@ def battery_needed_j(case: Case) -> float:
             index = int(item.params[0]) - first if rounds > 0 else index + 1
             continue
         if item.command in TAKE_OFFS:
-            to = np.array([*flight.home, flight.datum + stored_m(item, flight.autopilot)])
+            to = np.array([*flight.home, flight.datum + flight.climbs_m(item)])
         elif item.command in LANDS:
             over = np.array([*flight.place(item.x, item.y), here[2]])
             spent += move(over)

@@ -1,4 +1,4 @@
-"""Missions at the limit: each margin bisected to where the check says safe for the last time, then flown point by point.
+"""Missions at the limit: each margin bisected to where the check says safe for the last time, and flown there.
 
 Random worlds (slopes, towers, canopies, turned grids, zones of every kind), missions of every family, and knobs that
 bring them to a limit one after the other. What the check calls safe there is flown in brute force, 0.25 m apart.
