@@ -21,6 +21,10 @@ UPWARD = {"min_agl": 1.0, "terrain_clearance": 1.0, "max_agl": -1.0}
 """Which way a leg is moved to keep a limit of height."""
 
 TRIES = 8
+FINER = 7
+LEAST_PART = 0.8
+"""Of what the kernel gives, from which on it is looked for what is enough."""
+
 CENTIMETRE = 0.01
 
 
@@ -29,31 +33,43 @@ def rounded_up(by: float) -> float:
     return round(math.ceil(by * 100.0 - 1e-7) / 100.0, 2) if math.isfinite(by) and by < 1e9 else by
 
 
-def enough(v: Violation, mine: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> Violation:
-    """``v`` with a ``by`` in hundredths that is enough for all of the legs ``mine``, which are one stretch's."""
-    by = rounded_up(v.by)
-    if v.kind in UPWARD:
-        by = _lift(v, by, mine, legs, limits, air)
+def enough(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> Violation:
+    """``v`` with a ``by`` in hundredths that is enough for all of ``broken``: the legs that break what it breaks."""
     if v.kind == "coverage":
         return v
+    by = _lift(v, broken, legs, limits, air) if v.kind in UPWARD else rounded_up(v.by)
     below = v.kind in ("min_agl", "terrain_clearance", "zone")
     return replace(v, by=by, value=v.limit - by if below else v.limit + by)
 
 
-def _lift(v: Violation, by: float, mine: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> float:
+def _lift(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> float:
+    """Between what is not enough and what is, by trial: metres up, or down under a ceiling."""
     alone = Limits(
         min_agl_m=limits.min_agl_m if v.kind == "min_agl" else -1e9,
         max_agl_m=limits.max_agl_m if v.kind == "max_agl" else None,
         horizontal_clearance_m=limits.horizontal_clearance_m if v.kind == "terrain_clearance" else 0.0,
     )
-    for _ in range(TRIES):
+
+    def left(by: float) -> float:
         lift = np.array([0.0, 0.0, UPWARD[v.kind] * by])
         moved = Legs(
-            legs.start[mine] + lift, legs.end[mine] + lift, legs.column[mine], legs.track_error_m[mine],
-            legs.altitude_error_m[mine],
+            legs.start[broken] + lift, legs.end[broken] + lift, legs.column[broken], legs.track_error_m[broken],
+            legs.altitude_error_m[broken],
         )  # fmt: skip
-        left = [w.by for w in air.examine(moved, alone).violations if w.kind == v.kind]
-        if not left:
+        return max((w.by for w in air.examine(moved, alone).violations if w.kind == v.kind), default=0.0)
+
+    by = rounded_up(v.by)
+    for _ in range(TRIES):
+        missing = left(by)
+        if missing <= 0.0:
             break
-        by = rounded_up(by + max(max(left), CENTIMETRE))
+        by = rounded_up(by + max(missing, CENTIMETRE))
+    low = LEAST_PART * by
+    if left(low) <= 0.0:
+        low, by = 0.0, rounded_up(low)
+    for _ in range(FINER):
+        half = rounded_up(0.5 * (low + by))
+        if not low < half < by:
+            break
+        low, by = (low, half) if left(half) <= 0.0 else (half, by)
     return by

@@ -212,14 +212,16 @@ def _findings(
 ) -> list[Finding]:
     """The worst violation of each kind and zone on each stretch, in the order flown."""
     worst: dict[tuple[int, str, int], Violation] = {}
+    broken: dict[tuple[int, str, int], list[int]] = {}
     for v in report.violations:
         key = (int(plane.owner[v.leg]), v.kind, v.zone)
+        broken.setdefault(key, []).append(v.leg)
         if key not in worst or v.by > worst[key].by:
             worst[key] = v
     found = []
     for (owner, kind, zone), v in sorted(worst.items(), key=lambda kv: kv[0][0]):
         s = stretches[owner]
-        v = enough(v, np.flatnonzero(plane.owner == owner), plane.legs, limits, world.airspace)
+        v = enough(v, np.array(broken[owner, kind, zone]), plane.legs, limits, world.airspace)
         lat, lon = (float(x) for x in world.frame.to_degrees(v.east_m, v.north_m))
         name = world.airspace.zones[zone].name if zone >= 0 else ""
         what = WORDS[kind] + (f" “{name}” or its clearance" if name else "")

@@ -46,7 +46,7 @@ class Tally:
         return "\n".join(lines)
 
 
-def attack(seed: int, family: str, tally: Tally) -> None:
+def attack(seed: int, family: str, tally: Tally, turns: int = KNOBS) -> None:
     """One world: its knobs turned to the limit, each time judged by brute force."""
     rng = np.random.default_rng([seed, FAMILIES.index(family)])
     case = make_case(rng, family)
@@ -67,7 +67,7 @@ def attack(seed: int, family: str, tally: Tally) -> None:
             tally.worst = max(tally.worst, (depth, where))
         if depth > ALLOWED:
             tally.unsafe.append(f"{where}, by {depth:.3f}")
-        if turned == KNOBS:
+        if turned == turns:
             break
 
 
@@ -100,13 +100,15 @@ def at_limit(case: Case, knob: Knob, tally: Tally) -> Case | None:
     return change(case, loose)
 
 
-def run(seconds: float, seed: int, families: Sequence[str] = FAMILIES, most: int | None = None) -> Tally:
-    """Attack for so long, or through so many worlds of each family."""
+def run(
+    seconds: float, seed: int, families: Sequence[str] = FAMILIES, most: int | None = None, turns: int = KNOBS
+) -> Tally:
+    """Attack for so long, or through so many worlds of each family, with so many knobs turned in each."""
     tally, begun, world = Tally(), time.monotonic(), seed
     while time.monotonic() - begun < seconds and (most is None or world - seed < most):
         for family in families:
             before = len(tally.unsafe)
-            attack(world, family, tally)
+            attack(world, family, tally, turns)
             for line in tally.unsafe[before:]:
                 print("UNSAFE", line, flush=True)
         world += 1
