@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.check.stretch import Stretch
-from gcsplan.world.airspace import Floats, LegReport, Legs, Violation
+from gcsplan.world.airspace import Floats, Kind, LegReport, Legs, Violation
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.world import World
@@ -147,9 +147,10 @@ def steep_report(plane: PlaneLegs, report: LegReport, limits: Limits) -> LegRepo
     climb[mine] = np.where(angles[:, 0] >= -angles[:, 1], angles[:, 0], angles[:, 1])
     own = set(mine.tolist())
     violations = [v for v in report.violations if v.leg not in own or v.kind not in ("climb", "descent")]
-    for kind, limit, found in (
+    tried: tuple[tuple[Kind, float, Floats], ...] = (
         ("climb", limits.max_climb_deg, angles[:, 0]), ("descent", limits.max_descent_deg, -angles[:, 1]),
-    ):  # fmt: skip
+    )  # fmt: skip
+    for kind, limit, found in tried:
         worst: dict[int, int] = {}
         for k in np.flatnonzero(found > limit + NOISE_DEG).tolist():
             owner = int(plane.owner[mine[k]])
@@ -157,6 +158,6 @@ def steep_report(plane: PlaneLegs, report: LegReport, limits: Limits) -> LegRepo
                 worst[owner] = k
         for k in worst.values():
             leg, value = int(mine[k]), float(found[k])
-            place = (float(x) for x in plane.legs.start[leg])
-            violations.append(Violation(leg, kind, 0.0, *place, value, limit, value - limit, "deg"))  # type: ignore[arg-type]
+            east, north, amsl = plane.legs.start[leg].tolist()
+            violations.append(Violation(leg, kind, 0.0, east, north, amsl, value, limit, value - limit, "deg"))
     return replace(report, climb_deg=climb, violations=tuple(sorted(violations, key=lambda v: v.leg)))
