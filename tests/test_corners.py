@@ -5,15 +5,20 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from gcsplan.check.judge import judge
 from gcsplan.check.tuning import Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.build import corner_m
 from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mission_file import load_mission
+from gcsplan.pipeline import plan
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.world import World
@@ -177,3 +182,14 @@ def test_no_straight_line_from_where_it_turns_leaves_what_is_judged(autopilot: A
             low, high = (half, high) if safe else (low, half)
         nearest = float(np.hypot(*(track - middle).T).min())
         assert nearest >= low - 0.05, (seed, middle, points, radii)
+
+
+@pytest.mark.parametrize("autopilot", [COPTER, PX4])
+def test_a_plan_keeps_what_its_corners_take_beyond_the_track_error(autopilot: Autopilot) -> None:
+    crossing = yaml.safe_load((Path(__file__).parent / "data" / "crossing.yaml").read_text())
+    crossing["limits"]["track_error_m"] = 0.5
+    crossing["vehicles"][0]["autopilot"] = str(autopilot)
+    (planned,) = plan(load_mission("corner.yaml", text=yaml.safe_dump(crossing))).vehicles
+    assert planned.verdict.safe is True
+    assert corner_m(planned.request.vehicle) == (2.0 if autopilot is COPTER else 1.0)
+    assert planned.verdict.nearest is None or planned.verdict.nearest.zone_clearance_m >= 30.0 + 0.5 + 1.0
