@@ -20,11 +20,15 @@ import numpy as np
 from gcsplan.mavlink.plan_file import write_plan
 from gcsplan.mavlink.waypoints_file import write_waypoints
 from tests.campaigns.limit_cases import FAMILIES, Case, Knob, knobs, make_case
+from tests.campaigns.limit_fleets import fleet_at_limit
 from tests.campaigns.limit_oracle import ALLOWED, battery_needed_j, read_again, worst
 
 HALVINGS = 15
 KNOBS = 4
 """Turned one after the other in each world, so that several limits are near at once."""
+
+FLEETS = 5
+"""A fleet takes seconds: one in so many worlds."""
 
 
 @dataclass
@@ -36,6 +40,15 @@ class Tally:
     unsafe: list[str] = field(default_factory=list)
     worst: tuple[float, str] = (-np.inf, "")
     checks: int = 0
+
+    def see(self, family: str, knob: str, seed: int, depth: float, kind: str) -> None:
+        self.judged[family] += 1
+        self.turned[knob] += 1
+        where = f"seed {seed}, {family}, {knob}: {kind}"
+        if np.isfinite(depth):
+            self.worst = max(self.worst, (depth, where))
+        if depth > ALLOWED:
+            self.unsafe.append(f"{where}, by {depth:.3f}")
 
     def table(self) -> str:
         lines = [f"{family:10}{self.judged[family]:8}" for family in FAMILIES if self.judged[family]]
@@ -49,6 +62,10 @@ class Tally:
 def attack(seed: int, family: str, tally: Tally, turns: int = KNOBS) -> None:
     """One world: its knobs turned to the limit, each time judged by brute force."""
     rng = np.random.default_rng([seed, FAMILIES.index(family)])
+    if family == "fleet":
+        if seed % FLEETS == 0 and (found := fleet_at_limit(rng)) is not None:
+            tally.see(family, "fleet", seed, *found)
+        return
     case = make_case(rng, family)
     if case is None:
         return
@@ -59,14 +76,7 @@ def attack(seed: int, family: str, tally: Tally, turns: int = KNOBS) -> None:
             continue
         case = found
         turned += 1
-        tally.judged[family] += 1
-        tally.turned[knob[0]] += 1
-        depth, kind = _judged(case, rng)
-        where = f"seed {seed}, {family}, {knob[0]}: {kind}"
-        if np.isfinite(depth):
-            tally.worst = max(tally.worst, (depth, where))
-        if depth > ALLOWED:
-            tally.unsafe.append(f"{where}, by {depth:.3f}")
+        tally.see(family, knob[0], seed, *_judged(case, rng))
         if turned == turns:
             break
 
