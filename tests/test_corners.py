@@ -147,6 +147,15 @@ def test_a_circle_may_be_left_anywhere(autopilot: Autopilot) -> None:
     assert verdict(one, inside(450.0, 1400.0, 30.0)).safe is True
 
 
+def test_a_landing_behind_a_circle_is_on_the_circle_where_it_gives_no_place() -> None:
+    circle = at(m.LOITER_TURNS, 0, 1000, 100, 2.0, 0, 100.0)
+    ways = {}
+    for name, land in (("here", MissionItem(m.LAND, m.RELATIVE)), ("there", at(m.LAND, 0, 1000, 0))):
+        flown = Mission(COPTER, HOME, (at(m.TAKEOFF, 0, 0, 100), circle, land), "uav1")
+        ways[name] = verdict(flown, inside(90.0, 1000.0, 5.0, 60.0)).safe
+    assert ways == {"here": False, "there": True}
+
+
 @pytest.mark.parametrize("autopilot", [PX4, PLANE])
 def test_a_radius_longer_than_the_leg_skips_way_points(autopilot: Autopilot) -> None:
     # From the first of three near points it may fly straight on: along the hypotenuse.

@@ -92,6 +92,8 @@ class _Cutter:
                 continue
             begun = off if last is None else self._leave(last, s, off, stops)
             if s.column:
+                if last is None and s.kind == "land" and self._has_place(s.seq):
+                    begun = _Off()  # off the circle it flies to its place first
                 found += self._parts(s, (0.0, 1.0), self._beyond(_Off(begun.aside_m)), fading=False)
                 climbed = s.kind == "takeoff" and self.mission.autopilot is Autopilot.PX4
                 off, last, stops = _Off(0.0, self.tuning.px4_height_m if climbed else 0.0), None, False
@@ -200,6 +202,10 @@ class _Cutter:
     def _item(self, seq: int) -> MissionItem | None:
         index = seq - self.mission.first_seq
         return self.mission.items[index] if 0 <= index < len(self.mission.items) else None
+
+    def _has_place(self, seq: int) -> bool:
+        item = self._item(seq)
+        return item is not None and (item.x != 0 or item.y != 0)
 
     def _say(self, words: str) -> None:
         if words not in self.notes:

@@ -28,7 +28,7 @@ COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 LOITER_TO_ALT = 31
 
 FAMILIES = ("copter", "px4", "vtol", "terrain", "return", "spline", "circle", "jump", "wing", "battery", "fleet")
-"""What is flown: straight legs of each autopilot, the terrain frame, a return, curves, circles, arcs, rounds, fleets."""
+"""What is flown: straight legs of each autopilot, terrain frame, a return, curves, circles, arcs, rounds, fleets."""
 
 WING_RADIUS_M, WING_SPEED_M_S = 40.0, 14.0
 

@@ -2,7 +2,7 @@
 
 Two or three vehicles cross flat ground, in sequence or together, waiting on the ground, at gates in the air or not at
 all, each early or late within its window. What the planner calls separated is sampled every 10 ms with every vehicle as
-early or late as it may be, and the stored missions are flown by the simulated autopilots with departures moved likewise.
+early or late as it may be, and the stored missions are flown by the simulated autopilots, departures moved likewise.
 A resolved conflict is left just at the limit, so there is nothing to halve.
 """
 
