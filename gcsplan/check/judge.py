@@ -95,7 +95,7 @@ def _refused(mission: Mission) -> list[Finding]:
     refuses, found = manner(mission.autopilot).refuses, []
     for seq, item in enumerate(mission.items, mission.first_seq):
         if why := refuses(item):
-            words = f"item {seq} (command {item.command}): is refused on upload: {why}"
+            words = f"item {seq}: would be refused on upload: {why}"
             found.append(_finding(seq, "refused", words, float(item.frame), math.nan, math.nan, ""))
     return found
 
