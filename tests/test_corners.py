@@ -144,7 +144,21 @@ def test_a_circle_may_be_left_anywhere(autopilot: Autopilot) -> None:
     one = mission(autopilot, circle, at(m.WAYPOINT, 1500, 1000, 100, 0, 2.0))
     beside = inside(450.0, 1140.0, 30.0)
     assert verdict(one, beside).safe is False
+    assert verdict(one, inside(1000.0, 1060.0, 5.0)).safe is False  # 67 m beside the leg when two thirds are flown
     assert verdict(one, inside(450.0, 1400.0, 30.0)).safe is True
+
+
+@pytest.mark.parametrize("autopilot", [COPTER, PX4])
+def test_a_return_begins_where_the_vehicle_is_and_not_where_its_way_point_is(autopilot: Autopilot) -> None:
+    items = (at(m.LOITER_TURNS, 0, 2000, 100, 2.0, 0, 200.0),) if autopilot is COPTER else (
+        at(m.WAYPOINT, 1000, 1000, 100, 0, 2.0), at(m.WAYPOINT, 0, 2000, 100, 0, 200.0),
+    )  # fmt: skip
+    flown = Mission(autopilot, HOME, (at(m.TAKEOFF, 0, 0, 100), *items, MissionItem(m.RTL, m.NO_POSITION)), "uav1")
+    craft = vehicle(autopilot, horizontal_clearance_m=0.0)
+    post = Zone("post", Circle(70.0, 1000.0, 10.0), Level(150.0, "agl"))  # beside the middle of the way home
+    where = World(FLAT.frame, Airspace(FLAT.airspace.surface, [post]))
+    assert judge(flown, craft, where, rtl_rel_home_m=160.0).safe is False
+    assert judge(flown, craft, where, rtl_rel_home_m=120.0).safe is True
 
 
 def test_a_landing_behind_a_circle_is_on_the_circle_where_it_gives_no_place() -> None:

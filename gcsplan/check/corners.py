@@ -96,12 +96,14 @@ class _Cutter:
                     begun = _Off()  # off the circle it flies to its place first
                 found += self._parts(s, (0.0, 1.0), self._beyond(_Off(begun.aside_m)), fading=False)
                 climbed = s.kind == "takeoff" and self.mission.autopilot is Autopilot.PX4
-                off, last, stops = _Off(0.0, self.tuning.px4_height_m if climbed else 0.0), None, False
+                # A return goes on from where it climbed; else what was off ends on the ground.
+                off = begun if s.kind == "rtl" else _Off(0.0, self.tuning.px4_height_m if climbed else 0.0)
+                last, stops = None, False
                 continue
             if last is not None:
                 found += self._before(last, s, begun, stops)
-            cuts = (0.0, 0.5) if self.copter else PARTS
-            found += self._parts(s, cuts, self._beyond(begun), fading=not self.copter)
+            blends = self.copter and last is not None
+            found += self._parts(s, (0.0, 0.5) if blends else PARTS, self._beyond(begun), fading=not blends)
             off, last, stops = begun, s, s.hold_s > 0.0
         return found
 
