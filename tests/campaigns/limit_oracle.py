@@ -108,7 +108,7 @@ class Flight:
                 yield Line(self.straight(here, up), track, high, column=True)
                 here = begun = up
             elif item.command == 20:
-                yield from self.home_again(here)
+                yield from self.home_again(self.on_circle(here, circle) if circle > 0.0 else begun, here)
                 return
             elif item.command in LANDS:
                 over = np.array([*self.place(item.x, item.y), here[2]])
@@ -122,9 +122,7 @@ class Flight:
                     beyond = np.zeros(3) if item.params[0] > 0 or after is None else self.target(after) - to
                     yield Line(self.spline(here, to, leaves, beyond), track, high)
                 elif circle > 0.0:  # from anywhere on the circle
-                    a = self.rng.uniform(0.0, 2.0 * np.pi)
-                    start = here + circle * np.array([math.cos(a), math.sin(a), 0.0])
-                    yield Line(self.straight(start, to), track, high, angles=False)
+                    yield Line(self.straight(self.on_circle(here, circle), to), track, high, angles=False)
                 else:
                     terrain = item.frame == 10
                     error = self.case.terrain_error_m if terrain else 0.0
@@ -182,9 +180,18 @@ class Flight:
         t = np.linspace(0.0, 1.0, max(50, math.ceil(6.0 * float(np.linalg.norm(way)) / STEP_M)))[:, None]
         return np.asarray(a + leaves * t + (3 * way - 2 * leaves - beyond) * t**2 + (leaves + beyond - 2 * way) * t**3)
 
-    def home_again(self, here: Floats) -> Iterator[Line]:
-        """A copter's or PX4's return: up, straight home, down; within the cone it may climb less."""
+    def on_circle(self, middle: Floats, radius: float) -> Floats:
+        a = self.rng.uniform(0.0, 2.0 * np.pi)
+        return middle + radius * np.array([math.cos(a), math.sin(a), 0.0])
+
+    def home_again(self, here: Floats, meant: Floats) -> Iterator[Line]:
+        """A copter's or PX4's return: up, straight home, down; within the cone it may climb less.
+
+        ``meant`` is where the mission has it begin, ``here`` where it does.
+        """
         track, high = self.case.limits.track_error_m, self.case.limits.altitude_error_m
+        off = math.dist(here[:2], meant[:2])
+        track = 0.0 if 0.0 < off <= track else track
         top = max(self.datum + self.case.rtl_m, here[2])
         if self.autopilot is Autopilot.ARDUCOPTER and self.rng.random() < 0.5:
             top = max(here[2], min(top, self.datum + 3.0 * math.dist(here[:2], self.home)))
