@@ -50,4 +50,4 @@ def test_errors_that_are_taken_too_small_are_found(monkeypatch: pytest.MonkeyPat
         return legs
 
     monkeypatch.setattr(judging, "legs_in_plane", short(0.2))
-    assert run(FOREVER_S, 1, ("copter", "terrain"), most=8).unsafe
+    assert any(run(FOREVER_S, seed, ("copter", "terrain"), most=1).unsafe for seed in range(1, 9))
