@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
 from gcsplan.mavlink.autopilots import altitude_of_cm, encode_altitude, manner, max_items, stored
-from gcsplan.mavlink.mission import FENCE, FRAME_SYNONYMS, GLOBAL, RALLY, RELATIVE, TERRAIN, MissionItem, float32
+from gcsplan.mavlink.mission import FENCE, FRAME_SYNONYMS, GLOBAL, RALLY, MissionItem, float32
 from gcsplan.mavlink.stored_ardupilot import RULES, read_back_altitudes, stored_cm
 from gcsplan.mavlink.stored_px4 import LOCATED, yaw
+from gcsplan.mavlink.stored_px4 import LOCATED as PX4_LOCATED
+from gcsplan.mavlink.stored_px4 import PLACELESS as PX4_PLACELESS
 from gcsplan.sim.ardupilot_storage import keep_fence_item, keep_mission_item, keep_rally_item
 from gcsplan.sim.board import Refused
 from gcsplan.sim.px4_storage import keep_item
@@ -21,6 +23,7 @@ from gcsplan.vehicle import Autopilot
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 ARDUPILOTS = [COPTER, PLANE]
+ALSO_SIMULATED = {16, 17, 18, 19, 20, 21, 22, 31, 82, 93, 112, 177, 178, 195, 201, 206, 207}
 X, Y = 366_000_000, -843_800_000
 
 WIRE_FLOATS = st.one_of(
@@ -260,10 +263,36 @@ def test_the_table_knows_every_autopilot() -> None:
         row = manner(autopilot)
         assert row.autopilot is autopilot
         assert row.max_items >= 650
-        assert row.frames >= {GLOBAL, RELATIVE}
         assert row.atomic is (autopilot is PX4)
         assert all(0 < max_items(autopilot, kind) <= row.max_items for kind in (0, FENCE, RALLY))
     assert manner(COPTER).max_items == 650
-    assert not manner(PX4).takes_frame(TERRAIN)
-    assert manner(COPTER).takes_frame(11)
     assert not manner(COPTER).mav_types & manner(PLANE).mav_types
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_what_is_refused_is_just_what_the_simulated_vehicle_refuses(autopilot: Autopilot) -> None:
+    def refused_there(one: MissionItem) -> bool:
+        try:
+            if autopilot is PX4:
+                keep_item(one, 0)
+            else:
+                keep_mission_item(one, plane=autopilot is PLANE)
+        except Refused:
+            return True
+        return False
+
+    known = set(PX4_LOCATED) | set(PX4_PLACELESS) if autopilot is PX4 else set(RULES)
+    ours_alone = {80, 201, 212, 400, 531} if autopilot is PX4 else {94}  # versions differ
+    seen = set()
+    for command in [*sorted(known - ours_alone - set(range(5000, 5101))), 9, 31000]:
+        for frame in (0, 1, 2, 3, 4, 5, 6, 7, 10, 11):
+            for params in ((0.0,) * 4, (0.0, 0.0, 0.0, math.nan), (0.0, math.inf, 0.0, 0.0)):
+                one = MissionItem(command, frame, params, X, Y, 60.0)
+                ours, theirs = manner(autopilot).refuses(one), refused_there(one)
+                seen.add((bool(ours), theirs))
+                assert theirs or not ours, (one, ours)
+                if command in known and (autopilot is PX4 or command in ALSO_SIMULATED):
+                    assert bool(ours) is theirs, (one, ours)
+    assert {(True, True), (False, False)} <= seen
+    assert "above terrain" in manner(PX4).refuses(item(16, frame=10))
+    assert manner(COPTER).refuses(item(16, frame=11)) == ""

@@ -131,7 +131,7 @@ def test_a_splines_chords_hold_the_whole_curve(seed: int) -> None:
     rng = np.random.default_rng(seed)
     start, end = (36.6, -84.3, 400.0), (36.6 + rng.uniform(-0.01, 0.01), -84.3 + rng.uniform(-0.01, 0.01), 450.0)
     leaves, arrives = rng.uniform(-3000, 3000, (2, 3)) * [1, 1, 0.05]
-    places, bulge_m = chords(start, end, leaves, arrives)
+    places, bulge_m, _ = chords(start, end, leaves, arrives)
     assert places[0] == start
     assert places[-1] == end
     points = np.array([towards(start, p) for p in places])

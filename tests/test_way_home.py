@@ -174,6 +174,7 @@ def test_a_mission_that_hugs_a_zone_is_not_called_shut_in() -> None:
     corner = Zone("tower", Circle(1500.0, 0.0, 200.0))
     w = world(300.0, [corner])
     v = vehicle(min_agl_m=20.0, track_error_m=0.0, altitude_error_m=5.0, horizontal_clearance_m=30.0)
+    v = replace(v, corner_accel_m_s2=math.inf)  # turns on the spot
     m = mission(w, touch)
     assert judge(m, v, w).findings == ()
     home = judged(w, m, v, 60.0)
@@ -240,7 +241,8 @@ def test_within_the_cone_less_is_climbed_and_both_are_judged() -> None:
     m = mission(w, [(0, 0, 20), (0, 200, 20), (45, 0, 20)])
     px4 = mission(w, [(0, 0, 20), (0, 200, 20), (45, 0, 20)], PX4)
     assert judged(w, m, vehicle(**BARE), 100.0).unsafe == ()  # from 45 m away it climbs to 100 m first
-    assert [s.zone for s in judged(w, px4, vehicle(PX4, **BARE), 100.0).unsafe] == ["post"]  # 45 m is too low
+    sharp = replace(vehicle(PX4, **BARE), corner_accel_m_s2=math.inf)
+    assert [s.zone for s in judged(w, px4, sharp, 100.0).unsafe] == ["post"]  # 45 m is too low
 
 
 def test_a_plane_climbs_on_its_way_and_may_meet_what_an_altitude_would_clear() -> None:

@@ -30,7 +30,7 @@ class Aboard:
         self.rtl_rel_home_m = rtl_rel_home_m
         self.pace = Pace.of(vehicle)
         self.circle_m = 0.0
-        self.items, self.first_seq = mission.items, mission.first_seq
+        self.mission, self.items, self.first_seq = mission, mission.items, mission.first_seq
         self.direction: Vector | None = None
         self.jumped_from: int | None = None
         lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
@@ -47,7 +47,7 @@ class Aboard:
         self.at: Place = self.home
         self.airborne = False
         self.known = True
-        self.landed = False
+        self.landed = self.stopped = False
         self.low_m, self.around_m = 0.0, 0.0  # so far below `at`, and aside, it may begin its next leg
 
     def note(self, words: str) -> None:

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from gcsplan.check.returning import circle_growth
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m
+from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.mavlink import mission as m
 from gcsplan.mavlink.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -49,9 +50,6 @@ LEAST_TURN = math.radians(0.02)
 ABOUT = math.radians(170.0)
 """A corner that turns by less is none; one that turns by more is a turn about, whose way point lies far off."""
 
-WP_RADIUS_M, L1_S = 90.0, 4.06
-"""ArduPlane's WP_RADIUS and, for each m/s, its L1 distance (0.3183 · damping 0.75 · NAVL1_PERIOD 17), defaults."""
-
 MOST_BANK_DEG = 45.0
 """ArduPlane's ROLL_LIMIT_DEG, default."""
 
@@ -67,7 +65,7 @@ def tangent_m(radius_m: float, turn_rad: float) -> float:
     return radius_m * math.tan(0.5 * abs(turn_rad))
 
 
-def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame) -> None:
+def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tuning: Tuning = DEFAULTS) -> None:
     """Lay arcs of the vehicle's turn radius over the corners of ``flight``, in place.
 
     ``mission`` is the one that is followed, as stored. Every stretch is replaced by the chords of half the arc
@@ -102,7 +100,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame) -> No
             continue
         before = flight.stretches[first - 1] if first else None
         behind = before.reach_m if before is not None and not _moves(before) else 0.0
-        legs = _Run(run, mission, vehicle, frame, flight, behind)
+        legs = _Run(run, mission, vehicle, frame, flight, behind, tuning)
         wander_m = max(wander_m, legs.wander_m)
         bent += [piece for k in range(len(run)) for piece in legs.flown(k)]
         for k, s in enumerate(run):
@@ -142,8 +140,10 @@ class _Run:
     """Straight stretches flown one after the other without a stop, in the plane."""
 
     def __init__(
-        self, run: Sequence[Stretch], mission: Mission, vehicle: Vehicle, frame: Frame, flight: Flight, behind_m: float
-    ) -> None:
+        self, run: Sequence[Stretch], mission: Mission, vehicle: Vehicle, frame: Frame, flight: Flight, behind_m: float,
+        tuning: Tuning,
+    ) -> None:  # fmt: skip
+        self.tuning = tuning
         self.run, self.frame, self.radius = run, frame, vehicle.turn_radius_m
         self.error_m, self.wander_m = vehicle.limits.track_error_m, 0.0
         places = np.array([run[0].start, *(s.end for s in run)])
@@ -209,14 +209,14 @@ class _Run:
         if math.isfinite(item.params[1]) and item.params[1] > 0.0:
             return item.params[1], item.params[1]
         words = (
-            f"item {s.seq} gives no acceptance radius: its turn is judged as begun by WP_RADIUS {WP_RADIUS_M:g} m and "
-            f"NAVL1_PERIOD 17, the defaults"
+            f"item {s.seq} gives no acceptance radius: its turn is judged as begun by "
+            f"{self.tuning.says('WP_RADIUS', self.tuning.plane_radius_m)}, and "
+            f"{self.tuning.says('NAVL1_PERIOD', self.tuning.l1_period_s, 's')}"
         )
         if words not in flight.notes:
             flight.notes.append(words)
-        part = min(1.0, turn / (0.5 * math.pi))
         thin = circle_growth(max(s.start[2], s.end[2]))  # WP_RADIUS grows with altitude as circles do
-        least, most = (min(WP_RADIUS_M * growth, L1_S * s.speed_m_s) * part for growth in (1.0, thin))
+        least, most = (self.tuning.plane_turns_m(s.speed_m_s, turn, growth) for growth in (1.0, thin))
         return least, most
 
     def _widen_m(self, k: int) -> float:

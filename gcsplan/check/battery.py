@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from itertools import groupby, repeat
 from typing import Any
 
+from gcsplan.check.returning import flat_m
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.vehicle import Vehicle
 
 HALVINGS = 50
 MOST_ROUNDS = 1000
-EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ def battery_home(
     def back_j(at: Place) -> float:
         level = max(level_amsl_m, at[2]) if climbs_first else level_amsl_m
         vertical = abs(level - at[2]) + max(level - home[2], 0.0)
-        return energy.vertical_j_per_m * vertical + energy.horizontal_j_per_m * _away_m(at, home)
+        return energy.vertical_j_per_m * vertical + energy.horizontal_j_per_m * flat_m(at, home)
 
     spent = along = most = 0.0
     most_at, most_m = verdict.legs[0].start, 0.0
@@ -188,12 +188,3 @@ def _crossing(used: Callable[[float], float], usable: float, above: float, below
         middle = 0.5 * (above + below)
         above, below = (middle, below) if used(middle) > usable else (above, middle)
     return above
-
-
-def _away_m(a: Place, b: Place) -> float:
-    """Horizontal metres between places on the ellipsoid, by its radii half way: good to a millionth over 100 km."""
-    lat = math.radians(0.5 * (a[0] + b[0]))
-    w = 1.0 - ECCENTRICITY_2 * math.sin(lat) ** 2
-    north = EQUATOR_M * (1.0 - ECCENTRICITY_2) / w**1.5 * math.radians(b[0] - a[0])
-    east = EQUATOR_M / math.sqrt(w) * math.cos(lat) * math.radians((b[1] - a[1] + 180.0) % 360.0 - 180.0)
-    return math.hypot(north, east)

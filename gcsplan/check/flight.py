@@ -12,7 +12,8 @@ never passed over in silence. Facts about the autopilots: ArduPilot's and PX4's 
   GLIDE_SLOPE_MIN, and a climb that begins low, is flown at once and not along the leg (altitude.cpp): such a leg is
   judged as the whole band between both altitudes. A VTOL take-off climbs *by* its altitude, whatever its frame.
   Circles grow with altitude (AP_L1_Control.cpp, `loiter_radius`). It waits for no NAV_DELAY once it is armed.
-- PX4 knows no "here": latitude = longitude = 0 lies off Africa. A VTOL take-off goes over to forward flight.
+- PX4 knows no "here": latitude = longitude = 0 lies off Africa. A VTOL take-off goes over to forward flight. Behind an
+  item without autocontinue it goes on with none (mission.cpp, `on_active`); ArduPilot does not look at that.
 - A circle's radius is param3's of LOITER_TURNS, of ArduPlane's LOITER_UNLIM and param2's of its LOITER_TO_ALT; its
   LOITER_TIME takes WP_LOITER_RAD whatever the item says, and so does a radius of 1 m or less (commands_logic.cpp).
 - LAND with a place flies there level (in terrain frame at its height above ground), then descends. ArduCopter before
@@ -30,7 +31,7 @@ import numpy as np
 
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
-from gcsplan.check.commands import LOITER_TO_ALT, moves_nothing
+from gcsplan.check.commands import LOITER_TO_ALT, flown_otherwise, moves_nothing
 from gcsplan.check.returning import PLANE_LOITER_RADIUS_M, circle_growth, flat_m, return_home
 from gcsplan.check.route import DO_JUMP_TAG, fly_in_order
 from gcsplan.check.spline import chords, towards
@@ -72,12 +73,23 @@ class _Pilot(Aboard):
         return self.landed
 
     @property
+    def stays(self) -> bool:
+        last = self.flight.stretches[-1] if self.flight.stretches else None
+        return self.stopped or (last is not None and last.kind == "loiter" and math.isinf(last.hold_s))
+
+    @property
     def state(self) -> Hashable:
         return self.at, self.airborne, self.known, self.pace, self.circle_m, str(self.direction)
 
     def fly(self, seq: int, item: MissionItem) -> None:
         flown = len(self.flight.stretches)
+        if words := flown_otherwise(item, self.mission):
+            self.flight.not_judged.append(f"item {seq}: {words}: that is not judged")
         self._fly(seq, item)
+        if self.autopilot is Autopilot.PX4 and not (item.autocontinue or self.landed):
+            self.stopped = True
+            if self.airborne and self.known:
+                self.add(seq, "loiter", self.at, self.at, hold_s=math.inf)
         if len(self.flight.stretches) > flown:
             self.jumped_from = None
 
@@ -207,9 +219,9 @@ class _Pilot(Aboard):
         for leaves, fly in ((before, self.add), (np.zeros(3), self.instead)):
             if fly == self.instead and not before.any():
                 break
-            places, bulge_m = chords(here, target, leaves, arrives)
-            for a, b in pairwise(places):
-                fly(seq, "cruise", a, b, band_m=bulge_m, reach_m=bulge_m, on_path=True)
+            places, bulge_m, steep = chords(here, target, leaves, arrives)
+            for (a, b), slopes in zip(pairwise(places), steep, strict=True):
+                fly(seq, "cruise", a, b, band_m=bulge_m, reach_m=bulge_m, on_path=True, steep=slopes)
         self.at, self.direction = target, None if self.hold(item) else arrives
         if hold_s := self.hold(item):
             self.add(seq, "loiter", target, target, hold_s=hold_s)

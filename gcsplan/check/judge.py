@@ -8,20 +8,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from gcsplan.check.arcs import bend
 from gcsplan.check.climb_out import slant_findings
+from gcsplan.check.corners import round_corners
+from gcsplan.check.enough import enough
 from gcsplan.check.flight import follow
 from gcsplan.check.misses import nearest_misses
+from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
+from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.mission import Mission
 from gcsplan.vehicle import Vehicle
-from gcsplan.world.airspace import Floats, LegReport, Legs, Violation
+from gcsplan.world.airspace import Floats, LegReport, Violation
 from gcsplan.world.frame import EARTH_RADIUS_M, FARTHEST_M
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
@@ -29,22 +32,8 @@ from gcsplan.world.world import World
 TERRAIN_ERROR_M = 30.0
 """ArduPilot shifts all terrain by up to this when it arms; terrain-frame legs are judged with it."""
 
-CHORD_SLOPE = 0.002
-"""How much steeper than its chords a terrain-frame leg may be, rise over run: a tenth of a degree."""
-
-MOST_PARTS = 200
-"""Into which a piece of a terrain-frame leg is cut for that, at most."""
-
 HIGHEST_M = 20_000.0
 """No aircraft that is planned for here gets there; keeps absurd numbers out of the exact check."""
-
-
-@dataclass(frozen=True, slots=True)
-class PlaneLegs:
-    """The legs of all stretches in the plane; ``owner`` (N,) is the stretch of each leg."""
-
-    legs: Legs
-    owner: np.ndarray[tuple[int], np.dtype[np.intp]]
 
 
 def judge(
@@ -55,10 +44,12 @@ def judge(
     rtl_rel_home_m: float | None = None,
     terrain_error_m: float = TERRAIN_ERROR_M,
     misses: bool = False,
+    tuning: Tuning = DEFAULTS,
 ) -> Verdict:
     """Judge ``mission`` for ``vehicle`` in ``world``; never raises for a mission that is merely unsafe.
 
-    ``misses``: look too how near it comes to each limit (half as much work again).
+    ``misses``: look too how near it comes to each limit (half as much work again). ``tuning``: the parameters that
+    decide where the autopilot turns, where they were read from the vehicle.
     """
     table = manner(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
@@ -72,32 +63,49 @@ def judge(
                 float(count), float(table.max_items), float(count - table.max_items), "items",
             )
         )  # fmt: skip
+    findings += _refused(mission) + _unreached(flight)
     if not flight.stretches:
         flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle")
         return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
     far = [_too_far(s) for s in (*flight.stretches, *flight.instead) if _is_too_far(s, world)]
     if far:  # the plane does not reach there, and neither does any terrain model that could be loaded
         return Verdict(mission, (), tuple(findings + far), tuple(flight.not_judged), tuple(flight.notes))
+    round_corners(flight, stored, vehicle, world.frame, tuning)
     if vehicle.turn_radius_m > 0.0:
-        bend(flight, stored, vehicle, world.frame)
         findings += slant_findings([*flight.stretches, *flight.instead], vehicle, world)
     plane = legs_in_plane(flight.stretches, vehicle.limits, world, terrain_error_m)
-    report = world.airspace.examine(plane.legs, vehicle.limits)
+    report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
     figures = _figures(flight, plane, report, vehicle, world)
-    findings += _findings(flight.stretches, plane, report, world)
+    findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
     if flight.instead:  # what may be flown in place of a stretch must be legal; its figures are not the mission's
         plane = legs_in_plane(flight.instead, vehicle.limits, world, terrain_error_m)
-        report = world.airspace.examine(plane.legs, vehicle.limits)
-        known = {(f.seq, f.kind, f.zone) for f in findings}
-        more = _findings(flight.instead, plane, report, world)
-        findings += [f for f in more if (f.seq, f.kind, f.zone) not in known]
+        report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
+        findings = _worst(findings, _findings(flight.instead, plane, report, vehicle.limits, world))
     if any(s.terrain for s in flight.stretches):
         flight.notes.append(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged with {terrain_error_m:g} m of error"
         )
     verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near)
-    return _with_battery(verdict, vehicle)
+    return _with_battery(verdict, vehicle, flight)
+
+
+def _refused(mission: Mission) -> list[Finding]:
+    """The items that the autopilot will not take: the upload would end there."""
+    refuses, found = manner(mission.autopilot).refuses, []
+    for seq, item in enumerate(mission.items, mission.first_seq):
+        if why := refuses(item):
+            words = f"item {seq}: would be refused on upload: {why}"
+            found.append(_finding(seq, "refused", words, float(item.frame), math.nan, math.nan, ""))
+    return found
+
+
+def _unreached(flight: Flight) -> list[Finding]:
+    """Items behind a hold or a loop without end."""
+    return [
+        _finding(u.first, "unreachable", u.describe(), float(u.last - u.first + 1), 0.0, math.nan, "items")
+        for u in flight.unreached
+    ]
 
 
 def _is_too_far(stretch: Stretch, world: World) -> bool:
@@ -119,67 +127,6 @@ def _too_far(s: Stretch) -> Finding:
         f"to be judged"
     )
     return Finding(s.seq, "coverage", message, lat, lon, amsl, math.nan, math.nan, math.nan, "m")
-
-
-def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> PlaneLegs:
-    """The stretches as straight legs of the plane, with all that widens them; terrain-frame ones in many pieces."""
-    places = np.array([(s.start, s.end) for s in stretches])
-    plane = np.empty_like(places)
-    plane[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
-    plane[..., 2] = places[..., 2]
-    bow_m = world.frame.bow_m(places[:, 0, :2], places[:, 1, :2])
-    starts, ends, owner, track, height = [], [], [], [], []
-    for i, s in enumerate(stretches):
-        cuts, deviation = _follow_ground(plane[i], world) if s.terrain else (plane[i], np.zeros(1))
-        starts.append(cuts[:-1])
-        ends.append(cuts[1:])
-        owner += [i] * (len(cuts) - 1)
-        track += [limits.track_error_m + bow_m[i] + s.reach_m] * (len(cuts) - 1)
-        height += list(limits.altitude_error_m + s.band_m + (terrain_error_m if s.terrain else 0.0) + deviation)
-    owners = np.array(owner, dtype=np.intp)
-    column = np.array([s.column for s in stretches])[owners]
-    legs = Legs(np.concatenate(starts), np.concatenate(ends), column, np.array(track), np.array(height))
-    return PlaneLegs(legs, owners)
-
-
-def _follow_ground(ends: Floats, world: World) -> tuple[Floats, Floats]:
-    """A terrain-frame leg as straight pieces, some for each DEM cell, and how far each piece is off, metres.
-
-    Height is interpolated above ground between the ends, and ground is a quadratic in each cell: the chord of a
-    quadratic is off by at most its middle's distance.
-    """
-    surface = world.airspace.surface
-    a, b = surface.grid(ends[:, 0], ends[:, 1])
-    cuts = [np.array([0.0, 1.0])]
-    for axis in (0, 1):
-        low, high = sorted((a[axis], b[axis]))
-        lines = np.arange(math.ceil(low), math.floor(high) + 1)
-        if high > low:
-            cuts.append((lines - a[axis]) / (b[axis] - a[axis]))
-    t = np.unique(np.clip(np.concatenate(cuts), 0.0, 1.0))
-    run_m = float(np.hypot(*(ends[1, :2] - ends[0, :2])))
-
-    def point(f: Floats) -> tuple[Floats, Floats]:
-        en = ends[0, :2] + f[:, None] * (ends[1, :2] - ends[0, :2])
-        return en, surface.ground_at(en[:, 0], en[:, 1])
-
-    def sag(t: Floats) -> Floats:
-        _, ground = point(t)
-        _, middle = point(0.5 * (t[1:] + t[:-1]))
-        return np.asarray(np.abs(middle - 0.5 * (ground[1:] + ground[:-1])))
-
-    # A quadratic is steeper at its end than its chord by 4 · sag / length, and the angle of climb is judged by chords.
-    steeper = 4.0 * np.nan_to_num(sag(t)) / np.maximum(np.diff(t) * run_m, 1e-9)
-    parts = np.clip(np.ceil(steeper / CHORD_SLOPE), 1, MOST_PARTS).astype(int)
-    t = np.concatenate([*(a + (b - a) * np.arange(n) / n for a, b, n in zip(t[:-1], t[1:], parts, strict=True)), [1.0]])
-    _, ground_ends = point(np.array([0.0, 1.0]))
-    agl = ends[:, 2] - ground_ends
-    en, ground = point(t)
-    off = sag(t)
-    z = ground + agl[0] + t * (agl[1] - agl[0])
-    if np.isnan(z).any():  # unknown ground: examined as a straight leg, which reports the void
-        return ends, np.zeros(1)
-    return np.column_stack([en, z]), off
 
 
 def _figures(
@@ -246,16 +193,35 @@ WORDS = {
 }
 
 
-def _findings(stretches: Sequence[Stretch], plane: PlaneLegs, report: LegReport, world: World) -> list[Finding]:
+def _worst(findings: list[Finding], more: list[Finding]) -> list[Finding]:
+    """``findings`` and ``more``; of those that are of one kind, item and zone the worst."""
+    kept = {(f.seq, f.kind, f.zone): f for f in reversed(findings)}
+    for f in more:
+        key = (f.seq, f.kind, f.zone)
+        if key not in kept:
+            findings = [*findings, f]
+        elif f.by > kept[key].by:
+            findings = [f if g is kept[key] else g for g in findings]
+        if key not in kept or f.by > kept[key].by:
+            kept[key] = f
+    return findings
+
+
+def _findings(
+    stretches: Sequence[Stretch], plane: PlaneLegs, report: LegReport, limits: Limits, world: World
+) -> list[Finding]:
     """The worst violation of each kind and zone on each stretch, in the order flown."""
     worst: dict[tuple[int, str, int], Violation] = {}
+    broken: dict[tuple[int, str, int], list[int]] = {}
     for v in report.violations:
         key = (int(plane.owner[v.leg]), v.kind, v.zone)
+        broken.setdefault(key, []).append(v.leg)
         if key not in worst or v.by > worst[key].by:
             worst[key] = v
     found = []
     for (owner, kind, zone), v in sorted(worst.items(), key=lambda kv: kv[0][0]):
         s = stretches[owner]
+        v = enough(v, np.array(broken[owner, kind, zone]), plane.legs, limits, world.airspace)
         lat, lon = (float(x) for x in world.frame.to_degrees(v.east_m, v.north_m))
         name = world.airspace.zones[zone].name if zone >= 0 else ""
         what = WORDS[kind] + (f" “{name}” or its clearance" if name else "")
@@ -267,21 +233,44 @@ def _findings(stretches: Sequence[Stretch], plane: PlaneLegs, report: LegReport,
     return found
 
 
-def _with_battery(verdict: Verdict, vehicle: Vehicle) -> Verdict:
+def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict:
     energy = vehicle.energy
     if energy.battery_j is None:
         return verdict
     used, usable = verdict.energy_j, (1.0 - energy.reserve) * energy.battery_j
     verdict = replace(verdict, battery_used_percent=100.0 * used / energy.battery_j)
-    if used <= usable:
-        return verdict
     last = verdict.legs[-1]
-    message = (
-        f"battery: the flight needs {used:.0f} J and {usable:.0f} J may be used "
-        f"({energy.battery_j:.0f} J less {100 * energy.reserve:g} % reserve)"
-    )
-    finding = _finding(last.seq, "battery", message, used, usable, used - usable, "J")
-    return replace(verdict, findings=(*verdict.findings, finding))
+    if used > usable:
+        message = (
+            f"battery: the flight needs {used:.0f} J and {usable:.0f} J may be used "
+            f"({energy.battery_j:.0f} J less {100 * energy.reserve:g} % reserve)"
+        )
+        finding = _finding(last.seq, "battery", message, used, usable, used - usable, "J")
+        return replace(verdict, findings=(*verdict.findings, finding))
+    power_w = _power_w(verdict, vehicle, flight)
+    if power_w is None:
+        return verdict
+    if power_w <= 0.0:
+        words = f"item {last.seq}: how long the battery lasts there is not known, for hover_w is 0"
+        return replace(verdict, notes=(*verdict.notes, words))
+    left_s = (usable - used) / power_w
+    what = "its round" if flight.loop_seq is not None else "its hold"
+    words = f"item {last.seq}: {what} has no end: the battery comes to its reserve after {left_s:.0f} s of it"
+    return replace(verdict, notes=(*verdict.notes, words), until_reserve_s=left_s)
+
+
+def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None:
+    """What it takes, J/s, to go on without end where the mission does; None where it ends."""
+    if flight.loop_seq is not None:
+        begun = max((i for i, leg in enumerate(verdict.legs) if leg.jumped_from == flight.loop_seq), default=0)
+        round_ = verdict.legs[begun:]
+        seconds = math.fsum(leg.time_s * leg.times for leg in round_)
+        return math.fsum(leg.energy_j * leg.times for leg in round_) / seconds if seconds > 0.0 else 0.0
+    last = flight.stretches[-1]
+    if not math.isinf(last.hold_s):
+        return None
+    circling = last.reach_m > 0.0
+    return vehicle.energy.horizontal_j_per_m * last.speed_m_s if circling else vehicle.energy.hover_w
 
 
 def _finding(seq: int, kind: str, message: str, value: float, limit: float, by: float, unit: str) -> Finding:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from gcsplan.check.stretch import Place
 from gcsplan.vehicle import Autopilot
 
+EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
 PLANE_LOITER_RADIUS_M = 60.0  # ArduPlane WP_LOITER_RAD, default
 COPTER_CONE_SLOPE = 3.0  # ArduCopter RTL_CONE_SLOPE, default: rise over run
 PX4_CONE_SLOPE = 1.0  # PX4 RTL_CONE_ANG 45, default
@@ -71,7 +72,9 @@ def circle_growth(amsl_m: float) -> float:
 
 
 def flat_m(a: Place, b: Place) -> float:
-    """Horizontal metres between places, good for telling whether they are the same."""
-    north = (b[0] - a[0]) * 111_195.0
-    east = ((b[1] - a[1] + 180.0) % 360.0 - 180.0) * 111_195.0 * math.cos(math.radians(0.5 * (a[0] + b[0])))
+    """Horizontal metres between places on the ellipsoid, by its radii half way: good to a millionth over 100 km."""
+    lat = math.radians(0.5 * (a[0] + b[0]))
+    w = 1.0 - ECCENTRICITY_2 * math.sin(lat) ** 2
+    north = EQUATOR_M * (1.0 - ECCENTRICITY_2) / w**1.5 * math.radians(b[0] - a[0])
+    east = EQUATOR_M / math.sqrt(w) * math.cos(lat) * math.radians((b[1] - a[1] + 180.0) % 360.0 - 180.0)
     return math.hypot(north, east)

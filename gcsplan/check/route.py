@@ -5,6 +5,8 @@
   65,535 rounds on PX4, which keeps 16 bits.
 - ArduPilot counts `MOST_JUMPS` jumps of one mission and takes the rest for used up. Jump tags are ArduPilot's alone.
 - A round that begins as the one before it began is flown as that one was: it is followed once, and counted.
+- Behind a hold or a loop without end nothing is flown. On ArduPilot DO_ items right behind a hold are carried out while
+  it lasts, and what stands behind DO_LAND_START is for a return to lead to.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ from collections.abc import Hashable
 from dataclasses import replace
 from typing import Protocol
 
-from gcsplan.check.stretch import Flight
+from gcsplan.check.commands import LAND_STARTS
+from gcsplan.check.stretch import Flight, Unreached
 from gcsplan.mavlink import mission as m
 from gcsplan.mavlink.mission import Mission, MissionItem
 
@@ -36,6 +39,11 @@ class Pilot(Protocol):
     @property
     def over(self) -> bool:
         """True once the aircraft is down and stays there."""
+        ...
+
+    @property
+    def stays(self) -> bool:
+        """True once the aircraft holds without end."""
         ...
 
     @property
@@ -72,6 +80,9 @@ def fly_in_order(mission: Mission, pilot: Pilot) -> bool:
         if jump is None or pilot.over:
             pilot.fly(seq, items[index])
             index += 1
+            if pilot.stays:
+                _never(mission, flight, seq, index, loop=False)
+                return False
             continue
         if jump.target is None:
             flight.not_judged.append(f"item {seq} jumps to an item that the mission has not")
@@ -84,6 +95,8 @@ def fly_in_order(mission: Mission, pilot: Pilot) -> bool:
         if jump.was is not None and jump.was[0] == begins:
             if jump.rounds is None:
                 _without_end(flight, seq, first + jump.target, first + len(items) - 1, jump.was)
+                if flight.loop_seq is not None:
+                    _never(mission, flight, seq, index + 1, loop=True)
                 return False
             _again(flight, jump, jump.was)
             index += 1
@@ -125,10 +138,30 @@ def _again(flight: Flight, jump: _Jump, was: tuple[Hashable, int, int]) -> None:
     jump.done = jump.rounds
 
 
+def _never(mission: Mission, flight: Flight, seq: int, index: int, *, loop: bool) -> None:
+    """Name the items from ``index`` on, which are never flown: behind ``seq``, that holds or jumps without end."""
+    first, items, ardupilot = mission.first_seq, mission.items, mission.autopilot.is_ardupilot
+    landing = len(items)
+    if ardupilot:
+        landing = next((i for i in range(index, len(items)) if items[i].command in LAND_STARTS), len(items))
+    never = [
+        i for i in range(index, landing)
+        if not ardupilot or items[i].command < 95 or items[i].command in (m.DO_JUMP, DO_JUMP_TAG)
+    ]  # fmt: skip
+    if never:
+        flight.unreached.append(Unreached(seq, first + never[0], first + never[-1], loop))
+    if landing < len(items) - 1:
+        flight.not_judged.append(
+            f"item {first + landing} begins a landing that only a return leads to (DO_LAND_START): items "
+            f"{first + landing + 1} to {first + len(items) - 1} are not judged"
+        )
+
+
 def _without_end(flight: Flight, seq: int, target: int, last: int, was: tuple[Hashable, int, int]) -> None:
     if len(flight.stretches) == was[1]:
         flight.not_judged.append(f"item {seq} jumps to item {target} for ever and nothing is flown between them")
         return
+    flight.loop_seq = seq
     never = "" if seq == last else f"; the items after it, {seq + 1} to {last}, are never flown"
     flight.notes.append(
         f"item {seq} jumps back to item {target} without end: its round is judged and counted once, what ends it (a "

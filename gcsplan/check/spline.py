@@ -20,6 +20,7 @@ Vector = NDArray[np.float64]
 LONGEST = 4.0  # SPLINE_FACTOR
 BULGE_M = 0.25
 MOST_PIECES = 200
+LOOKS, SPREAD = 8, 0.05
 DEGREE_M = 111_195.0
 
 
@@ -29,10 +30,14 @@ def towards(a: Place, b: Place) -> Vector:
     return np.array([east, (b[0] - a[0]) * DEGREE_M, b[2] - a[2]])
 
 
-def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[list[Place], float]:
+Slopes = list[tuple[float, float]]
+
+
+def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[list[Place], float, Slopes]:
     """The curve's points from ``start`` to ``end`` (both given back exactly), and its bulge beyond their chords.
 
-    ``leaves``, ``arrives``: (3,) directions with their lengths, metres.
+    ``leaves``, ``arrives``: (3,) directions with their lengths, metres. Last, for each chord, the steepest rise over
+    run of the curve over it, up and down (negative).
     """
     way = towards(start, end)
     both = float(np.linalg.norm(leaves) + np.linalg.norm(arrives))
@@ -47,4 +52,21 @@ def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[l
     points = leaves * t + square * t**2 + cube * t**3
     flat = DEGREE_M * math.cos(math.radians(0.5 * (start[0] + end[0])))
     inner = [(start[0] + n / DEGREE_M, start[1] + e / flat, start[2] + u) for e, n, u in points.tolist()]
-    return [start, *inner, end], bend / (8.0 * pieces**2)
+    return [start, *inner, end], bend / (8.0 * pieces**2), _slopes(leaves, square, cube, pieces)
+
+
+def _slopes(leaves: Vector, square: Vector, cube: Vector, pieces: int) -> Slopes:
+    """Steepest slopes of each piece, up and down, looked at in `LOOKS` places and given a part of their spread more."""
+    t = np.linspace(0.0, 1.0, pieces * LOOKS + 1)[:, None]
+    speed = leaves + 2.0 * square * t + 3.0 * cube * t**2
+    run = np.hypot(speed[:, 0], speed[:, 1])
+    moves = run > 1e-6 * max(float(run.max()), 1e-9)
+    slope = np.divide(speed[:, 2], run, out=np.full(len(run), np.nan), where=moves)
+    known = np.flatnonzero(moves)
+    if not len(known):
+        return [(np.inf, -np.inf)] * pieces
+    slope = np.interp(np.arange(len(run)), known, slope[known])  # standing still it has none of its own
+    by_piece = np.column_stack([slope[k : len(slope) - LOOKS + k : LOOKS] for k in range(LOOKS + 1)])
+    up, down = by_piece.max(axis=1), by_piece.min(axis=1)
+    more = SPREAD * (up - down)
+    return list(zip((up + more).tolist(), (down - more).tolist(), strict=True))

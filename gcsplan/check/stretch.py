@@ -18,7 +18,8 @@ class Stretch:
     ``band_m`` widens the altitude error (altitude is known only within a band), ``reach_m`` the track error (a
     loiter's circle). ``on_path``: counts for the path's length, from the top of the take-off to the approach.
     ``rates_m_s``: of climb and descent, None the vehicle's own. ``times``: how often it is flown, by a jump that leads
-    back. ``jumped_from``: the jump that led to it, where it is the first after one.
+    back. ``jumped_from``: the jump that led to it, where it is the first after one. ``steep``: of a chord, rise over
+    run of what is flown over it at its steepest, up and down (negative); None: it is flown as it is.
     """
 
     seq: int
@@ -35,6 +36,23 @@ class Stretch:
     rates_m_s: tuple[float, float] | None = None
     times: int = 1
     jumped_from: int | None = None
+    steep: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unreached:
+    """Items ``first`` to ``last``, which are never flown, for ``seq`` holds or jumps back without end."""
+
+    seq: int
+    first: int
+    last: int
+    loop: bool = False
+
+    def describe(self) -> str:
+        """One line."""
+        does = "jumps back" if self.loop else "holds"
+        behind = f"item {self.first} is" if self.first == self.last else f"items {self.first} to {self.last} are"
+        return f"item {self.seq} {does} without end: {behind} never reached"
 
 
 @dataclass(slots=True)
@@ -42,9 +60,12 @@ class Flight:
     """All stretches in order, what could not be followed, and what is assumed.
 
     ``instead``: stretches that another version flies in place of one of the ``stretches``; they must be legal too.
+    ``loop_seq``: the jump that leads back without end, None where there is none.
     """
 
     stretches: list[Stretch] = field(default_factory=list)
     instead: list[Stretch] = field(default_factory=list)
     not_judged: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    unreached: list[Unreached] = field(default_factory=list)
+    loop_seq: int | None = None

@@ -63,7 +63,8 @@ class LegFigures:
 class Verdict:
     """``mission`` is the one that was judged, as sent; the judgement is of what the autopilot stores of it.
 
-    ``misses``: how near it comes to each limit, where that was asked.
+    ``misses``: how near it comes to each limit, where that was asked. ``until_reserve_s``: of a mission that ends in a
+    hold or a round without end, how long that may last.
     """
 
     mission: Mission
@@ -73,6 +74,7 @@ class Verdict:
     notes: tuple[str, ...] = ()
     battery_used_percent: float | None = None
     misses: tuple[Miss, ...] = ()
+    until_reserve_s: float | None = None
 
     @property
     def safe(self) -> bool | None:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.mission import FENCE, FRAME_SYNONYMS, GLOBAL, MISSION, RELATIVE, TERRAIN, float32
+from gcsplan.mavlink.mission import FENCE, MISSION, float32
 from gcsplan.mavlink.mission import MissionItem as Item
-from gcsplan.mavlink.stored_ardupilot import stored_by_copter, stored_by_plane
-from gcsplan.mavlink.stored_px4 import stored_by_px4
+from gcsplan.mavlink.stored_ardupilot import refused_by_copter, refused_by_plane, stored_by_copter, stored_by_plane
+from gcsplan.mavlink.stored_px4 import refused_by_px4, stored_by_px4
 from gcsplan.vehicle import Autopilot
 
 # MAV_AUTOPILOT
@@ -38,9 +38,10 @@ ALTITUDE_LIMIT_M = 83_000.0
 class Manner:
     """One autopilot's manners.
 
-    ``max_items`` counts wire items, home included where it is one. ``frames``: MAV_FRAMEs taken for located items.
-    ``stored(item)`` is what reads back. ``atomic``: a mission is swapped in whole at the end of an upload, so that
-    a broken upload leaves the old one. ``holds_s``: how long a broken upload keeps the vehicle busy.
+    ``max_items`` counts wire items, home included where it is one. ``stored(item)`` is what reads back;
+    ``refuses(item)`` says why it is not taken, empty where it is. ``atomic``: a mission is swapped in whole at the end
+    of an upload, so that a broken upload leaves the old one. ``holds_s``: how long a broken upload keeps the vehicle
+    busy.
     """
 
     autopilot: Autopilot
@@ -48,14 +49,10 @@ class Manner:
     mav_autopilot: int
     mav_types: frozenset[int]
     max_items: int
-    frames: frozenset[int]
     atomic: bool
     holds_s: float
     stored: Callable[[Item], Item]
-
-    def takes_frame(self, frame: int) -> bool:
-        """True for a MAV_FRAME (or its _INT twin) that located items may have."""
-        return FRAME_SYNONYMS.get(frame, frame) in self.frames
+    refuses: Callable[[Item], str]
 
 
 _TABLE: dict[Autopilot, Manner] = {
@@ -65,10 +62,10 @@ _TABLE: dict[Autopilot, Manner] = {
         ARDUPILOTMEGA,
         _COPTERS,
         max_items=650,  # measured; 15 bytes each in the storage of a 16 KB board (StorageManager.cpp)
-        frames=frozenset({GLOBAL, RELATIVE, TERRAIN}),
         atomic=False,  # MissionItemProtocol_Waypoints.cpp: COUNT truncates, items replace one by one
         holds_s=8.0,  # MissionItemProtocol.h: upload_timeout_ms
         stored=stored_by_copter,
+        refuses=refused_by_copter,
     ),
     Autopilot.ARDUPLANE: Manner(
         Autopilot.ARDUPLANE,
@@ -76,10 +73,10 @@ _TABLE: dict[Autopilot, Manner] = {
         ARDUPILOTMEGA,
         _PLANES,
         max_items=650,  # ArduPlane's own layout has room for 655; one figure for both keeps the smaller
-        frames=frozenset({GLOBAL, RELATIVE, TERRAIN}),
         atomic=False,
         holds_s=8.0,
         stored=stored_by_plane,
+        refuses=refused_by_plane,
     ),
     Autopilot.PX4: Manner(
         Autopilot.PX4,
@@ -89,10 +86,10 @@ _TABLE: dict[Autopilot, Manner] = {
         # navigation.h: NUM_MISSIONS_SUPPORTED 2000 on boards with an SD card, 65534 in simulation, 500 with missions
         # in RAM and 50 on the smallest boards; those answer NO_SPACE.
         max_items=2000,
-        frames=frozenset({GLOBAL, RELATIVE}),  # parse_mavlink_mission_item: all else is UNSUPPORTED_FRAME
         atomic=True,  # mavlink_mission.cpp: written to the inactive bank, swapped after the last item
         holds_s=5.0,  # mavlink_mission.h: MAVLINK_MISSION_PROTOCOL_TIMEOUT_DEFAULT
         stored=stored_by_px4,
+        refuses=refused_by_px4,
     ),
 }
 

@@ -69,6 +69,14 @@ def acceptance_radius_m(vehicle: Vehicle) -> float:
     return min(max(1.0, math.floor(vehicle.limits.track_error_m)), 255.0)
 
 
+def corner_m(vehicle: Vehicle) -> float:
+    """What a planner keeps beside its track for corners that are cut by more than ``track_error_m`` holds; mostly 0."""
+    if vehicle.turn_radius_m > 0.0 or math.isinf(vehicle.corner_accel_m_s2):
+        return 0.0
+    radius_m = acceptance_radius_m(vehicle)
+    return radius_m if radius_m > vehicle.limits.track_error_m else 0.0
+
+
 def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float, float], order: Order) -> Mission:
     """The mission that flies ``path``: take-off at home, its points, and ``order.end``.
 

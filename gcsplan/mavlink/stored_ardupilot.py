@@ -190,6 +190,33 @@ _PLANE_WAYPOINT = _at(p2=_byte, p3=_byte)
 _FENCE_VERTEX, _FENCE_CIRCLE, _FENCE_RETURN, _RALLY = (5001, 5002), (5003, 5004), 5000, 5100
 
 
+NAN_TAKEN = {16: (3,), 17: (3,), 21: (3,), 22: (3,), 84: (3,), 85: (2, 3)}
+"""Commands of which a param (by index) may be NaN (`mavlink_int_to_mission_cmd`, `sanity_check_params`)."""
+
+_FRAMES = (0, 2, 3, 5, 6, 10, 11)
+SPLINE_WAYPOINT = 82
+
+
+def refused_by_copter(item: MissionItem) -> str:
+    """Why ArduCopter refuses ``item`` on upload; empty where it takes it, or is not known to refuse it."""
+    for index, value in enumerate(item.params):
+        if math.isinf(value) or (math.isnan(value) and index not in NAN_TAKEN.get(item.command, ())):
+            return f"ArduPilot refuses param{index + 1} of command {item.command}, which is {value}"
+    rule = RULES.get(item.command)
+    if rule is None or not rule.located:
+        return ""
+    if item.frame not in _FRAMES:
+        return f"ArduPilot takes no item in frame {item.frame}"
+    return f"ArduPilot refuses an altitude of {item.z}" if math.isnan(item.z) else ""
+
+
+def refused_by_plane(item: MissionItem) -> str:
+    """Why ArduPlane refuses ``item`` on upload; empty where it takes it, or is not known to refuse it."""
+    if item.command == SPLINE_WAYPOINT:
+        return "ArduPlane takes no splines (command 82)"
+    return refused_by_copter(item)
+
+
 def stored_by_copter(item: MissionItem) -> MissionItem:
     """``item`` as ArduCopter reads it back."""
     return _stored(item, RULES.get(item.command))

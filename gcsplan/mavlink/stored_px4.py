@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from gcsplan.mavlink.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, MissionItem, float32
+from gcsplan.mavlink.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, RELATIVE, TERRAIN, MissionItem, float32
 
 Keep = Callable[[float], float]
 _RADIANS_PER_DEGREE = float32(float32(math.pi) / 180.0)
@@ -81,11 +81,43 @@ LOCATED: dict[int, _Rule] = {
 }
 """What is kept of param1 … param4 of commands with a place (frames 0, 3 and their twins)."""
 
+PLACELESS = frozenset(
+    {
+        20, 80, 93, 112, 114, 177, 178, 179, 183, 187, 189, 197, 200, 201, 203, 204, 205, 206, 211, 212, 214, 260, 400,
+        530, 531, 532, 534, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 42600,
+    }
+)  # fmt: skip
+"""Commands that are taken in MAV_FRAME_MISSION (2) alone."""
+
+FENCE_AND_RALLY = frozenset({5001, 5002, 5003, 5004, 5100})
 _FENCE = range(5000, 5005)
 _DO_JUMP = 177
 
 YAW_COMMANDS = frozenset(command for command, rule in LOCATED.items() if rule[3] is yaw)
 """Commands whose param4 goes through radians: a compiler may contract that product, so it is compared as an angle."""
+
+
+def refused_by_px4(item: MissionItem) -> str:
+    """Why PX4 refuses ``item`` on upload; empty where it takes it."""
+    frame = FRAME_SYNONYMS.get(item.frame, item.frame)
+    if frame not in (GLOBAL, RELATIVE, NO_POSITION):
+        return f"PX4 takes no item in frame {item.frame}" + (" (above terrain)" if frame == TERRAIN else "")
+    if item.command in FENCE_AND_RALLY:
+        return f"PX4 takes command {item.command} in a fence or among rally points alone"
+    known = PLACELESS if frame == NO_POSITION else LOCATED
+    if item.command in known:
+        modes = (0.0, 1.0, 2.0) if frame == NO_POSITION else (0.0, 3.0)
+        refused = item.command in (80, 201) and (
+            not math.isfinite(item.params[0]) or math.trunc(item.params[0]) not in modes
+        )
+        return (
+            f"PX4 takes no region of interest of the kind {item.params[0]:g} in frame {item.frame}" if refused else ""
+        )
+    other = LOCATED if frame == NO_POSITION else PLACELESS
+    if item.command in other:
+        wanted = "frame 2 (without a place)" if frame != NO_POSITION else "a frame with a place (0 or 3)"
+        return f"PX4 takes command {item.command} in {wanted} alone, and it is in frame {item.frame}"
+    return f"PX4 does not take command {item.command} in a mission"
 
 
 def stored_by_px4(item: MissionItem) -> MissionItem:

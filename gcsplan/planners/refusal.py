@@ -33,7 +33,7 @@ def explain(problem: Problem, *, proved: bool | None = None, plan: Plan | None =
     words = "no path was found"
     if goes_on(problem):
         proved = enclosed(problem)
-        words = f"no path was found within {within_m(problem) / 1000.0:.1f} km of the straight track"
+        words = f"a path is not found within {within_m(problem) / 1000.0:.1f} km of the straight track"
     if proved:
         words = "there is no path within the limits, which is proved"
     bare = NoPath(f"no mission: {words}", reason="infeasible" if proved else "not_found", untried=True)

@@ -12,7 +12,7 @@ from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.autopilots import manner
-from gcsplan.mavlink.build import LONGEST_LEG_M, MARGINS, Margins, Order, build_mission
+from gcsplan.mavlink.build import LONGEST_LEG_M, MARGINS, Margins, Order, build_mission, corner_m
 from gcsplan.mavlink.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
@@ -269,6 +269,7 @@ def make_problem(
     """
     vehicle = request.vehicle
     given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
+    margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
     limits = _with_margins(vehicle.limits, margins, terrain=source.altitude_frame == "terrain", source=source)
     air = world.airspace
     datum = request.start[2]

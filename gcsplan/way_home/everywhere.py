@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gcsplan.check.arcs import bend
 from gcsplan.check.battery import BatteryHome, battery_home
+from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import TERRAIN_ERROR_M
 from gcsplan.check.stretch import Place
@@ -62,8 +62,8 @@ def way_home(
     ground = world.ground_amsl(lat, lon)
     given = rule.default_rel_home_m if rtl_rel_home_m is None else rtl_rel_home_m
     flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=given)
-    if vehicle.turn_radius_m > 0.0 and verdict.legs:
-        bend(flight, stored, vehicle, world.frame)
+    if verdict.legs:
+        round_corners(flight, stored, vehicle, world.frame)
     trail = trail_of(flight, vehicle, world, terrain_error_m) if verdict.legs else None
     if trail is None or math.isnan(ground):
         why = "the mission could not be followed" if trail is None else "the ground at home is unknown"

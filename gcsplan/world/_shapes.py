@@ -93,31 +93,45 @@ def _polygon(corners: Floats, unit: Floats, reach: float, length: float) -> list
     return out
 
 
+DEEP_M, DEEP_PART = 0.005, 0.0005
+MOST_LOOKS = 200_000
+
+
 def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, float]:
     """Greatest distance from a polygon's border of a segment's point inside it, and where on the segment (0 … 1).
 
-    By zooming in on the best of samples, so not certainly the greatest; 0 where none is inside. For reports only.
+    Never too small, and too large by `DEEP_M` or `DEEP_PART` of it at most; 0 where no part is inside. For reports.
     """
+    length = float(np.hypot(*(end - start)))
+    best, at, looks = 0.0, 0.5, 0
+    middle, half = np.linspace(0.0, 1.0, 33), 1.0 / 64
+    while len(middle):
+        depth = _depth_inside(corners, start + middle[:, None] * (end - start))
+        k = int(depth.argmax())
+        if depth[k] > best:
+            best, at = float(depth[k]), float(middle[k])
+        # The distance from a border changes by no more than the way; outside, negative, it does too.
+        looks += len(middle)
+        spare = max(DEEP_M, DEEP_PART * best) if looks < MOST_LOOKS else np.inf
+        open_ = middle[depth + half * length > best + spare]
+        half *= 0.5
+        middle = np.concatenate([open_ - half, open_ + half])
+        middle = middle[(middle >= -half) & (middle <= 1.0 + half)].clip(0.0, 1.0)
+    return (best + max(DEEP_M, DEEP_PART * best) if best > 0.0 else 0.0), at
+
+
+def _depth_inside(corners: Floats, p: Floats) -> Floats:
+    """(N,) signed distance of points (N, 2) from a polygon's border, positive inside."""
     after = np.roll(corners, -1, axis=0)
     edge = after - corners
-    low, high, best, at = 0.0, 1.0, 0.0, 0.5
-    for _ in range(5):
-        t = np.linspace(low, high, 33)
-        p = start + t[:, None] * (end - start)
-        away = p[:, None] - corners
-        w = ((away * edge).sum(-1) / np.maximum((edge * edge).sum(-1), 1e-30)).clip(0.0, 1.0)
-        distance = np.linalg.norm(away - w[..., None] * edge, axis=-1).min(axis=1)
-        e, n = p[:, :1], p[:, 1:]
-        spans_n = (corners[:, 1] > n) != (after[:, 1] > n)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            east_of = corners[:, 0] + (n - corners[:, 1]) / edge[:, 1] * edge[:, 0] > e
-        depth = np.where((spans_n & east_of).sum(axis=1) % 2 == 1, distance, 0.0)
-        k = int(depth.argmax())
-        if depth[k] >= best:
-            best, at = float(depth[k]), float(t[k])
-        half = (high - low) / 16
-        low, high = max(at - half, 0.0), min(at + half, 1.0)
-    return best, at
+    away = p[:, None] - corners
+    w = ((away * edge).sum(-1) / np.maximum((edge * edge).sum(-1), 1e-30)).clip(0.0, 1.0)
+    distance = np.linalg.norm(away - w[..., None] * edge, axis=-1).min(axis=1)
+    e, n = p[:, :1], p[:, 1:]
+    spans_n = (corners[:, 1] > n) != (after[:, 1] > n)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        east_of = corners[:, 0] + (n - corners[:, 1]) / edge[:, 1] * edge[:, 0] > e
+    return np.asarray(np.where((spans_n & east_of).sum(axis=1) % 2 == 1, distance, -distance))
 
 
 def grown_edges(along: Floats, aside: Floats, reach: float) -> tuple[Floats, Floats, Floats]:

@@ -25,6 +25,8 @@ from gcsplan.world._field import Field
 from gcsplan.world._halo import Surroundings
 from gcsplan.world._shapes import deepest_inside
 from gcsplan.world._shared import (
+    BAND_HIGH,
+    BAND_LOW,
     BOW_M,
     CEILING,
     CEILING_AGL,
@@ -44,11 +46,14 @@ from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.tube import Band, Reaches, Tube, make_tube
-from gcsplan.world.zones import Polygon, Zone
+from gcsplan.world.zones import Circle, Polygon, Zone
 
 __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 
 Floats = NDArray[np.float64]
+NEAR_M, NEAR_PART = 0.01, 0.01
+"""To which the kernel resolves the nearest place of a zone over ground (`_sweep_zones.nearest_conflict`)."""
+
 ANGLE_DEG = 1e-7
 """Float noise of an angle: a climb that is steeper by less is legal."""
 
@@ -330,22 +335,43 @@ class Airspace:
         )
 
     def _depths(self, legs: Legs, hit: NDArray[np.intp], hit_at: Floats) -> tuple[Floats, Floats]:
-        """Signed distances of broken zones and where on the leg: the kernel gives 0 anywhere inside a polygon."""
+        """Signed distances of broken zones, never too large, and where on the leg.
+
+        The kernel gives 0 anywhere inside a polygon, and any place inside a zone over ground: of those the deepest
+        within the zone's band of heights is taken.
+        """
         value, at = hit_at[:, 0].copy(), hit_at[:, 1].copy()
-        for row in np.nonzero(value == 0.0)[0].tolist():
+        for row in range(len(hit)):
             leg, k = hit[row].tolist()
             numbers, shape = self._zones.table[k], self.zones[k].shape
-            if not isinstance(shape, Polygon) or numbers[FLOOR_AGL] or numbers[CEILING_AGL]:
+            over_ground = bool(numbers[FLOOR_AGL] or numbers[CEILING_AGL])
+            if over_ground and value[row] > 0.0:  # the nearest place is looked for to a centimetre or a hundredth
+                value[row] = max(0.0, value[row] - max(NEAR_M, NEAR_PART * value[row]))
+                continue
+            if value[row] > 0.0 or not (over_ground or isinstance(shape, Polygon)):
                 continue
             a, b, error = legs.start[leg], legs.end[leg], legs.altitude_error_m[leg]
             part = np.array([0.0, 1.0])
             if a[2] != b[2]:
-                levels = np.array([numbers[FLOOR] - error, numbers[CEILING] + error])
+                low, high = (BAND_LOW, BAND_HIGH) if over_ground else (FLOOR, CEILING)
+                levels = np.array([numbers[low] - error, numbers[high] + error])
                 part = np.sort((levels - a[2]) / (b[2] - a[2])).clip(0.0, 1.0)
-            depth, t = deepest_inside(shape.vertices, *(a[:2] + part[:, None] * (b - a)[:2]))
-            if depth > 0.0:
+            p, q = a[:2] + part[:, None] * (b - a)[:2]
+            if isinstance(shape, Polygon):
+                depth, t = deepest_inside(shape.vertices, p, q)
+            else:
+                depth, t = _deepest_in_circle(shape, shape.radius_m * self.scale, p, q)
+            if depth > -value[row]:
                 value[row], at[row] = -depth, part[0] + t * (part[1] - part[0])
         return value, at
+
+
+def _deepest_in_circle(shape: Circle, radius_m: float, p: Floats, q: Floats) -> tuple[float, float]:
+    """How deep a segment gets into a circle, and where on it."""
+    way, to = q - p, np.array([shape.east_m, shape.north_m]) - p
+    square = float(way @ way)
+    t = min(max(float(to @ way) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return radius_m - float(np.hypot(*(to - t * way))), t
 
 
 ZONE = 7  # after the kernel's kinds

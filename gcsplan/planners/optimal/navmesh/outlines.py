@@ -29,7 +29,7 @@ Place = tuple[float, float]
 
 COARSE = 4
 """Chords of a quarter circle of every arc at first."""
-OFF_M, OFF_OUTER_M = 5e-3, 2e-2
+OFF_M, OFF_OUTER_M = 5e-3, 0.1
 """How far chords may be off where a track comes near: for bounds, and for paths, of which each chord is a leg."""
 NEAR = 1.03
 """Where a track comes nearer than that times what it must keep, coarse arcs may stand in its way that fine ones do not,

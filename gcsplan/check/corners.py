@@ -1,0 +1,238 @@
+"""Corners as autopilots cut them: where a vehicle turns before it is there, and what that widens.
+
+A way point counts as reached within a radius. There the vehicle turns, and flies to where the next leg ends. Facts:
+
+- PX4 (mission_block.cpp, `is_mission_item_reached`): a multicopter takes a way point's own radius (param2), or
+  NAV_ACC_RAD (10 m) where that is 0, negative or not finite, and for every other command. A hold begins within that
+  radius as well. A take-off ends NAV_MC_ALT_RAD below its top.
+- ArduCopter (SCurve.cpp, `advance_target_along_track`): it begins the next leg while it still brakes on this one, where
+  the middle of the turn lies within WPNAV_RADIUS (2 m), and not in the first half of either leg. The item's own radius
+  is not stored. It stops at a hold, before a landing, a return or a circle.
+- ArduPlane (commands_logic.cpp, `verify_nav_wp`): param2 in whole metres, or `turn_distance` where that is 0. What
+  turns with a radius is `arcs`'; here is what flies as a VTOL.
+- Behind a circle the next leg begins anywhere on it.
+
+Nothing is assumed of how a vehicle gets onto its next leg, but that it stays between that leg and the straight line
+from where it turned to the leg's end. With the turn begun R before a corner of angle A, that line is R·sin(A) off the
+next leg at its beginning and on it at its end, and no more than R·sin(A)·cos(A) off the leg before.
+
+What lies within ``track_error_m`` and ``altitude_error_m`` is in them by their definition (corners are named there).
+What lies beyond widens the legs, and is flown instead of them. A vehicle whose ``corner_accel_m_s2`` is not bounded
+turns on the spot by definition.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from gcsplan.check.arcs import bend
+from gcsplan.check.returning import circle_growth, flat_m
+from gcsplan.check.spline import Vector, towards
+from gcsplan.check.stretch import Flight, Place, Stretch
+from gcsplan.check.tuning import DEFAULTS, Tuning
+from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.frame import Frame
+
+__all__ = ["round_corners"]
+
+PARTS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+"""Of a leg, each widened by what its beginning needs."""
+
+SAME_M = 0.02
+UNJUDGED = "that is not judged"
+
+
+def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tuning: Tuning = DEFAULTS) -> None:
+    """Put into ``flight`` what is flown at the corners of ``mission`` (as stored): arcs, or legs that are widened."""
+    if vehicle.turn_radius_m > 0.0:
+        bend(flight, mission, vehicle, frame, tuning)
+        return
+    if math.isinf(vehicle.corner_accel_m_s2):
+        return
+    cutter = _Cutter(flight, mission, vehicle, tuning)
+    flight.instead += cutter.widened(flight.stretches)
+    flight.not_judged += cutter.not_judged
+    flight.notes += [words for words in cutter.notes if words not in flight.notes]
+
+
+@dataclass(frozen=True, slots=True)
+class _Off:
+    """How far from the beginning of a leg a vehicle may begin it: to the side, and in height."""
+
+    aside_m: float = 0.0
+    height_m: float = 0.0
+
+
+class _Cutter:
+    """Goes along a flight from leg to leg, with what it may be off at the beginning of each."""
+
+    def __init__(self, flight: Flight, mission: Mission, vehicle: Vehicle, tuning: Tuning) -> None:
+        self.mission, self.tuning, self.limits = mission, tuning, vehicle.limits
+        self.copter = mission.autopilot is Autopilot.ARDUCOPTER
+        self.twins: dict[tuple[object, ...], list[Stretch]] = {}
+        for s in flight.instead:
+            self.twins.setdefault(_way(s), []).append(s)
+        self.notes: list[str] = []
+        self.not_judged: list[str] = []
+
+    def widened(self, stretches: Sequence[Stretch]) -> list[Stretch]:
+        """What is flown instead of ``stretches``, where corners are cut by more than the errors hold."""
+        found: list[Stretch] = []
+        off, last, stops = _Off(), None, False
+        for s in stretches:
+            if not s.column and s.start == s.end:
+                stops = stops or s.hold_s > 0.0
+                if s.reach_m > 0.0:  # a circle, which may be left anywhere
+                    off, last = _Off(s.reach_m, s.band_m), None
+                continue
+            begun = off if last is None else self._leave(last, s, off, stops)
+            if s.column:
+                if last is None and s.kind == "land" and self._has_place(s.seq):
+                    begun = _Off()  # off the circle it flies to its place first
+                found += self._parts(s, (0.0, 1.0), self._beyond(_Off(begun.aside_m)), fading=False)
+                climbed = s.kind == "takeoff" and self.mission.autopilot is Autopilot.PX4
+                # A return goes on from where it climbed; else what was off ends on the ground.
+                off = begun if s.kind == "rtl" else _Off(0.0, self.tuning.px4_height_m if climbed else 0.0)
+                last, stops = None, False
+                continue
+            if last is not None:
+                found += self._before(last, s, begun, stops)
+            blends = self.copter and last is not None
+            found += self._parts(s, (0.0, 0.5) if blends else PARTS, self._beyond(begun), fading=not blends)
+            off, last, stops = begun, s, s.hold_s > 0.0
+        return found
+
+    def _leave(self, s: Stretch, after: Stretch, off: _Off, stops: bool) -> _Off:
+        """How far off the beginning of ``after`` it may be when it sets out on it; ``off``: of that of ``s``."""
+        turn, long_m = _turn(s, after), flat_m(s.start, s.end)
+        sine = 1.0 if after.column else math.sin(min(turn, 0.5 * math.pi))
+        rise_m = abs(s.end[2] - s.start[2])
+        radius_m = self._radius_m(s, after, turn, stops)
+        if radius_m <= 0.0:
+            return _Off()
+        if self.copter:
+            shorter_m = 0.5 * min(long_m, flat_m(after.start, after.end))
+            rise_m = 0.5 * max(rise_m, abs(after.end[2] - after.start[2]))
+            return _Off(min(radius_m, shorter_m * sine), min(radius_m, rise_m))
+        if radius_m >= long_m:  # it turns at once, from wherever it is
+            aside_m, sag_m = min(radius_m, long_m + off.aside_m), rise_m + off.height_m
+        else:
+            part = radius_m / long_m
+            aside_m, sag_m = min(radius_m, radius_m * sine + part * off.aside_m), part * (rise_m + off.height_m)
+        if self.mission.autopilot is Autopilot.PX4:
+            sag_m = min(sag_m, self.tuning.px4_height_m)
+        return _Off(aside_m, sag_m)
+
+    def _radius_m(self, s: Stretch, after: Stretch, turn: float, stops: bool) -> float:
+        """How far before the end of ``s`` it may turn; 0 where it does not."""
+        item = self._item(s.seq)
+        within = s.seq == after.seq and s.kind == after.kind == "cruise"  # pieces of one curve, or up to one circle
+        if item is None or within or s.kind == "rtl":
+            return 0.0
+        if self.copter:
+            nearby = self._item(after.seq)
+            curves = nearby is not None and nearby.command == m.SPLINE_WAYPOINT
+            fast = item.command == m.WAYPOINT and after.kind == "cruise" and not (stops or curves)
+            if fast and self.tuning.copter_radius_m > self.limits.track_error_m:
+                self._say(f"corners are cut within {self.tuning.says('WPNAV_RADIUS', self.tuning.copter_radius_m)}")
+            return self.tuning.copter_radius_m if fast else 0.0
+        if self.mission.autopilot is Autopilot.PX4:
+            own = item.params[1] if item.command == m.WAYPOINT else 0.0
+            if math.isfinite(own) and own > 1e-7:
+                return own
+            if self.tuning.px4_radius_m > self.limits.track_error_m:
+                radius = self.tuning.says("NAV_ACC_RAD", self.tuning.px4_radius_m)
+                self._say(f"item {s.seq} gives no acceptance radius: it counts as reached within {radius}")
+            return self.tuning.px4_radius_m
+        return self._plane_radius_m(s, item, turn)
+
+    def _plane_radius_m(self, s: Stretch, item: MissionItem, turn: float) -> float:
+        if item.command != m.WAYPOINT:
+            return 0.0
+        if item.params[2] >= 1.0:
+            words = (
+                f"item {s.seq}: flies {item.params[2]:.0f} m past its way point before it turns (param3): {UNJUDGED}"
+            )
+            if words not in self.not_judged:
+                self.not_judged.append(words)
+        if item.params[1] > 0.0:
+            return float(item.params[1])
+        radius = self.tuning.says("WP_RADIUS", self.tuning.plane_radius_m)
+        self._say(f"item {s.seq} gives no acceptance radius: its turn is judged as begun by {radius}")
+        return self.tuning.plane_turns_m(s.speed_m_s, turn, circle_growth(max(s.start[2], s.end[2])))
+
+    # -- what is flown -------------------------------------------------------------------------------------------
+
+    def _before(self, s: Stretch, after: Stretch, begun: _Off, stops: bool) -> Iterator[Stretch]:
+        """The end of ``s``, from where it turns on: what is flown from there may not yet lie beside ``after``."""
+        radius_m, long_m = self._radius_m(s, after, turn := _turn(s, after), stops), flat_m(s.start, s.end)
+        aside_m, height_m = self._beyond(begun)
+        if self.copter or radius_m >= long_m:
+            yield from self._parts(s, (0.5 if self.copter else 0.0, 1.0), (aside_m, height_m), fading=False)
+            return
+        aside_m *= math.cos(min(turn, 0.5 * math.pi))
+        yield from self._parts(s, (1.0 - radius_m / long_m, 1.0), (aside_m, height_m), fading=False)
+
+    def _parts(
+        self, s: Stretch, cuts: Sequence[float], off_m: tuple[float, float], *, fading: bool
+    ) -> Iterator[Stretch]:
+        """``s`` between ``cuts``, and what flies its way instead, wider and higher by ``off_m``, in the end by none."""
+        aside_m, height_m = off_m
+        if aside_m <= 1e-9 and height_m <= 0.0:
+            return
+        for one in (s, *self.twins.get(_way(s), ())):
+            # In the terrain frame height runs over the ground: such a leg is not cut.
+            for a, b in [(0.0, 1.0)] if one.terrain else pairwise(cuts):
+                left = 1.0 - a if fading else 1.0
+                yield replace(
+                    one, start=_between(one, a), end=_between(one, b), reach_m=one.reach_m + left * aside_m,
+                    band_m=one.band_m + left * height_m, hold_s=0.0, on_path=False,
+                )  # fmt: skip
+
+    def _beyond(self, off: _Off) -> tuple[float, float]:
+        """What is off; 0 where the vehicle's own errors hold it."""
+        aside_m = off.aside_m if off.aside_m > self.limits.track_error_m else 0.0
+        return aside_m, off.height_m if off.height_m > self.limits.altitude_error_m else 0.0
+
+    # -- what the mission says -----------------------------------------------------------------------------------
+
+    def _item(self, seq: int) -> MissionItem | None:
+        index = seq - self.mission.first_seq
+        return self.mission.items[index] if 0 <= index < len(self.mission.items) else None
+
+    def _has_place(self, seq: int) -> bool:
+        item = self._item(seq)
+        return item is not None and (item.x != 0 or item.y != 0)
+
+    def _say(self, words: str) -> None:
+        if words not in self.notes:
+            self.notes.append(words)
+
+
+def _way(s: Stretch) -> tuple[object, ...]:
+    return s.seq, s.kind, s.start[:2], s.end[:2]
+
+
+def _between(s: Stretch, part: float) -> Place:
+    if part in (0.0, 1.0):
+        return s.end if part else s.start
+    a, b = s.start, s.end
+    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
+
+
+def _turn(s: Stretch, after: Stretch) -> float:
+    """The angle between two legs seen from above, radians; a right angle where one of them goes nowhere."""
+    one, two = _course(s), _course(after)
+    if one is None or two is None:
+        return 0.5 * math.pi
+    return abs((two - one + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+def _course(s: Stretch) -> float | None:
+    way: Vector = towards(s.start, s.end)
+    return math.atan2(way[1], way[0]) if math.hypot(way[0], way[1]) > SAME_M else None

@@ -1,0 +1,75 @@
+"""By how much a limit is broken, so that who moves by that much keeps it.
+
+The exact check resolves the ground beside a leg as finely as it needs to say yes or no; how deep it is broken it gives
+to a tenth. What is told is what was tried: the leg, moved by it, passes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.world.airspace import Airspace, Legs, Violation
+from gcsplan.world.limits import Limits
+
+__all__ = ["enough", "rounded_up"]
+
+UPWARD = {"min_agl": 1.0, "terrain_clearance": 1.0, "max_agl": -1.0}
+"""Which way a leg is moved to keep a limit of height."""
+
+TRIES = 8
+FINER = 7
+LEAST_PART = 0.8
+"""Of what the kernel gives, from which on it is looked for what is enough."""
+
+CENTIMETRE = 0.01
+
+
+def rounded_up(by: float) -> float:
+    """``by`` in whole hundredths, never less."""
+    return round(math.ceil(by * 100.0 - 1e-7) / 100.0, 2) if math.isfinite(by) and by < 1e9 else by
+
+
+def enough(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> Violation:
+    """``v`` with a ``by`` in hundredths that is enough for all of ``broken``: the legs that break what it breaks."""
+    if v.kind == "coverage":
+        return v
+    by = _lift(v, broken, legs, limits, air) if v.kind in UPWARD else rounded_up(v.by)
+    below = v.kind in ("min_agl", "terrain_clearance", "zone")
+    return replace(v, by=by, value=v.limit - by if below else v.limit + by)
+
+
+def _lift(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> float:
+    """Between what is not enough and what is, by trial: metres up, or down under a ceiling."""
+    alone = Limits(
+        min_agl_m=limits.min_agl_m if v.kind == "min_agl" else -1e9,
+        max_agl_m=limits.max_agl_m if v.kind == "max_agl" else None,
+        horizontal_clearance_m=limits.horizontal_clearance_m if v.kind == "terrain_clearance" else 0.0,
+    )
+
+    def left(by: float) -> float:
+        lift = np.array([0.0, 0.0, UPWARD[v.kind] * by])
+        moved = Legs(
+            legs.start[broken] + lift, legs.end[broken] + lift, legs.column[broken], legs.track_error_m[broken],
+            legs.altitude_error_m[broken],
+        )  # fmt: skip
+        return max((w.by for w in air.examine(moved, alone).violations if w.kind == v.kind), default=0.0)
+
+    by = rounded_up(v.by)
+    for _ in range(TRIES):
+        missing = left(by)
+        if missing <= 0.0:
+            break
+        by = rounded_up(by + max(missing, CENTIMETRE))
+    low = LEAST_PART * by
+    if left(low) <= 0.0:
+        low, by = 0.0, rounded_up(low)
+    for _ in range(FINER):
+        half = rounded_up(0.5 * (low + by))
+        if not low < half < by:
+            break
+        low, by = (low, half) if left(half) <= 0.0 else (half, by)
+    return by

@@ -1,0 +1,163 @@
+"""A flight's stretches as straight legs of the plane; those in the terrain frame in pieces that follow the ground.
+
+Over a bilinear surface the ground under a straight line is a quadratic in each cell. So is the altitude of a leg that
+is interpolated above ground: its distance from a chord is known from its middle, and its slope is steepest at an end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.check.stretch import Stretch
+from gcsplan.world.airspace import Floats, Kind, LegReport, Legs, Violation
+from gcsplan.world.limits import Limits
+from gcsplan.world.surface import Surface
+from gcsplan.world.world import World
+
+__all__ = ["PlaneLegs", "legs_in_plane", "steep_report"]
+
+SAG_M = 0.05
+"""How far a chord may lie from the quadratic that it stands for; added to the altitude error of its piece."""
+
+GRID_BOW_M = 0.01
+"""How far lines that are straight in the plane may lie from those straight in the grid, where cells are cut."""
+
+SHORTEST_M = 1e-3
+MOST_PARTS = 200
+"""Into which a piece of a terrain-frame leg is cut for `SAG_M`, at most."""
+
+NOISE_DEG = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class PlaneLegs:
+    """The legs of all stretches in the plane; ``owner`` (N,) is the stretch of each leg.
+
+    ``steep`` (N, 2): steepest rise over run, up and down (negative), where that is not the leg's own slope; else NaN.
+    """
+
+    legs: Legs
+    owner: NDArray[np.intp]
+    steep: Floats
+
+
+def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> PlaneLegs:
+    """The stretches as straight legs of the plane, with all that widens them; terrain-frame ones in many pieces."""
+    places = np.array([(s.start, s.end) for s in stretches])
+    plane = np.empty_like(places)
+    plane[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
+    plane[..., 2] = places[..., 2]
+    bow_m = world.frame.bow_m(places[:, 0, :2], places[:, 1, :2])
+    starts, ends, counts, deviation, steep = [], [], [], [], []
+    for i, s in enumerate(stretches):
+        if s.terrain:
+            points, off_m, slopes = follow_ground(plane[i], world.airspace.surface)
+        else:
+            points, off_m, slopes = plane[i], np.zeros(1), np.array([s.steep or (np.nan, np.nan)])
+        starts.append(points[:-1])
+        ends.append(points[1:])
+        counts.append(len(points) - 1)
+        deviation.append(off_m)
+        steep.append(slopes)
+    owner = np.repeat(np.arange(len(stretches)), counts)
+    track = limits.track_error_m + bow_m + np.array([s.reach_m for s in stretches])
+    height = limits.altitude_error_m + np.array([s.band_m + (terrain_error_m if s.terrain else 0.0) for s in stretches])
+    column = np.array([s.column for s in stretches])
+    legs = Legs(
+        np.concatenate(starts), np.concatenate(ends), column[owner], track[owner],
+        height[owner] + np.concatenate(deviation),
+    )  # fmt: skip
+    return PlaneLegs(legs, owner, np.concatenate(steep))
+
+
+def follow_ground(ends: Floats, surface: Surface) -> tuple[Floats, Floats, Floats]:
+    """A terrain-frame leg (2, 3) as straight pieces: points (N + 1, 3), how far each piece is off (N,), and `steep`.
+
+    Height is interpolated above ground between the ends. Over unknown ground it is left as one straight leg, which is
+    examined as such, and reports the void.
+    """
+    straight = ends, np.zeros(1), np.full((1, 2), np.nan)
+    run_m = float(np.hypot(*(ends[1, :2] - ends[0, :2])))
+    if run_m <= SHORTEST_M:
+        return straight
+    t = _cell_cuts(ends, surface, run_m)
+    agl = ends[:, 2] - surface.ground_at(ends[:, 0], ends[:, 1])
+
+    def altitude(f: Floats) -> Floats:
+        en = ends[0, :2] + f[:, None] * (ends[1, :2] - ends[0, :2])
+        return np.asarray(surface.ground_at(en[:, 0], en[:, 1]) + agl[0] + f * (agl[1] - agl[0]))
+
+    z, middle = altitude(t), altitude(0.5 * (t[1:] + t[:-1]))
+    if np.isnan(z).any() or np.isnan(middle).any():
+        return straight
+    sag = middle - 0.5 * (z[1:] + z[:-1])
+    long_m = np.diff(t) * run_m
+    slope, bend = np.diff(z) / long_m, 4.0 * np.abs(sag) / long_m
+    parts = np.clip(np.ceil(np.sqrt(np.abs(sag) / SAG_M)), 1, MOST_PARTS).astype(int)
+    piece = np.repeat(np.arange(len(parts)), parts)
+    begun = np.concatenate([[0], np.cumsum(parts)[:-1]])
+    share = (np.arange(len(piece)) - begun[piece]) / parts[piece]
+    f = np.append(t[:-1][piece] + np.diff(t)[piece] * share, 1.0)
+    # The quadratic itself, so that neighbours meet: its chord, and four times its sag at the middle.
+    z = np.append(z[:-1][piece] + (np.diff(z)[piece] + 4.0 * sag[piece] * (1.0 - share)) * share, z[-1])
+    en = ends[0, :2] + f[:, None] * (ends[1, :2] - ends[0, :2])
+    points = np.column_stack([en, z])
+    points[0], points[-1] = ends
+    off = np.abs(sag) / parts**2
+    return points, off[piece], np.column_stack([slope + bend, slope - bend])[piece]
+
+
+def _cell_cuts(ends: Floats, surface: Surface, run_m: float) -> Floats:
+    """Where a line crosses from cell to cell: rising parts of it from 0 to 1, none so near that rounding counts."""
+    way = ends[1, :2] - ends[0, :2]
+    middle, both = surface.grid(*(ends[0, :2] + 0.5 * way)), surface.grid(ends[:, 0], ends[:, 1])
+    bow_m = float(np.hypot(*((middle - both.mean(axis=0)) * surface.grid.metres_per_cell(*ends[0, :2]))))
+    parts = max(1, math.ceil(math.sqrt(bow_m / GRID_BOW_M)))
+    f = np.linspace(0.0, 1.0, parts + 1)
+    grid = surface.grid(*(ends[0, :2] + f[:, None] * way).T)
+    cuts = [f]
+    for axis in (0, 1):
+        for k in range(parts):
+            a, b = float(grid[k, axis]), float(grid[k + 1, axis])
+            lines = np.arange(math.ceil(min(a, b)), math.floor(max(a, b)) + 1)
+            if a != b:
+                cuts.append((k + (lines - a) / (b - a)) / parts)
+    t = np.unique(np.clip(np.concatenate(cuts), 0.0, 1.0))
+    kept = np.concatenate([[True], np.diff(t) * run_m > SHORTEST_M])
+    kept[-1] = True
+    if not kept.all():
+        t = t[kept]
+        if len(t) > 2 and (t[-1] - t[-2]) * run_m <= SHORTEST_M:
+            t = np.delete(t, -2)
+    return np.asarray(t)
+
+
+def steep_report(plane: PlaneLegs, report: LegReport, limits: Limits) -> LegReport:
+    """``report`` with the angles of pieces that follow the ground: those of their steepest metre, not of chords."""
+    mine = np.flatnonzero(~np.isnan(plane.steep[:, 0]) & ~plane.legs.column)
+    if not len(mine):
+        return report
+    angles = np.degrees(np.arctan(plane.steep[mine]))
+    climb = report.climb_deg.copy()
+    climb[mine] = np.where(angles[:, 0] >= -angles[:, 1], angles[:, 0], angles[:, 1])
+    own = set(mine.tolist())
+    violations = [v for v in report.violations if v.leg not in own or v.kind not in ("climb", "descent")]
+    tried: tuple[tuple[Kind, float, Floats], ...] = (
+        ("climb", limits.max_climb_deg, angles[:, 0]), ("descent", limits.max_descent_deg, -angles[:, 1]),
+    )  # fmt: skip
+    for kind, limit, found in tried:
+        worst: dict[int, int] = {}
+        for k in np.flatnonzero(found > limit + NOISE_DEG).tolist():
+            owner = int(plane.owner[mine[k]])
+            if owner not in worst or found[k] > found[worst[owner]]:
+                worst[owner] = k
+        for k in worst.values():
+            leg, value = int(mine[k]), float(found[k])
+            east, north, amsl = plane.legs.start[leg].tolist()
+            violations.append(Violation(leg, kind, 0.0, east, north, amsl, value, limit, value - limit, "deg"))
+    return replace(report, climb_deg=climb, violations=tuple(sorted(violations, key=lambda v: v.leg)))

@@ -1,0 +1,50 @@
+"""The parameters of an autopilot that decide where it turns: its defaults, or what was read from the vehicle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+__all__ = ["DEFAULTS", "Tuning"]
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """Where the autopilots turn, in metres. ``read``: names of the parameters that were read from the vehicle."""
+
+    copter_radius_m: float = 2.0  # ArduCopter WPNAV_RADIUS 200 cm (WP_RADIUS_M from 4.7 on)
+    px4_radius_m: float = 10.0  # PX4 NAV_ACC_RAD
+    px4_height_m: float = 0.8  # PX4 NAV_MC_ALT_RAD
+    plane_radius_m: float = 90.0  # ArduPlane WP_RADIUS
+    l1_period_s: float = 17.0  # ArduPlane NAVL1_PERIOD
+    l1_damping: float = 0.75  # ArduPlane NAVL1_DAMPING
+    read: frozenset[str] = frozenset()
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> Tuning:
+        """What ``values`` (parameters by name, in their own units) say; defaults for what they do not hold.
+
+        Numbers that are not finite or not positive are left aside.
+        """
+        known = {
+            "WPNAV_RADIUS": ("copter_radius_m", 0.01), "WP_RADIUS_M": ("copter_radius_m", 1.0),
+            "NAV_ACC_RAD": ("px4_radius_m", 1.0), "NAV_MC_ALT_RAD": ("px4_height_m", 1.0),
+            "WP_RADIUS": ("plane_radius_m", 1.0), "NAVL1_PERIOD": ("l1_period_s", 1.0),
+            "NAVL1_DAMPING": ("l1_damping", 1.0),
+        }  # fmt: skip
+        usable = {name: v for name, v in values.items() if name in known and math.isfinite(v) and v > 0.0}
+        fields = {known[name][0]: value * known[name][1] for name, value in usable.items()}
+        return cls(**fields, read=frozenset(usable))
+
+    def says(self, parameter: str, value: float, unit: str = "m") -> str:
+        """``parameter`` and its value in words, and where the value comes from."""
+        return f"{parameter} {value:g} {unit}, {'read from the vehicle' if parameter in self.read else 'the default'}"
+
+    def plane_turns_m(self, speed_m_s: float, turn_rad: float, growth: float = 1.0) -> float:
+        """How far before a way point without its own radius ArduPlane turns (`AP_L1_Control::turn_distance`)."""
+        ahead_m = self.l1_damping * self.l1_period_s / math.pi * speed_m_s
+        return min(self.plane_radius_m * growth, ahead_m) * min(1.0, abs(turn_rad) / (0.5 * math.pi))
+
+
+DEFAULTS = Tuning()

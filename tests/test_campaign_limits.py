@@ -1,0 +1,53 @@
+"""A short run of the campaign `limits`, and that it finds what it is for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+import gcsplan.check.judge as judging
+from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane
+from tests.campaigns.limit_cases import FAMILIES
+from tests.campaigns.limits import run
+
+FOREVER_S = 1e9
+
+
+def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
+    tally = run(FOREVER_S, 3, ("px4", "terrain", "spline", "wing", "battery"), most=1, turns=1)
+    assert tally.unsafe == []
+    assert sum(tally.judged.values()) >= 4
+
+
+@pytest.mark.slow
+def test_no_family_is_unsafe_at_the_limit() -> None:
+    tally = run(FOREVER_S, 40, most=4)
+    assert tally.unsafe == []
+    assert set(tally.judged) == set(FAMILIES)
+
+
+def test_corners_that_nobody_judges_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def sharp(*_: object) -> None:
+        """No corner is ever cut."""
+
+    monkeypatch.setattr(judging, "round_corners", sharp)
+    assert run(FOREVER_S, 3, ("vtol",), most=1, turns=2).unsafe
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("less", ["track_error_m", "altitude_error_m"])
+def test_errors_that_are_taken_too_small_are_found(monkeypatch: pytest.MonkeyPatch, less: str) -> None:
+    """The campaign itself can fail: with a fifth of a metre less than it is, an error lets something through."""
+
+    def short(error_m: float) -> Callable[..., PlaneLegs]:
+        def legs(stretches, limits, world, terrain_error_m):  # type: ignore[no-untyped-def]
+            return legs_in_plane(
+                stretches, replace(limits, **{less: max(0.0, getattr(limits, less) - error_m)}), world, terrain_error_m
+            )
+
+        return legs
+
+    monkeypatch.setattr(judging, "legs_in_plane", short(0.2))
+    assert any(run(FOREVER_S, seed, ("copter", "terrain"), most=1).unsafe for seed in range(1, 9))
