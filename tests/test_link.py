@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import InputError, LinkError
 from gcsplan.mavlink import wire
+from gcsplan.mavlink.drive import drive
 from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing, SigningKey, signing_key
-from gcsplan.mavlink.link import GCS, Channel, Heard, Job, Link, Steps, drive, pump, run
+from gcsplan.mavlink.link import GCS, Channel, Heard, Job, Link, Steps, pump, run
 from gcsplan.mavlink.messages import (
     Ack,
     Address,

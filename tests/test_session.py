@@ -220,7 +220,7 @@ def test_two_vehicles_with_one_number_are_refused() -> None:
         with (
             SimServer([first], f"udpout:127.0.0.1:{port}", speedup=10.0),
             SimServer([second], f"udpout:127.0.0.1:{port}", speedup=10.0),
-            pytest.raises(VehicleRefused, match="2 autopilots send heartbeats as system 1"),
+            pytest.raises(VehicleRefused, match="2 autopilots speak as system 1"),
         ):
             upload_mission(link, mission(), options=replace(OPTIONS, listen_s=0.5))
     assert first.items() == second.items() == ()

@@ -1,9 +1,13 @@
-"""What a vehicle says of itself: heartbeats, position, capabilities and texts, folded into a `VehicleState`."""
+"""What a vehicle says of itself: heartbeats, position, capabilities and texts, folded into a `VehicleState`.
+
+What one address says is kept apart from what another says: two vehicles with one number must not be taken for one.
+"""
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
@@ -12,6 +16,7 @@ from gcsplan.mavlink.autopilots import GENERIC, INVALID, autopilot_name, type_na
 from gcsplan.mavlink.link import Heard
 from gcsplan.mavlink.messages import Address
 from gcsplan.mavlink.mission import Home
+from gcsplan.mavlink.numbers import Place, place
 from gcsplan.mavlink.transport import Peer
 
 # MAV_STATE
@@ -28,18 +33,23 @@ _AUTOPILOT_COMPID = 1
 _NO_AUTOPILOT_TYPES = frozenset({5, 6, 18, 26, 27, 30, 31, 32, 33, 34, 36, 37, 38, 39, 40, 41, 42, 44})
 """Ground stations, trackers, companion computers, gimbals, cameras and the like."""
 
-_FRESH_S = 3.0
+FRESH_S = 3.0
+"""Heartbeats come once a second: one that is older than this was missed."""
 _MOST_SOURCES = 64
 _MOST_TEXTS = 20
+_BACK_S = 5.0  # a boot clock further behind than that is no message that was held up on its way
+_TURNS = 2
 
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
     """One vehicle as it reports itself; None where it did not.
 
-    ``address`` is its autopilot's. ``system_status`` is a MAV_STATE, ``amsl_m`` metres above mean sea level,
-    ``capabilities`` MAV_PROTOCOL_CAPABILITY bits. ``sources`` counts those who send an autopilot's heartbeats under
-    this system id: more than one are two vehicles with one number. ``texts`` are its last messages to people.
+    ``address`` is its autopilot's, ``peer`` where on the link it speaks from. ``system_status`` is a MAV_STATE,
+    ``amsl_m`` metres above mean sea level, ``capabilities`` MAV_PROTOCOL_CAPABILITY bits. ``sources`` counts those
+    who speak as an autopilot under this system id: more than one are two vehicles with one number. ``texts`` are its
+    last messages to people. ``beat_at`` and ``placed_at`` are when the last heartbeat and position came (the clock of
+    the link, -inf: never).
     """
 
     address: Address
@@ -54,6 +64,9 @@ class VehicleState:
     sources: int = 1
     home: Home | None = None
     texts: tuple[str, ...] = ()
+    peer: Peer | None = None
+    beat_at: float = -math.inf
+    placed_at: float = -math.inf
 
     @property
     def what(self) -> str:
@@ -72,84 +85,183 @@ class VehicleState:
 
 @dataclass(slots=True)
 class _Source:
+    """Heartbeats of one kind from one component at one address."""
+
     autopilot: int
     kind: int
     armed: bool
     status: int
+    first: float
     at: float
+
+    def overlaps(self, other: _Source) -> bool:
+        """Whether both were there at the same time."""
+        return self.first <= other.at and other.first <= self.at
+
+
+@dataclass(slots=True)
+class _Clock:
+    """The boot clock in an address's messages: a vehicle that reboots falls back once, two vehicles take turns."""
+
+    latest_s: float = -math.inf
+    latest_at: float = -math.inf
+    low_s: float = -math.inf
+    behind: bool = False
+    turns: int = 0
+
+    def note(self, boot_s: float, now: float) -> None:
+        if boot_s >= self.latest_s:
+            self.turns += self.behind
+            self.behind, self.latest_s, self.latest_at = False, boot_s, now
+        elif boot_s < self.latest_s - _BACK_S:
+            if now - self.latest_at > _BACK_S:  # nobody else was heard since: it has rebooted
+                self.latest_s, self.latest_at, self.behind = boot_s, now, False
+            elif boot_s > self.low_s or self.turns == 0:  # the other one's clock goes on as well
+                self.behind = True
+            self.low_s = boot_s
+
+
+@dataclass(slots=True)
+class _Told:
+    """What one component at one address says besides its heartbeats."""
+
+    clock: _Clock = field(default_factory=_Clock)
+    place: Place | None = None
+    from_fix: bool = False
+    placed_at: float = -math.inf
+    capabilities: int | None = None
+    home: Home | None = None
+    first: float = 0.0
+    at: float = 0.0
+
+
+_Voice = tuple[int, Peer]  # component id and address
+_Key = tuple[int, Peer, int, int]  # and the kinds of autopilot and vehicle
 
 
 class Watch:
     """Collects what one system id says; `note` takes every message, `state` is what it amounts to.
 
-    ``texts`` are the last things said to people, ``said`` counts all of them.
+    ``texts`` are the last things said to people, ``said`` counts all of them. Once a vehicle is `pin`ned, the state is
+    that of the one that speaks from there, whoever else says it has the same number.
     """
 
     def __init__(self, sysid: int) -> None:
         self.sysid = sysid
         self.texts: deque[str] = deque(maxlen=_MOST_TEXTS)
         self.said = 0
-        self._sources: dict[tuple[int, Peer], _Source] = {}
-        self._place: tuple[float, float, float] | None = None
-        self._place_from_fix = False
-        self.capabilities: int | None = None
-        self._home: Home | None = None
+        self._sources: dict[_Key, _Source] = {}
+        self._told: dict[_Voice, _Told] = {}
+        self._pinned: _Voice | None = None
+        self._pinned_at = 0.0
+
+    def pin(self, state: VehicleState, now: float) -> None:
+        """From now on the vehicle is the one in ``state``, and whoever else has its number is a rival for good."""
+        self._pinned, self._pinned_at = (state.address.compid, state.peer), now
 
     def note(self, heard: Heard, now: float) -> None:
         """Take one message in."""
-        handler = {
-            "HEARTBEAT": self._heartbeat,
-            "GLOBAL_POSITION_INT": self._position,
-            "GPS_RAW_INT": self._fix,
-            "AUTOPILOT_VERSION": self._version,
-            "HOME_POSITION": self._home_position,
-            "STATUSTEXT": self._text,
-        }.get(heard.message.get_type())
-        if handler:
-            handler(heard, heard.message, now)
+        kind = heard.message.get_type()
+        told = self._voice((heard.source.compid, heard.peer), now)
+        boot_ms = getattr(heard.message, "time_boot_ms", None)
+        if isinstance(boot_ms, int):
+            told.clock.note(boot_ms / 1e3, now)
+        if kind == "HEARTBEAT":
+            self._heartbeat(heard, now)
+        elif kind == "STATUSTEXT":
+            self._text(heard.message)
+        elif kind in _TELLS:
+            _TELLS[kind](told, heard.message, now)
 
     def texts_since(self, said: int) -> tuple[str, ...]:
         """The texts, as far as they are kept, after the first ``said`` of them."""
         new = min(self.said - said, len(self.texts))
         return tuple(self.texts)[len(self.texts) - new :]
 
+    def last_heard(self) -> float:
+        """When the pinned vehicle said anything last."""
+        told = self._told.get(self._pinned) if self._pinned else None
+        return told.at if told else -math.inf
+
+    def elsewhere(self, now: float) -> bool:
+        """Whether the number is heard now from an address that is not the pinned one."""
+        return any(voice != self._pinned and now - told.at <= FRESH_S for voice, told in self._told.items())
+
     def state(self, now: float) -> VehicleState | None:
         """The state now; None before an autopilot's heartbeat."""
-        fresh = {key: s for key, s in self._sources.items() if now - s.at <= _FRESH_S} or self._sources
-        pilots = [key for key, s in fresh.items() if _is_autopilot(key[0], s)]
-        if not pilots:
+        pilots = {key: s for key, s in self._sources.items() if _is_autopilot(key[0], s)}
+        fresh = {key: s for key, s in pilots.items() if now - s.at <= FRESH_S} or pilots
+        if self._pinned:
+            fresh = {key: s for key, s in pilots.items() if key[:2] == self._pinned}
+        if not fresh:
             return None
-        best = min(pilots, key=lambda key: (key[0] != _AUTOPILOT_COMPID, fresh[key].autopilot in (GENERIC, INVALID)))
-        source = fresh[best]
-        rivals = [key for key in pilots if key[0] == best[0] or fresh[key].autopilot not in (GENERIC, INVALID)]
-        lat, lon, amsl = self._place or (None, None, None)
+        best = min(
+            fresh,
+            key=lambda key: (
+                key[0] != _AUTOPILOT_COMPID, fresh[key].autopilot in (GENERIC, INVALID),
+                -fresh[key].at if self._pinned else 0,
+            ),
+        )  # fmt: skip
+        source, told = fresh[best], self._told.get(best[:2]) or _Told()
+        lat, lon, amsl = told.place or (None, None, None)
         return VehicleState(
             Address(self.sysid, best[0]), source.autopilot, source.kind, source.armed, source.status,
-            lat, lon, amsl, self.capabilities, len(rivals), self._home, tuple(self.texts),
+            lat, lon, amsl, told.capabilities, self._rivals(best, pilots, now), told.home, tuple(self.texts),
+            best[1], source.at, told.placed_at,
         )  # fmt: skip
 
-    def _heartbeat(self, heard: Heard, m: Any, now: float) -> None:
-        key = (heard.source.compid, heard.peer)
-        if key not in self._sources and len(self._sources) >= _MOST_SOURCES:
-            del self._sources[min(self._sources, key=lambda k: self._sources[k].at)]
+    def alike(self) -> bool:
+        """Whether all that comes from the pinned address can be of one vehicle: one kind, and one boot clock."""
+        return self._pinned is None or self._voices_at(self._pinned) == 1
+
+    def _voices_at(self, voice: _Voice) -> int:
+        kinds = [s for key, s in self._sources.items() if key[:2] == voice]
+        overlapping = any(a is not b and a.overlaps(b) for a in kinds for b in kinds)
+        told = self._told.get(voice)
+        return 2 if overlapping or (told and told.clock.turns >= _TURNS) else 1
+
+    def _rivals(self, best: _Key, pilots: dict[_Key, _Source], now: float) -> int:
+        """How many autopilots there are by all that was heard, at the same time as the one that is meant."""
+        mine, since = pilots[best], (self._pinned_at if self._pinned else now) - FRESH_S
+        others = {
+            key[:2]
+            for key, s in pilots.items()
+            if key[:2] != best[:2] and s.at >= since and s.overlaps(mine)
+            and (key[0] == best[0] or s.autopilot not in (GENERIC, INVALID))
+        }  # fmt: skip
+        # One that sends no heartbeat, or whose heartbeats get lost, is there all the same.
+        others |= {
+            voice
+            for voice, told in self._told.items()
+            if voice[0] == best[0] and voice[1] != best[1]
+            and told.at >= since and told.first <= mine.at and mine.first <= told.at
+        }  # fmt: skip
+        return len(others) + self._voices_at(best[:2])
+
+    def _voice(self, voice: _Voice, now: float) -> _Told:
+        told = self._told.get(voice)
+        if told is None:
+            if len(self._told) >= _MOST_SOURCES:
+                del self._told[min((v for v in self._told if v != self._pinned), key=lambda v: self._told[v].at)]
+            told = self._told[voice] = _Told(first=now)
+        told.at = now
+        return told
+
+    def _heartbeat(self, heard: Heard, now: float) -> None:
+        m = heard.message
+        key = (heard.source.compid, heard.peer, int(m.autopilot), int(m.type))
         armed = bool(m.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
-        self._sources[key] = _Source(m.autopilot, m.type, armed, m.system_status, now)
+        source = self._sources.get(key)
+        if source is not None:
+            source.armed, source.status, source.at = armed, m.system_status, now
+            return
+        if len(self._sources) >= _MOST_SOURCES:
+            del self._sources[
+                min((k for k in self._sources if k[:2] != self._pinned), key=lambda k: self._sources[k].at)
+            ]
+        self._sources[key] = _Source(key[2], key[3], armed, m.system_status, now, now)
 
-    def _position(self, heard: Heard, m: Any, now: float) -> None:
-        if (m.lat, m.lon) != (0, 0):  # 0, 0 is how the lack of a position is reported
-            self._place, self._place_from_fix = (m.lat / 1e7, m.lon / 1e7, m.alt / 1e3), False
-
-    def _fix(self, heard: Heard, m: Any, now: float) -> None:
-        if m.fix_type >= dialect.GPS_FIX_TYPE_3D_FIX and (self._place is None or self._place_from_fix):
-            self._place, self._place_from_fix = (m.lat / 1e7, m.lon / 1e7, m.alt / 1e3), True
-
-    def _version(self, heard: Heard, m: Any, now: float) -> None:
-        self.capabilities = int(m.capabilities)
-
-    def _home_position(self, heard: Heard, m: Any, now: float) -> None:
-        self._home = Home(m.latitude, m.longitude, m.altitude / 1e3)
-
-    def _text(self, heard: Heard, m: Any, now: float) -> None:
+    def _text(self, m: Any) -> None:
         text = m.text if isinstance(m.text, str) else bytes(m.text).decode(errors="replace")
         self.said += 1
         self.texts.append("".join(c for c in text if c.isprintable()).strip())
@@ -157,3 +269,33 @@ class Watch:
 
 def _is_autopilot(compid: int, source: _Source) -> bool:
     return compid == _AUTOPILOT_COMPID or source.kind not in _NO_AUTOPILOT_TYPES
+
+
+def _position(told: _Told, m: Any, now: float) -> None:
+    found = place(m.lat, m.lon, m.alt)
+    if found is not None:
+        told.place, told.from_fix, told.placed_at = found, False, now
+
+
+def _fix(told: _Told, m: Any, now: float) -> None:
+    found = place(m.lat, m.lon, m.alt)
+    if found is not None and m.fix_type >= dialect.GPS_FIX_TYPE_3D_FIX and (told.place is None or told.from_fix):
+        told.place, told.from_fix, told.placed_at = found, True, now
+
+
+def _version(told: _Told, m: Any, now: float) -> None:
+    told.capabilities = int(m.capabilities)
+
+
+def _home_position(told: _Told, m: Any, now: float) -> None:
+    found = place(m.latitude, m.longitude, m.altitude)
+    if found is not None:
+        told.home = Home(m.latitude, m.longitude, found.amsl_m)
+
+
+_TELLS = {
+    "GLOBAL_POSITION_INT": _position,
+    "GPS_RAW_INT": _fix,
+    "AUTOPILOT_VERSION": _version,
+    "HOME_POSITION": _home_position,
+}
