@@ -89,7 +89,7 @@ class Link:
 
     ``us`` are our own ids; with ``key`` every frame is signed and unsigned ones are dropped; ``heartbeat_s`` is the
     interval of our ground-station heartbeat, None for none. ``clock``, ``transport`` and ``wait`` can be had from
-    elsewhere, for simulated time. Raises InputError for a bad URL, LinkError if it does
+    elsewhere, for simulated time, and so can ``signing``. Raises InputError for a bad URL, LinkError if it does
     not open.
     """
 
@@ -103,11 +103,12 @@ class Link:
         clock: Clock = time.monotonic,
         transport: Transport | None = None,
         wait: Callable[[Sequence[Transport], float], None] = wait_readable,
+        signing: Signing | None = None,
     ) -> None:
         self.endpoint = parse_url(endpoint) if isinstance(endpoint, str) else endpoint
         self.us = us
         self.clock = clock
-        self._signing = Signing(key)
+        self._signing = signing or Signing(key)
         self._writer = FrameWriter(us, self._signing)
         self._parsers: dict[Peer, FrameParser] = {}
         self._heard_at: dict[Peer, float] = {}

@@ -39,6 +39,7 @@ _MOST_SOURCES = 64
 _MOST_TEXTS = 20
 _BACK_S = 5.0  # a boot clock further behind than that is no message that was held up on its way
 _TURNS = 2
+_FASTEST = 100.0  # a simulator's clock runs at most so much faster than ours
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,31 +102,36 @@ class _Source:
 
 @dataclass(slots=True)
 class _Clock:
-    """The boot clock in an address's messages: a vehicle that reboots falls back once, two vehicles take turns."""
+    """The boot clock in an address's messages: a vehicle that reboots falls back once, two vehicles take turns.
+
+    A turn is a fall of the clock and its return. A jump that no time has passed for, and then a fall, is two.
+    """
 
     latest_s: float = -math.inf
     latest_at: float = -math.inf
-    low_s: float = -math.inf
     behind: bool = False
+    jumped: bool = False
     turns: int = 0
 
     def note(self, boot_s: float, now: float) -> None:
         if boot_s >= self.latest_s:
+            longest_s = _BACK_S + _FASTEST * (now - self.latest_at)
+            self.jumped = self.jumped or -math.inf < self.latest_s < boot_s - longest_s
             self.turns += self.behind
             self.behind, self.latest_s, self.latest_at = False, boot_s, now
         elif boot_s < self.latest_s - _BACK_S:
             if now - self.latest_at > _BACK_S:  # nobody else was heard since: it has rebooted
-                self.latest_s, self.latest_at, self.behind = boot_s, now, False
-            elif boot_s > self.low_s or self.turns == 0:  # the other one's clock goes on as well
+                self.latest_s, self.latest_at, self.behind, self.jumped = boot_s, now, False, False
+            else:
+                self.turns += _TURNS * self.jumped
                 self.behind = True
-            self.low_s = boot_s
 
 
 @dataclass(slots=True)
 class _Told:
     """What one component at one address says besides its heartbeats."""
 
-    clock: _Clock = field(default_factory=_Clock)
+    clocks: dict[str, _Clock] = field(default_factory=dict)
     place: Place | None = None
     from_fix: bool = False
     placed_at: float = -math.inf
@@ -163,9 +169,8 @@ class Watch:
         """Take one message in."""
         kind = heard.message.get_type()
         told = self._voice((heard.source.compid, heard.peer), now)
-        boot_ms = getattr(heard.message, "time_boot_ms", None)
-        if isinstance(boot_ms, int):
-            told.clock.note(boot_ms / 1e3, now)
+        if kind in _CLOCKS and heard.message.time_boot_ms:
+            told.clocks.setdefault(kind, _Clock()).note(heard.message.time_boot_ms / 1e3, now)
         if kind == "HEARTBEAT":
             self._heartbeat(heard, now)
         elif kind == "STATUSTEXT":
@@ -218,7 +223,8 @@ class Watch:
         kinds = [s for key, s in self._sources.items() if key[:2] == voice]
         overlapping = any(a is not b and a.overlaps(b) for a in kinds for b in kinds)
         told = self._told.get(voice)
-        return 2 if overlapping or (told and told.clock.turns >= _TURNS) else 1
+        taking_turns = told is not None and any(clock.turns >= _TURNS for clock in told.clocks.values())
+        return 2 if overlapping or taking_turns else 1
 
     def _rivals(self, best: _Key, pilots: dict[_Key, _Source], now: float) -> int:
         """How many autopilots there are by all that was heard, at the same time as the one that is meant."""
@@ -293,6 +299,7 @@ def _home_position(told: _Told, m: Any, now: float) -> None:
         told.home = Home(m.latitude, m.longitude, found.amsl_m)
 
 
+_CLOCKS = frozenset({"SYSTEM_TIME", "ATTITUDE", "GLOBAL_POSITION_INT"})
 _TELLS = {
     "GLOBAL_POSITION_INT": _position,
     "GPS_RAW_INT": _fix,
