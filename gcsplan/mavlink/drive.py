@@ -114,7 +114,7 @@ def _take(machine: Driven, channel: Channel, prepared: Prepared, heard: Heard, r
     now = channel.link.clock()
     if recheck:
         recheck.note(heard, now)
-    packet = wire.decode(heard.message)
+    packet = None if heard.late else wire.decode(heard.message)
     if packet is None or (recheck and not recheck.admits(heard, packet.message)):
         return
     answers = machine.receive(packet, now)

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, Literal
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
@@ -26,6 +26,9 @@ _MARKERS = re.compile(b"[\xfd\xfe]")
 _MARKER_BYTES = (0xFD, 0xFE)
 _V2, _SIGNED = 0xFD, 0x01
 _SIGNING_EPOCH_S = 1_420_070_400  # 2015-01-01, in units of 10 µs from there
+GOOD: Final = "good"
+LATE: Final = "late"
+BAD: Final = "bad"
 _MOST_STREAMS = 4096
 KEY_VARIABLE = "GCSPLAN_SIGNING_KEY"
 
@@ -79,7 +82,8 @@ class Signing:
 
     A signed frame counts once, and only if it was signed after this link was opened: a vehicle takes over the time of
     those whom it hears, so whoever still signs with an older one has not heard us, and may be a recording. What the
-    signature does not fit changes nothing: a forged time must not shut the true stream out.
+    signature does not fit changes nothing: a forged time must not shut the true stream out. What was rightly signed
+    and comes late is `LATE`: it proves nothing, but it may speak against the one who is heard (a second vehicle).
     """
 
     def __init__(
@@ -100,28 +104,31 @@ class Signing:
         """Whether there is a key."""
         return bool(self._secret)
 
-    def accepts(self, frame: bytes) -> bool:
+    def judge(self, frame: bytes) -> Literal["good", "late", "bad"]:
         """Whether a frame whose checksum fits may count; everything may without a key."""
         if not self._secret:
-            return True
+            return GOOD
         if frame[0] != _V2 or not frame[2] & _SIGNED:
-            return False
+            return BAD
         stream = (frame[-13], frame[5], frame[6])  # link, system, component
         signed_at = int.from_bytes(frame[-12:-6], "little")
         signature = hashlib.sha256(self._secret + frame[:-6]).digest()[:6]
         if not hmac.compare_digest(signature, frame[-6:]) or signed_at < self._opened:
-            return False
-        if signed_at <= self._streams.get(stream, -1) or (
-            stream not in self._streams and len(self._streams) >= _MOST_STREAMS
-        ):
-            return False
+            return BAD
+        if signed_at <= self._streams.get(stream, -1):
+            return LATE
+        if stream not in self._streams and len(self._streams) >= _MOST_STREAMS:
+            return BAD
         self._streams[stream] = signed_at
         self.state.timestamp = max(self.state.timestamp, signed_at)
-        return True
+        return GOOD
 
 
 class FrameParser:
-    """Messages out of bytes. ``bad`` counts frames that did not check, ``unsigned`` those without a valid signature."""
+    """Messages out of bytes. ``bad`` counts frames that did not check, ``unsigned`` those without a valid signature.
+
+    A message has the attribute ``late`` beside pymavlink's own, of `Signing`.
+    """
 
     def __init__(self, signing: Signing | None = None) -> None:
         self._mav = dialect.MAVLink(None)  # it has no key: signatures are our affair
@@ -173,11 +180,12 @@ class FrameParser:
         except dialect.MAVError:
             self.bad += 1
             return None
-        if not self._signing.accepts(frame):
+        verdict = self._signing.judge(frame)
+        if verdict != GOOD:
             self.bad += 1
             self.unsigned += 1
-            return None
-        return message
+        message.late = verdict == LATE
+        return None if verdict == BAD else message
 
 
 def _is_unknown_kind(buffer: bytes, start: int) -> bool:

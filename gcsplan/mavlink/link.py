@@ -40,11 +40,16 @@ _IDLE_S = 0.1  # a machine hears of prompt answers, and progress is shown, at le
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """One message: who sent it (ids and address), and the pymavlink message itself."""
+    """One message: who sent it (ids and address), and the pymavlink message itself.
+
+    ``late``: rightly signed, but not newer than what was heard before. It counts for nothing, and may count against
+    who speaks.
+    """
 
     source: Address
     peer: Peer
     message: Any
+    late: bool = False
 
 
 class Channel:
@@ -174,7 +179,7 @@ class Link:
         sysid 0 is everybody.
         """
         if to.sysid == 0:
-            peers = set(self._heard_at) | ({self.transport.default} - {None})
+            peers = [p for p in dict.fromkeys((*self._heard_at, self.transport.default)) if p is not None]
             frame = self._writer.pack(message)
             for each in peers:
                 self.transport.write(frame, each)
@@ -238,11 +243,12 @@ class Link:
         source = Address(message.get_srcSystem(), message.get_srcComponent())
         if source == self.us:
             return  # our own voice, from a hub
-        self._routes[source] = peer
-        self._routes[source.sysid] = peer
-        self.heard_systems[source.sysid] = now
+        if not message.late:
+            self._routes[source] = peer
+            self._routes[source.sysid] = peer
+            self.heard_systems[source.sysid] = now
         for channel in self._channels.get(source.sysid, ()):
-            channel.inbox.append(Heard(source, peer, message))
+            channel.inbox.append(Heard(source, peer, message, message.late))
 
     def _beat(self, now: float) -> None:
         if not self._heartbeat_s or now < self._next_heartbeat:

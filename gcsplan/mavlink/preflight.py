@@ -181,6 +181,13 @@ def _position(state: VehicleState, start: Home, ground_m: float, against: Reason
         )
 
 
+def apart_m(a: VehicleState, b: VehicleState) -> float | None:
+    """Metres between the two places; None where one of them is not known."""
+    if a.lat_deg is None or a.lon_deg is None or b.lat_deg is None or b.lon_deg is None:
+        return None
+    return distance_m(a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg)
+
+
 def distance_m(lat_a: float, lon_a: float, lat_b: float, lon_b: float) -> float:
     """Great-circle distance in metres between two places in degrees (haversine on the mean sphere)."""
     a, b = math.radians(lat_a), math.radians(lat_b)

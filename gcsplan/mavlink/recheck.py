@@ -24,7 +24,7 @@ from gcsplan.mavlink.link import Channel, Heard, Steps
 from gcsplan.mavlink.machine import Wait
 from gcsplan.mavlink.messages import MissionMessage, Request
 from gcsplan.mavlink.outcome import Changed, Outcome, Unknown
-from gcsplan.mavlink.preflight import NEAR_START_M, Reasons, distance_m
+from gcsplan.mavlink.preflight import NEAR_START_M, Reasons, apart_m
 from gcsplan.mavlink.watch import FRESH_S, VehicleState, Watch
 
 Judge = Callable[[VehicleState], tuple[Reasons, list[str]]]
@@ -96,7 +96,7 @@ class Recheck:
 
     def note(self, heard: Heard, now: float) -> None:
         """Take in everything that comes under the vehicle's system id."""
-        if heard.peer == self._channel.peer and heard.source == self._address:
+        if heard.peer == self._channel.peer and heard.source == self._address and not heard.late:
             self.contact(now)
         self._watch.note(heard, now)
         self._news = True
@@ -173,10 +173,8 @@ class Recheck:
         against, warnings = self._judge(state)
         first = self._first
         if first and not first.armed and not any(word in _MOVED for word, _ in against):
-            if first.lat_deg is None or first.lon_deg is None or state.lat_deg is None or state.lon_deg is None:
-                return against, warnings
-            away_m = distance_m(first.lat_deg, first.lon_deg, state.lat_deg, state.lon_deg)
-            if away_m > NEAR_START_M:
+            away_m = apart_m(first, state)
+            if away_m is not None and away_m > NEAR_START_M:
                 against.append(("wrong_place", f"the vehicle is {away_m:.0f} m from where it was checked"))
         return against, warnings
 
@@ -187,13 +185,13 @@ class Recheck:
             return None
         against, _ = self._objections(state)
         found = [(word, text) for word, text in against if word in _AT_ONCE]
-        if not self._watch.alike():
+        if not self._watch.alike(now):
             words = f"two vehicles speak as system {self._address.sysid} from the same address"
             found.append(("ambiguous", words))
         return _changed(found)
 
     def _shut_after_silence(self, now: float) -> None:
-        if not self._shut and now - self._contact > FRESH_S:
+        if not self._shut and now >= self._contact + FRESH_S:
             self._shut, self._silent_until = True, self._contact
             self._began = None
 

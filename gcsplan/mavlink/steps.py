@@ -86,7 +86,7 @@ def parameter_steps(
         yield ask_at
         for heard in channel.take():
             (recheck or watch).note(heard, clock())
-            ours = heard.source == state.address and channel.peer in (None, heard.peer)
+            ours = not heard.late and heard.source == state.address and channel.peer in (None, heard.peer)
             kind = heard.message.get_type() if ours else ""
             if kind == "PARAM_VALUE":
                 name = parameter_name(heard.message)

@@ -155,7 +155,7 @@ class VerifiedUpload:
         if self._phase is not _Phase.IDLE:
             raise ImpossibleTransition("verified upload: START is impossible twice", where=f"vehicle {self.vehicle}")
         self._phase = _Phase.UPLOAD
-        return self._upload.start(now)
+        return self._upload.start(now) + self._advance(now)
 
     def receive(self, packet: Packet, now: float) -> list[Packet]:
         """Take ``packet`` in and return the answers. Items are answered in every phase: it may still be receiving."""
@@ -218,7 +218,7 @@ class VerifiedUpload:
             self._refused_before = self._upload.outcome
             self._began_before = self._began
             self._upload, self._reads = self._new_upload(), 0
-            return self._upload.start(now)
+            return self._upload.start(now) + self._advance(now)
         return self._read(now)
 
     def _read(self, now: float) -> list[Packet]:

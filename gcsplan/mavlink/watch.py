@@ -37,9 +37,10 @@ FRESH_S = 3.0
 """Heartbeats come once a second: one that is older than this was missed."""
 _MOST_SOURCES = 64
 _MOST_TEXTS = 20
-_BACK_S = 5.0  # a boot clock further behind than that is no message that was held up on its way
-_TURNS = 2
-_FASTEST = 100.0  # a simulator's clock runs at most so much faster than ours
+_ODD_S = 5.0  # messages are held up on their way, but not for longer
+_FASTEST = 2.0  # a vehicle's clock against ours
+_LEAP_M = 300.0
+_METRES_A_DEGREE = 111_195.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +95,7 @@ class _Source:
     status: int
     first: float
     at: float
+    armed_at: float = -math.inf
 
     def overlaps(self, other: _Source) -> bool:
         """Whether both were there at the same time."""
@@ -102,29 +104,28 @@ class _Source:
 
 @dataclass(slots=True)
 class _Clock:
-    """The boot clock in an address's messages: a vehicle that reboots falls back once, two vehicles take turns.
+    """The boot clock in one kind of an address's messages.
 
-    A turn is a fall of the clock and its return. A jump that no time has passed for, and then a fall, is two.
+    A vehicle that reboots falls back, and one that was not heard for long is further on. Only where two take turns
+    does the clock both fall back and leap ahead of the time that has passed.
     """
 
     latest_s: float = -math.inf
     latest_at: float = -math.inf
-    behind: bool = False
-    jumped: bool = False
-    turns: int = 0
+    fell: bool = False
+    leapt: bool = False
 
     def note(self, boot_s: float, now: float) -> None:
-        if boot_s >= self.latest_s:
-            longest_s = _BACK_S + _FASTEST * (now - self.latest_at)
-            self.jumped = self.jumped or -math.inf < self.latest_s < boot_s - longest_s
-            self.turns += self.behind
-            self.behind, self.latest_s, self.latest_at = False, boot_s, now
-        elif boot_s < self.latest_s - _BACK_S:
-            if now - self.latest_at > _BACK_S:  # nobody else was heard since: it has rebooted
-                self.latest_s, self.latest_at, self.behind, self.jumped = boot_s, now, False, False
-            else:
-                self.turns += _TURNS * self.jumped
-                self.behind = True
+        ahead_s = boot_s - self.latest_s - _FASTEST * (now - self.latest_at)
+        self.leapt = self.leapt or (self.latest_s > -math.inf and ahead_s > _ODD_S)
+        self.fell = self.fell or boot_s < self.latest_s - _ODD_S
+        if boot_s >= self.latest_s or boot_s < self.latest_s - _ODD_S:  # a message that was overtaken is none of these
+            self.latest_s, self.latest_at = boot_s, now
+
+    @property
+    def of_two(self) -> bool:
+        """Whether it cannot be the clock of one vehicle."""
+        return self.fell and self.leapt
 
 
 @dataclass(slots=True)
@@ -135,6 +136,7 @@ class _Told:
     place: Place | None = None
     from_fix: bool = False
     placed_at: float = -math.inf
+    leapt: bool = False  # from one place to another, faster than anything moves
     capabilities: int | None = None
     home: Home | None = None
     first: float = 0.0
@@ -168,6 +170,9 @@ class Watch:
     def note(self, heard: Heard, now: float) -> None:
         """Take one message in."""
         kind = heard.message.get_type()
+        if heard.late:
+            self._note_against(heard, kind, now)
+            return
         told = self._voice((heard.source.compid, heard.peer), now)
         if kind in _CLOCKS and heard.message.time_boot_ms:
             told.clocks.setdefault(kind, _Clock()).note(heard.message.time_boot_ms / 1e3, now)
@@ -177,6 +182,21 @@ class Watch:
             self._text(heard.message)
         elif kind in _TELLS:
             _TELLS[kind](told, heard.message, now)
+
+    def _note_against(self, heard: Heard, kind: str, now: float) -> None:
+        """What proves nothing may still show that there are two: another clock, another place, armed."""
+        m, told = heard.message, self._told.get((heard.source.compid, heard.peer))
+        if told is None:
+            return
+        if kind in _CLOCKS and m.time_boot_ms:
+            told.clocks.setdefault(kind, _Clock()).note(m.time_boot_ms / 1e3, now)
+        if kind == "GLOBAL_POSITION_INT" and told.place and now - told.placed_at <= FRESH_S:
+            found = place(m.lat, m.lon, m.alt)
+            told.leapt = told.leapt or (found is not None and _leap(told.place, found))
+        if kind == "HEARTBEAT" and m.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:
+            for key, source in self._sources.items():
+                if key[:2] == (heard.source.compid, heard.peer):
+                    source.armed_at = now
 
     def texts_since(self, said: int) -> tuple[str, ...]:
         """The texts, as far as they are kept, after the first ``said`` of them."""
@@ -209,24 +229,31 @@ class Watch:
         )  # fmt: skip
         source, told = fresh[best], self._told.get(best[:2]) or _Told()
         lat, lon, amsl = told.place or (None, None, None)
+        armed = source.armed or now - source.armed_at <= FRESH_S  # two that take turns: one of them is
         return VehicleState(
-            Address(self.sysid, best[0]), source.autopilot, source.kind, source.armed, source.status,
+            Address(self.sysid, best[0]), source.autopilot, source.kind, armed, source.status,
             lat, lon, amsl, told.capabilities, self._rivals(best, pilots, now), told.home, tuple(self.texts),
             best[1], source.at, told.placed_at,
         )  # fmt: skip
 
-    def alike(self) -> bool:
-        """Whether all that comes from the pinned address can be of one vehicle: one kind, and one boot clock."""
-        return self._pinned is None or self._voices_at(self._pinned) == 1
+    def alike(self, now: float) -> bool:
+        """Whether all that comes from the pinned address can be of one autopilot: one kind, boot clock and place."""
+        pilots = {
+            k: s
+            for k, s in self._sources.items()
+            if self._pinned and k[1] == self._pinned[1] and _is_autopilot(k[0], s)
+        }
+        mine = [key for key in pilots if key[:2] == self._pinned]
+        return not mine or self._rivals(max(mine, key=lambda k: pilots[k].at), pilots, now, here=True) == 1
 
     def _voices_at(self, voice: _Voice) -> int:
         kinds = [s for key, s in self._sources.items() if key[:2] == voice]
         overlapping = any(a is not b and a.overlaps(b) for a in kinds for b in kinds)
         told = self._told.get(voice)
-        taking_turns = told is not None and any(clock.turns >= _TURNS for clock in told.clocks.values())
-        return 2 if overlapping or taking_turns else 1
+        taking_turns = told is not None and any(clock.of_two for clock in told.clocks.values())
+        return 2 if overlapping or taking_turns or (told is not None and told.leapt) else 1
 
-    def _rivals(self, best: _Key, pilots: dict[_Key, _Source], now: float) -> int:
+    def _rivals(self, best: _Key, pilots: dict[_Key, _Source], now: float, *, here: bool = False) -> int:
         """How many autopilots there are by all that was heard, at the same time as the one that is meant."""
         mine, since = pilots[best], (self._pinned_at if self._pinned else now) - FRESH_S
         others = {
@@ -239,7 +266,7 @@ class Watch:
         others |= {
             voice
             for voice, told in self._told.items()
-            if voice[0] == best[0] and voice[1] != best[1]
+            if voice[0] == best[0] and voice[1] != best[1] and not here
             and told.at >= since and told.first <= mine.at and mine.first <= told.at
         }  # fmt: skip
         return len(others) + self._voices_at(best[:2])
@@ -260,12 +287,13 @@ class Watch:
         source = self._sources.get(key)
         if source is not None:
             source.armed, source.status, source.at = armed, m.system_status, now
+            source.armed_at = now if armed else source.armed_at
             return
         if len(self._sources) >= _MOST_SOURCES:
             del self._sources[
                 min((k for k in self._sources if k[:2] != self._pinned), key=lambda k: self._sources[k].at)
             ]
-        self._sources[key] = _Source(key[2], key[3], armed, m.system_status, now, now)
+        self._sources[key] = _Source(key[2], key[3], armed, m.system_status, now, now, now if armed else -math.inf)
 
     def _text(self, m: Any) -> None:
         text = m.text if isinstance(m.text, str) else bytes(m.text).decode(errors="replace")
@@ -280,13 +308,27 @@ def _is_autopilot(compid: int, source: _Source) -> bool:
 def _position(told: _Told, m: Any, now: float) -> None:
     found = place(m.lat, m.lon, m.alt)
     if found is not None:
-        told.place, told.from_fix, told.placed_at = found, False, now
+        _put(told, found, now, from_fix=False)
+
+
+def _put(told: _Told, found: Place, now: float, *, from_fix: bool) -> None:
+    if told.place is not None and now - told.placed_at <= FRESH_S:
+        told.leapt = told.leapt or _leap(told.place, found)
+    told.place, told.from_fix, told.placed_at = found, from_fix, now
+
+
+def _leap(a: Place, b: Place) -> bool:
+    """Whether two places of the last seconds are farther from each other than any vehicle flies meanwhile."""
+    north_m = (a.lat_deg - b.lat_deg) * _METRES_A_DEGREE
+    turn_deg = (a.lon_deg - b.lon_deg + 180.0) % 360.0 - 180.0
+    east_m = turn_deg * _METRES_A_DEGREE * math.cos(math.radians(a.lat_deg))
+    return math.hypot(north_m, east_m) > _LEAP_M
 
 
 def _fix(told: _Told, m: Any, now: float) -> None:
     found = place(m.lat, m.lon, m.alt)
     if found is not None and m.fix_type >= dialect.GPS_FIX_TYPE_3D_FIX and (told.place is None or told.from_fix):
-        told.place, told.from_fix, told.placed_at = found, True, now
+        _put(told, found, now, from_fix=True)
 
 
 def _version(told: _Told, m: Any, now: float) -> None:
