@@ -160,6 +160,10 @@ def _position(state: VehicleState, start: Home, ground_m: float, against: Reason
         warnings.append("the vehicle reports no position: whether it stands at the start could not be checked")
         return
     away_m = distance_m(state.lat_deg, state.lon_deg, start.lat_e7 / 1e7, start.lon_e7 / 1e7)
+    if state.just_at is not None and away_m <= NEAR_START_M:
+        lat, lon, _ = state.just_at
+        words = f"the vehicle reports two places by turns, the other at {lat:.6f}, {lon:.6f}: are there two of it?"
+        against.append(("wrong_place", words))
     if away_m > NEAR_START_M:
         against.append(
             (

@@ -146,6 +146,7 @@ class Recheck:
     def _look(self, now: float, *, boots: bool = False) -> Wait | Outcome | None:
         state = self._watch.state(now)
         since = now - _RECENT_S if self._began is None else self._since
+        since = max(since, self._watch.newcomer_at())  # ours must be heard beside it, and then they are two
         if state is None or state.beat_at < since or (self._located and state.placed_at < since):
             self._begin(now, since)
             return self._waits(now) or Unknown(self._unseen(state, since, now))
@@ -165,8 +166,8 @@ class Recheck:
     def _unseen(self, state: VehicleState | None, since: float, now: float) -> str:
         silent = state is None or state.beat_at < since
         what = "the vehicle fell silent" if silent else "the vehicle no longer reports its position"
-        if silent and self._watch.elsewhere(now):
-            what += f", and system {self._address.sysid} is heard from another address now"
+        if silent and self._watch.newcomer_at() > -math.inf:
+            what += f", and another one is heard as system {self._address.sysid} now"
         return f"{what}: it could not be checked again, and nothing further was sent"
 
     def _objections(self, state: VehicleState) -> tuple[Reasons, list[str]]:

@@ -52,6 +52,7 @@ class VehicleState:
     who speak as an autopilot under this system id: more than one are two vehicles with one number. ``texts`` are its
     last messages to people. ``beat_at`` and ``placed_at`` are when the last heartbeat and position came (the clock of
     the link, -inf: never).
+    ``just_at``: another place, too far for it to have come from there, where it was a moment ago.
     """
 
     address: Address
@@ -69,6 +70,7 @@ class VehicleState:
     peer: Peer | None = None
     beat_at: float = -math.inf
     placed_at: float = -math.inf
+    just_at: Place | None = None
 
     @property
     def what(self) -> str:
@@ -136,7 +138,9 @@ class _Told:
     place: Place | None = None
     from_fix: bool = False
     placed_at: float = -math.inf
-    leapt: bool = False  # from one place to another, faster than anything moves
+    leaps: int = 0  # from one place to another, faster than anything moves
+    leapt_from: Place | None = None
+    leapt_at: float = -math.inf
     capabilities: int | None = None
     home: Home | None = None
     first: float = 0.0
@@ -192,7 +196,8 @@ class Watch:
             told.clocks.setdefault(kind, _Clock()).note(m.time_boot_ms / 1e3, now)
         if kind == "GLOBAL_POSITION_INT" and told.place and now - told.placed_at <= FRESH_S:
             found = place(m.lat, m.lon, m.alt)
-            told.leapt = told.leapt or (found is not None and _leap(told.place, found))
+            if found is not None and _leap(told.place, found):
+                told.leaps, told.leapt_from, told.leapt_at = told.leaps + 2, found, now
         if kind == "HEARTBEAT" and m.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:
             for key, source in self._sources.items():
                 if key[:2] == (heard.source.compid, heard.peer):
@@ -203,14 +208,19 @@ class Watch:
         new = min(self.said - said, len(self.texts))
         return tuple(self.texts)[len(self.texts) - new :]
 
-    def last_heard(self) -> float:
-        """When the pinned vehicle said anything last."""
-        told = self._told.get(self._pinned) if self._pinned else None
-        return told.at if told else -math.inf
-
-    def elsewhere(self, now: float) -> bool:
-        """Whether the number is heard now from an address that is not the pinned one."""
-        return any(voice != self._pinned and now - told.at <= FRESH_S for voice, told in self._told.items())
+    def newcomer_at(self) -> float:
+        """When another autopilot was first heard under the number since the vehicle was pinned; -inf: none was."""
+        if self._pinned is None:
+            return -math.inf
+        compid = self._pinned[0]
+        pilots = [
+            s.first
+            for key, s in self._sources.items()
+            if key[:2] != self._pinned and _is_autopilot(key[0], s)
+            and (key[0] == compid or s.autopilot not in (GENERIC, INVALID))
+        ]  # fmt: skip
+        voices = [told.first for v, told in self._told.items() if v != self._pinned and v[0] == compid]
+        return max((at for at in (*pilots, *voices) if at >= self._pinned_at), default=-math.inf)
 
     def state(self, now: float) -> VehicleState | None:
         """The state now; None before an autopilot's heartbeat."""
@@ -234,6 +244,7 @@ class Watch:
             Address(self.sysid, best[0]), source.autopilot, source.kind, armed, source.status,
             lat, lon, amsl, told.capabilities, self._rivals(best, pilots, now), told.home, tuple(self.texts),
             best[1], source.at, told.placed_at,
+            told.leapt_from if now - told.leapt_at <= FRESH_S else None,
         )  # fmt: skip
 
     def alike(self, now: float) -> bool:
@@ -251,7 +262,7 @@ class Watch:
         overlapping = any(a is not b and a.overlaps(b) for a in kinds for b in kinds)
         told = self._told.get(voice)
         taking_turns = told is not None and any(clock.of_two for clock in told.clocks.values())
-        return 2 if overlapping or taking_turns or (told is not None and told.leapt) else 1
+        return 2 if overlapping or taking_turns or (told is not None and told.leaps > 1) else 1
 
     def _rivals(self, best: _Key, pilots: dict[_Key, _Source], now: float, *, here: bool = False) -> int:
         """How many autopilots there are by all that was heard, at the same time as the one that is meant."""
@@ -312,8 +323,8 @@ def _position(told: _Told, m: Any, now: float) -> None:
 
 
 def _put(told: _Told, found: Place, now: float, *, from_fix: bool) -> None:
-    if told.place is not None and now - told.placed_at <= FRESH_S:
-        told.leapt = told.leapt or _leap(told.place, found)
+    if told.place is not None and now - told.placed_at <= FRESH_S and _leap(told.place, found):
+        told.leaps, told.leapt_from, told.leapt_at = told.leaps + 1, told.place, now
     told.place, told.from_fix, told.placed_at = found, from_fix, now
 
 

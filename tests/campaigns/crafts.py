@@ -181,7 +181,7 @@ class Forger:
             dialect.MAVLink_global_position_int_message(rng.randrange(2**32), *i32, 0, 0, 0, 0, 0),
             dialect.MAVLink_gps_raw_int_message(0, rng.randrange(9), *i32, 0, 0, 0, 0, 0),
             dialect.MAVLink_home_position_message(*i32, 0, 0, 0, [math.nan] * 4, 0, 0, math.inf),
-            dialect.MAVLink_autopilot_version_message(rng.randrange(2**64), 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0),
+            dialect.MAVLink_autopilot_version_message(rng.randrange(2**64), 0, 0, 0, 0, *[[0] * 8] * 3, 0, 0, 0),
             dialect.MAVLink_statustext_message(rng.randrange(8), rng.randbytes(50)),
             dialect.MAVLink_heartbeat_message(rng.randrange(45), rng.randrange(20), rng.randrange(256), 0, 4, 3),
         ))  # fmt: skip
