@@ -43,9 +43,7 @@ class Acting(LoopbackVehicle):
     """Does ``act(self, message)`` before every mission message that it gets."""
 
     def __init__(self, autopilot: Autopilot, act: Callable[[Acting, Any], None], **trouble: Any) -> None:
-        super().__init__(
-            1, autopilot, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.0, misbehave=Misbehaviour(**trouble)
-        )
+        super().__init__(1, autopilot, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.0, misbehave=Misbehaviour(**trouble))
         self.act = act
         self.got: list[Any] = []
 
@@ -288,7 +286,9 @@ def fleet(*boards: LoopbackVehicle, judge: Callable[[Mission], str | None] | Non
                 telemetry.parameters = OddParameters(boards[0].autopilot, 1, __import__("random").Random(1))
         with Link(server.url_for_gcs) as link:
             orders = [
-                Order(link, mission(sysid=b.sysid), options=replace(OPTIONS, **options), judge=judge if n == 0 else None)
+                Order(
+                    link, mission(sysid=b.sysid), options=replace(OPTIONS, **options), judge=judge if n == 0 else None
+                )
                 for n, b in enumerate(boards)
             ]
             return upload_fleet(orders)
@@ -319,7 +319,9 @@ def on_patient_air(board: LoopbackVehicle, timeout_s: float, count: int = 8) -> 
     air = Air(6, Radio(), limit_s=2000.0)
     with on_air(("a", Craft(board, air)), air=air) as link:
         try:
-            return upload_mission(link, mission(count=count), options=replace(SLOW, timeout_s=timeout_s)), air.now - 1000.0
+            return upload_mission(
+                link, mission(count=count), options=replace(SLOW, timeout_s=timeout_s)
+            ), air.now - 1000.0
         except GcsplanError as error:
             return error, air.now - 1000.0
 

@@ -7,9 +7,9 @@ from typing import Protocol
 
 from gcsplan.mavlink import wire
 from gcsplan.mavlink.link import Channel, Heard, Steps
-from gcsplan.mavlink.machine import Progress
+from gcsplan.mavlink.machine import CANCELLED_BY_US, Progress
 from gcsplan.mavlink.messages import Address, Item, Packet, Request
-from gcsplan.mavlink.outcome import Outcome
+from gcsplan.mavlink.outcome import Outcome, Unknown
 from gcsplan.mavlink.patience import Patience
 from gcsplan.mavlink.prompt import Prepared
 from gcsplan.mavlink.recheck import Recheck
@@ -102,7 +102,7 @@ def drive(
         prompt.drop(prepared)
         channel.prepared = None
         if machine.deadline is not None:
-            channel.send_packets(machine.cancel(clock()))
+            _give_up(machine, channel, recheck, CANCELLED_BY_US)
 
 
 def _next(machine: Driven, recheck: Recheck | None, patience: Patience | None) -> float:
@@ -133,6 +133,14 @@ def _ended_early(machine: Driven, channel: Channel, recheck: Recheck | None, pat
         return True
     why = patience.over(machine.mark, machine.progress.total, now) if patience else None
     if why is not None:
-        channel.send_packets(machine.cancel(now, why))
+        _give_up(machine, channel, recheck, why)
         return True
     return False
+
+
+def _give_up(machine: Driven, channel: Channel, recheck: Recheck | None, why: str) -> None:
+    """End ``machine``, with a word to the vehicle unless it has fallen silent: another one may stand there now."""
+    if recheck and recheck.shut:
+        machine.stop(Unknown(why))
+    else:
+        channel.send_packets(machine.cancel(channel.link.clock(), why))

@@ -44,7 +44,6 @@ class Recheck:
     """Holds on to the vehicle in ``state``, which was found on ``channel`` and has passed ``judge``.
 
     ``may_move``: where it is does not matter. ``standby_s``: how long one that reboots is waited for.
-    ``warnings`` are those of the last look.
     """
 
     def __init__(
@@ -60,7 +59,6 @@ class Recheck:
         now = channel.link.clock()
         watch.pin(state, now)
         channel.pin(state.peer)
-        self.warnings: list[str] = []
         self._channel, self._watch, self._judge = channel, watch, judge
         self._address = state.address
         self._located = state.located
@@ -131,6 +129,7 @@ class Recheck:
     def last_look(self) -> Steps[Outcome | None]:
         """After the read-back: a `Changed` outcome, None where all is as it was; Unknown after silence."""
         clock = self._channel.link.clock
+        self._longest_s, self._began = LOOK_S, None
         self._begin(clock(), clock())
         while isinstance(seen := self._look(clock(), boots=True), Wait):
             self._ask(clock())
@@ -150,7 +149,7 @@ class Recheck:
         if state is None or state.beat_at < since or (self._located and state.placed_at < since):
             self._begin(now, since)
             return self._waits(now) or Unknown(self._unseen(state, since, now))
-        against, self.warnings = self._objections(state)
+        against = self._objections(state)
         if not boots and against and all(word == "not_ready" for word, _ in against):
             self._begin(now, since)
             self._since = now - _RECENT_S
@@ -170,22 +169,21 @@ class Recheck:
             what += f", and another one is heard as system {self._address.sysid} now"
         return f"{what}: it could not be checked again, and nothing further was sent"
 
-    def _objections(self, state: VehicleState) -> tuple[Reasons, list[str]]:
-        against, warnings = self._judge(state)
+    def _objections(self, state: VehicleState) -> Reasons:
+        against, _ = self._judge(state)
         first = self._first
         if first and not first.armed and not any(word in _MOVED for word, _ in against):
             away_m = apart_m(first, state)
             if away_m is not None and away_m > NEAR_START_M:
                 against.append(("wrong_place", f"the vehicle is {away_m:.0f} m from where it was checked"))
-        return against, warnings
+        return against
 
     def _another(self, now: float) -> Outcome | None:
         """Whether what speaks from the vehicle's address cannot be the vehicle that was checked."""
         state = self._watch.state(now)
         if state is None:
             return None
-        against, _ = self._objections(state)
-        found = [(word, text) for word, text in against if word in _AT_ONCE]
+        found = [(word, text) for word, text in self._objections(state) if word in _AT_ONCE]
         if not self._watch.alike(now):
             words = f"two vehicles speak as system {self._address.sysid} from the same address"
             found.append(("ambiguous", words))

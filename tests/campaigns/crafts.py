@@ -46,6 +46,7 @@ class Craft:
         self.vehicle, self.air = vehicle, air
         self.hub = Hub([vehicle], always=STATION, signing=signing)
         self.wanted: tuple[MissionItem, ...] = ()
+        self.deadline = self.hub.deadline
         self.silent = False
         self.address: Peer = ""
         self.there_since = air.now
@@ -60,22 +61,19 @@ class Craft:
         self._equal_since = math.inf
         self.equal: list[tuple[float, float]] = []
 
-    @property
-    def deadline(self) -> float | None:
-        """When it has something to do."""
-        return self.hub.deadline
-
     def take(self, client: str, data: bytes, now: float) -> list[tuple[Any, bytes]]:
         """Bytes of the ground station."""
         if self.silent:
             return []
         sent = self.hub.take(client, data, now)
+        self.deadline = self.hub.deadline
         self._look()
         return sent
 
     def on_timer(self, now: float) -> list[tuple[Any, bytes]]:
         """What is due."""
         sent = self.hub.on_timer(now)
+        self.deadline = self.hub.deadline
         self._look()
         return [] if self.silent else sent
 
