@@ -14,7 +14,7 @@ def test_nothing_is_found_among_adversaries() -> None:
     assert found == []
     assert counts["runs"] == 25
     # It is no campaign if nothing gets through, or nothing goes wrong.
-    assert counts["verified"] > 10
+    assert counts["verified"] > 5
     assert counts["exit 5"] > 8
     assert counts["exit 6"] > 3
     assert counts["changed"] > 3
