@@ -7,7 +7,7 @@ import pytest
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link import Link
 from gcsplan.mavlink.mission import MISSION
-from gcsplan.mavlink.session import Options, upload_mission, verify_mission
+from gcsplan.mavlink.session import Options, Order, upload_fleet, verify_mission
 from gcsplan.sim.server import SimServer
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission, a_vehicle
@@ -30,10 +30,9 @@ def test_a_mavsdk_vehicle_that_is_called_verified_holds_the_mission(loss: float,
         LossyRelay(("127.0.0.1", vehicle.port), loss=loss, seed=seed) as relay,
         Link(relay.url) as bad,
     ):
-        try:
-            result = upload_mission(bad, mission, options=OPTIONS)
-        except GcsplanError as error:
-            assert error.exit_code in (5, 6)
+        (result,) = upload_fleet([Order(bad, mission, options=OPTIONS)])
+        if isinstance(result, GcsplanError):
+            assert result.exit_code in (5, 6)
             return
         assert result.seconds <= TIMEOUT_S + 2.0 * 20 + 2.0
         if result.verified:
