@@ -31,6 +31,7 @@ Judge = Callable[[VehicleState], tuple[Reasons, list[str]]]
 
 LOOK_S = 10.0
 """So long a look waits for a vehicle that has fallen silent."""
+_TELLING = frozenset({"HEARTBEAT", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "ATTITUDE", "SYSTEM_TIME"})
 _RECENT_S = 1.5
 _ASK_AGAIN_S = 0.5
 _AGAIN_S = 0.1
@@ -97,7 +98,7 @@ class Recheck:
         if heard.peer == self._channel.peer and heard.source == self._address and not heard.late:
             self.contact(now)
         self._watch.note(heard, now)
-        self._news = True
+        self._news = self._news or heard.message.get_type() in _TELLING
 
     def contact(self, now: float) -> None:
         """The vehicle was heard at its address."""
