@@ -73,6 +73,8 @@ class Hub:
             self.forget(next(iter(self._listeners)))
         sent: Sent = []
         for message in listener.parser.feed(data, datagram=datagram):
+            if message.late:
+                continue
             try:
                 sent += self._handle(message, client, now)
             except (ArithmeticError, ValueError, TypeError, LookupError, AttributeError):
