@@ -381,3 +381,12 @@ def test_a_vehicle_that_asks_on_and_on_is_left_after_two_seconds_an_item_more() 
 def test_a_timeout_that_is_none_is_refused() -> None:
     with pytest.raises(GcsplanError, match="timeout"):
         uploaded(vehicle(), timeout_s=0.0)
+
+
+def test_a_vehicle_that_boots_longer_than_the_timeout_is_not_written_to_and_left_at_once() -> None:
+    """The time until it was ready is none of the transfer's."""
+    board = Acting(COPTER, lambda *_: None, seed=1)
+    board._boot_s = 4.5
+    result, _ = on_patient_air(board, 5.0, 2)
+    assert result.verified
+    assert board.count(Count) == 1

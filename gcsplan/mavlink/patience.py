@@ -9,6 +9,13 @@ ITEM_S = 2.0
 """What every item adds to the whole: seconds."""
 
 
+def checked_timeout_s(timeout_s: float) -> float:
+    """``timeout_s`` if it is one. Raises InputError."""
+    if not 0.0 < timeout_s <= 3600.0:
+        raise InputError(f"a timeout must lie within 0 … 3600 s, given {timeout_s:g}")
+    return timeout_s
+
+
 class Patience:
     """``timeout_s`` without progress end it, and the same with `ITEM_S` an item on top ends it with progress.
 
@@ -16,9 +23,7 @@ class Patience:
     """
 
     def __init__(self, timeout_s: float, items: int | None, now: float) -> None:
-        if not 0.0 < timeout_s <= 3600.0:
-            raise InputError(f"a timeout must lie within 0 … 3600 s, given {timeout_s:g}")
-        self.timeout_s = timeout_s
+        self.timeout_s = checked_timeout_s(timeout_s)
         self._known, self._items = items is not None, items or 0
         self._started = self._moved_on = now
         self._best: tuple[int, ...] = ()

@@ -15,7 +15,7 @@ from gcsplan.mavlink.drive import drive
 from gcsplan.mavlink.link import Channel, Steps
 from gcsplan.mavlink.mission import FENCE, MISSION, RELATIVE, Home, Mission, MissionItem
 from gcsplan.mavlink.parameters import FENCE_GROUPS, GROUPS, judge_fence_parameters, judge_parameters
-from gcsplan.mavlink.patience import TIMEOUT_S, Patience
+from gcsplan.mavlink.patience import TIMEOUT_S, Patience, checked_timeout_s
 from gcsplan.mavlink.preflight import (
     NEAR_GROUND_M,
     NEAR_START_M,
@@ -59,7 +59,8 @@ class Options:
 
     ``discover_s``: wait for a first heartbeat; ``listen_s``: listen for rivals after it; ``standby_s``: wait for a
     vehicle that is booting. ``ground_amsl_m``: DEM height at the start, by default the altitude of the mission's home.
-    ``timeout_s``: the longest time without progress, of `Patience`; it bounds ``discover_s`` and ``standby_s`` too.
+    ``timeout_s``: the longest time without progress of a transfer, of `Patience`; it bounds ``discover_s`` and
+    ``standby_s`` too.
     ``rtl_rel_home_m`` and ``expected_parameters`` are what the parameters on board are compared with.
     """
 
@@ -77,6 +78,9 @@ class Options:
     attempts: int = 4
     timers: Timers = field(default_factory=Timers)
     simulated: bool = False
+
+    def __post_init__(self) -> None:
+        checked_timeout_s(self.timeout_s)
 
 
 @dataclass(frozen=True)
@@ -113,7 +117,7 @@ def finding(channel: Channel, watch: Watch, options: Options) -> Steps[VehicleSt
 def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     """Find, preflight, read parameters, upload and prove. Raises VehicleRefused, LinkError."""
     clock, options = channel.link.clock, task.options
-    watch, patience = Watch(task.sysid), Patience(options.timeout_s, len(task.items), clock())
+    watch = Watch(task.sysid)
     state = yield from finding(channel, watch, options)
     warnings = preflight(state, task.items, task.autopilot, **_terms(task))
     recheck = _holding(channel, watch, state, options, lambda now: objections(
@@ -137,7 +141,7 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
         machine,
         channel,
         recheck=recheck,
-        patience=patience,
+        patience=Patience(options.timeout_s, len(task.items), started),
         progress=lambda: task.progress(task.name, machine.progress) if task.progress else None,
     )
     settled = machine.result

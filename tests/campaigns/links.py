@@ -353,7 +353,7 @@ class Run:
         timeout_s = self.options.timeout_s
         find_s = min(FIND_S, timeout_s) + min(STANDBY_S, timeout_s) + 4.0
         items = max(len(s.mission.wire_items()) for s in self.seats.values())
-        upload_s = max(find_s + PARAMETERS_S, timeout_s + 2.0 * items) + LAST_LOOK_S + 2.0
+        upload_s = find_s + PARAMETERS_S + timeout_s + 2.0 * items + LAST_LOOK_S + 2.0
         clear_s = find_s + timeout_s + 2.0 + timeout_s + 2.0 * 650 + 2.0
         return upload_s + (clear_s if self.options.atomic else 0.0)
 
