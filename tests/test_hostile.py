@@ -27,7 +27,7 @@ from gcsplan import cli, pipeline
 from gcsplan.commands.options import MISBEHAVIOURS
 from gcsplan.mavlink import session
 from gcsplan.mavlink.files import read_mission_file, write_plan
-from gcsplan.mavlink.messages import Ack, Packet
+from gcsplan.mavlink.messages import Packet, Request
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -469,8 +469,8 @@ def test_json_of_a_failed_upload_has_both_the_error_and_the_upload(
 def test_json_of_a_mission_on_board_of_a_vehicle_that_was_armed_meanwhile(run: Run) -> None:
     class Armed(LoopbackVehicle):
         def receive(self, packet: Packet, now: float) -> list[Packet]:
-            if isinstance(packet.message, Ack):  # ours, at the end of the read-back
-                self.armed = True
+            if isinstance(packet.message, Request) and packet.message.seq == len(self.items()) - 1:
+                self.armed = True  # while the last item is read back
             return super().receive(packet, now)
 
     words = ("--mission", "m.yaml", "--json", "--timeout", "30")
