@@ -185,7 +185,7 @@ class Recheck:
         if state is None:
             return None
         found = [(word, text) for word, text in self._objections(state) if word in _AT_ONCE]
-        if not self._watch.alike(now):
+        if not self._watch.alike():
             words = f"two vehicles speak as system {self._address.sysid} from the same address"
             found.append(("ambiguous", words))
         return _changed(found)

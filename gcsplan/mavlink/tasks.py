@@ -283,7 +283,7 @@ def _against_clearing(options: Options, same: VehicleState | None, state: Vehicl
         against.append(("armed", "the vehicle is armed: disarm it, or allow it with --allow-armed"))
     if same is not None and (same.address, same.peer) != (state.address, state.peer):
         against.append(("another", "it speaks from another address than the vehicle that was uploaded to"))
-    away_m = apart_m(same, state) if same is not None and not same.armed else None
+    away_m = apart_m(same, state) if same is not None else None
     if away_m is not None and away_m > NEAR_START_M and not options.ignore_position:
         against.append(("wrong_place", f"it is {away_m:.0f} m from where the vehicle was that was uploaded to"))
     return against, warnings

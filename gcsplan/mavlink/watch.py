@@ -242,12 +242,12 @@ class Watch:
         armed = source.armed or now - source.armed_at <= FRESH_S  # two that take turns: one of them is
         return VehicleState(
             Address(self.sysid, best[0]), source.autopilot, source.kind, armed, source.status,
-            lat, lon, amsl, told.capabilities, self._rivals(best, pilots, now), told.home, tuple(self.texts),
+            lat, lon, amsl, told.capabilities, self._rivals(best, pilots), told.home, tuple(self.texts),
             best[1], source.at, told.placed_at,
             told.leapt_from if now - told.leapt_at <= FRESH_S else None,
         )  # fmt: skip
 
-    def alike(self, now: float) -> bool:
+    def alike(self) -> bool:
         """Whether all that comes from the pinned address can be of one autopilot: one kind, boot clock and place."""
         pilots = {
             k: s
@@ -255,7 +255,7 @@ class Watch:
             if self._pinned and k[1] == self._pinned[1] and _is_autopilot(k[0], s)
         }
         mine = [key for key in pilots if key[:2] == self._pinned]
-        return not mine or self._rivals(max(mine, key=lambda k: pilots[k].at), pilots, now, here=True) == 1
+        return not mine or self._rivals(max(mine, key=lambda k: pilots[k].at), pilots, here=True) == 1
 
     def _voices_at(self, voice: _Voice) -> int:
         kinds = [s for key, s in self._sources.items() if key[:2] == voice]
@@ -264,13 +264,13 @@ class Watch:
         taking_turns = told is not None and any(clock.of_two for clock in told.clocks.values())
         return 2 if overlapping or taking_turns or (told is not None and told.leaps > 1) else 1
 
-    def _rivals(self, best: _Key, pilots: dict[_Key, _Source], now: float, *, here: bool = False) -> int:
+    def _rivals(self, best: _Key, pilots: dict[_Key, _Source], *, here: bool = False) -> int:
         """How many autopilots there are by all that was heard, at the same time as the one that is meant."""
-        mine, since = pilots[best], (self._pinned_at if self._pinned else now) - FRESH_S
+        mine = pilots[best]
         others = {
             key[:2]
             for key, s in pilots.items()
-            if key[:2] != best[:2] and s.at >= since and s.overlaps(mine)
+            if key[:2] != best[:2] and s.overlaps(mine)
             and (key[0] == best[0] or s.autopilot not in (GENERIC, INVALID))
         }  # fmt: skip
         # One that sends no heartbeat, or whose heartbeats get lost, is there all the same.
@@ -278,7 +278,7 @@ class Watch:
             voice
             for voice, told in self._told.items()
             if voice[0] == best[0] and voice[1] != best[1] and not here
-            and told.at >= since and told.first <= mine.at and mine.first <= told.at
+            and told.first <= mine.at and mine.first <= told.at
         }  # fmt: skip
         return len(others) + self._voices_at(best[:2])
 

@@ -52,6 +52,7 @@ class Craft:
         self.there_since = air.now
         self.left_at = math.inf
         self.beats = 0
+        self.known_since, self.last_heard = math.inf, -math.inf
         self.places = 0
         self.together = 0  # places heard while another stood at the same address
         self._beats_at: list[float] = []
@@ -96,8 +97,10 @@ class Craft:
     def heard(self, message: Any) -> None:
         """The ground station has taken this message of ours."""
         kind, now = message.get_type(), self.air.now
+        self.last_heard = now
         if kind == "HEARTBEAT":
             self.beats += 1
+            self.known_since = min(self.known_since, now)
             self._beats_at.append(now)
             self.armed_told = min(self.armed_told, now) if message.base_mode & 128 else math.inf
         elif kind == "GLOBAL_POSITION_INT":

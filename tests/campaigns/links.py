@@ -46,6 +46,7 @@ COUNT, ITEM, CLEAR, REQUEST_LIST, ACK = 44, 73, 45, 43, 47
 WRITES = (COUNT, ITEM, CLEAR)
 LAST_LOOK_S = 10.0
 FIND_S, STANDBY_S, PARAMETERS_S = 10.0, 30.0, 4.0
+SILENCE_S = 4.0
 ALIKE_FRAMES = 4
 """So many positions of each of two vehicles at one address, and it is known that they are two."""
 
@@ -298,14 +299,16 @@ class Run:
         for one in there:
             if one.armed_told < now and kind != ITEM and not self.options.allow_armed:
                 said.append("one that was heard to be armed")
-            if one.far_told < now and not self.options.ignore_position:
+            # A component that is no autopilot may say what it likes: it takes a heartbeat to be one.
+            if one.far_told < now and one.known_since < now and not self.options.ignore_position:
                 said.append("one that was heard to be 33 km away")
             if one is seat.checked:
                 continue
             if seat.checked in there:
-                if min(one.together, seat.checked.together if seat.checked else 0) > ALIKE_FRAMES:
+                least = min(one.together, seat.checked.together if seat.checked else 0)
+                if least > ALIKE_FRAMES and one.known_since < now:
                     said.append("two at one address")
-            elif seat.checked and one.there_since - seat.checked.left_at > 4.0 and not (one.beats and one.places):
+            elif not self._heard_lately(seat, one) and not (one.beats and one.places):
                 said.append("one that came after a silence and was not looked at")
         self.found += [f"misdelivered at {now - 1000.0:.2f} s: {what} to {words}" for words in said]
 
@@ -318,6 +321,11 @@ class Run:
             self._recorder.note(bytes(message.get_msgbuf()))
         beside = [o for o in (seat.craft, *seat.others) if o is not by and self._same_address(o, by)]
         by.together = by.together + (message.get_type() == "GLOBAL_POSITION_INT") if beside else 0
+
+    def _heard_lately(self, seat: Seat, one: Craft) -> bool:
+        """Whether anybody but ``one`` was heard from its address in the last seconds: there was no silence."""
+        others = [o for o in (seat.craft, *seat.others) if o is not one and o.address == one.address]
+        return any(self.air.now - o.last_heard <= SILENCE_S for o in others)
 
     def _same_address(self, a: Craft, b: Craft) -> bool:
         there = self.air.at(b.address)
@@ -404,7 +412,11 @@ class Run:
         for o in (seat.craft, *seat.others):
             # Heard while the one that was checked was there: a rival, wherever it stands.
             same = o.vehicle.compid == checked.vehicle.compid and o.address != checked.address
-            if o is not checked and same and o.heard_between(seat.began + 0.1, min(seat.acked_at, checked.left_at)):
+            if (
+                o is not checked
+                and same
+                and o.heard_between(max(seat.began, checked.there_since) + 0.1, min(seat.acked_at, checked.left_at))
+            ):
                 self.found.append(f"untold: {d.vehicle} has a twin that was heard, and exit 0")
 
 
