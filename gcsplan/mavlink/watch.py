@@ -266,11 +266,12 @@ class Watch:
 
     def _rivals(self, best: _Key, pilots: dict[_Key, _Source], *, here: bool = False) -> int:
         """How many autopilots there are by all that was heard, at the same time as the one that is meant."""
-        mine = pilots[best]
+        mine, told = pilots[best], self._told.get(best[:2])
+        until = max(mine.at, told.at) if told else mine.at  # anything that it says shows that it is there
         others = {
             key[:2]
             for key, s in pilots.items()
-            if key[:2] != best[:2] and s.overlaps(mine)
+            if key[:2] != best[:2] and s.first <= until and mine.first <= s.at
             and (key[0] == best[0] or s.autopilot not in (GENERIC, INVALID))
         }  # fmt: skip
         # One that sends no heartbeat, or whose heartbeats get lost, is there all the same.
@@ -278,7 +279,7 @@ class Watch:
             voice
             for voice, told in self._told.items()
             if voice[0] == best[0] and voice[1] != best[1] and not here
-            and told.first <= mine.at and mine.first <= told.at
+            and told.first <= until and mine.first <= told.at
         }  # fmt: skip
         return len(others) + self._voices_at(best[:2])
 
