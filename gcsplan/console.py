@@ -190,7 +190,7 @@ def release_table(plan: Plan, deliveries: Sequence[Delivery], gate: GateTime | N
     """When to start each vehicle of a fleet, for whoever does it: we never arm or start one."""
     if plan.fleet is None or len(plan.fleet.slots) < 2:
         return
-    ready = {d.vehicle for d in deliveries if d.verified}
+    ready = {d.vehicle for d in deliveries if d.verified and not d.code}
     columns = [("vehicle", False), ("release, T+ s", True), ("at the goal, T+ s", True), ("", False)]
     table = _table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
     for slot in sorted(plan.fleet.slots, key=lambda s: s.depart_s):

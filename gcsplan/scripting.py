@@ -34,6 +34,7 @@ def upload(
     allow_unjudged: bool = False,
     allow_armed: bool = False,
     ignore_position: bool = False,
+    timeout_s: float = 60.0,
     progress: ProgressCall | None = None,
 ) -> list[Delivery]:
     """Upload every mission of a plan, all at once, read each back, compare, and check what was read back.
@@ -41,7 +42,7 @@ def upload(
     ``to``: a URL for all vehicles (told apart by system id), ``"link"`` (the mission file's links), ``"sim"`` (a
     simulated vehicle for each), ``"NAME=URL"``, several of these, or a mapping from name to URL. Vehicles that it
     says nothing of get nothing. With ``atomic``, if one upload fails, what the others took is cleared again.
-    ``progress(name, told)`` is called on the way.
+    ``timeout_s`` is the longest time without progress. ``progress(name, told)`` is called on the way.
 
     One `Delivery` for each vehicle, in the plan's order: ``verified`` is True only where the mission was read back
     and equals what was sent; ``message`` says what went wrong. One vehicle's failure leaves the others standing and
@@ -56,7 +57,9 @@ def upload(
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
     from gcsplan.sim.loopback import loopback_fleet
 
-    options = delivery.Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic)
+    options = delivery.Options(
+        allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s
+    )
     return delivery.deliver(delivery.jobs_of(planned, targets), options, progress, simulator=loopback_fleet)
 
 

@@ -104,9 +104,9 @@ def delivered(
 ) -> tuple[dict[str, Delivery], dict[str, int], list[tuple[str, Progress]]]:
     """What became of a small fleet: deliveries, items on board without home, and what was told on the way."""
     monkeypatch.setattr(delivery, "LISTEN_S", 0.0)
-    order = delivery._order
+    order = delivery.order_of
     monkeypatch.setattr(
-        delivery, "_order", lambda *a: replace(o := order(*a), options=replace(o.options, timers=QUICK))
+        delivery, "order_of", lambda *a, **k: replace(o := order(*a, **k), options=replace(o.options, timers=QUICK))
     )
     told: list[tuple[str, Progress]] = []
     with fleet(range(1, count + 1), trouble, drop=0.0) as server:
@@ -156,8 +156,8 @@ def test_what_read_back_wrong_is_cleared_as_well(monkeypatch: pytest.MonkeyPatch
 def test_a_vehicle_that_keeps_its_mission_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     clear = session.clear_fleet
 
-    def armed_in_between(orders: list[Order]) -> Any:
-        results = clear(orders[1:])
+    def armed_in_between(orders: list[Order], seen: Any) -> Any:
+        results = clear(orders[1:], seen)
         return [VehicleRefused("not cleared: the vehicle is armed"), *results]
 
     monkeypatch.setattr(session, "clear_fleet", armed_in_between)

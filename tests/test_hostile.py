@@ -27,6 +27,7 @@ from gcsplan import cli, pipeline
 from gcsplan.commands.options import MISBEHAVIOURS
 from gcsplan.mavlink import session
 from gcsplan.mavlink.files import read_mission_file, write_plan
+from gcsplan.mavlink.messages import Packet, Request
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -463,6 +464,30 @@ def test_json_of_a_failed_upload_has_both_the_error_and_the_upload(
     assert document["error"]["reason"] == reason
     assert document["error"]["message"]
     assert document["vehicles"][0]["verified"] is False
+
+
+def test_json_of_a_mission_on_board_of_a_vehicle_that_was_armed_meanwhile(run: Run) -> None:
+    class Armed(LoopbackVehicle):
+        def receive(self, packet: Packet, now: float) -> list[Packet]:
+            if isinstance(packet.message, Request) and packet.message.seq == len(self.items()) - 1:
+                self.armed = True  # while the last item is read back
+            return super().receive(packet, now)
+
+    words = ("--mission", "m.yaml", "--json", "--timeout", "30")
+    for allowed in (False, True):
+        craft = Armed(1, Autopilot.ARDUCOPTER, lat_deg=36.6, lon_deg=-84.38, amsl_m=400.0)
+        with SimServer([craft], "udpin:127.0.0.1:0") as server:
+            flag = ("--allow-armed",) if allowed else ()
+            got, out, _ = run("upload", "uav1.waypoints", "--to", server.url_for_gcs, *words, *flag)
+        document = json.loads(out)
+        told = document["vehicles"][0]
+        assert (told["outcome"], told["verified"]) == ("accepted", True)
+        if allowed:
+            assert got == 0
+            continue
+        assert got == document["error"]["code"] == 5
+        assert told["changed"] == document["error"]["reason"] == "armed"
+        assert "the new mission IS on board" in document["error"]["message"]
 
 
 def test_json_of_a_failed_check_has_the_error_beside_the_verdict(run: Run, tmp_path: Path) -> None:

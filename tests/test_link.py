@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import InputError, LinkError
 from gcsplan.mavlink import wire
+from gcsplan.mavlink.drive import drive
 from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing, SigningKey, signing_key
-from gcsplan.mavlink.link import GCS, Channel, Heard, Job, Link, Steps, drive, pump, run
+from gcsplan.mavlink.link import GCS, Channel, Heard, Job, Link, Steps, pump, run
 from gcsplan.mavlink.messages import (
     Ack,
     Address,
@@ -193,8 +194,9 @@ KEY = SigningKey(bytes(range(32)))
 
 
 def test_signed_frames_are_taken_with_the_right_key_alone() -> None:
+    ours = Signing(KEY)
     frame = FrameWriter(VEHICLE, Signing(KEY)).pack(heartbeat())
-    assert len(FrameParser(Signing(KEY)).feed(frame)) == 1
+    assert len(FrameParser(ours).feed(frame)) == 1
     wrong = FrameParser(Signing(SigningKey(bytes(32))))
     assert wrong.feed(frame) == []
     assert wrong.unsigned == 1
@@ -204,10 +206,31 @@ def test_signed_frames_are_taken_with_the_right_key_alone() -> None:
 
 
 def test_a_signed_frame_is_not_taken_twice() -> None:
-    frame = FrameWriter(VEHICLE, Signing(KEY)).pack(heartbeat())
     parser = FrameParser(Signing(KEY))
-    assert len(parser.feed(frame)) == 1
-    assert parser.feed(frame) == []
+    frame = FrameWriter(VEHICLE, Signing(KEY)).pack(heartbeat())
+    (first,), (again,) = parser.feed(frame), parser.feed(frame)
+    assert (first.late, again.late) == (False, True)
+    assert parser.unsigned == 1
+
+
+def test_a_recording_from_before_the_link_was_opened_does_not_count() -> None:
+    """Not even of seconds ago, from a stream that was never heard; who hears us signs with our time from then on."""
+    vehicle = Signing(KEY, clock=lambda: 1_700_000_000.0)
+    recording = FrameWriter(VEHICLE, vehicle).pack(heartbeat())
+    ours = Signing(KEY, clock=lambda: 1_700_000_005.0)
+    parser = FrameParser(ours)
+    assert parser.feed(recording) == []
+    assert parser.unsigned == 1
+    assert len(FrameParser(vehicle).feed(FrameWriter(Address(255, 190), ours).pack(heartbeat()))) == 1
+    assert len(parser.feed(FrameWriter(VEHICLE, vehicle).pack(heartbeat()))) == 1
+
+
+def test_a_forged_time_does_not_shut_the_true_stream_out() -> None:
+    parser, vehicle = FrameParser(Signing(KEY)), FrameWriter(VEHICLE, Signing(KEY))
+    forged = bytearray(vehicle.pack(heartbeat()))
+    forged[-12:-6] = b"\xff" * 6
+    assert parser.feed(bytes(forged)) == []
+    assert len(parser.feed(vehicle.pack(heartbeat()))) == 1
 
 
 def test_a_key_is_read_from_a_file_or_the_environment_and_never_shown(

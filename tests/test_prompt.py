@@ -16,8 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.mavlink import wire
+from gcsplan.mavlink.drive import drive
 from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing, SigningKey, checksum
-from gcsplan.mavlink.link import GCS, Link, drive, pump, run
+from gcsplan.mavlink.link import GCS, Link, pump, run
 from gcsplan.mavlink.link import Job as PumpJob
 from gcsplan.mavlink.messages import Ack, Address, Count, Item, Request
 from gcsplan.mavlink.mission import FENCE, MissionItem

@@ -18,7 +18,8 @@ from importlib.util import find_spec
 from typing import Any
 
 from gcsplan.errors import InputError, LinkError
-from gcsplan.mavlink.link import Link, drive
+from gcsplan.mavlink.drive import drive
+from gcsplan.mavlink.link import Link
 from gcsplan.mavlink.link import run as run_steps
 from gcsplan.mavlink.messages import Address
 from gcsplan.mavlink.mission import RELATIVE, WAYPOINT, MissionItem

@@ -18,6 +18,7 @@ from gcsplan.commands.options import (
     JsonOption,
     PlaceOption,
     SysidOption,
+    TimeoutOption,
     ToOption,
     TypeOption,
     UncheckedSysidOption,
@@ -47,6 +48,7 @@ def upload(
     atomic: AtomicOption = False,
     fence: FenceOption = False,
     fence_infinite: FenceInfiniteOption = False,
+    timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
     """Check mission files, upload them, read them back, and compare.
@@ -64,8 +66,9 @@ def upload(
     if unchecked and (fence or fence_infinite):
         raise UsageError("--fence is made of the zones of a mission file: give --mission FILE instead of --unchecked")
     options = delivery.Options(
-        allow_armed=allow_armed, ignore_position=ignore_position, unchecked=unchecked, atomic=atomic
-    )
+        allow_armed=allow_armed, ignore_position=ignore_position, unchecked=unchecked, atomic=atomic,
+        timeout_s=timeout,
+    )  # fmt: skip
     if mission is not None:
         if sysid is not None:
             raise UsageError(
@@ -102,13 +105,14 @@ def verify(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The .waypoints or .plan that should be on board.")],
     to: ToOption,
     sysid: SysidOption = 1,
+    timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
     """Is exactly this file on board? Reads the mission back and compares; sends nothing else."""
     from gcsplan.console import delivery_table
     from gcsplan.steps import delivery
 
-    done = delivery.verify_file(file, to, sysid)
+    done = delivery.verify_file(file, to, sysid, timeout_s=timeout)
     if as_json:
         emit(done.as_dict(), delivery.failure([done]))
     else:
@@ -122,13 +126,14 @@ def download(
         Path, typer.Option("-o", "--out", metavar="FILE", help="File to write, .waypoints or .plan; replaced if there.")
     ],
     sysid: SysidOption = 1,
+    timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
     """Read the mission on board into a file."""
     from gcsplan.console import say
     from gcsplan.steps import delivery
 
-    items = delivery.download_to(source, sysid, out)
+    items = delivery.download_to(source, sysid, out, timeout_s=timeout)
     if as_json:
         emit({"file": str(out), "items": items})
     else:
@@ -140,6 +145,7 @@ def clear(
     sysid: SysidOption = 1,
     kind: TypeOption = "mission",
     allow_armed: ArmedOption = False,
+    timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
     """Remove the mission, fence or rally points on board, and read back that nothing is left."""
@@ -147,7 +153,7 @@ def clear(
     from gcsplan.steps import delivery
 
     with talking([f"vehicle {sysid}"]):
-        delivery.clear(to, sysid, kind, allow_armed=allow_armed)
+        delivery.clear(to, sysid, kind, allow_armed=allow_armed, timeout_s=timeout)
     if as_json:
         emit({"cleared": kind, "sysid": sysid})
     else:

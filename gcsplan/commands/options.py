@@ -37,6 +37,13 @@ FenceOption = Annotated[
 FenceInfiniteOption = Annotated[
     bool, typer.Option("--fence-infinite", help="As --fence, with zones that have a height as if they had none.")
 ]
+TimeoutOption = Annotated[
+    float,
+    typer.Option(
+        "--timeout", metavar="S", min=1.0, max=3600.0,
+        help="The longest time without progress, in seconds; 2 s an item more for the whole.",
+    ),
+]  # fmt: skip
 PlaceOption = Annotated[bool, typer.Option("--ignore-position", help="Send wherever the vehicle stands.")]
 
 UncheckedSysidOption = Annotated[

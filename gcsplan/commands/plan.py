@@ -17,6 +17,7 @@ from gcsplan.commands.options import (
     JsonOption,
     MissionArgument,
     PlaceOption,
+    TimeoutOption,
     UnjudgedOption,
 )
 from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
@@ -86,6 +87,7 @@ def plan(
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
     atomic: AtomicOption = False,
+    timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a mission file, write its outputs, and upload and verify them if asked.
@@ -182,7 +184,9 @@ def plan(
 
         if gate is not None:
             gate.require_ahead(datetime.now(UTC))  # planning took its time
-        options = delivery.Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic)
+        options = delivery.Options(
+            allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout
+        )
         names = [job.name for job in jobs]
         with talking(names), transfer_progress(names) as moved_on:
             deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)

@@ -7,6 +7,7 @@ IDLE           START          REQUEST_LIST goes out
 LISTING        RETRY          REQUEST_LIST again
 LISTING        COUNT          REQUEST_INT 0 goes out
 LISTING        EMPTY          COUNT 0: final ACK, accepted with no items
+LISTING        REFUSED        COUNT above what can be held: nothing is asked for
 FETCHING       ITEM           the one that was asked for: the next is asked for; any other is passed over
 FETCHING       RETRY          the same REQUEST_INT again
 FETCHING       LAST_ITEM      final ACK, accepted
@@ -26,7 +27,7 @@ from collections.abc import Mapping
 from enum import auto
 from typing import Any, ClassVar
 
-from gcsplan.mavlink.machine import Label, Machine, Progress, Timers, checked_type
+from gcsplan.mavlink.machine import CANCELLED_BY_US, Label, Machine, Progress, Timers, checked_type
 from gcsplan.mavlink.messages import (
     Ack,
     Address,
@@ -46,14 +47,17 @@ from gcsplan.mavlink.outcome import (
     ERROR,
     INVALID,
     INVALID_SEQUENCE,
+    OURS,
     UNSUPPORTED,
     Accepted,
+    Outcome,
     Refused,
     Unknown,
     code_words,
 )
 
 _BUSY = frozenset({ERROR, INVALID, INVALID_SEQUENCE, DENIED, CANCELLED})
+_MOST_ITEMS = 65535
 _RESTARTS = 16  # with pauses of 1.5 s much longer than the 8 s for which ArduPilot denies after a broken upload
 
 
@@ -86,7 +90,10 @@ S, E = State, Event
 
 
 class Download(Machine):
-    """Read ``vehicle``'s list. When ``outcome`` is `Accepted`, ``items`` is the whole list in wire order."""
+    """Read ``vehicle``'s list. When ``outcome`` is `Accepted`, ``items`` is the whole list in wire order.
+
+    ``most``: what the vehicle can hold; one that announces more is not asked for anything.
+    """
 
     ROLE = "download"
     TABLE: ClassVar[Mapping[Any, Any]] = (
@@ -110,12 +117,19 @@ class Download(Machine):
     )
 
     def __init__(
-        self, *, us: Address, vehicle: Address, mission_type: int = MISSION, timers: Timers | None = None
+        self,
+        *,
+        us: Address,
+        vehicle: Address,
+        mission_type: int = MISSION,
+        timers: Timers | None = None,
+        most: int = _MOST_ITEMS,
     ) -> None:
         super().__init__(
             us=us, vehicle=vehicle, mission_type=checked_type(mission_type), timers=timers or Timers(), state=S.IDLE
         )
         self.opaque_id = 0
+        self._most = most
         self._items: list[MissionItem] = []
         self._count: int | None = None
         self._restarts = 0
@@ -139,10 +153,15 @@ class Download(Machine):
         self._step(E.START)
         return self._ask_list(now)
 
-    def cancel(self, now: float) -> list[Packet]:
+    def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
         """Give up and tell the vehicle so."""
-        self._end(E.CANCEL, Unknown("cancelled by us"))
+        self.stop(Unknown(why))
         return [self._to_vehicle(Ack(CANCELLED, self.mission_type))]
+
+    def stop(self, outcome: Outcome) -> None:
+        """End, and ask no more."""
+        if self.outcome is None:
+            self._end(E.CANCEL, outcome)
 
     def _ask_list(self, now: float) -> list[Packet]:
         self._items, self._count, self._first_asked_at, self._asked_at = [], None, now, now
@@ -180,6 +199,10 @@ class Download(Machine):
             self._measure(now)
             self._heard_at, self._tries, self.opaque_id = now, 0, message.opaque_id
             self._count = message.count
+            if message.count > self._most:
+                words = f"it announces {message.count} items, and can hold at most {self._most}"
+                self._end(E.REFUSED, Refused(OURS, None, words))
+                return []
             if message.count == 0:
                 return self._finish(E.EMPTY)
             self._step(E.COUNT)

@@ -7,13 +7,15 @@ buffer never holds more than one frame.
 
 from __future__ import annotations
 
+import hashlib
+import hmac
 import os
 import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, Literal
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
@@ -24,6 +26,10 @@ _MARKERS = re.compile(b"[\xfd\xfe]")
 _MARKER_BYTES = (0xFD, 0xFE)
 _V2, _SIGNED = 0xFD, 0x01
 _SIGNING_EPOCH_S = 1_420_070_400  # 2015-01-01, in units of 10 µs from there
+GOOD: Final = "good"
+LATE: Final = "late"
+BAD: Final = "bad"
+_MOST_STREAMS = 4096
 KEY_VARIABLE = "GCSPLAN_SIGNING_KEY"
 
 
@@ -72,28 +78,61 @@ def _from_hex(raw: bytes, where: str) -> SigningKey:
 
 
 class Signing:
-    """The signing state that all parsers and the writer of one link share; without a key it signs nothing."""
+    """The signing state that all parsers and the writer of one link share; without a key it signs nothing.
 
-    def __init__(self, key: SigningKey | None = None, link_id: int = 0) -> None:
+    A signed frame counts once, and only if it was signed after this link was opened: a vehicle takes over the time of
+    those whom it hears, so whoever still signs with an older one has not heard us, and may be a recording. What the
+    signature does not fit changes nothing: a forged time must not shut the true stream out. What was rightly signed
+    and comes late is `LATE`: it proves nothing, but it may speak against the one who is heard (a second vehicle).
+    """
+
+    def __init__(
+        self, key: SigningKey | None = None, link_id: int = 0, *, clock: Callable[[], float] = time.time
+    ) -> None:
         self.state = dialect.MAVLinkSigning()
+        self._secret = key.secret if key else b""
+        self._streams: dict[tuple[int, int, int], int] = {}
+        self._opened = 0
         if key is not None:
             self.state.secret_key = key.secret
             self.state.sign_outgoing = True
             self.state.link_id = link_id
-            self.state.timestamp = int((time.time() - _SIGNING_EPOCH_S) * 1e5)
+            self._opened = self.state.timestamp = int((clock() - _SIGNING_EPOCH_S) * 1e5)
 
     @property
     def active(self) -> bool:
         """Whether there is a key."""
-        return self.state.secret_key is not None
+        return bool(self._secret)
+
+    def judge(self, frame: bytes) -> Literal["good", "late", "bad"]:
+        """Whether a frame whose checksum fits may count; everything may without a key."""
+        if not self._secret:
+            return GOOD
+        if frame[0] != _V2 or not frame[2] & _SIGNED:
+            return BAD
+        stream = (frame[-13], frame[5], frame[6])  # link, system, component
+        signed_at = int.from_bytes(frame[-12:-6], "little")
+        signature = hashlib.sha256(self._secret + frame[:-6]).digest()[:6]
+        if not hmac.compare_digest(signature, frame[-6:]) or signed_at < self._opened:
+            return BAD
+        if signed_at <= self._streams.get(stream, -1):
+            return LATE
+        if stream not in self._streams and len(self._streams) >= _MOST_STREAMS:
+            return BAD
+        self._streams[stream] = signed_at
+        self.state.timestamp = max(self.state.timestamp, signed_at)
+        return GOOD
 
 
 class FrameParser:
-    """Messages out of bytes. ``bad`` counts frames that did not check, ``unsigned`` those without a valid signature."""
+    """Messages out of bytes. ``bad`` counts frames that did not check, ``unsigned`` those without a valid signature.
+
+    A message has the attribute ``late`` beside pymavlink's own, of `Signing`.
+    """
 
     def __init__(self, signing: Signing | None = None) -> None:
-        self._mav = dialect.MAVLink(None)
-        self._mav.signing = (signing or Signing()).state
+        self._mav = dialect.MAVLink(None)  # it has no key: signatures are our affair
+        self._signing = signing or Signing()
         self._rest = b""
         self.bad = 0
         self.unsigned = 0
@@ -137,11 +176,16 @@ class FrameParser:
     def _decode(self, frame: bytes) -> Any:
         """The message in a whole frame; None if it does not check."""
         try:
-            return self._mav.decode(bytearray(frame))
-        except dialect.MAVError as error:
+            message = self._mav.decode(bytearray(frame))
+        except dialect.MAVError:
             self.bad += 1
-            self.unsigned += int("signature" in str(error))
             return None
+        verdict = self._signing.judge(frame)
+        if verdict != GOOD:
+            self.bad += 1
+            self.unsigned += 1
+        message.late = verdict == LATE
+        return None if verdict == BAD else message
 
 
 def _is_unknown_kind(buffer: bytes, start: int) -> bool:

@@ -1,28 +1,31 @@
 """A link: one socket or serial port, the vehicles behind it, and the clock. The only place where time is read.
 
-Frames are routed by (system id, component id); every system is answered at the address where it was heard. `pump`
-runs any number of tasks on any number of links in one thread: a fleet takes as long as its slowest vehicle. A task is
-a generator that yields the time until which it may sleep, and is woken before that by what its vehicle sends.
+Frames are routed by (system id, component id); every system is answered at the address where it was heard, and where a
+channel has pinned its vehicle's address, there alone. `pump` runs any number of tasks on any number of links in one
+thread: a fleet takes as long as its slowest vehicle. A task is a generator that yields the time until which it may
+sleep, and is woken before that by what its vehicle sends. What goes wrong in one task, of whatever kind, ends it alone.
 """
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink import wire
 from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing, SigningKey
-from gcsplan.mavlink.messages import Address, Item, Packet, Request
+from gcsplan.mavlink.messages import Address, Packet
 from gcsplan.mavlink.prompt import Prepared, PromptAnswers
 from gcsplan.mavlink.transport import Clock, Peer, Transport, Udp, open_transport, wait_readable
 from gcsplan.mavlink.url import Endpoint, parse_url
 
+_log = logging.getLogger(__name__)
 T = TypeVar("T")
 Steps = Generator[float, None, T]
 
@@ -37,11 +40,16 @@ _IDLE_S = 0.1  # a machine hears of prompt answers, and progress is shown, at le
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """One message: who sent it (ids and address), and the pymavlink message itself."""
+    """One message: who sent it (ids and address), and the pymavlink message itself.
+
+    ``late``: rightly signed, but not newer than what was heard before. It counts for nothing, and may count against
+    who speaks.
+    """
 
     source: Address
     peer: Peer
     message: Any
+    late: bool = False
 
 
 class Channel:
@@ -55,6 +63,11 @@ class Channel:
         self.sysid = sysid
         self.inbox: deque[Heard] = deque(maxlen=_MOST_WAITING)
         self.prepared: Prepared | None = None
+        self.peer: Peer | None = None
+
+    def pin(self, peer: Peer | None) -> None:
+        """Answer at ``peer`` from now on, whoever else speaks under the same system id."""
+        self.peer = peer
 
     @property
     def waits(self) -> bool:
@@ -68,19 +81,20 @@ class Channel:
 
     def send(self, message: Any, to: Address) -> bool:
         """Send a pymavlink message."""
-        return self.link.send(message, to)
+        return self.link.send(message, to) if self.peer is None else self.link.send(message, to, self.peer)
 
     def send_packets(self, packets: Iterable[Packet]) -> None:
         """Send mission messages."""
         for packet in packets:
-            self.link.send(wire.encode(packet.message, packet.target), packet.target)
+            self.send(wire.encode(packet.message, packet.target), packet.target)
 
 
 class Link:
     """An open link. Use it as a context manager, or `close` it.
 
     ``us`` are our own ids; with ``key`` every frame is signed and unsigned ones are dropped; ``heartbeat_s`` is the
-    interval of our ground-station heartbeat, None for none. Raises InputError for a bad URL, LinkError if it does
+    interval of our ground-station heartbeat, None for none. ``clock``, ``transport`` and ``wait`` can be had from
+    elsewhere, for simulated time, and so can ``signing``. Raises InputError for a bad URL, LinkError if it does
     not open.
     """
 
@@ -92,11 +106,14 @@ class Link:
         key: SigningKey | None = None,
         heartbeat_s: float | None = 1.0,
         clock: Clock = time.monotonic,
+        transport: Transport | None = None,
+        wait: Callable[[Sequence[Transport], float], None] = wait_readable,
+        signing: Signing | None = None,
     ) -> None:
         self.endpoint = parse_url(endpoint) if isinstance(endpoint, str) else endpoint
         self.us = us
         self.clock = clock
-        self._signing = Signing(key)
+        self._signing = signing or Signing(key)
         self._writer = FrameWriter(us, self._signing)
         self._parsers: dict[Peer, FrameParser] = {}
         self._heard_at: dict[Peer, float] = {}
@@ -106,7 +123,8 @@ class Link:
         self._next_heartbeat = clock()
         self._bad = self._unsigned = 0
         self.heard_systems: dict[int, float] = {}
-        self.transport: Transport = open_transport(self.endpoint)
+        self.transport: Transport = transport or open_transport(self.endpoint)
+        self.wait = wait
         self.prompt = PromptAnswers(self._writer, possible=isinstance(self.transport, Udp))
 
     def __enter__(self) -> Link:
@@ -155,15 +173,18 @@ class Link:
         """Whether there is an address to send to."""
         return self._peer(to) is not None
 
-    def send(self, message: Any, to: Address) -> bool:
-        """Send a pymavlink message where ``to`` was heard; False where nobody knows the way. sysid 0 is everybody."""
+    def send(self, message: Any, to: Address, peer: Peer | None = None) -> bool:
+        """Send a pymavlink message to ``peer``, by default where ``to`` was heard; False where nobody knows the way.
+
+        sysid 0 is everybody.
+        """
         if to.sysid == 0:
-            peers = set(self._heard_at) | ({self.transport.default} - {None})
+            peers = [p for p in dict.fromkeys((*self._heard_at, self.transport.default)) if p is not None]
             frame = self._writer.pack(message)
             for each in peers:
                 self.transport.write(frame, each)
             return bool(peers)
-        peer = self._peer(to)
+        peer = self._peer(to) if peer is None else peer
         if peer is None:
             return False
         self.transport.write(self._writer.pack(message), peer)
@@ -222,11 +243,12 @@ class Link:
         source = Address(message.get_srcSystem(), message.get_srcComponent())
         if source == self.us:
             return  # our own voice, from a hub
-        self._routes[source] = peer
-        self._routes[source.sysid] = peer
-        self.heard_systems[source.sysid] = now
+        if not message.late:
+            self._routes[source] = peer
+            self._routes[source.sysid] = peer
+            self.heard_systems[source.sysid] = now
         for channel in self._channels.get(source.sysid, ()):
-            channel.inbox.append(Heard(source, peer, message))
+            channel.inbox.append(Heard(source, peer, message, message.late))
 
     def _beat(self, now: float) -> None:
         if not self._heartbeat_s or now < self._next_heartbeat:
@@ -239,78 +261,6 @@ class Link:
             dialect.MAVLink_heartbeat_message(gcs, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3),
             Address(0, 0),
         )
-
-
-class Driven(Protocol):
-    """A sans-IO machine as `drive` needs it."""
-
-    vehicle: Address
-
-    @property
-    def answers(self) -> Sequence[Item]:
-        """What a request gets, by seq, at any time between `start` and `cancel`."""
-        ...
-
-    def answered(self, seqs: Iterable[int], now: float) -> None:
-        """Take note of requests that got their answer already."""
-        ...
-
-    @property
-    def deadline(self) -> float | None:
-        """When `on_timer` is due; None once it has ended."""
-        ...
-
-    def start(self, now: float) -> list[Packet]:
-        """Begin."""
-        ...
-
-    def receive(self, packet: Packet, now: float) -> list[Packet]:
-        """Take a packet in."""
-        ...
-
-    def on_timer(self, now: float) -> list[Packet]:
-        """Do what is due."""
-        ...
-
-    def cancel(self, now: float) -> list[Packet]:
-        """End early."""
-        ...
-
-
-def drive(
-    machine: Driven,
-    channel: Channel,
-    *,
-    watch: Callable[[Heard], None] | None = None,
-    progress: Callable[[], None] | None = None,
-) -> Steps[None]:
-    """The task that runs ``machine`` to its end; it is cancelled if the task is closed before (Ctrl-C)."""
-    clock, prompt = channel.link.clock, channel.link.prompt
-    channel.prepared = prepared = prompt.prepare(machine.answers, machine.vehicle)
-    channel.send_packets(machine.start(clock()))
-    try:
-        while (deadline := machine.deadline) is not None:
-            yield deadline
-            if prepared.asked:
-                machine.answered(prepared.asked, clock())
-                prepared.asked.clear()
-            for heard in channel.take():
-                packet = wire.decode(heard.message)
-                if packet is not None:  # the answer first: the vehicle waits for it
-                    answers = machine.receive(packet, clock())
-                    channel.send_packets(answers)
-                    if answers and isinstance(packet.message, Request):
-                        prompt.learn(prepared, heard.peer, heard.message)
-                if watch:
-                    watch(heard)
-            channel.send_packets(machine.on_timer(clock()))
-            if progress:
-                progress()
-    finally:
-        prompt.drop(prepared)
-        channel.prepared = None
-        if machine.deadline is not None:
-            channel.send_packets(machine.cancel(clock()))
 
 
 class Job(Generic[T]):
@@ -332,6 +282,10 @@ class Job(Generic[T]):
             self.result, self.ended = stop.value, True
         except GcsplanError as error:
             self.error, self.ended = error, True
+        except Exception as error:  # a bug: the other vehicles' tasks have nothing to do with it
+            _log.exception("a task for system %d failed", self.channel.sysid)
+            words = f"internal error, a bug in gcsplan: {type(error).__name__}: {error}; what is on board is not known"
+            self.error, self.ended = GcsplanError(words, where=f"vehicle {self.channel.sysid}"), True
 
     def close(self) -> None:
         """End it early; its machine says goodbye to the vehicle."""
@@ -339,7 +293,7 @@ class Job(Generic[T]):
 
 
 def pump(jobs: Sequence[Job[T]]) -> None:
-    """Run all ``jobs`` to their ends, together. Errors of gcsplan stay with their job; others end all of them."""
+    """Run all ``jobs`` to their ends, together. Errors stay with their job."""
     if not jobs:
         return
     links = list({id(job.channel.link): job.channel.link for job in jobs}.values())
@@ -356,7 +310,7 @@ def pump(jobs: Sequence[Job[T]]) -> None:
             due = min(*waiting, *(link.next_heartbeat for link in links), clock() + _IDLE_S)
             if len(links) == 1 and links[0].answer(due):
                 continue
-            wait_readable([link.transport for link in links], due - clock())
+            links[0].wait([link.transport for link in links], due - clock())
             for link in links:
                 link.poll()
     finally:

@@ -10,7 +10,7 @@ bring about ourselves and that is not in the table (a second ``start``) is a bug
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar
@@ -58,6 +58,24 @@ class Progress:
     total: int
 
 
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Not yet: ask again at ``until``."""
+
+    until: float
+
+
+Gate = Callable[[float], "Wait | Outcome | None"]
+"""Asked before anything is written to a vehicle: None lets it pass, an outcome ends the transfer with it."""
+
+
+def always(now: float) -> None:
+    """The gate that is never shut."""
+
+
+CANCELLED_BY_US = "cancelled by us"
+
+
 class Label(Enum):
     """A state or an event: one of its kind, so that identity will do for a hash, and it is a quick one."""
 
@@ -74,7 +92,9 @@ class Machine:
     ROLE: ClassVar[str]
     TABLE: ClassVar[Mapping[tuple[Any, Any], Any]]
 
-    def __init__(self, *, us: Address, vehicle: Address, mission_type: int, timers: Timers, state: Label) -> None:
+    def __init__(
+        self, *, us: Address, vehicle: Address, mission_type: int, timers: Timers, state: Label, gate: Gate = always
+    ) -> None:
         self.us = us
         self.vehicle = vehicle
         self.mission_type = mission_type
@@ -83,6 +103,7 @@ class Machine:
         self.outcome: Outcome | None = None
         self._state = state
         self._deadline: float | None = None
+        self._gate = gate
 
     @property
     def deadline(self) -> float | None:
@@ -119,6 +140,20 @@ class Machine:
 
     def answered(self, seqs: Iterable[int], now: float) -> None:
         """Take note of requests that got their answer already."""
+
+    @property
+    def mark(self) -> tuple[int, ...]:
+        """How far it has come; grows with every item that is asked for or read for the first time."""
+        return (self.progress.done,)
+
+    @property
+    def progress(self) -> Progress:
+        """Items done so far."""
+        raise NotImplementedError
+
+    def stop(self, outcome: Outcome) -> None:
+        """End with ``outcome`` and without a word to the vehicle: it may be another one by now."""
+        raise NotImplementedError
 
     def _step(self, event: Label) -> None:
         try:

@@ -1,4 +1,4 @@
-"""How a transfer ends: accepted, refused, or unknown; and the vehicle's codes in words, each with a cure."""
+"""How a transfer ends: accepted, refused, unknown, or stopped by us; the vehicle's codes in words, each with a cure."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
 INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
+OURS = -1
+"""No code of the vehicle's: it is we who do not take what it says."""
 
 _CODES: dict[int, tuple[str, str]] = {
     ACCEPTED: ("accepted", ""),
@@ -68,6 +70,8 @@ class Refused:
         return words if self.seq is None else f"item {self.seq}: {words}"
 
     def __str__(self) -> str:
+        if self.code == OURS:
+            return f"refused: {self.reason}"
         cure = code_cure(self.code)
         return f"refused: {self.reason} (MAV_MISSION_RESULT {self.code})" + (f"; {cure}" if cure else "")
 
@@ -83,4 +87,15 @@ class Unknown:
         return f"unknown: {self.why}"
 
 
-Outcome = Accepted | Refused | Unknown
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """We stopped: the vehicle is no longer as it was when it was checked. ``reason`` is a word: armed, moved, …"""
+
+    reason: str
+    why: str
+
+    def __str__(self) -> str:
+        return f"stopped: {self.why}"
+
+
+Outcome = Accepted | Refused | Unknown | Changed

@@ -12,6 +12,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.mavlink.autopilots import PX4, manner
 from gcsplan.mavlink.mission import GLOBAL, RELATIVE, Mission
+from gcsplan.mavlink.numbers import finite, whole
 from gcsplan.mavlink.preflight import distance_m
 from gcsplan.vehicle import Autopilot
 
@@ -55,11 +56,18 @@ _SAME_M = 0.5
 
 
 def decode_value(message: Any, mav_autopilot: int) -> float:
-    """The number in a PARAM_VALUE: ArduPilot casts to float, PX4 puts an integer's bytes in the float's place."""
+    """The number in a PARAM_VALUE: ArduPilot casts to float, PX4 puts an integer's bytes in the float's place.
+
+    NaN where it holds none: NaN itself, infinity, a float that no float32 holds.
+    """
     integer = message.param_type <= dialect.MAV_PARAM_TYPE_INT32
-    if mav_autopilot == PX4 and integer:
-        return float(struct.unpack("<i", struct.pack("<f", message.param_value))[0])
-    return float(message.param_value)
+    try:
+        if mav_autopilot == PX4 and integer:
+            return float(struct.unpack("<i", struct.pack("<f", message.param_value))[0])
+    except (struct.error, OverflowError):
+        return math.nan
+    value = finite(message.param_value)
+    return math.nan if value is None else value
 
 
 def parameter_name(message: Any) -> str:
@@ -85,7 +93,8 @@ def judge_parameters(
     label = manner(mission.autopilot).label
     if not values:
         return [f"no parameters could be read: failsafe, return and fence settings of {label} were not compared"]
-    found = [
+    values, odd = _numbers(values)
+    found = odd + [
         f"{name} is {values[name]:g} on board, {want:g} is expected"
         for name, want in (expected or {}).items()
         if name in values and not math.isclose(values[name], want, rel_tol=1e-6, abs_tol=1e-6)
@@ -104,15 +113,26 @@ def judge_fence_parameters(values: Values) -> list[str]:
     """Whether a fence that is sent will be enforced, in words; nothing is changed on board."""
     if not values:
         return ["no parameters could be read: whether the fence is enforced is not known"]
-    found = []
+    values, found = _numbers(values)
     if values.get("FENCE_ENABLE") == 0:
         found.append("FENCE_ENABLE is 0 on board: the fence is kept and not enforced until it is enabled")
     kinds = values.get("FENCE_TYPE")
-    if kinds is not None and not int(kinds) & _POLYGON_FENCE:
+    if kinds is not None and not _bits(kinds) & _POLYGON_FENCE:
         found.append(f"FENCE_TYPE is {kinds:g} on board: polygons and circles (4) are not among the fences in force")
     if values.get("FENCE_ACTION") == 0 or values.get("GF_ACTION") == 0:
         found.append("the fence's action on board is none: a breach is only reported")
     return found
+
+
+def _numbers(values: Values) -> tuple[Values, list[str]]:
+    """Those of ``values`` that are numbers, and a line for each that is none."""
+    good = {name: value for name, value in values.items() if math.isfinite(value)}
+    return good, [f"{name} on board is no number: it was not compared" for name in values if name not in good]
+
+
+def _bits(value: float) -> int:
+    """A set of bits that came as a float; what is none has no bit set."""
+    return whole(value, 0, 2**31 - 1) or 0
 
 
 def _return_altitude(values: Values, wanted_m: float | None) -> list[str]:
@@ -128,7 +148,7 @@ def _return_altitude(values: Values, wanted_m: float | None) -> list[str]:
 
 
 def _fences(values: Values, extent: _Extent) -> list[str]:
-    kinds = int(values.get("FENCE_TYPE", 0)) if values.get("FENCE_ENABLE", 0) else 0
+    kinds = _bits(values.get("FENCE_TYPE", 0.0)) if values.get("FENCE_ENABLE", 0) else 0
     px4 = bool(values.get("GF_ACTION", 0))
     limits = [
         ("FENCE_ALT_MAX", bool(kinds & _ALTITUDE_FENCE), "high", extent.top_rel_home_m),

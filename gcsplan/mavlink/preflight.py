@@ -27,6 +27,8 @@ NEAR_START_M = 30.0
 NEAR_GROUND_M = 15.0
 _EARTH_RADIUS_M = 6_371_008.8
 
+Reasons = list[tuple[str, str]]
+
 
 def preflight(
     state: VehicleState,
@@ -44,6 +46,28 @@ def preflight(
     ``start`` is where the mission begins; ``ground_amsl_m`` the ground there, by default the altitude of ``start``.
     Raises VehicleRefused with every reason against it; ``reason`` is the first one's word.
     """
+    against, warnings = objections(
+        state, items, autopilot, mission_type=mission_type, start=start, ground_amsl_m=ground_amsl_m,
+        allow_armed=allow_armed, ignore_position=ignore_position,
+    )  # fmt: skip
+    if against:
+        words = "; ".join(text for _, text in against)
+        raise VehicleRefused(f"not sent: {words}", where=f"vehicle {state.address.sysid}", reason=against[0][0])
+    return warnings
+
+
+def objections(
+    state: VehicleState,
+    items: Sequence[MissionItem],
+    autopilot: Autopilot,
+    *,
+    mission_type: int = MISSION,
+    start: Home | None = None,
+    ground_amsl_m: float | None = None,
+    allow_armed: bool = False,
+    ignore_position: bool = False,
+) -> tuple[Reasons, list[str]]:
+    """What `preflight` has against it, a word and a text each, and its warnings."""
     against: list[tuple[str, str]] = []
     warnings: list[str] = []
     _identity(state, autopilot, against, warnings)
@@ -52,24 +76,12 @@ def preflight(
     if start is not None and not ignore_position:
         ground = start.amsl_m if ground_amsl_m is None else ground_amsl_m
         _position(state, start, ground, against, warnings)
-    if against:
-        words = "; ".join(text for _, text in against)
-        raise VehicleRefused(f"not sent: {words}", where=f"vehicle {state.address.sysid}", reason=against[0][0])
-    return warnings
-
-
-Reasons = list[tuple[str, str]]
+    return against, warnings
 
 
 def _identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnings: list[str]) -> None:
     if state.sources > 1:
-        against.append(
-            (
-                "ambiguous",
-                f"{state.sources} autopilots send heartbeats as system {state.address.sysid}: "
-                "give each vehicle its own number, or leave one of them off the link",
-            )
-        )
+        against.append(("ambiguous", rivals_words(state)))
     row = manner(autopilot)
     if is_generic(state.mav_autopilot):
         warnings.append(
@@ -93,6 +105,14 @@ def _identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warni
                     f"the mission is written for {row.label}, and the vehicle is a {type_name(state.mav_type)}",
                 )
             )
+
+
+def rivals_words(state: VehicleState) -> str:
+    """That several vehicles have the number, and what to do about it."""
+    return (
+        f"{state.sources} autopilots speak as system {state.address.sysid}: give each vehicle its own number, or leave "
+        f"one of them off the link"
+    )
 
 
 def _readiness(state: VehicleState, allow_armed: bool, against: Reasons, warnings: list[str]) -> None:
@@ -140,6 +160,10 @@ def _position(state: VehicleState, start: Home, ground_m: float, against: Reason
         warnings.append("the vehicle reports no position: whether it stands at the start could not be checked")
         return
     away_m = distance_m(state.lat_deg, state.lon_deg, start.lat_e7 / 1e7, start.lon_e7 / 1e7)
+    if state.just_at is not None and away_m <= NEAR_START_M:
+        lat, lon, _ = state.just_at
+        words = f"the vehicle reports two places by turns, the other at {lat:.6f}, {lon:.6f}: are there two of it?"
+        against.append(("wrong_place", words))
     if away_m > NEAR_START_M:
         against.append(
             (
@@ -159,6 +183,13 @@ def _position(state: VehicleState, start: Home, ground_m: float, against: Reason
                 "--ignore-position",
             )
         )
+
+
+def apart_m(a: VehicleState, b: VehicleState) -> float | None:
+    """Metres between the two places; None where one of them is not known."""
+    if a.lat_deg is None or a.lon_deg is None or b.lat_deg is None or b.lon_deg is None:
+        return None
+    return distance_m(a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg)
 
 
 def distance_m(lat_a: float, lon_a: float, lat_b: float, lon_b: float) -> float:

@@ -7,18 +7,20 @@ from typing import Any, Literal
 
 from gcsplan.errors import CheckFailed, GcsplanError, LinkError, ReadBackDiffers, VehicleRefused
 from gcsplan.mavlink.compare import Difference, faults
-from gcsplan.mavlink.mission import MISSION, Mission, MissionItem
-from gcsplan.mavlink.outcome import Accepted, Outcome, Refused
+from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, Mission, MissionItem
+from gcsplan.mavlink.outcome import Accepted, Changed, Outcome, Refused
+from gcsplan.mavlink.watch import VehicleState
 
 OutcomeWord = Literal["accepted", "refused", "unknown"]
 _SHOWN = 8
+_LISTS = {MISSION: "mission", FENCE: "fence", RALLY: "list of rally points"}
 
 
 def outcome_word(outcome: Outcome) -> OutcomeWord:
     """The outcome for summaries."""
     if isinstance(outcome, Accepted):
         return "accepted"
-    return "refused" if isinstance(outcome, Refused) else "unknown"
+    return "refused" if isinstance(outcome, (Refused, Changed)) else "unknown"
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,8 @@ class UploadResult:
     passed the caller's check again. ``reason``: the outcome in words. ``on_board``: what the vehicle holds, where
     that is not what was sent. ``read_back`` is in wire order; ``mission`` the same as a Mission (missions only).
     ``failed_check``: why the read-back does not pass the check. ``simulated`` is the caller's word for the vehicle.
+    ``changed``: a word for what became of the vehicle since it was checked (armed, moved, ambiguous, …), ``change``
+    the same in a sentence; nothing was sent since that was seen. ``state``: the vehicle as it was found.
     """
 
     vehicle: str
@@ -50,6 +54,9 @@ class UploadResult:
     texts: tuple[str, ...] = ()
     read_back: tuple[MissionItem, ...] | None = None
     mission: Mission | None = None
+    changed: str = ""
+    change: str = ""
+    state: VehicleState | None = None
 
     @property
     def faults(self) -> tuple[Difference, ...]:
@@ -70,6 +77,7 @@ class UploadResult:
         more: dict[str, Any] = {
             "attempts": self.attempts if self.attempts > 1 else None,
             "reason": self.reason if not self.verified else None,
+            "changed": self.changed,
             "on_board": self.on_board,
             "failed_check": self.failed_check,
             "differences": [str(d) for d in self.differences],
@@ -79,13 +87,18 @@ class UploadResult:
         return fixed | {key: value for key, value in more.items() if value}
 
     def error(self) -> GcsplanError | None:
-        """The error that this result amounts to; None if it is verified."""
+        """The error that this result amounts to; None if it is verified, and the vehicle still as it was."""
+        where = f"{self.vehicle or 'vehicle'} (system {self.sysid})"
+        if self.verified and self.changed:
+            words = f"the new {_LISTS[self.mission_type]} IS on board, read back and equal to what was sent, but "
+            return VehicleRefused(f"{words}{self.change}. Nothing further was sent", where=where, reason=self.changed)
         if self.verified:
             return None
-        where = f"{self.vehicle or 'vehicle'} (system {self.sysid})"
         tail = f"; {self.on_board}" if self.on_board else ""
         if self.texts:
             tail += f"; the vehicle says: {' / '.join(self.texts[-3:])}"
+        if self.changed and not self.faults and self.failed_check is None:
+            return VehicleRefused(f"the upload was stopped: {self.change}{tail}", where=where, reason=self.changed)
         if self.outcome == "refused":
             return VehicleRefused(f"the vehicle {self.reason}{tail}", where=where)
         if self.faults:

@@ -10,7 +10,7 @@ by reading back, compare), and the caller's check once more on what was read bac
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
@@ -25,7 +25,7 @@ from gcsplan.mavlink.tasks import (
     ProgressCall,
     Task,
     clearing,
-    finding,
+    looking_at,
     reading,
     uploading,
     verifying,
@@ -160,14 +160,16 @@ def upload_lists(orders: Sequence[ListOrder], mission_type: int) -> list[UploadR
     return _together([(order.link, order.sysid, starting(order)) for order in orders])
 
 
-def clear_fleet(orders: Sequence[Order]) -> list[UploadResult | GcsplanError]:
+def clear_fleet(orders: Sequence[Order], seen: Mapping[str, VehicleState | None]) -> list[UploadResult | GcsplanError]:
     """Clear the mission on every vehicle of ``orders``, all at once, and read back that it is gone.
 
+    ``seen``: by mission name the vehicle that was uploaded to; one that speaks from another address is left alone.
     Results in the order given, an error in place of a result: a vehicle that is armed, or gone, keeps what it has.
     """
 
     def starting(order: Order) -> Callable[[Channel], Steps[UploadResult]]:
-        return lambda channel: clearing(channel, order.mission.name, (MISSION,), order.options)
+        same = seen.get(order.mission.name)
+        return lambda channel: clearing(channel, order.mission.name, (MISSION,), order.options, same)
 
     return _together([(order.link, order.mission.sysid, starting(order)) for order in orders])
 
@@ -248,8 +250,8 @@ def download_items(
     settings = options or Options()
 
     def steps(channel: Channel) -> Steps[tuple[MissionItem, ...]]:
-        state = yield from finding(channel, Watch(sysid), settings)
-        read = yield from reading(channel, state, mission_type, settings)
+        state, recheck = yield from looking_at(channel, settings)
+        read = yield from reading(channel, state, mission_type, settings, recheck)
         return read.items
 
     return _run(link, sysid, steps)
@@ -271,8 +273,8 @@ def download_mission(
     settings = options or Options()
 
     def steps(channel: Channel) -> Steps[Mission]:
-        state = yield from finding(channel, Watch(sysid), settings)
-        read = yield from reading(channel, state, MISSION, settings)
+        state, recheck = yield from looking_at(channel, settings)
+        read = yield from reading(channel, state, MISSION, settings, recheck)
         start = home
         if start is None and (not autopilot.is_ardupilot or not read.items):
             start = state.home

@@ -9,9 +9,9 @@ from gcsplan.mavlink.autopilots import is_generic
 from gcsplan.mavlink.link import Channel, Link, Steps
 from gcsplan.mavlink.messages import Address
 from gcsplan.mavlink.parameters import decode_value, parameter_name
+from gcsplan.mavlink.recheck import Recheck, request_message
 from gcsplan.mavlink.watch import STANDBY, UNINIT, VehicleState, Watch
 
-_REQUEST_MESSAGE = 512
 _AUTOPILOT_VERSION, _GLOBAL_POSITION_INT, _HOME_POSITION = 148, 33, 242
 _DOES_NOT_EXIST = 1  # MAV_PARAM_ERROR
 _ASK_AGAIN_S = 0.5
@@ -56,9 +56,16 @@ def discover_steps(
 
 
 def parameter_steps(
-    channel: Channel, state: VehicleState, groups: tuple[tuple[str, ...], ...], watch: Watch
+    channel: Channel,
+    state: VehicleState,
+    groups: tuple[tuple[str, ...], ...],
+    watch: Watch,
+    recheck: Recheck | None = None,
 ) -> Steps[dict[str, float]]:
-    """The values of those parameters that the vehicle has; at most two seconds, one if it gives none."""
+    """The values of those parameters that the vehicle has; at most two seconds, one if it gives none.
+
+    A value that is no number is NaN.
+    """
     clock = channel.link.clock
     values: dict[str, float] = {}
     unknown: set[str] = set()  # the vehicle said that it has none of that name
@@ -78,8 +85,9 @@ def parameter_steps(
             ask_at = now + _ASK_AGAIN_S
         yield ask_at
         for heard in channel.take():
-            watch.note(heard, clock())
-            kind = heard.message.get_type() if heard.source == state.address else ""
+            (recheck or watch).note(heard, clock())
+            ours = not heard.late and heard.source == state.address and channel.peer in (None, heard.peer)
+            kind = heard.message.get_type() if ours else ""
             if kind == "PARAM_VALUE":
                 name = parameter_name(heard.message)
                 if any(name in group for group in groups):
@@ -128,8 +136,7 @@ def _ask(channel: Channel, state: VehicleState) -> None:
         _HOME_POSITION: state.home is None,
     }
     for kind in (kind for kind, lacking in wanted.items() if lacking):
-        request = dialect.MAVLink_command_long_message(*to, _REQUEST_MESSAGE, 0, kind, 0, 0, 0, 0, 0, 0)
-        channel.send(request, to)
+        channel.send(request_message(to, kind), to)
 
 
 def _ask_parameter(channel: Channel, to: Address, name: str) -> None:

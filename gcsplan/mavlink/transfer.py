@@ -6,6 +6,8 @@ that can help. Only a list that was read back whole and equal is ever called ver
     upload ── accepted, unknown, error ──► read back ── equal ──► verified
        ▲  └── refused, nothing asked ──► refused   │
        └────────────── differs, upload not accepted ┴── accepted: somebody else changed it, or it went bad: differs
+
+Before each announcement a gate is asked whether the vehicle is still the one that was checked, and as it was.
 """
 
 from __future__ import annotations
@@ -18,15 +20,16 @@ from gcsplan.errors import InputError
 from gcsplan.mavlink.autopilots import manner
 from gcsplan.mavlink.compare import Difference, compare, faults
 from gcsplan.mavlink.download import Download
-from gcsplan.mavlink.machine import ImpossibleTransition, Machine, Progress, Timers
+from gcsplan.mavlink.machine import CANCELLED_BY_US, Gate, ImpossibleTransition, Machine, Progress, Timers, always
 from gcsplan.mavlink.messages import Address, Item, Packet
 from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, MissionItem
-from gcsplan.mavlink.outcome import ERROR, Accepted, Outcome, Refused, Unknown
+from gcsplan.mavlink.outcome import ERROR, Accepted, Changed, Outcome, Refused, Unknown
 from gcsplan.mavlink.upload import Clear, Upload
 from gcsplan.vehicle import Autopilot
 
 __all__ = [
     "Accepted",
+    "Changed",
     "Clear",
     "Download",
     "ImpossibleTransition",
@@ -74,7 +77,8 @@ class _Phase(Enum):
 class VerifiedUpload:
     """Upload ``items`` (wire order) to ``vehicle``, read them back and compare, at most ``attempts`` times.
 
-    Used like the machines that it is made of; ``result`` is None until it has ended.
+    Used like the machines that it is made of; ``result`` is None until it has ended. ``gate``: of `machine`.
+    ``most``: a longer list is none that the vehicle can hold, and is not read.
     """
 
     def __init__(
@@ -87,6 +91,8 @@ class VerifiedUpload:
         mission_type: int = MISSION,
         timers: Timers | None = None,
         attempts: int = 4,
+        gate: Gate = always,
+        most: int = 65535,
     ) -> None:
         if attempts < 1:
             raise InputError(f"an upload needs at least one attempt, given {attempts}")
@@ -94,6 +100,11 @@ class VerifiedUpload:
         self.autopilot = autopilot
         self.timers = timers or Timers()
         self.result: Settled | None = None
+        self._gate = gate
+        self._hold_most = max(most, len(items))
+        self._last_read: tuple[MissionItem, ...] | None = None
+        self._read_of: Upload | None = None  # after which it was read
+        self._began_before = False
         self._items = tuple(items)
         self._most = attempts
         self._attempt = 1
@@ -127,6 +138,15 @@ class VerifiedUpload:
         return self._retries + (child.retries if child and child.outcome is None else 0) + self._attempt - 1
 
     @property
+    def mark(self) -> tuple[int, ...]:
+        """How far it has come; grows with every item that is asked for or read for the first time."""
+        return (self._attempt, self._reads, self.progress.done)
+
+    @property
+    def _began(self) -> bool:
+        return self._began_before or self._upload.began
+
+    @property
     def _child(self) -> Upload | Download | None:
         return {_Phase.UPLOAD: self._upload, _Phase.READ: self._download}.get(self._phase)
 
@@ -135,7 +155,7 @@ class VerifiedUpload:
         if self._phase is not _Phase.IDLE:
             raise ImpossibleTransition("verified upload: START is impossible twice", where=f"vehicle {self.vehicle}")
         self._phase = _Phase.UPLOAD
-        return self._upload.start(now)
+        return self._upload.start(now) + self._advance(now)
 
     def receive(self, packet: Packet, now: float) -> list[Packet]:
         """Take ``packet`` in and return the answers. Items are answered in every phase: it may still be receiving."""
@@ -162,31 +182,51 @@ class VerifiedUpload:
         child = self._child
         return child.on_timer(now) + self._advance(now) if child else []
 
-    def cancel(self, now: float) -> list[Packet]:
-        """Give up; what is on board is then unknown."""
+    def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
+        """Give up and say so; what is on board is then unknown."""
         if self.result is not None:
             return []
         child = self._child
-        out = child.cancel(now) if child and child.outcome is None else []
+        out = child.cancel(now, why) if child and child.outcome is None else []
         self._retries += child.retries if child else 0
-        self._end(Unknown("cancelled by us"))
+        self._end(Unknown(why))
         return out
 
     def _new_upload(self) -> Upload:
-        return Upload(self._items, us=self.us, vehicle=self.vehicle, mission_type=self.mission_type, timers=self.timers)
+        return Upload(
+            self._items, us=self.us, vehicle=self.vehicle, mission_type=self.mission_type, timers=self.timers,
+            gate=self._gate,
+        )  # fmt: skip
+
+    def stop(self, outcome: Outcome) -> None:
+        """End with ``outcome``, and answer nothing from now on: the vehicle may be another one by now."""
+        if self.result is not None:
+            return
+        child = self._child
+        self._retries += child.retries if child and child.outcome is None else 0
+        self._upload.stop(outcome)
+        self._end_changed(outcome)
+
+    def _end_changed(self, outcome: Outcome) -> list[Packet]:
+        """End where nothing more is asked: what is on board is what was read last, unless it was written to since."""
+        untouched = self._read_of is self._upload or not self._upload.began
+        return self._end(outcome, self._last_read if untouched else None)
 
     def _wake(self, now: float) -> list[Packet]:
         self._phase = self._resume
         if self._phase is _Phase.UPLOAD:
             self._refused_before = self._upload.outcome
+            self._began_before = self._began
             self._upload, self._reads = self._new_upload(), 0
-            return self._upload.start(now)
+            return self._upload.start(now) + self._advance(now)
         return self._read(now)
 
     def _read(self, now: float) -> list[Packet]:
         self._phase = _Phase.READ
         self._reads += 1
-        self._download = Download(us=self.us, vehicle=self.vehicle, mission_type=self.mission_type, timers=self.timers)
+        self._download = Download(
+            us=self.us, vehicle=self.vehicle, mission_type=self.mission_type, timers=self.timers, most=self._hold_most
+        )
         return self._download.start(now)
 
     def _pause(self, now: float, resume: _Phase) -> list[Packet]:
@@ -201,6 +241,8 @@ class VerifiedUpload:
         self._retries += child.retries
         if child is self._download:
             return self._after_reading(now, child.outcome)
+        if self._upload.barred:
+            return self._end_changed(child.outcome)
         refused = isinstance(child.outcome, Refused)
         if refused and not self._upload.began:
             if self._may_help() and self._attempt < self._most:
@@ -224,6 +266,7 @@ class VerifiedUpload:
         if not isinstance(reading, Accepted):
             return self._unreadable(now, uploaded, reading)
         read = self._download.items
+        self._last_read, self._read_of = read, self._upload
         differences = tuple(compare(self._items, read, self.autopilot, self.mission_type))
         if not faults(differences):
             return self._end(Accepted(self._download.opaque_id), read, differences, verified=True)
@@ -251,7 +294,7 @@ class VerifiedUpload:
         verified: bool = False,
     ) -> list[Packet]:
         self._phase = _Phase.ENDED
-        words = "" if verified else on_board(self._items, read, self.autopilot, self.mission_type, self._upload.began)
+        words = "" if verified else on_board(self._items, read, self.autopilot, self.mission_type, self._began)
         self.result = Settled(outcome, verified, differences, read, words, self._attempt, self.retries)
         return []
 
@@ -270,7 +313,8 @@ def on_board(
     name = _LIST[mission_type]
     if read is None:
         if not began:
-            return f"the vehicle asked for nothing: its former {name} should be untouched"
+            cut = "" if manner(autopilot).atomic else ", or cut short if the announcement reached it"
+            return f"the vehicle asked for nothing: its former {name} should be untouched{cut}"
         return f"what the vehicle holds is not known: do not fly it; upload again or clear its {name}"
     if not read:
         return f"the vehicle holds no {name} now"

@@ -3,8 +3,8 @@
 =============  =============  =============================================================================
 state          event          what happens
 =============  =============  =============================================================================
-IDLE           START          COUNT goes out
-ANNOUNCED      RETRY          COUNT again: nothing was asked yet
+IDLE           START          COUNT goes out, as soon as the gate lets it
+ANNOUNCED      RETRY          COUNT again, through the gate: nothing was asked yet
 ANNOUNCED      ASKED          the item goes out; from here on nothing is ever sent unasked
 SENDING        ASKED          the item goes out: any seq in range, in any order, again and again
 …              ALL_ASKED      … and with it every item has been asked for at least once
@@ -27,7 +27,17 @@ from enum import auto
 from typing import Any, ClassVar
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.machine import Label, Machine, Progress, Timers, checked_type
+from gcsplan.mavlink.machine import (
+    CANCELLED_BY_US,
+    Gate,
+    Label,
+    Machine,
+    Progress,
+    Timers,
+    Wait,
+    always,
+    checked_type,
+)
 from gcsplan.mavlink.messages import Ack, Address, ClearAll, Count, Item, MissionMessage, Packet, Request
 from gcsplan.mavlink.mission import ALL, MISSION, MissionItem
 from gcsplan.mavlink.outcome import (
@@ -113,10 +123,12 @@ class Upload(Machine):
         vehicle: Address,
         mission_type: int = MISSION,
         timers: Timers | None = None,
+        gate: Gate = always,
     ) -> None:
         super().__init__(
-            us=us, vehicle=vehicle, mission_type=checked_type(mission_type), timers=timers or Timers(), state=S.IDLE
-        )
+            us=us, vehicle=vehicle, mission_type=checked_type(mission_type), timers=timers or Timers(), state=S.IDLE,
+            gate=gate,
+        )  # fmt: skip
         self.items = tuple(items)
         if not self.items:
             raise InputError("an empty list is not uploaded: clear the vehicle's list instead")
@@ -129,6 +141,8 @@ class Upload(Machine):
         self._gives_up_at = 0.0  # nothing new asked until then: a stall
         self._doubt: Outcome | None = None
         self._cancelled = False
+        self._announced = 0
+        self.barred = False  # the gate has ended it
 
     @property
     def progress(self) -> Progress:
@@ -155,26 +169,41 @@ class Upload(Machine):
         for seq in seqs:
             self._asked_for(seq, now)
 
-    def cancel(self, now: float) -> list[Packet]:
+    def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
         """Give up and say so (ArduPilot does not listen); the outcome is unknown from the first request on."""
-        self._end(E.CANCEL, Unknown("cancelled by us"))
-        self._cancelled = True
+        self.stop(Unknown(why))
         return [self._to_vehicle(Ack(CANCELLED, self.mission_type))]
 
+    def stop(self, outcome: Outcome) -> None:
+        """End, and answer nothing from now on."""
+        if self.outcome is None:
+            self._end(E.CANCEL, outcome)
+        self._cancelled = True
+
     def _announce(self, now: float) -> list[Packet]:
+        held = self._gate(now)
+        if isinstance(held, Wait):
+            self._deadline = held.until
+            return []
+        if held is not None:
+            self.barred = True
+            self.stop(held)
+            return []
+        self.retries += int(self._announced > 0)
+        self._announced += 1
         self._deadline = now + self.timers.response_s
         return [self._to_vehicle(Count(len(self.items), self.mission_type))]
 
     def _react(self, message: MissionMessage, now: float) -> list[Packet]:
         if isinstance(message, Request) and message.seq < len(self.items):
             return self._answer(message.seq, now)
-        if isinstance(message, Ack) and self._state not in (S.IDLE, S.ENDED):
+        if isinstance(message, Ack) and self._announced and self._state is not S.ENDED:
             self._judge(message, now)
         return []
 
     def _answer(self, seq: int, now: float) -> list[Packet]:
-        if self._state is S.IDLE or self._cancelled:
-            return []
+        if not self._announced or self._cancelled:
+            return []  # to a list that was not announced: somebody else's request
         self._asked_for(seq, now)
         return [self._to_vehicle(self._item(seq))]
 
@@ -223,9 +252,8 @@ class Upload(Machine):
 
     def _expire(self, now: float) -> list[Packet]:
         again = self._doubt is None or isinstance(self._doubt, Unknown) or self._doubt == Refused(ERROR)
-        if self._state is S.ANNOUNCED and again and self.retries < self.timers.retries:
+        if self._state is S.ANNOUNCED and again and self._announced <= self.timers.retries:
             self._step(E.RETRY)
-            self.retries += 1
             return self._announce(now)
         self._end(E.TIMEOUT, self._doubt or self._silence(now))
         return []
@@ -233,7 +261,7 @@ class Upload(Machine):
     def _silence(self, now: float) -> Unknown:
         done, total = len(self._asked), len(self.items)
         if not done:
-            return Unknown(f"no answer to {self.retries + 1} announcements of the list", silent=True)
+            return Unknown(f"no answer to {self._announced} announcements of the list", silent=True)
         if now >= self._gives_up_at:
             return Unknown(f"the vehicle asks on and on and gets no further than item {self._highest} of {total}")
         if done == total:
@@ -255,10 +283,17 @@ class Clear(Machine):
     }
 
     def __init__(
-        self, *, us: Address, vehicle: Address, mission_type: int = MISSION, timers: Timers | None = None
+        self,
+        *,
+        us: Address,
+        vehicle: Address,
+        mission_type: int = MISSION,
+        timers: Timers | None = None,
+        gate: Gate = always,
     ) -> None:
         kind = mission_type if mission_type == ALL else checked_type(mission_type)
-        super().__init__(us=us, vehicle=vehicle, mission_type=kind, timers=timers or Timers(), state=S.IDLE)
+        super().__init__(us=us, vehicle=vehicle, mission_type=kind, timers=timers or Timers(), state=S.IDLE, gate=gate)
+        self._asked = 0
 
     @property
     def progress(self) -> Progress:
@@ -270,17 +305,31 @@ class Clear(Machine):
         self._step(E.START)
         return self._ask(now)
 
-    def cancel(self, now: float) -> list[Packet]:
+    def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
         """Give up."""
-        self._end(E.CANCEL, Unknown("cancelled by us"))
+        self.stop(Unknown(why))
         return []
 
+    def stop(self, outcome: Outcome) -> None:
+        """End, and ask no more."""
+        if self.outcome is None:
+            self._end(E.CANCEL, outcome)
+
     def _ask(self, now: float) -> list[Packet]:
+        held = self._gate(now)
+        if isinstance(held, Wait):
+            self._deadline = held.until
+            return []
+        if held is not None:
+            self.stop(held)
+            return []
+        self.retries += int(self._asked > 0)
+        self._asked += 1
         self._deadline = now + self.timers.response_s
         return [self._to_vehicle(ClearAll(self.mission_type))]
 
     def _react(self, message: MissionMessage, now: float) -> list[Packet]:
-        if isinstance(message, Ack) and self._state is S.ANNOUNCED:
+        if isinstance(message, Ack) and self._asked and self._state is S.ANNOUNCED:
             if message.code == ACCEPTED:
                 self._end(E.TAKEN, Accepted(message.opaque_id))
             else:
@@ -289,9 +338,8 @@ class Clear(Machine):
         return []
 
     def _expire(self, now: float) -> list[Packet]:
-        if self.retries < self.timers.retries:
+        if self._asked <= self.timers.retries:
             self._step(E.RETRY)
-            self.retries += 1
             return self._ask(now)
-        self._end(E.TIMEOUT, Unknown(f"no answer to {self.retries + 1} requests to clear", silent=True))
+        self._end(E.TIMEOUT, Unknown(f"no answer to {self._asked} requests to clear", silent=True))
         return []

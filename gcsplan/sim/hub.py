@@ -9,11 +9,11 @@ import logging
 import random
 from collections import OrderedDict
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from gcsplan.errors import UsageError
 from gcsplan.mavlink import wire
-from gcsplan.mavlink.frames import FrameParser, FrameWriter
+from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing
 from gcsplan.mavlink.messages import Address, Packet
 from gcsplan.sim.telemetry import Message, Telemetry
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -31,21 +31,26 @@ _log = logging.getLogger(__name__)
 @dataclass
 class _Listener:
     heard_at: float
-    parser: FrameParser = field(default_factory=FrameParser)
+    parser: FrameParser
 
 
 class Hub:
     """One or many vehicles behind one port. ``always`` is a client that is told everything from the start.
 
+    With ``signing`` they sign what they say and take signed frames alone.
+
     ``mishandled`` counts messages that raised: 0 unless there is a bug in here.
     """
 
-    def __init__(self, vehicles: Sequence[LoopbackVehicle], *, always: Client | None = None) -> None:
+    def __init__(
+        self, vehicles: Sequence[LoopbackVehicle], *, always: Client | None = None, signing: Signing | None = None
+    ) -> None:
         ids = [v.sysid for v in vehicles]
         if not ids or len(set(ids)) != len(ids):
             raise UsageError(f"a simulator wants at least one vehicle and each system id once, given {ids}")
         self._vehicles = [(v, Telemetry(v), random.Random(v.misbehave.seed + 1)) for v in vehicles]
         self._always = always
+        self._signing = signing or Signing()
         self._listeners: OrderedDict[Client, _Listener] = OrderedDict()
         self._whereabouts: OrderedDict[Address, Client] = OrderedDict()
         self._writers: dict[Address, FrameWriter] = {}  # each source counts its own frames
@@ -68,6 +73,8 @@ class Hub:
             self.forget(next(iter(self._listeners)))
         sent: Sent = []
         for message in listener.parser.feed(data, datagram=datagram):
+            if message.late:
+                continue
             try:
                 sent += self._handle(message, client, now)
             except (ArithmeticError, ValueError, TypeError, LookupError, AttributeError):
@@ -95,7 +102,7 @@ class Hub:
         return sent
 
     def _frame(self, message: Message, source: Address) -> bytes:
-        return self._writers.setdefault(source, FrameWriter(source)).pack(message)
+        return self._writers.setdefault(source, FrameWriter(source, self._signing)).pack(message)
 
     def _routed(self, packets: Sequence[Packet], speaker: Address | None = None, client: Client | None = None) -> Sent:
         sent: Sent = []
@@ -141,7 +148,7 @@ class Hub:
     def welcome(self, client: Client, now: float) -> None:
         """A client that is there, though it may not have said a word: it does not wait a second for a heartbeat."""
         if client not in self._listeners:
-            self._listeners[client] = _Listener(now)
+            self._listeners[client] = _Listener(now, FrameParser(self._signing))
             self._next_second = now
 
     def forget(self, client: Client) -> None:

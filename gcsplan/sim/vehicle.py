@@ -86,6 +86,10 @@ class LoopbackVehicle:
         """Where it stands."""
         return self._board.home
 
+    def carry_to(self, home: Home) -> None:
+        """Put it somewhere else; its home goes along."""
+        self._board.home = home
+
     @property
     def armed(self) -> bool:
         """Whether its motors may turn."""

@@ -8,7 +8,6 @@ Links and transfers are imported by what opens one: most plans are sent nowhere,
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +16,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
@@ -30,12 +28,12 @@ from gcsplan.mission_file import MissionFile
 from gcsplan.pipeline import Plan
 from gcsplan.steps.checking import Checked, split_name
 from gcsplan.steps.fencing import not_fenced, upload_fences
+from gcsplan.steps.orders import order_of, teller
 from gcsplan.steps.withdrawal import withdrawn
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
-    from gcsplan.mavlink import session
     from gcsplan.mavlink.link import Link
     from gcsplan.mavlink.machine import Progress
     from gcsplan.mavlink.results import UploadResult
@@ -52,12 +50,16 @@ Simulator = Callable[[Sequence[Mission]], AbstractContextManager[str]]
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What the user allows. ``atomic``: if one upload fails, the missions that others took are cleared again."""
+    """What the user allows. ``atomic``: if one upload fails, the missions that others took are cleared again.
+
+    ``timeout_s``: the user's patience, of `gcsplan.mavlink.patience`.
+    """
 
     allow_armed: bool = False
     ignore_position: bool = False
     unchecked: bool = False
     atomic: bool = False
+    timeout_s: float = 60.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,11 +235,18 @@ def deliver(
             held = LinkError("nothing was sent but fences, all or nothing: another vehicle's fence is not on board")
             return [_delivery(job, barred.get(job.name) or held) for job in jobs]
         orders = {
-            job.name: _order(job, links[job.url], options, progress)
+            job.name: order_of(
+                job,
+                links[job.url],
+                options,
+                progress,
+                simulated=job.url == SIM,
+                listen_s=0.0 if job.url == SIM else LISTEN_S,
+            )
             for job in jobs
             if job.url in links and job.name not in barred
         }
-        results = session.upload_fleet(list(orders.values()), ended=_teller(progress))
+        results = session.upload_fleet(list(orders.values()), ended=teller(progress))
         ended = dict(zip(orders, results, strict=True))
         done = [
             _with_fence(
@@ -258,7 +267,11 @@ def _fenced(jobs: Sequence[Job], links: Mapping[str, Link], options: Options) ->
         return {}
     from gcsplan.mavlink import session
 
-    return upload_fences(jobs, links, session.Options(allow_armed=options.allow_armed, listen_s=LISTEN_S))
+    settings = session.Options(
+        allow_armed=options.allow_armed, ignore_position=options.ignore_position, listen_s=LISTEN_S,
+        timeout_s=options.timeout_s,
+    )  # fmt: skip
+    return upload_fences(jobs, links, settings)
 
 
 def _with_fence(delivery: Delivery, fence: UploadResult | GcsplanError | None) -> Delivery:
@@ -271,60 +284,6 @@ def _with_fence(delivery: Delivery, fence: UploadResult | GcsplanError | None) -
         warnings=tuple(dict.fromkeys((words, *delivery.warnings, *fence.warnings))),
         details=dict(delivery.details or {}) | {"fence": told},
     )
-
-
-def _teller(progress: ProgressCall | None) -> session.EndCall | None:
-    if progress is None:
-        return None
-    from gcsplan.mavlink.machine import Progress
-
-    def tell(order: session.Order, ended: UploadResult | GcsplanError) -> None:
-        count = len(order.mission.wire_items())
-        refused = isinstance(ended, VehicleRefused)
-        word = ("refused" if refused else "unknown") if isinstance(ended, GcsplanError) else ended.outcome
-        verified = not isinstance(ended, GcsplanError) and ended.verified
-        progress(order.mission.name, Progress("verified" if verified else f"{word}!", count if verified else 0, count))
-
-    return tell
-
-
-def _order(job: Job, link: Link, options: Options, progress: ProgressCall | None) -> session.Order:
-    from gcsplan.mavlink import session
-
-    ground_m = None
-    if job.world is not None:
-        home = job.mission.home
-        ground_m = job.world.ground_amsl(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
-        ground_m = None if math.isnan(ground_m) else ground_m
-    settings = session.Options(
-        unchecked=options.unchecked or (job.verdict is not None and job.verdict.safe is None),
-        allow_armed=options.allow_armed,
-        ignore_position=options.ignore_position,
-        ground_amsl_m=ground_m,
-        rtl_rel_home_m=job.rtl_rel_home_m,
-        simulated=job.url == SIM,
-        listen_s=0.0 if job.url == SIM else LISTEN_S,
-    )
-    return session.Order(link, job.mission, job.verdict, settings, _judge_again(job), progress)
-
-
-def _judge_again(job: Job) -> session.Judge | None:
-    """The check on what was read back: what a vehicle holds is what it will fly."""
-    if job.world is None or job.vehicle is None or job.verdict is None:
-        return None
-    world, vehicle, first = job.world, job.vehicle, job.verdict
-
-    def again(read_back: Mission) -> str | None:
-        # Home on board is where the vehicle stands now; altitudes count from where the mission was planned to start.
-        verdict = judge(
-            replace(read_back, home=job.mission.home), vehicle, world, rtl_rel_home_m=job.rtl_rel_home_m,
-            terrain_error_m=job.terrain_error_m,
-        )  # fmt: skip
-        if verdict.safe is True or (verdict.safe is None and first.safe is None):
-            return None
-        return verdict.describe()
-
-    return again
 
 
 def _delivery(job: Job, ended: UploadResult | GcsplanError) -> Delivery:
@@ -343,9 +302,9 @@ def _delivery(job: Job, ended: UploadResult | GcsplanError) -> Delivery:
 
 
 def exit_code(deliveries: Sequence[Delivery]) -> int:
-    """The worst of 7, 6, 5 (then 4): a fleet's exit code; 0 if all are verified."""
+    """The worst of 70 (our bug), 7, 6, 5 (then 4): a fleet's exit code; 0 if all are verified."""
     codes = {d.code for d in deliveries}
-    order = (ReadBackDiffers.exit_code, LinkError.exit_code, VehicleRefused.exit_code)
+    order = (GcsplanError.exit_code, ReadBackDiffers.exit_code, LinkError.exit_code, VehicleRefused.exit_code)
     return next((c for c in order if c in codes), max(codes, default=0))
 
 
@@ -369,7 +328,7 @@ def require_file(file: Path) -> None:
         raise InputError("there is no such file", where=str(file))
 
 
-def verify_file(file: Path, url: str, sysid: int) -> Delivery:
+def verify_file(file: Path, url: str, sysid: int, *, timeout_s: float = 60.0) -> Delivery:
     """Compare a file with what is on board; nothing is written to the vehicle."""
     from gcsplan.mavlink import session
 
@@ -379,11 +338,12 @@ def verify_file(file: Path, url: str, sysid: int) -> Delivery:
         read = read_mission_file(file, autopilot=autopilot)
         mission = replace(read.mission, sysid=sysid)
         job = Job(file.stem, link.url, mission)
-        done = _delivery(job, session.verify_mission(link, mission, options=session.Options(listen_s=LISTEN_S)))
+        options = session.Options(listen_s=LISTEN_S, timeout_s=timeout_s)
+        done = _delivery(job, session.verify_mission(link, mission, options=options))
     return replace(done, warnings=(*read.notes, *done.warnings))
 
 
-def download_to(url: str, sysid: int, file: Path) -> int:
+def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) -> int:
     """Write the mission on board to a `.waypoints` or `.plan` file; returns the number of its wire items."""
     if file.suffix.lower() not in (".waypoints", ".plan"):
         raise UsageError(f"-o {file}: a name that ends in .waypoints or .plan is wanted")
@@ -394,19 +354,19 @@ def download_to(url: str, sysid: int, file: Path) -> int:
     with _open(url) as link:
         autopilot = _autopilot_of(link, sysid)
         mission = session.download_mission(
-            link, sysid, autopilot, name=file.stem, options=session.Options(listen_s=0.0)
+            link, sysid, autopilot, name=file.stem, options=session.Options(listen_s=0.0, timeout_s=timeout_s)
         )
     text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
     write_whole(file, text)
     return len(mission.wire_items())
 
 
-def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False) -> None:
+def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False, timeout_s: float = 60.0) -> None:
     """Clear one list on board and read back that it is empty."""
     from gcsplan.mavlink import session
 
     if kind not in KINDS:
         raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
     with _open(url) as link:
-        options = session.Options(listen_s=LISTEN_S, allow_armed=allow_armed)
+        options = session.Options(listen_s=LISTEN_S, allow_armed=allow_armed, timeout_s=timeout_s)
         session.clear_mission(link, sysid, KINDS[kind], options=options).raise_for_outcome()

@@ -21,19 +21,19 @@ def withdrawn(
 ) -> list[Delivery]:
     """All or nothing: where one is not verified, the missions that vehicles took are cleared and read back as gone.
 
-    Cleared is what was accepted, or may have been: a vehicle that never took anything of ours keeps its own.
+    Cleared is what was accepted, or may have been: a vehicle that never took anything of ours keeps its own. To one
+    that is no longer as it was when it was checked nothing further is sent: it keeps what it has, and that is said.
     """
     from gcsplan.mavlink import session
 
-    failures = [d.vehicle for d in deliveries if not d.verified]
+    failures = [d.vehicle for d in deliveries if d.code]
     if not failures:
         return list(deliveries)
-    taken = [
-        name for name, result in ended.items()
-        if not isinstance(result, GcsplanError) and result.outcome in ("accepted", "unknown")
-    ]  # fmt: skip
+    results = {name: result for name, result in ended.items() if not isinstance(result, GcsplanError)}
+    taken = [name for name, r in results.items() if r.outcome in ("accepted", "unknown") and not r.changed]
     again = [replace(orders[name], options=replace(orders[name].options, listen_s=0.0)) for name in taken]
-    cleared = dict(zip(taken, session.clear_fleet(again), strict=True))
+    seen = {orders[name].mission.name: results[name].state for name in taken}
+    cleared = dict(zip(taken, session.clear_fleet(again, seen), strict=True))
     why = f"not verified: {', '.join(failures)}"
     return [_after_clearing(d, cleared[d.vehicle], why) if d.vehicle in cleared else d for d in deliveries]
 

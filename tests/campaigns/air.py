@@ -1,0 +1,186 @@
+"""Simulated air: a ground station, vehicles at addresses, a bad radio between them, and a clock that only we move.
+
+`Link`, `session` and everything above them run on it as they are: `Air` is their transport, their clock and their
+waiting. What stands at an address is a `Hub`, as behind a simulator's socket, or anything else that takes bytes.
+"""
+
+from __future__ import annotations
+
+import heapq
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from gcsplan.mavlink.frames import Signing
+from gcsplan.mavlink.link import Link
+from gcsplan.mavlink.transport import Heard, Peer
+
+STATION = "ground station"
+EPOCH_S = 1_800_000_000.0
+_MOST_FRAMES = 400_000
+
+
+class Hang(AssertionError):
+    """Simulated time, or the number of frames, ran out."""
+
+
+class Place(Protocol):
+    """What stands at an address."""
+
+    @property
+    def deadline(self) -> float | None: ...
+
+    def take(self, client: str, data: bytes, now: float) -> list[tuple[Any, bytes]]: ...
+
+    def on_timer(self, now: float) -> list[tuple[Any, bytes]]: ...
+
+
+@dataclass(frozen=True)
+class Radio:
+    """Probabilities for each datagram, either way; delays in seconds."""
+
+    loss: float = 0.0
+    duplicate: float = 0.0
+    held_up: float = 0.0
+    delay_s: float = 0.02
+    jitter_s: float = 0.02
+    hold_s: float = 0.4
+
+
+class Air:
+    """The ground station's transport.
+
+    ``written(address, data)`` is told every frame that leaves it, ``heard(by, message)`` every message that it takes.
+    """
+
+    datagrams = True
+    handles: Sequence[int] = ()
+    place = "127.0.0.1:0"
+
+    def __init__(self, seed: int, radio: Radio, *, limit_s: float, default: Peer | None = None) -> None:
+        self.now = 1000.0
+        self.radio = radio
+        self.default: Peer | None = default
+        self.written: Callable[[Peer, bytes], None] = lambda peer, data: None
+        self.heard: Callable[[object, Any], None] = lambda by, message: None
+        self._rng = random.Random(seed)
+        self._limit_s = self.now + limit_s
+        self._places: dict[Peer, list[Place]] = {}
+        self._queue: list[tuple[float, int, Peer, object | None, bytes]] = []  # sent by a place, or by us: None
+        self._acts: list[tuple[float, int, Callable[[], None]]] = []
+        self._inbox: list[tuple[Peer, bytes, object]] = []
+        self._senders: list[object] = []
+        self._count = 0
+
+    def clock(self) -> float:
+        """The time now."""
+        return self.now
+
+    def wall_clock(self) -> float:
+        """Seconds since 1970, for signatures."""
+        return EPOCH_S + self.now
+
+    def link(self, signing: Signing | None = None) -> Link:
+        """A ground station's link on this air."""
+        return _Link(self, "udpin:127.0.0.1:0", clock=self.clock, transport=self, wait=self.wait, signing=signing)
+
+    # who is there, and what happens when
+
+    def at(self, address: Peer) -> list[Place]:
+        """What stands at ``address``: a list that may be changed."""
+        return self._places.setdefault(address, [])
+
+    def later(self, after_s: float, act: Callable[[], None]) -> None:
+        """Do ``act`` in ``after_s`` seconds."""
+        self._count += 1
+        heapq.heappush(self._acts, (self.now + after_s, self._count, act))
+
+    def put(self, address: Peer, place: Place) -> None:
+        """Let ``place`` stand at ``address`` from now on, beside what is there."""
+        self.at(address).append(place)
+        self._answer(address, place, place.on_timer(self.now))
+
+    def say(self, address: Peer, data: bytes, by: object) -> None:
+        """Let ``address`` send ``data`` to the ground station."""
+        self._send(address, data, by)
+
+    # the transport
+
+    def read(self) -> list[Heard]:
+        heard, self._inbox = self._inbox, []
+        self._senders = [by for *_, by in heard]
+        return [(address, data) for address, data, _ in heard]
+
+    def write(self, data: bytes, peer: Peer) -> None:
+        self.written(peer, data)
+        self._send(peer, data, None)
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def wait(self, transports: Sequence[Any], timeout_s: float) -> None:
+        """Let time go on until the ground station hears something, or ``timeout_s`` is over."""
+        until = self.now + max(0.0, timeout_s)
+        while not self._inbox:
+            due = self._next()
+            if due > until:
+                break
+            self.now = max(self.now, due)
+            self._happen()
+        self.now = max(self.now, until) if not self._inbox else self.now
+        if self.now > self._limit_s or self._count > _MOST_FRAMES:
+            raise Hang(f"it goes on after {self.now - 1000.0:.0f} simulated seconds and {self._count} frames")
+
+    def _next(self) -> float:
+        due = [at for places in self._places.values() for p in places if (at := p.deadline) is not None]
+        due += [heap[0][0] for heap in (self._queue, self._acts) if heap]
+        return min(due, default=float("inf"))
+
+    def _happen(self) -> None:
+        now = self.now
+        while self._acts and self._acts[0][0] <= now:
+            heapq.heappop(self._acts)[2]()
+        while self._queue and self._queue[0][0] <= now:
+            _, _, address, by, data = heapq.heappop(self._queue)
+            if by is not None:
+                self._inbox.append((address, data, by))
+            else:
+                for there in list(self.at(address)):
+                    self._answer(address, there, there.take(STATION, data, now))
+        for address, places in list(self._places.items()):
+            for there in list(places):
+                if there.deadline is not None and there.deadline <= now:
+                    self._answer(address, there, there.on_timer(now))
+
+    def _answer(self, address: Peer, by: Place, sent: list[tuple[Any, bytes]]) -> None:
+        for _, data in sent:
+            self._send(address, data, by)
+
+    def _send(self, address: Peer, data: bytes, by: object | None) -> None:
+        radio, rng = self.radio, self._rng
+        for _ in range(1 + (rng.random() < radio.duplicate)):
+            if rng.random() < radio.loss:
+                continue
+            late_s = radio.delay_s + rng.random() * radio.jitter_s
+            if rng.random() < radio.held_up:
+                late_s += rng.random() * radio.hold_s
+            self._count += 1
+            heapq.heappush(self._queue, (self.now + late_s, self._count, address, by, data))
+
+
+class _Link(Link):
+    """A link that tells its air which message of whom it has taken."""
+
+    def __init__(self, air: Air, url: str, **more: Any) -> None:
+        self._air, self._by = air, None
+        super().__init__(url, **more)
+
+    def _take_in(self, peer: Peer, data: bytes, now: float) -> None:
+        self._by = self._air._senders.pop(0)
+        super()._take_in(peer, data, now)
+
+    def _route(self, peer: Peer, message: Any, now: float) -> None:
+        if not message.late:
+            self._air.heard(self._by, message)
+        super()._route(peer, message, now)

@@ -1,0 +1,221 @@
+"""What flies about in the links' campaign: vehicles that are watched, forgers, and radios that replay."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Any
+
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.mavlink import wire
+from gcsplan.mavlink.compare import compare, faults
+from gcsplan.mavlink.frames import FrameWriter, Signing
+from gcsplan.mavlink.messages import Ack, Address, Count, Item, Request
+from gcsplan.mavlink.mission import MISSION, Home, MissionItem
+from gcsplan.mavlink.transport import Peer
+from gcsplan.sim.hub import Hub
+from gcsplan.sim.misbehaviour import spoilt
+from gcsplan.sim.parameters import REAL32, Parameters
+from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.vehicle import Autopilot
+from tests.campaigns.air import STATION, Air
+
+US = Address(255, 190)
+ODD = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-45, 2.0**31, -(2.0**31), 1e9, -1.0, 0.5, 65536.0)
+
+
+class OddParameters(Parameters):
+    """Values that no autopilot should send, of types that do not exist."""
+
+    def __init__(self, autopilot: Autopilot, sysid: int, rng: random.Random) -> None:
+        super().__init__(autopilot, sysid)
+        self._rng = rng
+
+    def on_wire(self, name: str) -> tuple[float, int]:
+        """Something odd, mostly."""
+        if self._rng.random() < 0.3:
+            return super().on_wire(name)
+        return self._rng.choice(ODD), self._rng.choice((REAL32, 6, 1, 0, 255, 10))
+
+
+class Craft:
+    """A vehicle behind a hub: what is on board and when, and what the ground station has heard of it."""
+
+    def __init__(self, vehicle: LoopbackVehicle, air: Air, signing: Signing | None = None) -> None:
+        self.vehicle, self.air = vehicle, air
+        self.hub = Hub([vehicle], always=STATION, signing=signing)
+        self.wanted: tuple[MissionItem, ...] = ()
+        self.deadline = self.hub.deadline
+        self.silent = False
+        self.address: Peer = ""
+        self.there_since = air.now
+        self.left_at = math.inf
+        self.beats = 0
+        self.known_since, self.last_heard = math.inf, -math.inf
+        self.places = 0
+        self.together = 0  # places heard while another stood at the same address
+        self._beats_at: list[float] = []
+        self.armed_told = self.far_told = math.inf
+        self.start = vehicle.home
+        self._last: list[MissionItem] | None = None
+        self._equal_since = math.inf
+        self.equal: list[tuple[float, float]] = []
+
+    def take(self, client: str, data: bytes, now: float) -> list[tuple[Any, bytes]]:
+        """Bytes of the ground station."""
+        if self.silent:
+            return []
+        sent = self.hub.take(client, data, now)
+        self.deadline = self.hub.deadline
+        self._look()
+        return sent
+
+    def on_timer(self, now: float) -> list[tuple[Any, bytes]]:
+        """What is due."""
+        sent = self.hub.on_timer(now)
+        self.deadline = self.hub.deadline
+        self._look()
+        return [] if self.silent else sent
+
+    def _look(self) -> None:
+        items = list(self.vehicle.items())
+        if items == self._last or not self.wanted:
+            return
+        self._last, now = items, self.air.now
+        same = not faults(compare(self.wanted, items, self.vehicle.autopilot))
+        if self._equal_since < now and not same:
+            self.equal.append((self._equal_since, now))
+        self._equal_since = min(self._equal_since, now) if same else math.inf
+
+    def was_equal(self, since: float, until: float) -> bool:
+        """Whether it held what was sent at some time between."""
+        self._look()
+        spans = [*self.equal, (self._equal_since, math.inf)]
+        return any(begin <= until and end >= since for begin, end in spans)
+
+    def heard(self, message: Any) -> None:
+        """The ground station has taken this message of ours."""
+        kind, now = message.get_type(), self.air.now
+        self.last_heard = now
+        if kind == "HEARTBEAT":
+            self.beats += 1
+            self.known_since = min(self.known_since, now)
+            self._beats_at.append(now)
+            self.armed_told = min(self.armed_told, now) if message.base_mode & 128 else math.inf
+        elif kind == "GLOBAL_POSITION_INT":
+            self.places += 1
+            far = max(abs(message.lat - self.start.lat_e7), abs(message.lon - self.start.lon_e7)) > 5000
+            self.far_told = min(self.far_told, now) if far else math.inf
+
+    def heard_between(self, since: float, until: float) -> bool:
+        """Whether two of its heartbeats were heard between."""
+        return sum(since <= at <= until for at in self._beats_at) >= 2
+
+    # what may happen to it
+
+    def carry(self, far: bool) -> None:
+        """Move it by 33 km, or by a few metres."""
+        home, d = self.vehicle.home, 3_000_000 if far else 200
+        self.vehicle.carry_to(Home(home.lat_e7 + d, home.lon_e7, home.amsl_m))
+
+    def edit(self, rng: random.Random) -> None:
+        """A second ground station changes, drops or swaps items."""
+        items = list(self.vehicle.items())
+        if len(items) < 2:
+            return
+        i = rng.randrange(1, len(items))
+        kind = rng.random()
+        if kind < 0.6:
+            items[i] = spoilt(items[i], rng.choice(("x", "z", "command", "param1")))
+        elif kind < 0.8:
+            del items[i:]
+        else:
+            items.append(items[i])
+        self.vehicle.load(items)
+
+    def arm(self) -> None:
+        """Somebody arms it."""
+        self.vehicle.armed = True
+
+    def disarm(self) -> None:
+        """And disarms it."""
+        self.vehicle.armed = False
+
+    def go_silent(self) -> None:
+        """Out of reach."""
+        self.silent = True
+
+    def come_back(self) -> None:
+        """Within reach again."""
+        self.silent = False
+
+
+class Forger:
+    """Says mission messages, parameters and telemetry in a vehicle's name, from ``address``."""
+
+    def __init__(self, air: Air, address: Peer, victim: Address, rng: random.Random, *, polite: bool) -> None:
+        self._air, self._address, self._rng, self._polite = air, address, rng, polite
+        compid = victim.compid if rng.random() < 0.8 else rng.choice((0, 2, 154, 190))
+        self._writer = FrameWriter(Address(victim.sysid, compid))
+
+    def speak(self) -> None:
+        """One forged message."""
+        kinds = (self._telemetry, self._parameter) if self._polite else (self._telemetry, self._parameter, self._list)
+        self._air.say(self._address, self._writer.pack(self._rng.choice(kinds)()), self)
+
+    def _list(self) -> Any:
+        rng = self._rng
+        lies = (
+            Ack(rng.choice((0, 0, 1, 5, 13, 15, 77))), Count(rng.choice((0, 1, 7, 700, 65535))),
+            Request(rng.choice((0, 1, 3, 65535)), legacy=rng.random() < 0.5),
+            Item(rng.choice((0, 1, 2, 60000)), MissionItem(16, 3, (math.nan,) * 4, 2**31 - 1, -(2**31), math.inf)),
+        )  # fmt: skip
+        return wire.encode(rng.choice(lies), US)
+
+    def _telemetry(self) -> Any:
+        rng = self._rng
+        i32 = [rng.randrange(-(2**31), 2**31) for _ in range(3)]
+        if self._polite:  # from the vehicle's own address: what spoils no look
+            return dialect.MAVLink_statustext_message(rng.randrange(8), rng.randbytes(50))
+        return rng.choice((
+            dialect.MAVLink_global_position_int_message(rng.randrange(2**32), *i32, 0, 0, 0, 0, 0),
+            dialect.MAVLink_gps_raw_int_message(0, rng.randrange(9), *i32, 0, 0, 0, 0, 0),
+            dialect.MAVLink_home_position_message(*i32, 0, 0, 0, [math.nan] * 4, 0, 0, math.inf),
+            dialect.MAVLink_autopilot_version_message(rng.randrange(2**64), 0, 0, 0, 0, *[[0] * 8] * 3, 0, 0, 0),
+            dialect.MAVLink_statustext_message(rng.randrange(8), rng.randbytes(50)),
+            dialect.MAVLink_heartbeat_message(rng.randrange(45), rng.randrange(20), rng.randrange(256), 0, 4, 3),
+        ))  # fmt: skip
+
+    def _parameter(self) -> Any:
+        rng = self._rng
+        name = rng.choice(
+            (b"RTL_ALT", b"FENCE_TYPE", b"FENCE_ENABLE", b"RTL_RETURN_ALT", b"GF_ACTION", rng.randbytes(16))
+        )
+        return dialect.MAVLink_param_value_message(name, rng.choice(ODD), rng.randrange(256), 1, 65535)
+
+
+class Recorder:
+    """Keeps what a vehicle says, and says it again later."""
+
+    MOST = 3000
+
+    def __init__(self, air: Air) -> None:
+        self._air = air
+        self.frames: list[tuple[float, bytes]] = []
+
+    def note(self, data: bytes) -> None:
+        """Record a frame."""
+        if len(self.frames) < self.MOST:
+            self.frames.append((self._air.now, data))
+
+    def replay(self, address: Peer, after_s: float, most: int) -> None:
+        """Send the first ``most`` frames again with their timing, from ``after_s`` seconds ahead."""
+        if not self.frames:
+            return
+        began = self.frames[0][0]
+        for at, data in self.frames[:most]:
+            self._air.later(after_s + at - began, lambda data=data: self._air.say(address, data, self))  # type: ignore[misc]
+
+
+__all__ = ["MISSION", "Craft", "Forger", "OddParameters", "Recorder"]
