@@ -1,0 +1,1 @@
+"""Attacks that run as long as one likes: python -m tests.campaigns.NAME --seconds N."""
