@@ -1,0 +1,183 @@
+"""Hostile files: mission files, zones, missions of others and terrain, spoilt at random, through the command line.
+
+    python -m tests.campaigns.files --seconds 120 [--seed 1] [--inputs N] [--keep DIR]
+
+Each input is one run of ``gcsplan check --json`` in a folder of its own, with one file (or more) spoilt in the way of
+people, programs and attackers. What it owes: an exit code of the contract, one JSON document, no traceback, no warning,
+nothing on standard error but messages, nothing left in the folder, an answer within `PATIENCE_S`, and no more than
+`MEMORY_MB` in all. Inputs run in a process beside this one, so that a crash of a library is seen as what it is. Ends
+with 1 and the seed where anything of that failed; ``--seed S --inputs 1 --keep DIR`` shows that input again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import random
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from gcsplan import cli
+from tests.campaigns.hostile import KINDS, write_clean
+
+CODES = {0, 2, 3, 4}
+PATIENCE_S = 20.0
+MEMORY_MB = 600.0
+
+
+def attack(seed: int) -> tuple[str, int, list[str]]:
+    """Run the input of that seed in the current folder: its kind, the exit code, and what is wrong."""
+    rng = random.Random(seed)
+    kind = rng.choices(list(KINDS), [weight for weight, _ in KINDS.values()])[0]
+    arguments = KINDS[kind][1](rng)
+    before = set(os.listdir())
+    out, err, began = io.StringIO(), io.StringIO(), time.monotonic()
+    code: Any = None
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
+        warnings.simplefilter("always")
+        sys.argv = ["gcsplan", "check", *arguments, "--json"]
+        try:
+            cli.main()
+        except SystemExit as ended:
+            code = ended.code
+        except BaseException as error:  # nothing may come through
+            code = f"{type(error).__name__}: {error}"
+    took = time.monotonic() - began
+    found = civil(code, out.getvalue(), err.getvalue())
+    if set(os.listdir()) != before:
+        found.append(f"left {sorted(set(os.listdir()) - before)}")
+    if took > PATIENCE_S / 2:
+        found.append(f"took {took:.1f} s")
+    return kind, code if isinstance(code, int) else -1, [f"seed {seed} ({kind}): {what}" for what in found]
+
+
+def civil(code: object, out: str, err: str) -> list[str]:
+    """What is wrong with how a run ended."""
+    found = [] if code in CODES else [f"ended with {code}: {err[-400:]}"]
+    try:
+        document = json.loads(out)
+        if ("error" in document) != (code != 0) or (code != 0 and document["error"]["code"] != code):
+            found.append("the document does not say how it ended")
+    except ValueError:
+        found.append(f"standard output is no JSON document: {out[:200]!r}")
+    found += [f"standard error holds a {word}: {err[-400:]}" for word in ("Traceback", "Warning") if word in err]
+    if code == 2 and not err.startswith("gcsplan: "):
+        found.append(f"no message on standard error: {err[:200]!r}")
+    return found
+
+
+def work(first: int, step: int) -> None:
+    """Run inputs for ever, one line of JSON for each on the real standard output."""
+    say = os.fdopen(os.dup(1), "w")
+    said = tempfile.TemporaryFile()
+    os.dup2(said.fileno(), 1)
+    os.dup2(said.fileno(), 2)  # libraries write there past Python
+    write_clean()
+    cli.app = typer.main.get_command(cli.app)  # type: ignore[assignment]  # made once: it takes longer than a check
+    seed = first
+    while True:
+        print(json.dumps(["begins", seed]), file=say, flush=True)
+        kind, code, found = attack(seed)
+        if said.tell():
+            said.seek(0)
+            found.append(f"seed {seed} ({kind}): a library wrote {said.read()[:300]!r}")
+            said.seek(0)
+            said.truncate()
+        memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+        if memory_mb > MEMORY_MB:
+            found.append(f"seed {seed} ({kind}): {memory_mb:.0f} MB are held")
+        print(json.dumps(["ended", kind, code, found, memory_mb]), file=say, flush=True)
+        seed += step
+
+
+def campaign(seconds: float, seed: int, inputs: int, keep: str | None) -> int:
+    """Start the process that runs the inputs, watch it, and tell what came of it."""
+    count: Counter[str] = Counter()
+    found: list[str] = []
+    memory_mb, current, until = 0.0, seed, time.monotonic() + seconds
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(keep or place)
+        folder.mkdir(exist_ok=True)
+        command = [sys.executable, "-m", "tests.campaigns.files", "--work", "--seed", str(seed)]
+        paths = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+        process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": paths})
+        assert process.stdout is not None
+        try:
+            while sum(count.values()) < inputs and time.monotonic() < until and not found:
+                line = _line(process.stdout.fileno(), 3 * PATIENCE_S if not count else PATIENCE_S)
+                if not line:
+                    code = process.poll()
+                    how = f"ended the process with {code}" if code is not None else f"no answer in {PATIENCE_S:g} s"
+                    found.append(f"seed {current}: {how}")
+                    break
+                told = json.loads(line)
+                if told[0] == "begins":
+                    current = told[1]
+                else:
+                    count[f"{told[1]} {told[2]}"] += 1
+                    found += told[3]
+                    memory_mb = max(memory_mb, told[4])
+        finally:
+            process.kill()
+            process.wait()
+    print("\n".join(found[:20]) if found else _summary(count, memory_mb))
+    return 1 if found else 0
+
+
+_rest: list[bytes] = [b""]
+
+
+def _line(handle: int, seconds: float) -> bytes:
+    """The next line from a pipe; nothing at its end or when time is up."""
+    import select
+
+    until = time.monotonic() + seconds
+    while b"\n" not in _rest[0]:
+        left = until - time.monotonic()
+        if left <= 0.0 or not select.select([handle], [], [], left)[0]:
+            return b""
+        more = os.read(handle, 65536)
+        if not more:
+            time.sleep(0.2)  # so that the end of the process is known too
+            return b""
+        _rest[0] += more
+    line, _, _rest[0] = _rest[0].partition(b"\n")
+    return line
+
+
+def _summary(count: Counter[str], memory_mb: float) -> str:
+    kinds = sorted({key.split()[0] for key in count})
+    each = []
+    for kind in kinds:
+        codes = {key.split()[1]: n for key, n in sorted(count.items()) if key.split()[0] == kind}
+        each.append(f"  {kind}: {sum(codes.values())} (" + ", ".join(f"exit {c}: {n}" for c, n in codes.items()) + ")")
+    return f"{sum(count.values())} inputs, 0 faults, {memory_mb:.0f} MB at most\n" + "\n".join(each)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=120.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--inputs", type=int, default=10**9, help="no more than so many")
+    parser.add_argument("--keep", metavar="DIR", help="work there, and leave the files of the last input")
+    parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.work:
+        work(given.seed, 1)
+    return campaign(given.seconds, given.seed, given.inputs, given.keep)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
