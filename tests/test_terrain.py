@@ -565,7 +565,9 @@ def test_a_file_in_one_huge_block_is_refused(tmp_path: Path) -> None:
     refusal(path)
 
 
-def test_a_small_file_that_unpacks_into_a_large_block_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_small_file_that_unpacks_into_a_large_block_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "a.tif"
     with rasterio.open(
         path, "w", driver="GTiff", width=64, height=64, count=3, dtype="float32", crs="EPSG:4326", interleave="pixel",
