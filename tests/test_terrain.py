@@ -565,6 +565,15 @@ def test_a_file_in_one_huge_block_is_refused(tmp_path: Path) -> None:
     refusal(path)
 
 
+def test_a_small_file_that_claims_large_ground_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = degrees_tif(tmp_path / "a.tif")
+    load(path)
+    monkeypatch.setattr(mosaic, "FEW_CELLS", 1000)
+    load(path)
+    monkeypatch.setattr(mosaic, "CELLS_IN_BYTE", 0.01)
+    assert "claims" in str(refusal(path))
+
+
 def test_a_small_file_that_unpacks_into_a_large_block_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

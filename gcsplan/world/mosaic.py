@@ -23,7 +23,7 @@ FIT_ERROR_M = 0.01
 """The polynomial may misplace a node by this much at most."""
 
 FEW_CELLS, CELLS_IN_BYTE = 5_000_000, 100
-"""So many cells of any file, and of larger windows so many in each byte of the file: ground is packed 20 to 1 at best."""
+"""A window may have so many cells, or so many for each byte of its files: no ground is packed more closely."""
 
 ALIGNED_CELLS = 1e-3
 """Tiles whose nodes are off a common grid by more than this part of a cell are refused."""

@@ -150,6 +150,8 @@ class Worker:
     def __exit__(self, *_: object) -> None:
         self.process.kill()
         self.process.wait()
+        if self.process.stdout is not None:
+            self.process.stdout.close()
 
     def answer(self) -> tuple[str, int, list[str], float] | None:
         """Kind, exit code, faults and memory of the next input; None where there is no answer."""

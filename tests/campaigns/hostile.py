@@ -52,7 +52,8 @@ altitude_frame: relative
 LOCAL = """
 version: 1
 frame: {origin: [36.6, -84.38], amsl_m: 0}
-terrain: {peaks: [{center: [500, 50], height_m: 70, decay_m: [20, 20]}, {center: [300, -80], height_m: 40, decay_m: [9, 30]}]}
+terrain: {peaks: [{center: [500, 50], height_m: 70, decay_m: [20, 20]},
+    {center: [300, -80], height_m: 40, decay_m: [9, 30]}]}
 limits: {min_agl_m: 5}
 no_fly:
   - {name: a, center: {east_m: 200, north_m: 10}, radius_m: 20, floor_agl_m: 10}
@@ -68,24 +69,25 @@ KML = (
     "-84.37,36.62,0</coordinates></LinearRing></outerBoundaryIs></Polygon></MultiGeometry></Placemark></Document></kml>"
 )
 YAML_WORDS = (
-    b"&a ", b"*a", b"<<: ", b"!!python/object:os.system ", b"!!binary ", b"!<x> ", b": ", b"- ", b"{", b"}", b"[", b"? ",
-    b".nan", b"-.inf", b"1e999", b"0x", b"0o9", b"1_000", b"12:30", b"\t", b"\xff", b"\xef\xbb\xbf", b"\x85", b"|\n",
-    b">-\n", b"---\n", b"...\n", b"%YAML 9.9\n", b"#", b"'", b'"', b"\\x", b"\xe2\x80\xa8", b"no", b"~", b"",
+    b"&a ", b"*a", b"<<: ", b"!!python/object:os.system ", b"!!binary ", b"!<x> ", b": ", b"- ", b"{", b"}", b"[",
+    b"? ", b".nan", b"-.inf", b"1e999", b"0x", b"0o9", b"1_000", b"12:30", b"\t", b"\xff", b"\xef\xbb\xbf", b"\x85",
+    b"|\n", b">-\n", b"---\n", b"...\n", b"%YAML 9.9\n", b"#", b"'", b'"', b"\\x", b"\xe2\x80\xa8", b"no", b"~", b"",
 )  # fmt: skip
 NUMBERS = (
     b"nan", b"-inf", b"1e39", b"-1e308", b"1e-400", b"0", b"-0", b"-1", b"177", b"82", b"22", b"20", b"16", b"201",
-    b"65535", b"65536", b"2147483648", b"9" * 400, b"0x10", b"1,5", b"\t", b"\n", b"\r", b" ", b"", b"\x00", b"#", b"90",
-    b"181", b"36.6", b"-84.37", b"QGC WPL 110\n",
+    b"65535", b"65536", b"2147483648", b"9" * 400, b"0x10", b"1,5", b"\t", b"\n", b"\r", b" ", b"", b"\x00", b"#",
+    b"90", b"181", b"36.6", b"-84.37", b"QGC WPL 110\n",
 )  # fmt: skip
 XML_WORDS = (
-    b"<!DOCTYPE a [<!ENTITY x 'y'>]>", b"&x;", b"&#0;", b"&#xD800;", b"<Polygon>", b"</Polygon>", b"<Placemark>", b"nan",
-    b"1e400", b"91,181", b",", b"<![CDATA[", b"]]>", b"\x00", b"<?xml version='1.0' encoding='utf-7'?>", b"<!--", b"-->",
-    b"<a xmlns='b'>", b"<NetworkLink/>", b"<innerBoundaryIs>", b" ", b"\xff\xfe", b"<LinearRing>", b"36.62,-84.37",
+    b"<!DOCTYPE a [<!ENTITY x 'y'>]>", b"&x;", b"&#0;", b"&#xD800;", b"<Polygon>", b"</Polygon>", b"<Placemark>",
+    b"nan", b"1e400", b"91,181", b",", b"<![CDATA[", b"]]>", b"\x00", b"<?xml version='1.0' encoding='utf-7'?>",
+    b"<!--", b"-->", b"<a xmlns='b'>", b"<NetworkLink/>", b"<innerBoundaryIs>", b" ", b"\xff\xfe", b"<LinearRing>",
+    b"36.62,-84.37",
 )  # fmt: skip
 ASC_WORDS = (
-    b"ncols 2147483647", b"nrows 99999999", b"nrows 2147483647", b"ncols 0", b"nrows -1", b"-1", b"nan", b"inf", b"1e400",
-    b"cellsize 0", b"cellsize 1e-300", b"cellsize -1", b"dx 1", b"xllcenter 7", b"NODATA_value nan", b"\x00", b"\n", b" ",
-    b"1e39", b"-32768", b"9" * 300,
+    b"ncols 2147483647", b"nrows 99999999", b"nrows 2147483647", b"ncols 0", b"nrows -1", b"-1", b"nan", b"inf",
+    b"1e400", b"cellsize 0", b"cellsize 1e-300", b"cellsize -1", b"dx 1", b"xllcenter 7", b"NODATA_value nan",
+    b"\x00", b"\n", b" ", b"1e39", b"-32768", b"9" * 300,
 )  # fmt: skip
 HEADER = b"ncols 60\nnrows 60\nxllcorner -84.41\nyllcorner 36.57\ncellsize 0.001\nNODATA_value -9999\n"
 
@@ -153,8 +155,8 @@ def written(name: str, data: bytes) -> None:
 
 
 PLAUSIBLE: tuple[Any, ...] = (
-    0, 1, -1, 2, 3, 5, 10, 16, 17, 18, 19, 20, 21, 22, 30, 31, 82, 84, 85, 93, 112, 114, 177, 178, 189, 195, 206, 0.5, 40,
-    60, 90, 120, 180, 360, 500, 1000, 36.6, -84.38, 36.605, -84.37, 36.61, 1e-3, 1e-7, 1e4, 1e5,
+    0, 1, -1, 2, 3, 5, 10, 16, 17, 18, 19, 20, 21, 22, 30, 31, 82, 84, 85, 93, 112, 114, 177, 178, 189, 195, 206, 0.5,
+    40, 60, 90, 120, 180, 360, 500, 1000, 36.6, -84.38, 36.605, -84.37, 36.61, 1e-3, 1e-7, 1e4, 1e5,
 )  # fmt: skip
 """Numbers that pass for good ones in some place or other: commands, frames, heights, places, counts."""
 
@@ -245,9 +247,11 @@ def _plans() -> list[Any]:
                 plans.append(json.loads(corpus.plan(items, firmware, survey=survey)))
     for plan in plans[::2]:
         plan["geoFence"] = {
-            "version": 2, "circles": [{"circle": {"center": [36.6, -84.37], "radius": 900}, "inclusion": True, "version": 1}],
-            "polygons": [{"polygon": [[36.59, -84.39], [36.62, -84.39], [36.62, -84.36]], "inclusion": False, "version": 1}],
-            "breachReturn": [36.6, -84.37, 50],
+            "version": 2, "breachReturn": [36.6, -84.37, 50],
+            "circles": [{"circle": {"center": [36.6, -84.37], "radius": 900}, "inclusion": True, "version": 1}],
+            "polygons": [
+                {"polygon": [[36.59, -84.39], [36.62, -84.39], [36.62, -84.36]], "inclusion": False, "version": 1},
+            ],
         }  # fmt: skip
         plan["rallyPoints"] = {"version": 2, "points": [[36.6, -84.379, 50.0], [36.601, -84.371, 60.0]]}
     landing = {
@@ -354,7 +358,8 @@ def names(rng: random.Random) -> list[str]:
     shutil.copy("clean/m.yaml", "m.yaml")
     strange = rng.choice(
         ("clean", "/dev/null", "nowhere", "", "\x00", "a\nb", "uav1=", "=", "uav1=uav1=x", "x" * 5000, "clean/m.yaml",
-         "clean/west.asc", "clean/east.tif", "-", "~", "\udcff", "clean/uav1.waypoints/x", ".", "uav9=clean/uav1.waypoints")
+         "clean/west.asc", "clean/east.tif", "-", "~", "\udcff", "clean/uav1.waypoints/x", ".",
+         "uav9=clean/uav1.waypoints")
     )  # fmt: skip
     if rng.random() < 0.5:
         return ["m.yaml", strange]
