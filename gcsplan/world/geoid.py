@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.errors import InputError
-from gcsplan.world.raster import gdal
+from gcsplan.world.raster import gdal, missing, require_numbers
 
 Floats = NDArray[np.float64]
 
@@ -67,6 +67,7 @@ class GeoidGrid:
         """Heights at points, NaN where the grid has none; of no points: only see that it is a grid."""
         try:
             with gdal(self.path, "GTX") as dataset:
+                require_numbers(dataset, self.path, where=self.where)
                 return _heights(dataset, lat, lon)
         except InputError:
             raise
@@ -118,6 +119,8 @@ def _between(dataset: Any, band: int, row: Floats, col: Floats, around: int) -> 
     raw = dataset.read(band, window=Window(left, top, right - left, bottom - top), masked=True)
     posts = raw.data.astype(np.float64)
     posts[np.ma.getmaskarray(raw)] = np.nan
+    for block in missing(dataset, band, left, top, right - left, bottom - top):
+        posts[block] = np.nan
     with np.errstate(over="ignore", invalid="ignore"):
         posts = posts * float(dataset.scales[band - 1]) + float(dataset.offsets[band - 1])
         c1 = (c0 + 1) % around if around else c0 + 1

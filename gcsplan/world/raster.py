@@ -177,14 +177,10 @@ def _unreadable(path: Path, why: Exception) -> str:
     )
 
 
-def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_unit: str | None) -> Raster:
+def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
+    """Raise InputError where an opened file holds no real numbers, or one number costs too much to read."""
     from rasterio.enums import ColorInterp, Interleaving
 
-    notes = []
-    if dataset.count < 1:
-        raise InputError(f"{path} holds no raster band", where=where)
-    if dataset.count > 1:
-        notes.append(f"{path.name} has {dataset.count} bands; the first is taken as the heights")
     if dataset.colorinterp[0] in (ColorInterp.red, ColorInterp.palette) or "complex" in dataset.dtypes[0]:
         raise InputError(f"{path} is a picture, not a raster of heights", where=where)
     bands = dataset.count if dataset.interleaving == Interleaving.pixel else 1
@@ -194,6 +190,15 @@ def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_uni
             "(gdal_translate -co TILED=YES)",
             where=where,
         )
+
+
+def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_unit: str | None) -> Raster:
+    notes = []
+    if dataset.count < 1:
+        raise InputError(f"{path} holds no raster band", where=where)
+    if dataset.count > 1:
+        notes.append(f"{path.name} has {dataset.count} bands; the first is taken as the heights")
+    require_numbers(dataset, path, where=where)
     t = dataset.transform
     geometry = (t.a, t.b, t.c, t.d, t.e, t.f)
     if not all(math.isfinite(x) for x in geometry):
@@ -290,7 +295,7 @@ def _strips(
         raw = dataset.read(1, window=Window(col, row + first, cols, n), masked=True)
         part = raw.data.astype(np.float64)
         part[np.ma.getmaskarray(raw)] = np.nan
-        for block in _missing(dataset, col, row + first, cols, n):
+        for block in missing(dataset, 1, col, row + first, cols, n):
             part[block] = np.nan
         part[part == -32768.0] = np.nan  # the void of SRTM, declared or not, before a scale can hide it
         with np.errstate(over="ignore", invalid="ignore"):
@@ -299,13 +304,13 @@ def _strips(
         yield first, part
 
 
-def _missing(dataset: Any, col: int, row: int, cols: int, rows: int) -> Iterator[tuple[slice, slice]]:
-    """The parts of a window that a GeoTIFF has no data for: a block that was never written, which GDAL reads as 0 m."""
+def missing(dataset: Any, band: int, col: int, row: int, cols: int, rows: int) -> Iterator[tuple[slice, slice]]:
+    """The parts of a window of a band that a GeoTIFF has no data for: a block that was never written, which GDAL reads as 0 m."""
     if dataset.driver != "GTiff":
         return
     height, width = dataset.block_shapes[0]
     for i in range(row // height, (row + rows - 1) // height + 1):
         for j in range(col // width, (col + cols - 1) // width + 1):
-            if dataset.get_tag_item(f"BLOCK_OFFSET_{j}_{i}", "TIFF", bidx=1) is None:
+            if dataset.get_tag_item(f"BLOCK_OFFSET_{j}_{i}", "TIFF", bidx=band) is None:
                 top, left = i * height - row, j * width - col
                 yield slice(max(top, 0), max(top + height, 0)), slice(max(left, 0), max(left + width, 0))

@@ -117,18 +117,17 @@ def campaign(seconds: float, seed: int, inputs: int, keep: str | None) -> int:
             with Worker(folder, seed) as worker:
                 while sum(count.values()) < inputs and time.monotonic() < until and len(found) < MAX_FOUND:
                     told = worker.answer()
-                    if told is None:
-                        found.append(f"seed {worker.seed}: {worker.fate()}")
-                        break
-                    kind, code, faults, held_mb = told
+                    kind, code, faults, held_mb = told or ("none", -1, [f"seed {worker.seed}: {worker.fate()}"], 0.0)
                     count[f"{kind} {code}"] += 1
                     found += faults
+                    for line in faults:
+                        print(line, flush=True)
+                    if told is None:
+                        break
                     memory_mb = max(memory_mb, held_mb)
                     if held_mb > MEMORY_MB:
                         break
                 seed = worker.seed + 1
-    for line in found:
-        print(line)
     print(_summary(count, len(found), memory_mb))
     return 1 if found else 0
 

@@ -191,7 +191,7 @@ def spoilt_json(tree: Any, rng: random.Random) -> bytes:
 
 def mission_file(rng: random.Random) -> list[str]:
     """A mission file: keys, values and text."""
-    base = rng.choice((MISSION, RICH, LOCAL))
+    base = rng.choice((MISSION, MISSION, RICH, RICH, LOCAL))
     if rng.random() < 0.7:
         spoilt = nudged if rng.random() < 0.5 else spoilt_tree
         data = yaml.dump(spoilt(_tree(base), rng), Dumper=getattr(yaml, "CSafeDumper", yaml.SafeDumper)).encode()
