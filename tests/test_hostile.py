@@ -348,6 +348,26 @@ def test_a_file_of_others_that_is_moved_aside_is_named(run: Run, tmp_path: Path)
     assert (tmp_path / "out" / "previous" / "uav1.plan").read_text() == "mine"
 
 
+def test_a_picture_beside_a_plan_goes_with_it(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("plan", "m.yaml", "-o", "out", "--png", "out/map.png")[0] == 0
+    (tmp_path / "m.yaml").write_text(MISSION.replace("min_agl_m: 30", "min_agl_m: 900, max_agl_m: 100"))
+    assert run("plan", "m.yaml", "-o", "out")[0] in (2, 3)
+    assert not (out / "map.png").exists()
+    assert (out / "previous" / "map.png").exists()
+
+
+def test_why_there_is_no_mission_is_told_even_where_the_old_one_cannot_be_moved(run: Run, tmp_path: Path) -> None:
+    assert run("plan", "m.yaml", "-o", "out")[0] == 0
+    (tmp_path / "out" / "previous").write_text("mine")
+    (tmp_path / "m.yaml").write_text(MISSION.replace("min_agl_m: 30", "min_agl_m: 900, max_agl_m: 100"))
+    code, _, err = run("plan", "m.yaml", "-o", "out")
+    assert code in (2, 3)
+    assert "agl" in err
+    assert "are still in out" in err
+    assert (tmp_path / "out" / "uav1.plan").exists()
+
+
 def test_a_picture_that_cannot_be_drawn_stops_before_anything_is_written(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

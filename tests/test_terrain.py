@@ -463,6 +463,25 @@ def test_a_geoid_grid_knows_its_band_and_its_voids(tmp_path: Path) -> None:
         grid.height_m([36.9], [-84.9])
 
 
+@pytest.mark.parametrize("kind", ["never written", "complex", "one block"])
+def test_a_geoid_grid_that_no_heights_are_in_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    path = tmp_path / "g.tif"
+    with rasterio.open(
+        path, "w", driver="GTiff", width=64, height=64, count=1, dtype="complex64" if kind == "complex" else "float32",
+        crs="EPSG:4326", transform=from_origin(-85.0, 37.0, 0.02, 0.02), sparse_ok=True, tiled=True, blockxsize=32,
+        blockysize=32,
+    ) as file:  # fmt: skip
+        file.write(np.full((32, 32), -30.0), 1, window=Window(32, 0, 32, 32))
+    if kind == "one block":
+        monkeypatch.setattr(raster, "MAX_BLOCK_BYTES", 4000)
+    with pytest.raises(InputError, match="does not cover|picture|TILED"):
+        GeoidGrid(path, where="m").height_m([36.8, 36.9], [-84.1, -84.9])
+    if kind == "never written":
+        assert GeoidGrid(path, where="m").height_m([36.8], [-84.1]).tolist() == [-30.0]
+
+
 def test_a_geoid_grid_with_strips_of_no_rows_is_no_danger(tmp_path: Path) -> None:
     """PROJ divides by that number, and the process is gone."""
     path = Path(geoid_tif(tmp_path / "g.tif", np.full((60, 60), -30.0), -85.0, 37.0, 0.02, compress="deflate"))
