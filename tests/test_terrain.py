@@ -476,7 +476,7 @@ def test_a_geoid_grid_that_no_heights_are_in_is_refused(
         file.write(np.full((32, 32), -30.0), 1, window=Window(32, 0, 32, 32))
     if kind == "one block":
         monkeypatch.setattr(raster, "MAX_BLOCK_BYTES", 4000)
-    with pytest.raises(InputError, match="does not cover|picture|TILED"):
+    with pytest.raises(InputError, match=r"does not cover|picture|TILED"):
         GeoidGrid(path, where="m").height_m([36.8, 36.9], [-84.1, -84.9])
     if kind == "never written":
         assert GeoidGrid(path, where="m").height_m([36.8], [-84.1]).tolist() == [-30.0]

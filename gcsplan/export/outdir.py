@@ -41,6 +41,8 @@ __all__ = [
 ]
 
 MAX_MANIFEST_BYTES = 1_000_000
+MAX_OUTPUT_BYTES = 1_000_000_000
+"""No output is as large; what is was put there by somebody, and is not read to find that out."""
 
 # What gcsplan's outputs are called, for a directory whose manifest is damaged.
 _OURS = re.compile(r".+\.(waypoints|plan)|mission\.(kml|geojson)|profile\.csv|(summary|upload)\.json|report\.html")
@@ -241,7 +243,9 @@ def _mark(folder: Path) -> tuple[int, int, int] | None:
 
 def _is_ours(path: Path, digest: str | None) -> bool:
     """True for a plain file that still is what gcsplan wrote."""
-    return digest is not None and is_plain(path) and digest_of_file(path) == digest
+    if digest is None or not is_plain(path) or os.lstat(path).st_size > MAX_OUTPUT_BYTES:
+        return False
+    return digest_of_file(path) == digest
 
 
 def _manifest_text(record: Mapping[str, str | None]) -> bytes:

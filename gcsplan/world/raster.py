@@ -305,7 +305,7 @@ def _strips(
 
 
 def missing(dataset: Any, band: int, col: int, row: int, cols: int, rows: int) -> Iterator[tuple[slice, slice]]:
-    """The parts of a window of a band that a GeoTIFF has no data for: a block that was never written, which GDAL reads as 0 m."""
+    """Where a GeoTIFF has no data in a window of a band: blocks that were never written, which GDAL reads as 0 m."""
     if dataset.driver != "GTiff":
         return
     height, width = dataset.block_shapes[0]
