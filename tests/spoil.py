@@ -27,7 +27,10 @@ def spoilt_tree(tree: Any, rng: random.Random) -> Any:
     """One to three places replaced by something odd, scaled, moved about, or taken out."""
     tree = copy.deepcopy(tree)
     for _ in range(rng.choice((1, 1, 2, 3))):
-        *way, last = rng.choice([p for p in places(tree) if p])
+        spots = [p for p in places(tree) if p]
+        if not spots:
+            break  # nothing is left to spoil
+        *way, last = rng.choice(spots)
         parent = functools.reduce(lambda t, k: t[k], way, tree)
         value = parent[last]
         kind = rng.random()

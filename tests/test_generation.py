@@ -34,6 +34,7 @@ from gcsplan.export.outdir import (
     write_outputs,
 )
 from tests.campaigns import crash
+from tests.campaigns.disk import workshop
 from tests.test_hostile import MISSION, ROWS
 from tests.test_outdir import FIRST, SECOND, files, tree
 
@@ -91,7 +92,7 @@ def write_over(place: Path) -> crash.World:
 @pytest.mark.slow
 @pytest.mark.parametrize("fence", ["content", "stage", "journal", "gone", "end"])
 def test_power_losses_find_every_fence_that_is_left_out(fence: str) -> None:
-    with crash.workshop() as place:
+    with workshop() as place:
         of, root = write_over(place), place / "out"
         log = crash.operations(root, of)
         syncs = [i for i, operation in enumerate(log) if operation[0] == "fsync"]

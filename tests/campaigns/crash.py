@@ -25,7 +25,6 @@ import random
 import shutil
 import signal
 import sys
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -44,7 +43,7 @@ from gcsplan.export.outdir import (
     settle_outputs,
     write_outputs,
 )
-from tests.campaigns.disk import Operation, Recorder, Tree, states
+from tests.campaigns.disk import Operation, Recorder, Tree, states, workshop
 
 Step = Callable[[Path], object]
 
@@ -320,14 +319,6 @@ def attack(seed: int, place: Path) -> tuple[Counter[str], list[str]]:
         found += together(root, of, rng)
     shutil.rmtree(root)
     return count, [f"seed {seed}: {fault}" for fault in found]
-
-
-@contextlib.contextmanager
-def workshop() -> Iterator[Path]:
-    """A directory to work in, in memory where there is one: what is attacked is the order, not the disk."""
-    memory = Path("/dev/shm")
-    with tempfile.TemporaryDirectory(dir=memory if os.access(memory, os.W_OK) else None) as place:
-        yield Path(place)
 
 
 def main() -> int:

@@ -11,7 +11,9 @@ from __future__ import annotations
 import os
 import random
 import sys
+import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -20,6 +22,14 @@ Tree: TypeAlias = "dict[str, bytes | None]"
 
 Operation: TypeAlias = "tuple[str, ...]"
 """What was done, and to which paths; of a write the content too, as Latin-1."""
+
+
+@contextmanager
+def workshop() -> Iterator[Path]:
+    """A directory to work in, in memory where there is one: what is attacked is no disk."""
+    memory = Path("/dev/shm")
+    with tempfile.TemporaryDirectory(dir=memory if os.access(memory, os.W_OK) else None) as place:
+        yield Path(place)
 
 
 class Recorder:

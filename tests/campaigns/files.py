@@ -31,6 +31,7 @@ from typing import Any
 import typer
 
 from gcsplan import cli
+from tests.campaigns.disk import workshop
 from tests.campaigns.hostile import KINDS, write_clean
 
 CODES = {0, 2, 3, 4}
@@ -110,7 +111,7 @@ def campaign(seconds: float, seed: int, inputs: int, keep: str | None) -> int:
     count: Counter[str] = Counter()
     found: list[str] = []
     memory_mb, until = 0.0, time.monotonic() + seconds
-    with tempfile.TemporaryDirectory() as place:
+    with workshop() as place:
         folder = Path(keep or place)
         folder.mkdir(exist_ok=True)
         while sum(count.values()) < inputs and time.monotonic() < until and len(found) < MAX_FOUND:
