@@ -73,7 +73,7 @@ def test_a_short_campaign_of_kills_and_power_losses_finds_nothing() -> None:
     command = [sys.executable, "-m", "tests.campaigns.crash", "--seconds", "3", "--seed", "1", "--rounds", "2"]
     ended = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=120)
     assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert re.fullmatch(r"\d+ directories: \d+ kills, \d+ power losses, \d+ pairs; 0 faults\n", ended.stdout)
+    assert re.fullmatch(r"\d+ directories: (\d+ [a-z ]+(, )?){4}; 0 faults\n", ended.stdout)
 
 
 def write_over(place: Path) -> crash.World:

@@ -8,7 +8,8 @@ from one plan to the next, and then
 - kills the process with SIGKILL before each system call of the step that changes anything, and in the middle of each
   write, again while it recovers, and once more;
 - loses power after each of them: of what no fsync had secured any part may be missing (`tests.campaigns.disk`);
-- lets two processes write at once.
+- lets two processes write at once;
+- does the same to a single file of the user's choice that is written over an older one.
 
 After each, whoever looks at the names alone must see files of one plan at most; whoever asks gcsplan must see a whole
 plan or be refused; nothing of anybody else's may be missing; and the next run must bring back exactly what was there
@@ -42,6 +43,7 @@ from gcsplan.export.outdir import (
     retire_outputs,
     settle_outputs,
     write_outputs,
+    write_whole,
 )
 from tests.campaigns.disk import Operation, Recorder, Tree, states, workshop
 
@@ -303,6 +305,34 @@ def together(root: Path, of: World, rng: random.Random) -> list[str]:
     return found
 
 
+def single_files(root: Path, rng: random.Random) -> Iterator[list[str]]:
+    """A file of the user's choice, written over an older one: killed and without power; what is wrong after each."""
+    old, new = b"mine, old", b"new " + b"x" * rng.randrange(200)
+    before: Tree = {"notes.txt": b"mine", "x.plan": old}
+    of = World(before, before | {"x.plan": new}, lambda out: write_whole(out / "x.plan", new), Counter())
+
+    def faulty(when: str) -> list[str]:
+        tree, found = tree_of(root), []
+        if tree.get("x.plan") not in (old, new):
+            found.append(f"{when} the file is torn: {tree.get('x.plan')!r}")
+        of.step(root)
+        if tree_of(root) != of.after:
+            found.append(f"{when} the next run leaves {sorted(tree_of(root))}")
+        return found
+
+    for change in range(100):
+        put(root, before)
+        ended = in_child(killed_before(change, lambda: of.step(root)))
+        yield faulty(f"killed at change {change} of one file:")
+        if ended == 0:
+            break
+    log = operations(root, of)
+    for done in range(len(log) + 1):
+        for tree in states(before, log[:done], rng, POWER_STATES):
+            put(root, tree)
+            yield faulty(f"without power after operation {done} of one file:")
+
+
 def attack(seed: int, place: Path) -> tuple[Counter[str], list[str]]:
     """One round: how many attacks of each kind, and every fault that they found."""
     rng = random.Random(seed)
@@ -317,6 +347,9 @@ def attack(seed: int, place: Path) -> tuple[Counter[str], list[str]]:
     for _ in range(2):
         count["pairs"] += 1
         found += together(root, of, rng)
+    for faulty in single_files(root, rng):
+        count["single files"] += 1
+        found += faulty
     shutil.rmtree(root)
     return count, [f"seed {seed}: {fault}" for fault in found]
 
