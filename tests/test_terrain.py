@@ -7,6 +7,7 @@ import math
 import struct
 import subprocess
 import sys
+import time
 import warnings
 from pathlib import Path
 from typing import Any
@@ -582,6 +583,18 @@ def test_a_file_in_one_huge_block_is_refused(tmp_path: Path) -> None:
         data[at + 8 : at + 10] = struct.pack("<H", 60_000)
     Path(path).write_bytes(bytes(data))
     refusal(path)
+
+
+def test_a_grid_that_lacks_rows_is_refused_at_once(tmp_path: Path) -> None:
+    """GDAL takes twice as long for every missing row before the one that it is asked for."""
+    head = "ncols 60\nnrows 601\nxllcorner -84.41\nyllcorner 36.57\ncellsize 0.001\n"
+    (tmp_path / "a.asc").write_text(head + "\n".join(" ".join("400" for _ in range(60)) for _ in range(60)))
+    read = open_raster(tmp_path / "a.asc", where="m", crs="EPSG:4326").read
+    assert [len(part) for _, part in read(0, 20, 60, 30)] == [30]
+    began = time.monotonic()
+    with pytest.raises(InputError, match="cannot be read"):
+        list(read(0, 500, 60, 60))
+    assert time.monotonic() - began < 30.0
 
 
 def test_a_small_file_that_claims_large_ground_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
