@@ -483,6 +483,13 @@ def test_a_geoid_grid_that_no_heights_are_in_is_refused(
         assert GeoidGrid(path, where="m").height_m([36.8], [-84.1]).tolist() == [-30.0]
 
 
+@pytest.mark.parametrize("step", [1e-310, 1e-7, 95.0])
+def test_a_geoid_grid_of_impossible_steps_is_refused(tmp_path: Path, step: float) -> None:
+    path = geoid_tif(tmp_path / "g.tif", np.full((3, 3), -30.0), -85.0, 37.0, step)
+    with pytest.raises(InputError, match="in degrees"):
+        GeoidGrid(Path(path), where="m")
+
+
 def test_a_geoid_grid_with_strips_of_no_rows_is_no_danger(tmp_path: Path) -> None:
     """PROJ divides by that number, and the process is gone."""
     path = Path(geoid_tif(tmp_path / "g.tif", np.full((60, 60), -30.0), -85.0, 37.0, 0.02, compress="deflate"))

@@ -6,7 +6,6 @@ GDAL reads it, and what is between four posts is bilinear, as PROJ's own ``vgrid
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +81,12 @@ class GeoidGrid:
 def _heights(dataset: Any, lat: Floats | None, lon: Floats | None) -> Floats:
     """Bilinear between posts, which stand in the middle of pixels. Raises ValueError for what is no grid in degrees."""
     t, cols, rows = dataset.transform, dataset.width, dataset.height
-    if t.b or t.d or not (0.0 < t.a < 90.0 and -90.0 < t.e < 0.0 and math.isfinite(t.c + t.f)) or min(cols, rows) < 2:
+    if (
+        t.b
+        or t.d
+        or not (1e-6 < t.a < 90.0 and -90.0 < t.e < -1e-6 and abs(t.c) + abs(t.f) < 1e4)
+        or min(cols, rows) < 2
+    ):
         raise ValueError("it must be north-up, in degrees, and of two posts a side at least")
     if lat is None or lon is None:
         return np.empty(0)
