@@ -10,7 +10,7 @@ import typer
 
 from gcsplan.commands import check, energy, fly, links, plan, rehearse
 from gcsplan.commands.bench import bench_app
-from gcsplan.commands.ending import Interrupted, explained, fail, put, speak_plainly
+from gcsplan.commands.ending import Interrupted, end_in_good_order, explained, fail, interrupted, put, speak_plainly
 from gcsplan.commands.memory import settle_memory
 from gcsplan.errors import GcsplanError, InputError
 
@@ -22,7 +22,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Exit codes: 0 done, 2 bad input, 3 no mission, 4 violation, 5 refused, 6 unknown or dead link, "
-    "7 read-back differs, 70 a bug of ours, 130 interrupted.",
+    "7 read-back differs, 70 a bug of ours, 129, 130, 143 interrupted (SIGHUP, Ctrl-C, SIGTERM).",
 )
 app.add_typer(bench_app, name="bench")
 app.command(short_help="Plan a mission file; upload and verify if asked.")(plan.plan)
@@ -58,6 +58,7 @@ def main() -> NoReturn:
     speak_plainly()
     settle_memory()
     try:
+        end_in_good_order()
         # Outside standalone mode click hands typer.Exit's code back instead of exiting.
         code = app(args=arguments, prog_name="gcsplan", standalone_mode=False)
         if code == Interrupted.exit_code:  # what typer makes of Ctrl-C
@@ -67,7 +68,7 @@ def main() -> NoReturn:
     except GcsplanError as error:
         fail(error, as_json, debug)
     except (KeyboardInterrupt, typer.Abort):
-        fail(Interrupted("interrupted"), as_json, debug)
+        fail(interrupted(), as_json, debug)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)

@@ -6,7 +6,6 @@ files or none. The mutations are drawn from fixed seeds.
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import functools
 import io
@@ -15,7 +14,7 @@ import random
 import socket
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +32,7 @@ from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.steps import delivery, outputs
 from gcsplan.vehicle import Autopilot
+from tests.spoil import spoilt_bytes, spoilt_tree
 
 pytestmark = pytest.mark.slow
 
@@ -55,12 +55,6 @@ ROWS = (
     "3\t0\t3\t16\t0\t0\t0\t0\t36.60000000\t-84.37000000\t40\t1",
     "4\t0\t3\t21\t0\t0\t0\t0\t36.60000000\t-84.37000000\t0\t1",
 )
-ODD: tuple[Any, ...] = (
-    None, True, -1, 0, 1e308, float("nan"), float("-inf"), 2**31, 2**64, 10**400, 1e-320, "", "nan", "[/]", "\x00",
-    "a" * 5000, "../..", "/dev/zero", [], {}, [[]], [0, 0], [36.6, -84.38], [float("nan"), 1], [1] * 500,
-    {"east_m": 1e9, "north_m": 0},
-)  # fmt: skip
-
 Run = Callable[..., tuple[int, str, str]]
 
 
@@ -96,53 +90,6 @@ def require_civil(ended: tuple[int, str, str], what: object) -> None:
         assert err.startswith("gcsplan: "), (what, err)
     assert "Traceback" not in err
     assert "Warning" not in err, (what, err)
-
-
-def places(tree: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Every place in a tree of lists and dicts."""
-    yield path
-    entries = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
-    for key, value in entries:
-        yield from places(value, (*path, key))
-
-
-def spoilt_tree(tree: Any, rng: random.Random) -> Any:
-    """One to three places replaced by something odd, scaled, moved about, or taken out."""
-    tree = copy.deepcopy(tree)
-    for _ in range(rng.choice((1, 1, 2, 3))):
-        *way, last = rng.choice([p for p in places(tree) if p])
-        parent = functools.reduce(lambda t, k: t[k], way, tree)
-        value = parent[last]
-        kind = rng.random()
-        if kind < 0.5:
-            parent[last] = copy.deepcopy(rng.choice(ODD))
-        elif kind < 0.7 and isinstance(value, float):
-            parent[last] = value * rng.choice((-1.0, 0.999, 1.001, 2.0, 1e6))
-        elif kind < 0.85:
-            del parent[last]
-        else:
-            parent[last] = [copy.deepcopy(value)] * rng.choice((1, 2, 50))
-    return tree
-
-
-def spoilt_bytes(data: bytes, rng: random.Random, words: tuple[bytes, ...] = ()) -> bytes:
-    """A few bits flipped, pieces doubled or lost, words put in."""
-    out = bytearray(data)
-    for _ in range(rng.choice((1, 2, 5))):
-        i = rng.randrange(len(out) + 1)
-        kind = rng.random()
-        if kind < 0.35 and i < len(out):
-            out[i] ^= 1 << rng.randrange(8)
-        elif kind < 0.5:
-            del out[i : i + rng.choice((1, 4, 40))]
-        elif kind < 0.65:
-            out[i:i] = out[: rng.choice((1, 4, 40))]
-        elif kind < 0.7:
-            del out[i:]
-        else:
-            word = rng.choice(words or (b"\x00", b"\xff"))
-            out[i : i + rng.choice((0, len(word)))] = word
-    return bytes(out)
 
 
 def test_spoilt_mission_files_end_in_a_message(run: Run, tmp_path: Path) -> None:
@@ -400,6 +347,26 @@ def test_a_file_of_others_that_is_moved_aside_is_named(run: Run, tmp_path: Path)
     assert code == 0
     assert "uav1.plan" in err.splitlines()[0]
     assert (tmp_path / "out" / "previous" / "uav1.plan").read_text() == "mine"
+
+
+def test_a_picture_beside_a_plan_goes_with_it(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("plan", "m.yaml", "-o", "out", "--png", "out/map.png")[0] == 0
+    (tmp_path / "m.yaml").write_text(MISSION.replace("min_agl_m: 30", "min_agl_m: 900, max_agl_m: 100"))
+    assert run("plan", "m.yaml", "-o", "out")[0] in (2, 3)
+    assert not (out / "map.png").exists()
+    assert (out / "previous" / "map.png").exists()
+
+
+def test_why_there_is_no_mission_is_told_even_where_the_old_one_cannot_be_moved(run: Run, tmp_path: Path) -> None:
+    assert run("plan", "m.yaml", "-o", "out")[0] == 0
+    (tmp_path / "out" / "previous").write_text("mine")
+    (tmp_path / "m.yaml").write_text(MISSION.replace("min_agl_m: 30", "min_agl_m: 900, max_agl_m: 100"))
+    code, _, err = run("plan", "m.yaml", "-o", "out")
+    assert code in (2, 3)
+    assert "agl" in err
+    assert "are still in out" in err
+    assert (tmp_path / "out" / "uav1.plan").exists()
 
 
 def test_a_picture_that_cannot_be_drawn_stops_before_anything_is_written(

@@ -221,10 +221,10 @@ def test_a_full_disk_leaves_everything_as_it_was(tmp_path: Path, monkeypatch: py
     out = prepared(tmp_path)
     before = tree(tmp_path)
 
-    def write_bytes(self: Path, data: bytes) -> int:
-        raise OSError(errno.ENOSPC, "No space left on device", str(self))
+    def write(handle: int, data: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_bytes", write_bytes)
+    monkeypatch.setattr(outdir.os, "write", write)
     for target in (out, tmp_path / "new" / "deeper"):
         with pytest.raises(InputError, match="No space left on device"):
             write_outputs(target, SECOND)

@@ -120,7 +120,7 @@ def test_two_processes_that_compile_for_themselves_get_the_same_bytes(tmp_path: 
             check=True,
         )
         found.append(done.stdout)
-        assert list(folder.glob("swarm-*.code"))
+        assert list(folder.glob("gcsplan/swarm-*.code"))
     assert found[0] == found[1] != ""
 
 
@@ -140,7 +140,7 @@ def test_an_older_processors_instructions_give_the_same_bytes(
     monkeypatch.setattr(llvm, "get_host_cpu_features", llvm.FeatureMap)
     monkeypatch.setattr(UNIT, "_loaded", None)
     there = [cost.terms(controls), cost_of("ssgwo", 7).terms(controls)]
-    assert list(tmp_path.glob("swarm-*.code"))
+    assert list(tmp_path.glob("gcsplan/swarm-*.code"))
     assert [a.tobytes() for a in there] == [a.tobytes() for a in here]
 
 

@@ -82,6 +82,7 @@ def check(
     each altitude frame. Ends with 0 if all pass, 4 on a violation or on anything that could not be judged, 2 on a file
     that cannot be read.
     """
+    from gcsplan.export.outdir import steady
     from gcsplan.steps import checking, outputs
 
     given: dict[str, object] = {
@@ -96,7 +97,8 @@ def check(
     if report is not None and (report.suffix.lower() not in (".html", ".htm") or not report.parent.is_dir()):
         raise UsageError(f"--report {report}: a name that ends in .html, in a directory that is there, is wanted")
     make = _in_mission if _is_mission(files[0]) else _with_options
-    batch = make(files, given, way_home)
+    with steady(checking.split_name(file)[1] for file in files if not _is_mission(file)):
+        batch = make(files, given, way_home)
     failed = checking.failure(batch.checked, allow_unjudged=allow_unjudged, unreadable=batch.unreadable)
     if report is not None:
         _report(batch, report)

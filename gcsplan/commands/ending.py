@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import json
 import os
+import signal
 import sys
+import threading
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -19,6 +21,52 @@ class Interrupted(GcsplanError):
 
     exit_code: ClassVar[int] = 130
     default_reason: ClassVar[str] = "interrupted"
+
+
+class Terminated(Interrupted):
+    """SIGTERM: the same, asked for by another process."""
+
+    exit_code: ClassVar[int] = 143
+    default_reason: ClassVar[str] = "terminated"
+
+
+class HungUp(Interrupted):
+    """SIGHUP: the same, because the terminal is gone."""
+
+    exit_code: ClassVar[int] = 129
+    default_reason: ClassVar[str] = "terminated"
+
+
+_ENDINGS: dict[int, type[Interrupted]] = {
+    getattr(signal, name): kind for name, kind in (("SIGTERM", Terminated), ("SIGHUP", HungUp)) if hasattr(signal, name)
+}
+_received: list[int] = []
+
+
+def end_in_good_order() -> None:
+    """From now on SIGTERM and SIGHUP end this process as Ctrl-C does: links are closed, what was begun is taken back.
+
+    A process that was started to ignore one of them (nohup) goes on ignoring it.
+    """
+    owner = os.getpid()
+
+    def stop(number: int, _: object) -> None:
+        if os.getpid() != owner:  # a child that was forked: not its business
+            signal.signal(number, signal.SIG_DFL)
+            os.kill(os.getpid(), number)
+        _received.append(number)
+        raise KeyboardInterrupt
+
+    here = threading.current_thread() is threading.main_thread()  # elsewhere Python sets no handlers
+    for number in _ENDINGS if here else ():
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, stop)
+
+
+def interrupted(words: str = "") -> Interrupted:
+    """What to end with after a KeyboardInterrupt: by whom it was sent."""
+    kind = _ENDINGS[_received[0]] if _received else Interrupted
+    return kind(words or kind.default_reason)
 
 
 def emit(document: dict[str, Any], error: dict[str, Any] | None = None) -> None:
@@ -48,7 +96,7 @@ def talking(names: Sequence[str]) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        raise Interrupted(
+        raise interrupted(
             f"interrupted while talking to {', '.join(names)}: a transfer under way was broken off, and the vehicle "
             f"told so; what it holds now is unknown: send it again, or compare with gcsplan verify"
         ) from None
@@ -72,7 +120,7 @@ def explained(error: Exception) -> GcsplanError:
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, KeyboardInterrupt):  # compiled code turns Ctrl-C into an error of its own
-            return Interrupted("interrupted")
+            return interrupted()
         cause = cause.__cause__ or cause.__context__
     return GcsplanError(f"internal error, a bug in gcsplan: {type(error).__name__}: {error} (--debug shows where)")
 

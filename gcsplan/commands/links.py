@@ -58,6 +58,7 @@ def upload(
     """
     from gcsplan import pipeline
     from gcsplan.console import delivery_table, say_notes, say_notes_of, transfer_progress, verdict_table
+    from gcsplan.export.outdir import require_settled, steady
     from gcsplan.sim.loopback import loopback_fleet
     from gcsplan.steps import checking, delivery, fencing
 
@@ -76,7 +77,8 @@ def upload(
             )
         source = pipeline.load_mission(mission)
         delivery.targets([to], [r.vehicle for r in source.vehicles])  # a slip in the URL shows before the tables do
-        checked = checking.check_files(source, files)
+        with steady(checking.split_name(file)[1] for file in files):
+            checked = checking.check_files(source, files)
         if not as_json:
             for c in checked:
                 say_notes(c.notes)
@@ -90,6 +92,7 @@ def upload(
     else:
         if len(files) > 1:
             raise UsageError("--unchecked takes one FILE, for the vehicle --sysid; send the others one by one")
+        require_settled([checking.split_name(files[0])[1]])
         jobs = [delivery.unchecked_job(files[0], to, sysid or 1)]
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
@@ -110,8 +113,10 @@ def verify(
 ) -> None:
     """Is exactly this file on board? Reads the mission back and compares; sends nothing else."""
     from gcsplan.console import delivery_table
+    from gcsplan.export.outdir import require_settled
     from gcsplan.steps import delivery
 
+    require_settled([file])
     done = delivery.verify_file(file, to, sysid, timeout_s=timeout)
     if as_json:
         emit(done.as_dict(), delivery.failure([done]))

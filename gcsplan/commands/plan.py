@@ -106,7 +106,7 @@ def plan(
         say_notes_of,
         transfer_progress,
     )
-    from gcsplan.export.outdir import add_output, retire_outputs, write_outputs, write_whole
+    from gcsplan.export.outdir import add_output, can_hold, retire_outputs, settle_outputs, write_outputs, write_whole
     from gcsplan.planners import registry
     from gcsplan.steps import outputs
     from gcsplan.steps.gate import GateTime
@@ -124,6 +124,8 @@ def plan(
     named = png is not None and png.suffix.lower() == ".png" and (png.parent.is_dir() or png.parent == directory)
     if png is not None and not (each or named):
         raise UsageError(f"--png {png}: a directory, or a name that ends in .png in one that is there, is wanted")
+    if settle_outputs(directory):
+        say(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
     try:
         source = pipeline.load_mission(mission)
         targets: dict[str, str] = {}
@@ -158,16 +160,20 @@ def plan(
     except UsageError:
         raise  # a slip on the command line says nothing against an earlier mission
     except (InputError, NoMission, CheckFailed):
-        moved = retire_outputs(directory)
-        if moved:
-            say(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
+        try:
+            if retire_outputs(directory):
+                say(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
+        except InputError as error:  # why there is no mission matters more
+            say(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
         raise
     pictures: dict[Path, bytes] = {}
     if png is not None and each:
         pictures = {png / name: content for name, content in outputs.figures_of(planned).items()}
     elif png is not None:
         pictures = {png: outputs.picture_of(planned)}
-    in_the_way = write_outputs(directory, files)
+    # Pictures of this plan that lie beside it are a part of it, and go with it.
+    beside = [file for file in pictures if can_hold(directory, file)]
+    in_the_way = write_outputs(directory, {**files, **{file.name: pictures.pop(file) for file in beside}})
     for file, content in pictures.items():
         write_whole(file, content)
     if in_the_way:

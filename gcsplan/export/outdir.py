@@ -1,53 +1,51 @@
-"""The output directory: written whole or not at all, and never at the cost of a file that is not ours.
+"""The output directory: one whole plan or none, and never at the cost of a file that is not ours.
 
 A manifest (``.gcsplan``) names the files that gcsplan wrote, with their SHA-256. A file that stands in the way and is
 not in it, or was edited since, is somebody's work: it is moved to ``previous/``, under a free name, and never lost.
-All new files are complete on the disk before the first one is moved to its place; if a move fails, those before it are
-taken back.
+How a directory gets from one plan to the next so that nobody ever sees files of both: `gcsplan.export.generation`.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
-import shutil
-import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gcsplan.errors import InputError
+from gcsplan.export.durable import locked, sync_directory, write_whole
+from gcsplan.export.generation import (
+    MANIFEST,
+    NAME,
+    PREVIOUS,
+    Generation,
+    digest_of_file,
+    is_caught,
+    is_plain,
+    settle,
+)
 
-MANIFEST = ".gcsplan"
-PREVIOUS = "previous"
+__all__ = [
+    "MANIFEST",
+    "PREVIOUS",
+    "add_output",
+    "can_hold",
+    "require_settled",
+    "retire_outputs",
+    "settle_outputs",
+    "steady",
+    "write_outputs",
+    "write_whole",
+]
+
 MAX_MANIFEST_BYTES = 1_000_000
+MAX_OUTPUT_BYTES = 1_000_000_000
+"""No output is as large; what is was put there by somebody, and is not read to find that out."""
 
-_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 # What gcsplan's outputs are called, for a directory whose manifest is damaged.
 _OURS = re.compile(r".+\.(waypoints|plan)|mission\.(kml|geojson)|profile\.csv|(summary|upload)\.json|report\.html")
-
-
-def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
-    """Write one file of the user's choice, whole or not at all; what is there is replaced. Raises InputError."""
-    target = Path(path)
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    try:
-        handle, name = tempfile.mkstemp(prefix=f"{MANIFEST}-", dir=target.parent)
-        part = Path(name)
-        try:
-            with open(handle, "wb") as stream:
-                stream.write(data)
-            mask = os.umask(0)
-            os.umask(mask)
-            part.chmod(0o666 & ~mask)  # as any other new file; mkstemp's own are for the owner alone
-            part.replace(target)
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot be written: {getattr(error, 'strerror', None) or error}", where=str(path)) from error
 
 
 def write_outputs(directory: str | os.PathLike[str], files: Mapping[str, str | bytes]) -> list[str]:
@@ -75,68 +73,127 @@ def retire_outputs(directory: str | os.PathLike[str]) -> list[str]:
     with _reported(root):
         if not root.is_dir():
             return []
-        ours = _manifest(root)
-        names = sorted(name for name in ours if os.path.lexists(root / name))
-        if not names:
-            return []
-        previous = root / PREVIOUS
-        with _Moves(root) as moves:
-            moves.make_directory(previous)
-            before = _manifest(previous)
-            for name, digest in sorted(before.items()):
-                if _is_ours(previous / name, digest):
-                    moves.discard(previous / name)
-            kept = {}
-            for name in names:
-                if os.path.lexists(previous / name):
-                    moves.move(previous / name, _free(previous, name))
-                if _is_ours(root / name, ours[name]):
-                    kept[name] = ours[name]
-                moves.move(root / name, previous / name)
-            for manifest in (previous / MANIFEST, root / MANIFEST):
-                if os.path.lexists(manifest):
-                    moves.discard(manifest)
-            moves.move(moves.stage_file(MANIFEST, _manifest_text(kept)), previous / MANIFEST)
+        with locked(root):
+            settle(root)
+            ours = _manifest(root)
+            names = sorted(name for name in ours if os.path.lexists(root / name))
+            if not names:
+                return []
+            before = _manifest(root / PREVIOUS)
+            with Generation(root) as next_one:
+                for name, digest in sorted(before.items()):
+                    if name not in names and _is_ours(root / PREVIOUS / name, digest):
+                        next_one.discard(f"{PREVIOUS}/{name}")
+                kept = {}
+                for name in names:
+                    in_the_way = root / PREVIOUS / name
+                    if os.path.lexists(in_the_way):
+                        leave = next_one.discard if _is_ours(in_the_way, before.get(name)) else next_one.set_aside
+                        leave(f"{PREVIOUS}/{name}")
+                    if _is_ours(root / name, ours[name]):
+                        kept[name] = ours[name]
+                    next_one.retire(name)
+                for manifest in (f"{PREVIOUS}/{MANIFEST}", MANIFEST):
+                    if os.path.lexists(root / manifest):
+                        next_one.discard(manifest)
+                next_one.bring(f"{PREVIOUS}/{MANIFEST}", _manifest_text(kept))
         return names
+
+
+def settle_outputs(directory: str | os.PathLike[str]) -> bool:
+    """Where an earlier run was killed while it wrote to ``directory``, put back the outputs before it.
+
+    Returns whether there was anything to put back. Raises InputError where that cannot be done.
+    """
+    root = Path(directory)
+    with _reported(root):
+        if not root.is_dir() or not is_caught(root):
+            return False
+        with locked(root):
+            return settle(root)
+
+
+def require_settled(files: Iterable[str | os.PathLike[str]]) -> None:
+    """Raise InputError where one of ``files`` lies in a directory that is caught between two plans."""
+    for folder in _folders(files):
+        if is_caught(folder):
+            raise InputError(
+                "this directory is between two plans: gcsplan is writing here, or was cut off while it did, and which "
+                "files belong together is not known. Wait, or run gcsplan plan with -o for this directory again, "
+                "which settles it; or move the files elsewhere if you know what they are",
+                where=str(folder),
+            )
+
+
+@contextmanager
+def steady(files: Iterable[str | os.PathLike[str]]) -> Iterator[None]:
+    """Around the reading of several files: raises InputError where a plan was written among them meanwhile."""
+    files = tuple(files)
+    folders = _folders(files)
+    require_settled(files)
+    before = [_mark(folder) for folder in folders]
+    try:
+        yield
+    except InputError:  # files that were missing for a moment are no fault of the user's
+        require_settled(files)
+        raise
+    require_settled(files)
+    for folder, mark in zip(folders, before, strict=True):
+        if _mark(folder) != mark:
+            raise InputError("another gcsplan wrote its outputs here while they were read; run this again",
+                             where=str(folder))  # fmt: skip
+
+
+def can_hold(directory: str | os.PathLike[str], file: str | os.PathLike[str]) -> bool:
+    """Whether ``file`` may be one of gcsplan's outputs in ``directory``, by its place and its name."""
+    path = Path(file)
+    return Path(os.path.realpath(path.parent)) == Path(os.path.realpath(directory)) and _is_name(path.name)
 
 
 def _write(root: Path, files: Mapping[str, str | bytes], *, keep: bool) -> list[str]:
     _check_names(files)
     contents = {name: c.encode("utf-8") if isinstance(c, str) else bytes(c) for name, c in files.items()}
     in_the_way = []
-    with _reported(root), _made(root):
+    with _reported(root), _made(root), locked(root):
+        settle(root)
         ours = _manifest(root)
-        with _Moves(root) as moves:
-            digests = {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
-            record = {**(ours if keep else {}), **digests}
-            staged = {name: moves.stage_file(name, content) for name, content in contents.items()}
-            manifest = moves.stage_file(MANIFEST, _manifest_text(record))
+        with Generation(root) as next_one:
             leaving = [] if keep else [name for name in ours if name not in contents]
-            for name in [*leaving, *staged]:
-                target = root / name
-                if os.path.lexists(target):
-                    if _is_ours(target, ours.get(name)):
-                        moves.discard(target)
-                    else:
-                        moves.make_directory(root / PREVIOUS)
-                        moves.move(target, _free(root / PREVIOUS, name))
-                        in_the_way.append(name)
-                if name in staged:
-                    moves.move(staged[name], target)
+            for name in [*leaving, *contents]:
+                if not os.path.lexists(root / name) or _is_among(root, name, leaving):
+                    continue
+                if _is_ours(root / name, ours.get(name)):
+                    next_one.discard(name)
+                else:
+                    next_one.set_aside(name)
+                    in_the_way.append(name)
             if os.path.lexists(root / MANIFEST):
-                moves.discard(root / MANIFEST)
-            moves.move(manifest, root / MANIFEST)
+                next_one.discard(MANIFEST)
+            record = dict(ours) if keep else {}
+            for name, content in contents.items():
+                record[name] = next_one.bring(name, content)
+            next_one.bring(MANIFEST, _manifest_text(record))
     return in_the_way
+
+
+def _is_among(root: Path, name: str, others: Iterable[str]) -> bool:
+    """Whether ``name`` is one of ``others`` in other letters, on a disk where upper and lower case are the same."""
+    alike = [root / other for other in others if other != name and other.casefold() == name.casefold()]
+    return any(os.path.lexists(path) and os.path.samefile(path, root / name) for path in alike)
 
 
 def _check_names(files: Mapping[str, str | bytes]) -> None:
     for name in files:
-        if not _NAME.fullmatch(name) or name.casefold() == PREVIOUS:
+        if not _is_name(name):
             raise ValueError(f"an output's name must be a plain file name, given {name!r}")
     if len({name.casefold() for name in files}) < len(files):
         raise InputError(
             f"two outputs differ only by upper and lower case: {', '.join(sorted(files))}; rename a vehicle"
         )
+
+
+def _is_name(name: str) -> bool:
+    return NAME.fullmatch(name) is not None and name.casefold() != PREVIOUS
 
 
 @contextmanager
@@ -161,6 +218,7 @@ def _made(root: Path) -> Iterator[None]:
         for path in reversed(missing):
             path.mkdir()
             made.append(path)
+            sync_directory(path.parent)
         yield
     except BaseException:
         for path in reversed(made):
@@ -169,83 +227,25 @@ def _made(root: Path) -> Iterator[None]:
         raise
 
 
-class _Moves:
-    """Moves inside one directory that are all done or, if anything fails, all taken back.
-
-    Nothing is ever overwritten: what is in the way is moved aside first, so each move can be undone by its reverse.
-    What was discarded is deleted only at the end.
-    """
-
-    def __init__(self, root: Path) -> None:
-        self.root = root
-        self.done: list[tuple[Path, Path]] = []
-        self.directories: list[Path] = []
-
-    def __enter__(self) -> _Moves:
-        self.stage = Path(tempfile.mkdtemp(prefix=f"{MANIFEST}-", dir=self.root))
-        return self
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if error is not None:
-            self._undo(error)
-        shutil.rmtree(self.stage, ignore_errors=True)
-
-    def stage_file(self, name: str, content: bytes) -> Path:
-        """Write a file that `move` will bring to its place."""
-        path = self.stage / f"new-{name}"
-        path.write_bytes(content)
-        return path
-
-    def make_directory(self, path: Path) -> None:
-        """Make ``path`` unless it is there; a link or a file in its place is an error."""
-        if os.path.lexists(path) and (path.is_symlink() or not path.is_dir()):
-            raise NotADirectoryError(20, "a directory is wanted here, and this is none", str(path))
-        if not path.is_dir():
-            path.mkdir()
-            self.directories.append(path)
-
-    def move(self, source: Path, target: Path) -> None:
-        """Bring ``source`` to ``target``, which must be free."""
-        self.done.append((source, target))
-        os.replace(source, target)
-
-    def discard(self, path: Path) -> None:
-        """Put ``path`` where it is deleted at the end."""
-        self.move(path, self.stage / f"old-{len(self.done)}")
-
-    def _undo(self, error: BaseException) -> None:
-        while self.done:
-            source, target = self.done.pop()
-            if not os.path.lexists(target):
-                continue  # this is the move that failed
-            try:
-                os.replace(target, source)
-            except OSError as second:
-                raise InputError(
-                    f"the outputs could not be written ({error}), and what was moved could not be brought back "
-                    f"({second}): the earlier files are in {self.stage}",
-                    where=str(self.root),
-                ) from error
-        for path in reversed(self.directories):
-            with suppress(OSError):
-                path.rmdir()
+def _folders(files: Iterable[str | os.PathLike[str]]) -> list[Path]:
+    """Where ``files`` lie, links followed; nothing for what can be no name of a file."""
+    return sorted({Path(os.path.realpath(file)).parent for file in files if "\0" not in os.fspath(file)})
 
 
-def _free(directory: Path, name: str) -> Path:
-    stem, dot, suffix = name.rpartition(".")
-    candidate, number = directory / name, 1
-    while os.path.lexists(candidate):
-        candidate = directory / (f"{stem}.{number}{dot}{suffix}" if stem else f"{name}.{number}")
-        number += 1
-    return candidate
+def _mark(folder: Path) -> tuple[int, int, int] | None:
+    """What tells one plan in ``folder`` from the next; None where gcsplan wrote none."""
+    try:
+        told = os.lstat(folder / MANIFEST)
+    except OSError:
+        return None
+    return told.st_ino, told.st_mtime_ns, told.st_size
 
 
 def _is_ours(path: Path, digest: str | None) -> bool:
     """True for a plain file that still is what gcsplan wrote."""
-    if digest is None or path.is_symlink() or not path.is_file():
+    if digest is None or not is_plain(path) or os.lstat(path).st_size > MAX_OUTPUT_BYTES:
         return False
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest() == digest
+    return digest_of_file(path) == digest
 
 
 def _manifest_text(record: Mapping[str, str | None]) -> bytes:
@@ -257,7 +257,7 @@ def _manifest(directory: Path) -> dict[str, str | None]:
     path = directory / MANIFEST
     if not os.path.lexists(path):
         return {}
-    if path.is_symlink() or not path.is_file():
+    if not is_plain(path):
         raise FileExistsError(17, "stands where gcsplan keeps its list of outputs", str(path))
     with path.open("rb") as stream:
         data = stream.read(MAX_MANIFEST_BYTES + 1)
@@ -266,4 +266,4 @@ def _manifest(directory: Path) -> dict[str, str | None]:
         entries = {str(name): str(digest) for name, digest in outputs.items()}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return {p.name: None for p in directory.iterdir() if _OURS.fullmatch(p.name)}
-    return {n: d for n, d in entries.items() if _NAME.fullmatch(n) and n.casefold() != PREVIOUS}
+    return {name: digest for name, digest in entries.items() if _is_name(name)}

@@ -29,12 +29,22 @@ from gcsplan.errors import Problem
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
 _FAR = 1e6
 
+LEAST = 1e-3
+"""Of speeds and accelerations, and joules of a battery: what is divided by less has no bound."""
+
+
+def _no_trifle(value: float) -> float:
+    if value < LEAST:
+        raise ValueError(f"must be at least {LEAST:g}, given {value:g}")
+    return value
+
+
 Metres = Annotated[float, Field(ge=-_FAR, le=_FAR)]
 Length = Annotated[float, Field(ge=0.0, le=_FAR)]
 Positive = Annotated[float, Field(gt=0.0, le=_FAR)]
 Angle = Annotated[float, Field(gt=0.0, le=90.0)]
-Speed = Annotated[float, Field(gt=0.0, le=300.0)]
-Accel = Annotated[float, Field(gt=0.0, le=100.0)]
+Speed = Annotated[float, Field(gt=0.0, le=300.0), AfterValidator(_no_trifle)]
+Accel = Annotated[float, Field(gt=0.0, le=100.0), AfterValidator(_no_trifle)]
 Seconds = Annotated[float, Field(ge=0.0, le=86400.0)]
 Text = Annotated[str, Field(min_length=1, max_length=300)]
 Encoding = Literal["box", "sections", "polar", "bspline", "offsets"]
@@ -152,7 +162,7 @@ class EnergyKeys(_Section):
     vertical_j_per_m: Annotated[float, Field(ge=0.0, le=1e9)] = 120.0
     horizontal_j_per_m: Annotated[float, Field(ge=0.0, le=1e9)] = 100.0
     hover_w: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
-    battery_j: Annotated[float, Field(gt=0.0, le=1e15)] | None = None
+    battery_j: Annotated[float, Field(gt=0.0, le=1e15), AfterValidator(_no_trifle)] | None = None
     reserve: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.2
 
 

@@ -70,10 +70,10 @@ class Kernels:
         made_of = hashlib.sha256(shipped).hexdigest() if shipped is not None else f"source {digest}"
         key = hashlib.sha256("\0".join((FORMAT, made_of, *machine.marks)).encode()).hexdigest()
         kept_as = shelf.name_of_code(self.name, key)
-        code = shelf.read_kept(kept_as, self.folder)
+        code = shelf.read_kept(kept_as)
         if code is None:
             code = self._compile(machine, shipped)
-            shelf.keep(kept_as, self.folder, code)
+            shelf.keep(kept_as, code)
         addresses = machine.link(code, tuple(self.forms))
         return {name: _callable(name, addresses[name], text) for name, text in self.forms.items()}
 

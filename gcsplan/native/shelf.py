@@ -1,18 +1,37 @@
-"""Where the intermediate form of kernels lies beside their source, and machine code in a cache on disk."""
+"""Where the intermediate form of kernels lies beside their source, and machine code in a cache on disk.
+
+Machine code is run as it is found: whoever can write to the cache can run anything as the user of this process. So it
+is taken only from a regular file that belongs to that user and that nobody else can write to, in a folder (0700) of
+which the same is true. A folder of ours with a wider mode is tightened, and emptied if others could write to it; where
+the cache belongs to somebody else, or is nowhere, kernels are compiled in memory. The digest in front of the code tells
+a file that is not whole, and nothing about who wrote it. The shipped form has the trust of the package that it lies in.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
+import stat
 import sys
 import tempfile
+import time
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 SUFFIX = ".kernels"
+MAX_CODE_BYTES = 64_000_000
+NEWEST = 8
+"""Of the same kernels, so many machine codes are kept: for versions side by side."""
+
+OLD_PART_S = 86_400.0
+"""A file that was being written so long ago never will be."""
+
 _CHECK = 32  # bytes of the digest before what is kept
+_SUFFIX_OF_CODE = ".code"
+_SUFFIX_OF_PART = ".part"
 
 
 def digest_of(sources: Sequence[Path], more: str) -> str | None:
@@ -40,57 +59,102 @@ def read_shipped(path: Path, digest: str | None) -> bytes | None:
 def write_shipped(path: Path, digest: str, made_with: dict[str, str], bitcode: bytes) -> None:
     """Put bitcode beside its sources."""
     head = json.dumps({"sources": digest, **made_with}, sort_keys=True)
-    _replace(path, head.encode() + b"\n" + zlib.compress(bitcode, 9))
+    _replace(path, head.encode() + b"\n" + zlib.compress(bitcode, 9), mode=0o644)  # read by all who share the package
 
 
-def read_kept(name: str, beside: Path) -> bytes | None:
-    """Machine code of that name from a cache, if it is there and whole."""
-    for folder in _folders(beside):
-        try:
-            kept = (folder / name).read_bytes()
-        except OSError:
-            continue
-        if hashlib.sha256(kept[_CHECK:]).digest() == kept[:_CHECK]:
-            return kept[_CHECK:]
-    return None
+def read_kept(name: str) -> bytes | None:
+    """Machine code of that name from the cache, if it is there, whole, and nobody else could have put it there."""
+    try:
+        folder = _cache()
+        if folder is None or not _is_private(folder):
+            return None
+        with open(folder / name, "rb", opener=_open_plainly) as file:
+            if not _is_trusted(os.fstat(file.fileno())):
+                return None
+            kept = file.read(MAX_CODE_BYTES)
+    except OSError:
+        return None
+    return kept[_CHECK:] if hashlib.sha256(kept[_CHECK:]).digest() == kept[:_CHECK] else None
 
 
-def keep(name: str, beside: Path, code: bytes) -> bool:
-    """Keep machine code in the first cache that can be written; whether there is one. Older code is dropped."""
-    for folder in _folders(beside):
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            _replace(folder / name, hashlib.sha256(code).digest() + code)
-        except OSError:
-            continue
-        _forget_others(folder, name)
-        return True
-    return False
+def keep(name: str, code: bytes) -> bool:
+    """Keep machine code in the cache; whether there is one of ours alone. Older code is dropped."""
+    try:
+        folder = _cache()
+        if folder is None:
+            return False
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if not _is_private(folder):
+            return False
+        _replace(folder / name, hashlib.sha256(code).digest() + code, mode=0o600)
+    except OSError:
+        return False
+    _forget_others(folder, name)
+    return True
 
 
-def _folders(beside: Path) -> Iterator[Path]:
-    """Where numba keeps its code too: what NUMBA_CACHE_DIR says, beside the source, the user's cache."""
+def _cache() -> Path | None:
+    """The user's cache, or one in what NUMBA_CACHE_DIR says; None where no absolute path is known.
+
+    A relative path would mean another folder, perhaps somebody else's, in every directory that one works in.
+    """
     told = os.environ.get("NUMBA_CACHE_DIR")
-    if told:
-        yield Path(told)
-        return
-    yield beside / "__pycache__"
-    if sys.platform == "win32":
-        home = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        home = Path.home() / "Library" / "Caches"
-    else:
-        home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    yield home / "gcsplan"
+    try:
+        if told:
+            base = Path(told)
+        elif sys.platform == "win32":
+            base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+        elif sys.platform == "darwin":
+            base = Path.home() / "Library" / "Caches"
+        else:
+            given = os.environ.get("XDG_CACHE_HOME", "")
+            base = Path(given) if os.path.isabs(given) else Path.home() / ".cache"
+    except RuntimeError:  # no home is known
+        return None
+    return base / "gcsplan" if base.is_absolute() else None
 
 
-def _replace(path: Path, content: bytes) -> None:
+def _is_private(folder: Path) -> bool:
+    """Whether a folder is this user's and, now at the latest, nobody else's. Raises OSError where it is not there."""
+    if os.name != "posix":  # the user's own folder has a list of who may do what, which modes do not show
+        return folder.is_dir()
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        told = os.fstat(handle)
+        if told.st_uid != os.geteuid():
+            return False
+        if told.st_mode & 0o077:
+            os.fchmod(handle, 0o700)
+        if told.st_mode & 0o022:  # who could write here may have put something here
+            for name in os.listdir(handle):
+                if name.endswith((_SUFFIX_OF_CODE, _SUFFIX_OF_PART)):
+                    os.unlink(name, dir_fd=handle)
+        return not os.fstat(handle).st_mode & 0o077  # some file systems keep no modes
+    finally:
+        os.close(handle)
+
+
+def _open_plainly(path: str, flags: int) -> int:
+    """Open no link, and wait for no pipe."""
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+
+
+def _is_trusted(told: os.stat_result) -> bool:
+    """Whether an opened file is a regular one of this user's, with this name alone, that nobody else can write to."""
+    if not stat.S_ISREG(told.st_mode) or told.st_size > MAX_CODE_BYTES:
+        return False
+    if os.name != "posix":
+        return True
+    return told.st_uid == os.geteuid() and told.st_nlink == 1 and not told.st_mode & 0o022
+
+
+def _replace(path: Path, content: bytes, *, mode: int) -> None:
     """Write a file whole or not at all: another process may be reading it, or writing the same."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=_SUFFIX_OF_PART)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
-        os.chmod(name, 0o644)  # others may read it where the package is shared
+        os.chmod(name, mode)
         os.replace(name, path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
@@ -98,7 +162,7 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 def _forget_others(folder: Path, name: str) -> None:
-    """Drop all but the newest few of the same kernels: one is left behind by every change of source or machine."""
+    """Drop all but the newest of the same kernels (every change of source or machine leaves one), and cut-off parts."""
     kind = name.split("-")[0]
 
     def age(path: Path) -> float:
@@ -107,14 +171,11 @@ def _forget_others(folder: Path, name: str) -> None:
         except OSError:
             return 0.0
 
-    for old in sorted(folder.glob(f"{kind}-*{_SUFFIX_OF_CODE}"), key=age)[:-4]:
-        try:
+    others = sorted(folder.glob(f"{kind}-*{_SUFFIX_OF_CODE}"), key=age)[:-NEWEST]
+    cut_off = [p for p in folder.glob(f"*{_SUFFIX_OF_PART}") if age(p) < time.time() - OLD_PART_S]
+    for old in (*others, *cut_off):
+        with suppress(OSError):
             old.unlink()
-        except OSError:
-            continue
-
-
-_SUFFIX_OF_CODE = ".code"
 
 
 def name_of_code(kind: str, key: str) -> str:

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 
@@ -25,9 +24,6 @@ Floats = NDArray[np.float64]
 
 WORST_SHIFT_M = 30.0
 """A horizontal datum shift less accurate than this is refused: it would move hills by more than a DEM cell."""
-
-WORST_GEOID_M = 120.0
-"""No geoid is farther from its ellipsoid (EGM2008: -107 … +86 m)."""
 
 # Keys are stripped of everything but letters and digits.
 _GEOIDS = {"EGM84": "EGM84", "EGM96": "EGM96", "EGM2008": "EGM2008", "AMSL": "AMSL", "MSL": "AMSL"}
@@ -123,64 +119,6 @@ def vertical_datum(given: str | None, raster: VerticalDatum | None, *, where: st
         "raster (gdal_edit.py -a_srs)",
         where=where,
     )
-
-
-class GeoidGrid:
-    """Height of a geoid above the ellipsoid, from a grid file that PROJ reads (.gtx, .tif).
-
-    Raises InputError where the file is missing or no grid.
-    """
-
-    def __init__(self, path: Path, *, where: str) -> None:
-        self.path = path
-        self.where = where
-        if not path.is_file():
-            raise InputError(f"the geoid grid {path} is not there; give the path of a .gtx or .tif grid", where=where)
-        # PROJ reads a comma as the start of a second grid, quoted or not.
-        if "," in str(path):
-            raise InputError(f"a geoid grid's path must hold no comma, given {path}; rename it", where=where)
-        quoted = str(path.resolve()).replace('"', '""')
-        try:
-            self._shift = Transformer.from_pipeline(
-                "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad "
-                f'+step +proj=vgridshift +grids="{quoted}" +multiplier=-1 '
-                "+step +proj=unitconvert +xy_in=rad +xy_out=deg"
-            )
-        except ProjError as why:
-            raise InputError(f"PROJ cannot read the geoid grid {path}: {_first_line(why)}", where=where) from None
-
-    def height_m(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
-        """Geoid above the ellipsoid at points (any equal shapes), metres; AMSL = ellipsoidal height - this.
-
-        Raises InputError where the grid does not cover a point, or holds no geoid there.
-        """
-        lat, lon = np.asarray(lat_deg, float), (np.asarray(lon_deg, float) + 180.0) % 360.0 - 180.0
-        try:
-            _, _, shifted = self._shift.transform(lon, lat, np.zeros_like(lat))
-        except ProjError as why:
-            raise InputError(
-                f"the geoid grid {self.path} cannot be used: {_first_line(why)}", where=self.where
-            ) from None
-        height = -np.asarray(shifted, float)
-        if not np.isfinite(height).all():
-            bad = np.argwhere(~np.isfinite(np.atleast_1d(height)))[0]
-            at = tuple(bad)
-            raise InputError(
-                f"the geoid grid {self.path} does not cover {np.atleast_1d(lat)[at]:.4f}, "
-                f"{np.atleast_1d(lon)[at]:.4f}; give one that covers the mission",
-                where=self.where,
-            )
-        if height.size and np.abs(height).max() > WORST_GEOID_M:
-            raise InputError(
-                f"the geoid grid {self.path} gives {height.ravel()[np.abs(height).argmax()]:g} m; a geoid lies "
-                f"within ±{WORST_GEOID_M:g} m of its ellipsoid",
-                where=self.where,
-            )
-        if height.size and not height.any():
-            raise InputError(
-                f"the geoid grid {self.path} changes nothing here (0 m everywhere); give a real geoid", where=self.where
-            )
-        return height
 
 
 def plane_to_raster(

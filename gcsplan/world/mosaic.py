@@ -22,6 +22,9 @@ Box = tuple[float, float, float, float]
 FIT_ERROR_M = 0.01
 """The polynomial may misplace a node by this much at most."""
 
+FEW_CELLS, CELLS_IN_BYTE = 5_000_000, 100
+"""A window may have so many cells, or so many for each byte of its files: no ground is packed more closely."""
+
 ALIGNED_CELLS = 1e-3
 """Tiles whose nodes are off a common grid by more than this part of a cell are refused."""
 
@@ -181,6 +184,13 @@ class Mosaic:
             raise InputError(
                 f"the mission needs {c1 - c0} × {r1 - r0} cells of the DEM, more than {most_cells / 1e6:.3g} million; "
                 "use a coarser DEM (gdalwarp -tr) or a smaller mission",
+                where=self.where,
+            )
+        held = sum(p.raster.stored_bytes for p, _ in parts)
+        if (c1 - c0) * (r1 - r0) > max(FEW_CELLS, CELLS_IN_BYTE * held):
+            raise InputError(
+                f"the DEM claims {c1 - c0} × {r1 - r0} cells around the mission in a file of {held} bytes, more than "
+                "any terrain can be packed: it is damaged or empty; if it is not, use a coarser one (gdalwarp -tr)",
                 where=self.where,
             )
         x = layout.x0 + np.arange(c0, c1) * layout.dx

@@ -28,7 +28,10 @@ Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
 
 SAMPLE = "sample:jacksboro"
 MAX_CELLS = 200_000_000
-"""Of one window, and of one block of a file: 1.6 GB as float64."""
+"""Of one window: 1.6 GB as float64."""
+
+MAX_BLOCK_BYTES = 256_000_000
+"""Of one block of a file, which GDAL unpacks whole to read one cell of it."""
 
 LOWEST_M, HIGHEST_M = -500.0, 9000.0
 """Ground outside of this is a void that nobody declared (-9999, -32768, 3.4e38): unknown."""
@@ -43,6 +46,9 @@ UNITS_M = {
 }  # fmt: skip
 """Metres in one unit of height, by the words that files use (lower case)."""
 
+CACHE_BYTES = 64_000_000
+"""Of unpacked blocks that GDAL keeps; without a word it keeps a twentieth of the machine's memory."""
+
 _STRIP_CELLS = 4_000_000
 
 
@@ -52,7 +58,8 @@ class Raster:
 
     ``read(col, row, cols, rows)`` gives strips (first row within the window, heights (n, cols)), NaN where unknown.
     ``west``, ``north`` are the outer corner in the raster's own units, ``dx``, ``dy`` > 0 the cell. ``read`` gives
-    metres but of the raster's own vertical datum; ``vertical`` is what the file says of that.
+    metres but of the raster's own vertical datum; ``vertical`` is what the file says of that. ``stored_bytes``: the
+    size of the file.
     """
 
     name: str
@@ -65,6 +72,7 @@ class Raster:
     rows: int
     vertical: VerticalDatum | None
     read: Reader
+    stored_bytes: int
     sha256: Callable[[], str]
     notes: tuple[str, ...] = ()
 
@@ -77,7 +85,7 @@ def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: 
     """
     require_file(path, where=where)
     try:
-        with _gdal(path) as dataset:
+        with gdal(path) as dataset:
             return _header(dataset, path, where=where, crs=crs, height_unit=height_unit)
     except InputError:
         raise
@@ -126,30 +134,38 @@ def sample_jacksboro() -> Raster:
 
     return Raster(
         SAMPLE, take_apart("EPSG:4326", where=SAMPLE), west, north, dx, dy, cols, rows, VerticalDatum("EGM96"), read,
-        lambda: sha256_of(path),
+        path.stat().st_size, lambda: sha256_of(path),
     )  # fmt: skip
 
 
 @contextmanager
-def _gdal(path: Path) -> Iterator[Any]:
-    """The dataset at ``path``, whatever GDAL's environment variables say about pixel corners."""
+def gdal(path: Path, other: str = "") -> Iterator[Any]:
+    """The dataset at ``path``, whatever GDAL's environment variables say about pixel corners.
+
+    ``other``: the driver of what is no GeoTIFF, where the file's name does not say.
+    """
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning
 
-    with warnings.catch_warnings(), rasterio.Env(GTIFF_POINT_GEO_IGNORE=False, GDAL_PAM_ENABLED=True):
+    with (
+        warnings.catch_warnings(),
+        rasterio.Env(GTIFF_POINT_GEO_IGNORE=False, GDAL_PAM_ENABLED=True, GDAL_CACHEMAX=CACHE_BYTES),
+    ):
         # Our own check of the georeference says more; the others are between rasterio and its own dependencies.
         for category in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
             warnings.simplefilter("ignore", category)
-        with rasterio.open(path.resolve(), driver=_driver(path)) as dataset:
+        with rasterio.open(path.resolve(), driver=_driver(path, other)) as dataset:
             yield dataset
 
 
-def _driver(path: Path) -> str:
+def _driver(path: Path, other: str) -> str:
     """GDAL's word for the format, by the file's first bytes; never one that may follow links to elsewhere."""
     with path.open("rb") as file:
         magic = file.read(4)
     if magic in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
         return "GTiff"
+    if other:
+        return other
     return "SRTMHGT" if path.suffix.lower() == ".hgt" else "AAIGrid"
 
 
@@ -167,22 +183,28 @@ def _unreadable(path: Path, why: Exception) -> str:
     )
 
 
-def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_unit: str | None) -> Raster:
-    from rasterio.enums import ColorInterp
+def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
+    """Raise InputError where an opened file holds no real numbers, or one number costs too much to read."""
+    from rasterio.enums import ColorInterp, Interleaving
 
-    notes = []
-    if dataset.count < 1:
-        raise InputError(f"{path} holds no raster band", where=where)
-    if dataset.count > 1:
-        notes.append(f"{path.name} has {dataset.count} bands; the first is taken as the heights")
     if dataset.colorinterp[0] in (ColorInterp.red, ColorInterp.palette) or "complex" in dataset.dtypes[0]:
         raise InputError(f"{path} is a picture, not a raster of heights", where=where)
-    if math.prod(dataset.block_shapes[0]) > MAX_CELLS:
+    bands = dataset.count if dataset.interleaving == Interleaving.pixel else 1
+    if math.prod(dataset.block_shapes[0]) * np.dtype(dataset.dtypes[0]).itemsize * bands > MAX_BLOCK_BYTES:
         raise InputError(
             f"{path} is stored in blocks of {dataset.block_shapes[0]} cells, too many to hold; rewrite it in tiles "
             "(gdal_translate -co TILED=YES)",
             where=where,
         )
+
+
+def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_unit: str | None) -> Raster:
+    notes = []
+    if dataset.count < 1:
+        raise InputError(f"{path} holds no raster band", where=where)
+    if dataset.count > 1:
+        notes.append(f"{path.name} has {dataset.count} bands; the first is taken as the heights")
+    require_numbers(dataset, path, where=where)
     t = dataset.transform
     geometry = (t.a, t.b, t.c, t.d, t.e, t.f)
     if not all(math.isfinite(x) for x in geometry):
@@ -216,14 +238,14 @@ def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_uni
 
     def read(col: int, row: int, cols: int, rows: int) -> Iterator[tuple[int, Floats]]:
         try:
-            with _gdal(path) as opened:
+            with gdal(path) as opened:
                 yield from _strips(opened, col, row, cols, rows, scale * factor, offset * factor)
         except Exception as why:
             raise InputError(_unreadable(path, why), where=where) from None
 
     return Raster(
         path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical, read,
-        lambda: sha256_of(path), tuple(notes),
+        path.stat().st_size, lambda: sha256_of(path), tuple(notes),
     )  # fmt: skip
 
 
@@ -273,14 +295,32 @@ def _strips(
     """Strips of ``raw * scale + offset``, metres; masked, non-finite and implausible cells are NaN."""
     from rasterio.windows import Window
 
+    if dataset.driver == "AAIGrid":
+        # GDAL seeks a row behind a missing one in a time that doubles with each; asked in order it says so at once.
+        for above in range(row + rows):
+            dataset.read(1, window=Window(0, above, 1, 1))
     strip = max(1, _STRIP_CELLS // cols)
     for first in range(0, rows, strip):
         n = min(strip, rows - first)
         raw = dataset.read(1, window=Window(col, row + first, cols, n), masked=True)
         part = raw.data.astype(np.float64)
         part[np.ma.getmaskarray(raw)] = np.nan
+        for block in missing(dataset, 1, col, row + first, cols, n):
+            part[block] = np.nan
         part[part == -32768.0] = np.nan  # the void of SRTM, declared or not, before a scale can hide it
         with np.errstate(over="ignore", invalid="ignore"):
             part = part * scale + offset
             part[~((part >= LOWEST_M) & (part <= HIGHEST_M))] = np.nan
         yield first, part
+
+
+def missing(dataset: Any, band: int, col: int, row: int, cols: int, rows: int) -> Iterator[tuple[slice, slice]]:
+    """Where a GeoTIFF has no data in a window of a band: blocks that were never written, which GDAL reads as 0 m."""
+    if dataset.driver != "GTiff":
+        return
+    height, width = dataset.block_shapes[0]
+    for i in range(row // height, (row + rows - 1) // height + 1):
+        for j in range(col // width, (col + cols - 1) // width + 1):
+            if dataset.get_tag_item(f"BLOCK_OFFSET_{j}_{i}", "TIFF", bidx=band) is None:
+                top, left = i * height - row, j * width - col
+                yield slice(max(top, 0), max(top + height, 0)), slice(max(left, 0), max(left + width, 0))

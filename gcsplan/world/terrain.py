@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import InputError
-from gcsplan.world.datum import GeoidGrid, VerticalDatum, vertical_datum
+from gcsplan.world.datum import VerticalDatum, vertical_datum
 from gcsplan.world.frame import FARTHEST_M, Frame
+from gcsplan.world.geoid import GeoidGrid
 from gcsplan.world.mosaic import Mosaic, Window
 from gcsplan.world.obstacles import canopy_on
 from gcsplan.world.peaks import Peak, flat_grid, peaks_grid

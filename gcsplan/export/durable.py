@@ -1,0 +1,183 @@
+"""Files that stay written: whole or not at all, and on the disk before anything relies on them.
+
+What the operating system was told is not yet on the disk: after a loss of power any part of it may be missing, and in
+any order. `sync_directory` and the `fsync` of a file are the only fences; a write that others rely on passes one first.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from gcsplan.errors import InputError
+
+try:
+    import fcntl
+except ImportError:  # Windows: no locks and no fences for directories; docs/safety.md says what that costs
+    POSIX = False
+else:
+    POSIX = True
+
+PART = ".gcsplan-part-"
+"""How a file is called that `write_whole` is writing; it is locked as long as its writer lives."""
+
+LOCK_WAIT_S = 10.0
+"""So long one run waits for another one that is writing to the same directory."""
+
+_PART_NAME = re.compile(re.escape(PART) + r"[0-9a-f]{16}")
+_CANNOT_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM}
+_CANNOT_LOCK = {errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.ENOLCK, errno.ENOSYS}
+_ATTEMPTS = 5
+_AT_ONCE = 16
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write one file of the user's choice, whole or not at all; what is there is replaced. Raises InputError.
+
+    What an earlier run that was killed left half-written beside it is removed.
+    """
+    target = Path(path)
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    try:
+        _sweep(target.parent)
+        handle, part = _new_part(target.parent)
+        try:
+            try:
+                _write(handle, data)
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+            os.replace(part, target)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+        sync_directory(target.parent)
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be written: {getattr(error, 'strerror', None) or error}", where=str(path)) from error
+
+
+def write_new(path: Path, data: bytes) -> None:
+    """Make a file that must not be there yet; `sync_files` brings it to the disk. Raises OSError."""
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    try:
+        _write(handle, data)
+    finally:
+        os.close(handle)
+
+
+def sync_files(paths: Sequence[Path]) -> None:
+    """Return when the content of every one of ``paths`` is on the disk. Raises OSError."""
+    # Several at once, for the disk then takes them with one write of its journal instead of one for each.
+    with ThreadPoolExecutor(min(len(paths), _AT_ONCE)) as pool:
+        list(pool.map(_sync_file, paths))
+
+
+def _sync_file(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY if POSIX else os.O_RDWR)  # Windows secures what it may write alone
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def sync_directory(path: Path) -> None:
+    """Return when every name in ``path`` is on the disk as it stands, where the file system can do that."""
+    if not POSIX:
+        return
+    handle = -1
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+        os.fsync(handle)
+    except OSError as error:  # some network file systems have no such call for directories
+        if error.errno not in _CANNOT_SYNC:
+            raise
+    finally:
+        if handle >= 0:
+            os.close(handle)
+
+
+@contextmanager
+def locked(directory: Path) -> Iterator[None]:
+    """No other gcsplan writes to ``directory`` meanwhile, where the file system has locks.
+
+    The lock goes with the process, however it ends. Raises InputError where another one holds it for `LOCK_WAIT_S`.
+    """
+    if not POSIX:
+        yield
+        return
+    until = time.monotonic() + LOCK_WAIT_S
+    while True:
+        handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            free = _take_lock(handle)
+            if free and os.path.samestat(os.fstat(handle), os.stat(directory)):  # else it was made anew meanwhile
+                yield
+                return
+        finally:
+            os.close(handle)
+        if time.monotonic() > until:
+            raise InputError(
+                f"another gcsplan has been writing here for {LOCK_WAIT_S:g} s; nothing was changed. Wait for it, or "
+                f"choose another directory with -o",
+                where=str(directory),
+            )
+        time.sleep(0.02)
+
+
+def is_mine(path: Path | str) -> bool:
+    """Whether what stands there (not what it links to) belongs to the user of this process; True without owners."""
+    return not hasattr(os, "geteuid") or os.lstat(path).st_uid == os.geteuid()
+
+
+def _take_lock(handle: int) -> bool:
+    """False where another process holds it; True where it is ours, or there are no locks."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        if error.errno not in _CANNOT_LOCK:
+            raise
+    return True
+
+
+def _write(handle: int, data: bytes) -> None:
+    left = memoryview(data)
+    while left:
+        left = left[os.write(handle, left) :]
+
+
+def _new_part(directory: Path) -> tuple[int, Path]:
+    """A new locked file under a name of its own."""
+    for _ in range(_ATTEMPTS):
+        part = directory / f"{PART}{secrets.token_hex(8)}"
+        handle = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        if not POSIX or (_take_lock(handle) and os.fstat(handle).st_nlink):
+            return handle, part
+        os.close(handle)  # another run took it for a dead one's before it was locked
+    raise FileExistsError(errno.EEXIST, "other runs keep removing what is written here", str(directory))
+
+
+def _sweep(directory: Path) -> None:
+    """Remove what writers that are dead left: files of ours with the name of a part that nobody has locked."""
+    if not POSIX:
+        return
+    with os.scandir(directory) as entries:
+        parts = [e.path for e in entries if _PART_NAME.fullmatch(e.name) and e.is_file(follow_symlinks=False)]
+    for part in parts:
+        with suppress(OSError):
+            if not is_mine(part):
+                continue
+            handle = os.open(part, os.O_RDONLY | os.O_NOFOLLOW)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                os.unlink(part)
+            finally:
+                os.close(handle)

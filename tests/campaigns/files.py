@@ -1,0 +1,210 @@
+"""Hostile files: mission files, zones, missions of others and terrain, spoilt at random, through the command line.
+
+    python -m tests.campaigns.files --seconds 120 [--seed 1] [--inputs N] [--keep DIR]
+
+Each input is one run of ``gcsplan check --json`` in a folder of its own, with one file (or more) spoilt in the way of
+people, programs and attackers. What it owes: an exit code of the contract, one JSON document, no traceback, no warning,
+nothing on standard error but messages, nothing left in the folder, an answer within `PATIENCE_S`, and no more than
+`MEMORY_MB` in all. Inputs run in a process beside this one, so that a crash of a library is seen as what it is. Ends
+with 1 and the seed where anything of that failed; ``--seed S --inputs 1 --keep DIR`` shows that input again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import random
+import resource
+import select
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from gcsplan import cli
+from tests.campaigns.disk import workshop
+from tests.campaigns.hostile import KINDS, write_clean
+
+CODES = {0, 2, 3, 4}
+PATIENCE_S = 10.0
+"""Of the processor; the clock may show ten times as much on a busy machine before a run is taken to hang."""
+
+MEMORY_MB = 600.0
+MAX_FOUND = 20
+
+
+def attack(seed: int) -> tuple[str, int, list[str]]:
+    """Run the input of that seed in the current folder: its kind, the exit code, and what is wrong."""
+    rng = random.Random(seed)
+    kind = rng.choices(list(KINDS), [weight for weight, _ in KINDS.values()])[0]
+    arguments = KINDS[kind][1](rng)
+    before = set(os.listdir())
+    out, err, began = io.StringIO(), io.StringIO(), time.process_time()
+    code: Any = None
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
+        warnings.simplefilter("always")
+        sys.argv = ["gcsplan", "check", *arguments, "--json"]
+        try:
+            cli.main()
+        except SystemExit as ended:
+            code = ended.code
+        except BaseException as error:  # nothing may come through
+            code = f"{type(error).__name__}: {error}"
+    took = time.process_time() - began
+    found = civil(code, out.getvalue(), err.getvalue())
+    if set(os.listdir()) != before:
+        found.append(f"left {sorted(set(os.listdir()) - before)}")
+    if took > PATIENCE_S:
+        found.append(f"took {took:.1f} s of the processor")
+    return kind, code if isinstance(code, int) else -1, [f"seed {seed} ({kind}): {what}" for what in found]
+
+
+def civil(code: object, out: str, err: str) -> list[str]:
+    """What is wrong with how a run ended."""
+    found = [] if code in CODES else [f"ended with {code}: {err[-400:]}"]
+    try:
+        document = json.loads(out)
+        if ("error" in document) != (code != 0) or (code != 0 and document["error"]["code"] != code):
+            found.append("the document does not say how it ended")
+    except ValueError:
+        found.append(f"standard output is no JSON document: {out[:200]!r}")
+    found += [f"standard error holds a {word}: {err[-400:]}" for word in ("Traceback", "Warning") if word in err]
+    if code == 2 and not err.startswith("gcsplan: "):
+        found.append(f"no message on standard error: {err[:200]!r}")
+    return found
+
+
+def work(seed: int) -> None:
+    """Run inputs for ever, one line of JSON for each on the real standard output."""
+    say = os.fdopen(os.dup(1), "w")
+    said = tempfile.TemporaryFile()  # noqa: SIM115  # as long as the process
+    os.dup2(said.fileno(), 1)
+    os.dup2(said.fileno(), 2)  # libraries write there past Python
+    write_clean()
+    cli.app = typer.main.get_command(cli.app)  # type: ignore[assignment]  # made once: it takes longer than a check
+    while True:
+        print(json.dumps(["begins", seed]), file=say, flush=True)
+        kind, code, found = attack(seed)
+        if said.tell():
+            said.seek(0)
+            found.append(f"seed {seed} ({kind}): a library wrote {said.read()[:300]!r}")
+            said.seek(0)
+            said.truncate()
+        memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+        if memory_mb > MEMORY_MB:
+            found.append(f"seed {seed} ({kind}): {memory_mb:.0f} MB are held")
+        print(json.dumps(["ended", kind, code, found, memory_mb]), file=say, flush=True)
+        seed += 1
+
+
+def campaign(seconds: float, seed: int, inputs: int, keep: str | None) -> int:
+    """Start the process that runs the inputs, watch it, start it again where it dies, and tell what came of it."""
+    count: Counter[str] = Counter()
+    found: list[str] = []
+    memory_mb, until = 0.0, time.monotonic() + seconds
+    with workshop() as place:
+        folder = Path(keep or place)
+        folder.mkdir(exist_ok=True)
+        while sum(count.values()) < inputs and time.monotonic() < until and len(found) < MAX_FOUND:
+            with Worker(folder, seed) as worker:
+                while sum(count.values()) < inputs and time.monotonic() < until and len(found) < MAX_FOUND:
+                    told = worker.answer()
+                    kind, code, faults, held_mb = told or ("none", -1, [f"seed {worker.seed}: {worker.fate()}"], 0.0)
+                    count[f"{kind} {code}"] += 1
+                    found += faults
+                    for line in faults:
+                        print(line, flush=True)
+                    if told is None:
+                        break
+                    memory_mb = max(memory_mb, held_mb)
+                    if held_mb > MEMORY_MB:
+                        break
+                seed = worker.seed + 1
+    print(_summary(count, len(found), memory_mb))
+    return 1 if found else 0
+
+
+class Worker:
+    """A process that runs one input after the other, and what it says of them."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        command = [sys.executable, "-m", "tests.campaigns.files", "--work", "--seed", str(seed)]
+        paths = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+        environment = os.environ | {"PYTHONPATH": paths}
+        self.process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, env=environment)
+        self.seed = seed
+        self._said = b""
+
+    def __enter__(self) -> Worker:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+        if self.process.stdout is not None:
+            self.process.stdout.close()
+
+    def answer(self) -> tuple[str, int, list[str], float] | None:
+        """Kind, exit code, faults and memory of the next input; None where there is no answer."""
+        while True:
+            line = self._line(10.0 * PATIENCE_S)
+            if not line:
+                return None
+            word, *rest = json.loads(line)
+            if word == "ended":
+                kind, code, faults, memory_mb = rest
+                return kind, code, faults, memory_mb
+            self.seed = rest[0]
+
+    def fate(self) -> str:
+        """Why there is no answer."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return f"the process ended with {self.process.wait(1.0)}"
+        return f"no answer in {10.0 * PATIENCE_S:g} s"
+
+    def _line(self, seconds: float) -> bytes:
+        assert self.process.stdout is not None
+        handle, until = self.process.stdout.fileno(), time.monotonic() + seconds
+        while b"\n" not in self._said:
+            left = until - time.monotonic()
+            more = os.read(handle, 65536) if left > 0.0 and select.select([handle], [], [], left)[0] else b""
+            if not more:
+                return b""
+            self._said += more
+        line, _, self._said = self._said.partition(b"\n")
+        return line
+
+
+def _summary(count: Counter[str], faults: int, memory_mb: float) -> str:
+    kinds = sorted({key.split()[0] for key in count})
+    each = []
+    for kind in kinds:
+        codes = {key.split()[1]: n for key, n in sorted(count.items()) if key.split()[0] == kind}
+        each.append(f"  {kind}: {sum(codes.values())} (" + ", ".join(f"exit {c}: {n}" for c, n in codes.items()) + ")")
+    return f"{sum(count.values())} inputs, {faults} faults, {memory_mb:.0f} MB at most\n" + "\n".join(each)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=120.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--inputs", type=int, default=10**9, help="no more than so many")
+    parser.add_argument("--keep", metavar="DIR", help="work there, and leave the files of the last input")
+    parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.work:
+        work(given.seed)
+    return campaign(given.seconds, given.seed, given.inputs, given.keep)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
