@@ -17,6 +17,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.bench.terrain_problems import problems
+from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal import planner as optimal
 from gcsplan.planners.optimal.navmesh import mesh as mesh_module
 from gcsplan.planners.optimal.navmesh.grid import Mesh, Plane
@@ -81,7 +82,14 @@ def mesh_of(
 
     plane = cast(
         Plane,
-        SimpleNamespace(at=at, begins=lambda _: (0, 0), parts=1, stride=1, inside=np.ones((ny - 1, nx - 1), np.bool_)),
+        SimpleNamespace(
+            at=at,
+            begins=lambda _: (0, 0),
+            parts=1,
+            stride=1,
+            inside=np.ones((ny - 1, nx - 1), np.bool_),
+            problem=SimpleNamespace(budget=Budget.endless()),
+        ),
     )
     named = 8 * (nx * ny + 1) * of.shape[1]
     return Mesh(

@@ -17,7 +17,7 @@ try:
     cli.main()
 except SystemExit as ended:
     print(ended.code, gc.get_threshold()[0] == memory.OBJECTS)
-others = ("numba", "scipy", "pymavlink", "shapely", "matplotlib", "gcsplan.steps.delivery", "gcsplan.way_home.rally",
+others = ("numba", "scipy", "pymavlink", "matplotlib", "gcsplan.steps.delivery", "gcsplan.way_home.rally",
           "gcsplan.fleet.resolve", "gcsplan.report")
 print([name for name in others if name in sys.modules])
 """

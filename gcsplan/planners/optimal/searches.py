@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gcsplan.errors import InputError
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.bounds.shorter import bound_by_caps, halve, raise_climb
+from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.governor import Search, Size
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import LARGE
@@ -18,7 +19,6 @@ from gcsplan.planners.optimal.level_world import in_window
 from gcsplan.planners.optimal.plane_search import PAST, SLACKS, PlaneSearch
 from gcsplan.planners.optimal.sources.bound_corridor import follow
 from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
-from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
 from gcsplan.planners.problem import Problem, Refusal, terminals
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
@@ -181,7 +181,7 @@ class Searches:
         return far or self._straight.kind != "pinched"
 
     def _look_at_outlines(self) -> None:
-        from gcsplan.planners.optimal.cap_search import above_all
+        from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks  # shapely: many missions need none
 
         limits = self.problem.limits
         top_m = above_all(self.problem) if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m

@@ -29,8 +29,9 @@ Place = tuple[float, float]
 
 COARSE = 4
 """Chords of a quarter circle of every arc at first."""
-OFF_M, OFF_OUTER_M = 5e-3, 0.1
-"""How far chords may be off where a track comes near: for bounds, and for paths, of which each chord is a leg."""
+OFF_M, OFF_OUTER_M, OFF_OUTER = 5e-3, 0.1, 6e-4
+"""How far chords may be off where a track comes near: for bounds; and for paths, of which each chord is a leg, or that
+part of the radius where that is more."""
 NEAR = 1.03
 """Where a track comes nearer than that times what it must keep, coarse arcs may stand in its way that fine ones do not,
 or leave a slit that fine ones shut: chords of `COARSE` are off by two percent of the radius."""
@@ -120,7 +121,8 @@ class Outline:
 
     def _angles(self, radius: float, sectors: Iterable[int]) -> Floats:
         """Where the chords of a circle begin, rising; some ``sectors`` drawn finely."""
-        step = math.sqrt(8.0 * (OFF_OUTER_M if self.outer else OFF_M) / max(radius, 1e-3))
+        off_m = max(OFF_OUTER_M, OFF_OUTER * radius) if self.outer else OFF_M
+        step = math.sqrt(8.0 * off_m / max(radius, 1e-3))
         parts = max(math.ceil(WIDTH / step), 2)
         more = [s * WIDTH + np.arange(1, parts) * (WIDTH / parts) for s in sectors]
         return np.sort(np.concatenate([np.arange(4 * COARSE) * WIDTH, *more]))
