@@ -304,7 +304,7 @@ def test_parameters_that_are_no_numbers_are_said_and_end_nothing() -> None:
 
 
 def test_a_bug_in_one_vehicles_job_leaves_the_others_standing() -> None:
-    def broken(_: Mission) -> str | None:
+    def broken(_: Mission, __: object) -> str | None:
         raise ZeroDivisionError("a bug")
 
     first, second = fleet(vehicle(), vehicle(sysid=2), judge=broken)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -87,7 +87,7 @@ def test_a_checked_mission_is_uploaded_and_verified(autopilot: Autopilot) -> Non
     seen: list[tuple[str, Progress]] = []
     judged: list[Mission] = []
 
-    def judge(read: Mission) -> None:
+    def judge(read: Mission, _: Mapping[str, float]) -> None:
         judged.append(read)
 
     with air(board) as link:
@@ -132,9 +132,23 @@ def test_nothing_is_sent_without_a_passing_verdict_of_this_mission(
     assert board.items() == ()
 
 
+def test_a_mission_that_the_vehicles_own_parameters_make_unsafe_is_not_sent() -> None:
+    board, heard = vehicle(Autopilot.PX4), []
+
+    def judge(_: Mission, values: Mapping[str, float]) -> str | None:
+        heard.append(dict(values))
+        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 10.0 else None
+
+    with air(board) as link, pytest.raises(VehicleRefused, match="a corner in a zone") as caught:
+        upload_mission(link, mission(Autopilot.PX4), options=replace(OPTIONS, read_parameters=True), judge=judge)
+    assert caught.value.reason == "parameters"
+    assert board.items() == ()
+    assert heard[0]["NAV_MC_ALT_RAD"] == pytest.approx(0.8)
+
+
 def test_the_read_back_is_checked_again() -> None:
     with air(vehicle()) as link:
-        result = upload_mission(link, mission(), options=OPTIONS, judge=lambda read: "a hill in the way")
+        result = upload_mission(link, mission(), options=OPTIONS, judge=lambda read, values: "a hill in the way")
     assert not result.verified
     with pytest.raises(CheckFailed, match="a hill in the way"):
         result.raise_for_outcome()

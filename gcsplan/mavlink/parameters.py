@@ -1,4 +1,4 @@
-"""Failsafe, return and fence parameters: which are read, and what their values mean for a mission. Never written."""
+"""Failsafe, return, fence and corner parameters: which are read, and what their values mean for a mission. Never written."""
 
 from __future__ import annotations
 
@@ -22,15 +22,17 @@ _COPTER = (
     ("RTL_ALT", "RTL_ALT_M"),  # cm; renamed and in metres since 4.7
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",),
     ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",),
+    ("WPNAV_RADIUS", "WP_RADIUS_M"),  # cm; renamed and in metres since 4.7
 )  # fmt: skip
 _PLANE = (
     ("RTL_ALTITUDE", "ALT_HOLD_RTL"),  # metres since 4.5; before that ALT_HOLD_RTL in cm
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",),
     ("THR_FAILSAFE",), ("FS_LONG_ACTN",), ("FS_GCS_ENABL",), ("BATT_FS_LOW_ACT",),
+    ("WP_RADIUS",), ("NAVL1_PERIOD",), ("NAVL1_DAMPING",),
 )  # fmt: skip
 _PX4 = (
     ("RTL_RETURN_ALT",), ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
-    ("NAV_RCL_ACT",), ("NAV_DLL_ACT",), ("COM_LOW_BAT_ACT",),
+    ("NAV_RCL_ACT",), ("NAV_DLL_ACT",), ("COM_LOW_BAT_ACT",), ("NAV_ACC_RAD",), ("NAV_MC_ALT_RAD",),
 )  # fmt: skip
 GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
     Autopilot.ARDUCOPTER: _COPTER, Autopilot.ARDUPLANE: _PLANE, Autopilot.PX4: _PX4,

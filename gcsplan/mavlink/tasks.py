@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 from gcsplan.errors import LinkError, VehicleRefused
@@ -45,8 +46,8 @@ from gcsplan.mavlink.watch import VehicleState, Watch
 from gcsplan.vehicle import Autopilot
 
 ProgressCall = Callable[[str, Progress], None]
-Judge = Callable[[Mission], str | None]
-"""The check again, on what was read back: None if it passes, else why not."""
+Judge = Callable[[Mission, Mapping[str, float]], str | None]
+"""The check again, with the parameters that were read: None if it passes, else why not."""
 
 # The most that is read of a list. ArduPilot: 64 KB of missions on an SD card (BRD_SD_MISSION) at 15 bytes an item.
 _MOST_HELD = {ARDUPILOTMEGA: 4369, MAV_PX4: 2000}
@@ -123,7 +124,16 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     recheck = _holding(channel, watch, state, options, lambda now: objections(
         now, task.items, task.autopilot, **_terms(task)
     ))  # fmt: skip
-    warnings += yield from _parameters(channel, task, state, watch, recheck)
+    against, values = yield from _parameters(channel, task, state, watch, recheck)
+    warnings += against
+    failed = task.judge(task.mission, values) if task.mission and task.judge and values else None
+    if failed is not None:
+        raise VehicleRefused(
+            f"with this vehicle's parameters the mission is not safe, and nothing was sent; plan it with more "
+            f"track_error_m, or set the parameters:\n{failed}",
+            where=f"vehicle {task.sysid}",
+            reason="parameters",
+        )
     said_before = watch.said
     machine = VerifiedUpload(
         task.items,
@@ -155,7 +165,7 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     after = watch.state(clock())
     if after and after.armed and not state.armed:
         warnings.append("the vehicle was armed by somebody during the upload")
-    result = result_of(task, channel, settled, clock() - started, warnings, watch.texts_since(said_before))
+    result = result_of(task, channel, settled, clock() - started, warnings, watch.texts_since(said_before), values)
     result = replace(result, state=state)
     return replace(result, changed=changed.reason, change=changed.why) if changed else result
 
@@ -174,10 +184,13 @@ def _holding(channel: Channel, watch: Watch, state: VehicleState, options: Optio
     return Recheck(channel, watch, state, judge, may_move=options.ignore_position, standby_s=options.standby_s)
 
 
-def _parameters(channel: Channel, task: Task, state: VehicleState, watch: Watch, recheck: Recheck) -> Steps[list[str]]:
-    """What the parameters on board have against the list, in words."""
+def _parameters(
+    channel: Channel, task: Task, state: VehicleState, watch: Watch, recheck: Recheck
+) -> Steps[tuple[list[str], dict[str, float]]]:
+    """What the parameters on board have against the list, in words; and their values, as far as they are read."""
     options, mission = task.options, task.mission
     warnings: list[str] = []
+    values: dict[str, float] = {}
     if mission and options.read_parameters:
         values = yield from parameter_steps(channel, state, GROUPS[task.autopilot], watch, recheck)
         warnings += judge_parameters(
@@ -186,7 +199,7 @@ def _parameters(channel: Channel, task: Task, state: VehicleState, watch: Watch,
     if task.mission_type == FENCE and options.read_parameters:
         values = yield from parameter_steps(channel, state, FENCE_GROUPS[task.autopilot], watch, recheck)
         warnings += judge_fence_parameters(values)
-    return warnings
+    return warnings, values
 
 
 def reading(
@@ -300,16 +313,22 @@ def _require_one(state: VehicleState) -> None:
 
 
 def result_of(
-    task: Task, channel: Channel, settled: Settled, seconds: float, warnings: list[str], texts: tuple[str, ...]
+    task: Task,
+    channel: Channel,
+    settled: Settled,
+    seconds: float,
+    warnings: list[str],
+    texts: tuple[str, ...],
+    values: Mapping[str, float] = MappingProxyType({}),
 ) -> UploadResult:
-    """What became of ``task``, with the caller's check of what was read back."""
+    """What became of ``task``, with the caller's check of what was read back under the parameters that were read."""
     mission: Mission | None = None
     failed: str | None = None
     if task.mission and settled.read_back:
         mission = Mission.from_wire(
             task.autopilot, settled.read_back, home=task.mission.home, name=task.name, sysid=task.sysid
         )
-        failed = task.judge(mission) if task.judge else None
+        failed = task.judge(mission, values) if task.judge else None
         warnings = warnings + _other_home(task.mission, settled.read_back)
     return UploadResult(
         task.name,

@@ -87,6 +87,8 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
         "TECS_SINK_MAX": _r(5.0),
         "TERRAIN_FOLLOW": _i(0),
         "WP_LOITER_RAD": _i(60, INT16),
+        "NAVL1_DAMPING": _r(0.75),
+        "NAVL1_PERIOD": _r(17.0),
         "WP_RADIUS": _i(90, INT16),
     },
     Autopilot.PX4: {
@@ -104,6 +106,7 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
         "MPC_Z_VEL_MAX_DN": _r(1.5),
         "MPC_Z_VEL_MAX_UP": _r(3.0),
         "NAV_ACC_RAD": _r(10.0),
+        "NAV_MC_ALT_RAD": _r(0.8),
         "NAV_DLL_ACT": _i(0),
         "NAV_RCL_ACT": _i(2),
         "RTL_DESCEND_ALT": _r(30.0),

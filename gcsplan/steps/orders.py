@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from gcsplan.check.judge import judge
+from gcsplan.check.tuning import Tuning
 from gcsplan.errors import GcsplanError, VehicleRefused
 from gcsplan.mavlink.mission import Mission
 
@@ -66,11 +68,11 @@ def _judge_again(job: Job) -> session.Judge | None:
         return None
     world, vehicle, first = job.world, job.vehicle, job.verdict
 
-    def again(read_back: Mission) -> str | None:
+    def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
         # Home on board is where the vehicle stands now; altitudes count from where the mission was planned to start.
         verdict = judge(
             replace(read_back, home=job.mission.home), vehicle, world, rtl_rel_home_m=job.rtl_rel_home_m,
-            terrain_error_m=job.terrain_error_m,
+            terrain_error_m=job.terrain_error_m, tuning=Tuning.of(values),
         )  # fmt: skip
         if verdict.safe is True or (verdict.safe is None and first.safe is None):
             return None
