@@ -1,4 +1,4 @@
-"""Failsafe, return, fence and corner parameters: which are read, and what their values mean for a mission. Never written."""
+"""Failsafe, return, fence and corner parameters: which are read, and what they mean for a mission. Never written."""
 
 from __future__ import annotations
 
