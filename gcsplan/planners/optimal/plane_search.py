@@ -29,6 +29,8 @@ PAST = 12
 DARED_M, PINCHED_M = (0.05, 0.1, 0.2, 0.4), 1.0
 """By how much more than it lacked the nodes beside a track through a slit are raised, one after the other, and what it
 may lack for another to be looked for."""
+PROVED = 1e-8
+"""A smaller gap, as a part, is that of rounding: the best path is proved the best."""
 NODE_S, NODE_MB = 2e-6, 3e-4
 """Counted seconds and megabytes of a node that is looked at, with what a search over it keeps."""
 SMALL = 50.0
@@ -113,7 +115,7 @@ class PlaneSearch:
                 limit = self.limit(leg)
             if limit > leg.reach_m:
                 leg.flood((limit / leg.length_m - 1.0) * (1.0 + 1e-9), limit)
-        return not incumbent.done()
+        return incumbent.gap > PROVED
 
     def try_below(self, cap_m: float, *, fine: bool, exactly: Exactly | None = None) -> bool:
         """Look for a path below a cap; True if it is the best so far."""
