@@ -135,11 +135,13 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
     margin = max(least, min(part * extent, MARGIN_MOST_M), 0.25 * extent)
     box = np.array([*(low - margin), *(high + margin)])
     grown = box.copy()
+    # Past the end of a zone there must be room for its clearance twice: from the zone, and from unknown ground.
+    beside = max(least, 0.1 * extent)
     for zone in zones:
         west, south, east, north = zone.bounds
         if west < box[2] and east > box[0] and south < box[3] and north > box[1]:
-            grown[:2] = np.minimum(grown[:2], (west - least, south - least))
-            grown[2:] = np.maximum(grown[2:], (east + least, north + least))
+            grown[:2] = np.minimum(grown[:2], (west - beside, south - beside))
+            grown[2:] = np.maximum(grown[2:], (east + beside, north + beside))
     # A zone as large as a country must not load a country's DEM.
     grown[:2] = np.maximum(grown[:2], low - 3.0 * margin)
     grown[2:] = np.minimum(grown[2:], high + 3.0 * margin)

@@ -27,7 +27,7 @@ RATES = {
 """Counted seconds of a lattice's node made ready, a mesh's portal and an interval opened on one, a leg under the exact
 check and a cell of terrain that it crosses, a piece of a tube, a place whose floor is read, a corner of an outline
 triangulated, a label of the lattice search, and a point of a line that is pulled, for each size of move."""
-COUNTED = 0.35
+COUNTED = 0.45
 """What part of the budget's seconds may be spent as counted work."""
 FIRST, FIRST_S = 3.0, 0.5
 """How many times ``budget_s`` the search for a first path may take, and how many seconds on top."""
