@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
+import json
 import math
 import multiprocessing as mp
 import time
@@ -33,6 +34,8 @@ COUNT = 100
 KILL_MB, KILL_S = 6000.0, 120.0
 """A process that takes more is ended."""
 GROUND_ALIKE_M = 1e-6
+WORTH = 1e-3
+"""Percent that a search must gain to count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +60,8 @@ class Outcome:
     memory_mb: float | None = None
     stopped_by: str = ""
     detail: str = ""
+    search: str = "[]"
+    """JSON: the steps of the plan, as `gcsplan.planners.problem.Step` has them."""
 
 
 def problem_of(one: Everyday) -> Problem:
@@ -162,6 +167,7 @@ def _solve(problem: Problem) -> dict[str, Any]:
         "status": "solved" if passes(problem, solution.path.points) else "unsafe",
         "cost": cost, "bound": bound, "first_path_s": solution.first_path_s, "stopped_by": solution.stopped_by,
         "gap_percent": None if not bound else 100.0 * (cost / bound - 1.0),
+        "search": json.dumps([asdict(step) for step in solution.search]),
     }  # fmt: skip
 
 
@@ -210,7 +216,27 @@ def report(outcomes: Sequence[Outcome]) -> str:
             f"{_some(group, 'first_path_s', 50, 100)} | {_some(group, 'planning_s', 50, 90, 100)} | "
             f"{_some(group, 'memory_mb', 100)} |"
         )
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, "", *_searches(outcomes)]) + "\n"
+
+
+def _searches(outcomes: Sequence[Outcome]) -> list[str]:
+    """What each search did in all missions; Markdown."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for outcome in outcomes:
+        for step in json.loads(outcome.search):
+            found.setdefault(step["name"], []).append(step)
+    lines = [
+        "| search | runs | better path in | most gained % | higher bound in | most raised % | refused | s in all |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, steps in sorted(found.items(), key=lambda item: -len(item[1])):
+        gained, raised = ([step[key] for step in steps] for key in ("gained_percent", "bound_percent"))
+        lines.append(
+            f"| {name} | {len(steps)} | {sum(g > WORTH for g in gained)} | {max(gained):.3g} | "
+            f"{sum(r > WORTH for r in raised)} | {max(raised):.3g} | {sum(step['refused'] for step in steps)} | "
+            f"{sum(step['s'] for step in steps):.1f} |"
+        )
+    return lines
 
 
 def _some(group: Sequence[Outcome], name: str, *percents: float) -> str:

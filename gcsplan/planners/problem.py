@@ -89,6 +89,7 @@ class Problem:
             return np.zeros(0, np.bool_)
         grid = self.airspace.surface.grid
         metres = float(np.abs(end[:, :2] - start[:, :2]).sum())
+        self.budget.spend("check", 1)
         self.budget.spend("leg", len(start))
         self.budget.spend("cell", metres / float(grid.metres_per_cell(*self.start[:2]).min()))
         return self.airspace.clear(Legs.between(start, end, self.limits), self.limits)

@@ -57,6 +57,7 @@ class Judge:
         new = np.array([k for k, leg in enumerate(legs) if leg.tobytes() not in self.passed], np.intp)
         if not len(new):
             return ()
+        self.problem.budget.spend("check", 3)  # of which the violations are written down
         self.problem.budget.spend("leg", len(new))
         found = self.problem.airspace.examine(self._legs(legs[new]), self.problem.limits).violations
         bad = {v.leg for v in found}
