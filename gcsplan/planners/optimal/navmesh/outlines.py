@@ -266,10 +266,12 @@ class Solids:
             if track is None:
                 return None
             line = shapely.LineString(track.points)
-            near = [k for k in self._tree.query(line).tolist() if which[k] and k not in self._known]
-            met = {k for k in near if shapely.relate_pattern(self.outlines[k].shape, line, "T********")}
+            near = [k for k in self._tree.query(line).tolist() if which[k]]
+            # Coarse arcs lie inside the true ones, or outside: what a track passes so near is drawn finely first.
+            finer = [k for k in near if self.outlines[k].refine(track.points) and k in self._known]
+            unknown = (k for k in near if k not in self._known)
+            met = {k for k in unknown if shapely.relate_pattern(self.outlines[k].shape, line, "T********")}
             self._known |= met
-            finer = [k for k in known if self.outlines[k].refine(track.points)]
             if not met and not finer:
                 return track
             if not self._budget.goes_on():
