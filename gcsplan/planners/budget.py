@@ -26,9 +26,9 @@ RATES = {
     "pull": 80e-6,
 }
 """Counted seconds of a lattice's node made ready, a mesh's portal and an interval opened on one, a call of the exact
-check with what is made of it, a leg under it and a cell of terrain that it crosses, a piece of a tube, a place whose floor
-is read, a corner of an outline triangulated, a label of the lattice search, and a point of a line that is pulled, for
-each size of move. A fit over 140 plans of all kinds."""
+check with what is made of it, a leg under it and a cell of terrain that it crosses, a piece of a tube, a place whose
+floor is read, a corner of an outline triangulated, a label of the lattice search, and a point of a line that is pulled,
+for each size of move. A fit over 140 plans of all kinds."""
 COUNTED = 0.4
 """What part of the budget's seconds may be spent as counted work."""
 FIRST, FIRST_S = 3.0, 0.5
