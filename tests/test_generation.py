@@ -144,7 +144,8 @@ def test_the_campaign_kills_at_every_system_call_that_changes_the_folder(tmp_pat
     write_outputs(here, {"uav1.plan": "a", "x.csv": "b"})
     ended(strace, "-f", "-y", "-o", str(log), "-e", f"trace={names}", sys.executable, "-c", f"{step}step()")
     seen = [x for x in log.read_text().splitlines() if str(here) in x and " = -1 " not in x and "resumed" not in x]
-    calls = [x for x in seen if "open" not in x or re.search(r"O_(CREAT|WRONLY|RDWR|TRUNC)", x)]
+    # By the call's name: the path of a test that runs in a worker holds "popen", too.
+    calls = [x for x in seen if not re.search(r"^\d+ +open", x) or re.search(r"O_(CREAT|WRONLY|RDWR|TRUNC)", x)]
     assert int(ended(sys.executable, "-c", step + count)) == len(calls), calls
 
 
