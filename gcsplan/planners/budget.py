@@ -28,7 +28,7 @@ RATES = {
 """Counted seconds of a lattice's node made ready, a mesh's portal and an interval opened on one, a call of the exact
 check with what is made of it, a leg under it and a cell of terrain that it crosses, a piece of a tube, a place whose
 floor is read, a corner of an outline triangulated, a label of the lattice search, and a point of a line that is pulled,
-for each size of move. A fit over 140 plans of all kinds."""
+for each size of move. Rounded from a fit over plans of all kinds."""
 COUNTED = 0.4
 """What part of the budget's seconds may be spent as counted work."""
 FIRST, FIRST_S = 3.0, 0.5
@@ -46,8 +46,6 @@ class Budget:
     begun_s: float = field(default_factory=time.perf_counter)
     spent: float = 0.0
     """Counted seconds so far."""
-    held_mb: float = 0.0
-    """What the searches keep between each other, counted."""
     clocked_out: bool = False
     """Whether the clock stopped something, so that another run may end elsewhere."""
     ran_out: bool = False
@@ -100,7 +98,7 @@ class Budget:
     @property
     def room_mb(self) -> float:
         """Megabytes that the next search may take."""
-        return max(self.megabytes - self.held_mb, 0.0)
+        return self.megabytes
 
     @classmethod
     def endless(cls) -> Budget:
