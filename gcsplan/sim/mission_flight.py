@@ -75,15 +75,17 @@ class Flown:
         stops = [(at, where) for at, where in stops if self.begin_s[lane] <= at <= end_s]
         flown = self.along_m[:, lane]
         passed = s[(track.hold_s == PASSED) & (s < flown[-1])]
-        times = np.concatenate([self.times_s[kept], [at for at, _ in stops], np.interp(passed, flown, self.times_s)])
-        along = np.concatenate([flown[kept], [where for _, where in stops], passed])
-        times, first = np.unique(times, return_index=True)
-        along = np.maximum.accumulate(along[first])
+        sampled, first = np.unique(np.append(self.times_s[kept], [at for at, _ in stops]), return_index=True)
+        sampled_m = np.maximum.accumulate(np.append(flown[kept], [where for _, where in stops])[first])
+        slack = track.slack_m(sampled, sampled_m)
+        times, first = np.unique(np.append(sampled, np.interp(passed, sampled_m, sampled)), return_index=True)
+        along = np.maximum.accumulate(np.append(sampled_m, passed)[first])
         middle = 0.5 * (along[1:] + along[:-1])
         piece = np.clip(np.searchsorted(s, middle, side="right") - 1, 0, len(track.column) - 1)
+        of = np.searchsorted(sampled, 0.5 * (times[1:] + times[:-1]), side="right") - 1
         return Trace(
             track.name, times, self._places(lane, times, along), track.column[piece], track.seq[piece],
-            float(self.arrive_s[lane]), 0.0, track.slack_m(SAMPLE_S), track.ends_in_air and not leaves, leaves,
+            float(self.arrive_s[lane]), 0.0, slack[of], track.ends_in_air and not leaves, leaves,
         )  # fmt: skip
 
     def _places(self, lane: int, times: Floats, along: Floats) -> Floats:

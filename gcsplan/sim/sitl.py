@@ -338,5 +338,6 @@ def _trace(log: _Log, part: Part, world: World) -> Trace:
     last = part.mission.items[-1].command
     return Trace(
         name, times[begin:], points[begin:], ((vertical & moved) | before)[begin:], items[:-1][begin:].astype(np.intp),
-        arrive_s, _SLACK_M, _SLACK_M, not log.down and last not in (m.LAND, m.RTL) and not part.leaves, part.leaves,
+        arrive_s, _SLACK_M, np.full(len(times) - begin - 1, _SLACK_M),
+        not log.down and last not in (m.LAND, m.RTL) and not part.leaves, part.leaves,
     )  # fmt: skip

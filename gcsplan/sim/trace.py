@@ -45,8 +45,8 @@ class Trace:
     """One aircraft's way through the air.
 
     ``times_s`` (M,) rising, ``points`` (M, 3) east_m, north_m, amsl_m, from leaving the ground to the end. Its line is
-    within ``off_m`` of the straight ones between them; at every moment it is within ``slack_m`` of where an even motion
-    between them puts it. ``column`` and ``seq`` (M - 1,): whether a piece belongs to a take-off or landing,
+    within ``off_m`` of the straight ones between them; at every moment it is within ``slack_m`` (M - 1,) of where an
+    even motion between them puts it. ``column`` and ``seq`` (M - 1,): whether a piece belongs to a take-off or landing,
     and the wire item it was flown for. ``arrive_s``: the goal reached; NaN where it never was. ``stays``: it hangs in
     the air at the end; ``leaves``: it is gone after the end.
     """
@@ -58,7 +58,7 @@ class Trace:
     seq: NDArray[np.intp]
     arrive_s: float
     off_m: float
-    slack_m: float
+    slack_m: Floats
     stays: bool = False
     leaves: bool = False
 
@@ -187,16 +187,16 @@ def meetings(
 ) -> list[Meeting]:
     """The least distance of each pair nearer than ``needed_m`` while both are in the air, and of the nearest pair.
 
-    Sampled every ``step_s``, and less what may lie between the samples: never optimistic. The nearest stands first.
-    Then those that land within ``needed_m`` of one that has landed up to ``pad_clear_s`` before.
+    Looked for in steps of ``step_s``, then at the traces' own times, and less by how uneven the motion between those
+    may be: never optimistic. The nearest stands first. Then those that land within ``needed_m`` of one that has landed
+    up to ``pad_clear_s`` before.
     """
     found: list[Meeting] = []
     if len(traces) > 1:
         first = math.floor(min(t.begin_s for t in traces) / step_s)
         last = math.ceil(max(t.end_s for t in traces) / step_s) + 1
         times = step_s * np.arange(first, last + 1, dtype=np.float64)
-        places = np.stack([t.at(times) for t in traces])
-        found = _in_the_air(traces, times, places, needed_m)
+        found = _in_the_air(traces, times, needed_m)
     landed = sorted((t for t in traces if not t.stays and not t.leaves), key=lambda t: t.end_s)
     for n, late in enumerate(landed):
         for early in landed[:n]:
@@ -206,43 +206,65 @@ def meetings(
     return found
 
 
-def _in_the_air(traces: Sequence[Trace], times: Floats, places: Floats, needed_m: float) -> list[Meeting]:
+def _in_the_air(traces: Sequence[Trace], times: Floats, needed_m: float) -> list[Meeting]:
     flying = np.array([(times[1:] >= t.begin_s) & ((times[:-1] <= t.end_s) | t.stays) for t in traces])
-    speed = np.linalg.norm(np.diff(places, axis=1), axis=2)
     n = len(times) - 1
     blocks = np.arange(0, n, BLOCK)
-    reach = np.array([np.add.reduceat(one, blocks) for one in speed])  # no farther than this within a block
+    places = np.stack([t.at(times[blocks]) for t in traces])
+    reach = np.array([_reach(t, times[blocks], times[np.minimum(blocks + BLOCK, n)]) for t in traces])
     i, j = np.triu_indices(len(traces), 1)
     bound = np.full((len(i), len(blocks)), np.inf)
     for m, (a, b) in enumerate(zip(i.tolist(), j.tolist(), strict=True)):
         both = np.logical_or.reduceat(flying[a] & flying[b], blocks)
-        apart = np.linalg.norm(places[a, blocks] - places[b, blocks], axis=1)
+        apart = np.linalg.norm(places[a] - places[b], axis=1)
         bound[m] = np.where(both, apart - reach[a] - reach[b], np.inf)
     found: list[Meeting] = []
     best = math.inf
     for m in np.argsort(bound.min(axis=1)).tolist():
         if bound[m].min() > max(best, needed_m):
             break
-        a, b = int(i[m]), int(j[m])
+        a, b = traces[i[m]], traces[j[m]]
         rows = (blocks[bound[m] <= max(best, needed_m)][:, None] + np.arange(BLOCK)).ravel()
         rows = rows[rows < n]
-        rows = rows[flying[a, rows] & flying[b, rows]]
-        if not len(rows):
-            continue
-        distance, at = _nearest(places[a] - places[b], rows)
-        low = int(distance.argmin())
-        least = max(0.0, float(distance[low]) - 2.0 * (traces[a].slack_m + traces[b].slack_m))
-        when = float(times[rows[low]] + at[low] * (times[1] - times[0]))
+        rows = rows[flying[i[m], rows] & flying[j[m], rows]]
+        least, when = _nearest(a, b, times, rows)
         if least < needed_m or least < best:
-            found.append(Meeting((traces[a].name, traces[b].name), least, when))
+            found.append(Meeting((a.name, b.name), least, when))
         best = min(best, least)
     found.sort(key=lambda meeting: meeting.distance_m)
     return [f for k, f in enumerate(found) if k == 0 or f.distance_m < needed_m]
 
 
-def _nearest(apart: Floats, rows: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Least length of the vectors between ``apart[r]`` and ``apart[r + 1]``, straight, and where in [0, 1]."""
-    p, d = apart[rows], apart[rows + 1] - apart[rows]
-    square = np.maximum((d * d).sum(axis=1), 1e-18)
-    f = np.clip(-(p * d).sum(axis=1) / square, 0.0, 1.0)
-    return np.linalg.norm(p + f[:, None] * d, axis=1), f
+def _reach(trace: Trace, begin_s: Floats, end_s: Floats) -> Floats:
+    """No farther than this from where it is at ``begin_s`` is it until ``end_s``."""
+    flown = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(trace.points, axis=0), axis=1)))
+    along = np.interp(end_s, trace.times_s, flown) - np.interp(begin_s, trace.times_s, flown)
+    return np.asarray(along + 2.0 * trace.slack_m.max(initial=0.0))
+
+
+def _nearest(a: Trace, b: Trace, times: Floats, rows: NDArray[np.intp]) -> tuple[float, float]:
+    """The least distance while both fly within the intervals ``rows`` of ``times``, less what is uneven, and when."""
+    begin = max(a.begin_s, b.begin_s)
+    end = min(math.inf if t.stays else t.end_s for t in (a, b))
+    knots = np.unique(np.concatenate([times[rows], times[rows + 1], a.times_s, b.times_s]))
+    knots = knots[(knots >= begin) & (knots <= end)]
+    middle = 0.5 * (knots[1:] + knots[:-1])
+    looked = np.zeros(len(times), np.bool_)
+    looked[rows] = True
+    kept = looked[np.searchsorted(times, middle, side="right") - 1]
+    if not kept.any():
+        return math.inf, math.nan
+    apart = a.at(knots) - b.at(knots)
+    p, d = apart[:-1][kept], np.diff(apart, axis=0)[kept]
+    f = np.clip(-(p * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-18), 0.0, 1.0)
+    distance = np.linalg.norm(p + f[:, None] * d, axis=1) - _uneven(a, middle[kept]) - _uneven(b, middle[kept])
+    low = int(distance.argmin())
+    when = knots[:-1][kept][low] + f[low] * np.diff(knots)[kept][low]
+    return max(0.0, float(distance[low])), float(when)
+
+
+def _uneven(trace: Trace, times_s: Floats) -> Floats:
+    """How far it may be from where an even motion puts it, at ``times_s``."""
+    at = np.searchsorted(trace.times_s, times_s, side="right") - 1
+    inside = (at >= 0) & (at < len(trace.slack_m))
+    return np.where(inside, trace.slack_m[np.where(inside, at, 0)], 0.0)

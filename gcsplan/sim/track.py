@@ -46,7 +46,7 @@ class Track:
     it does not stop; infinite for good. Of the pieces (N - 1,): ``cap_m_s`` the most that climb, descent and corners
     allow along it; ``command_m_s`` the speed over ground that the command means; ``level`` the horizontal part of a
     metre; ``accel_m_s2``; ``column`` (take-off or landing); ``seq`` the wire item. ``goal`` is the node where the path
-    ends. ``bend_m_s2``: the most that its velocity changes.
+    ends.
     """
 
     name: str
@@ -62,7 +62,6 @@ class Track:
     ends_in_air: bool
     slowing_m_s2: float
     airspeed_m_s: float
-    bend_m_s2: float
     not_flown: tuple[str, ...]
 
     @property
@@ -70,11 +69,24 @@ class Track:
         """(N - 1,) of each piece, in space."""
         return np.asarray(np.linalg.norm(np.diff(self.points, axis=0), axis=1))
 
-    def slack_m(self, sample_s: float) -> float:
-        """How far the motion may stray from the straight line between two of its points ``sample_s`` apart."""
-        fastest = float(np.minimum(self.cap_m_s, self.command_m_s / np.maximum(self.level, 0.05)).max())
-        bend = self.bend_m_s2 * sample_s**2 / 8.0
-        return min(bend, 0.5 * fastest * sample_s)
+    def slack_m(self, times_s: Floats, along_m: Floats) -> Floats:
+        """(M - 1,) how far along the track the motion may be from an even one between two of its samples.
+
+        ``times_s``, ``along_m`` (M,): samples, every stop among them. Between two of them the speed changes no faster
+        than their pieces allow. It is also between none and the fastest that they allow, so that what is flown at that
+        speed from sample to sample is even.
+        """
+        seconds, flown = np.diff(times_s), np.diff(along_m)
+        speed = flown / seconds
+        ends = np.cumsum(self.length_m)[:-1]
+        first, last = np.searchsorted(ends, along_m[:-1], side="left"), np.searchsorted(ends, along_m[1:], side="right")
+        ranges = np.column_stack([first, last + 1]).ravel()
+        allowed = np.minimum(self.cap_m_s, self.command_m_s / np.maximum(self.level, 0.05))
+        fastest = np.maximum.reduceat(np.append(allowed, 0.0), ranges)[::2]
+        accel = np.maximum.reduceat(np.append(self.accel_m_s2, 0.0), ranges)[::2]
+        # A lower command takes hold slowly: until then the speed of before counts.
+        fastest = np.maximum.reduce([fastest, speed, np.append(0.0, speed[:-1]), np.full_like(speed, 1e-9)])
+        return np.asarray(np.minimum(accel * seconds**2 / 8.0, flown * (1.0 - speed / fastest)))
 
     def braking(self) -> Floats:
         """(N,) the largest v² at each node from which every later cap and stop can still be met.
@@ -217,7 +229,6 @@ def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics:
         name, points, np.array(line.hold_s), np.array(cap), np.array(command), np.array(level),
         np.array(accel), np.array(column, dtype=np.bool_), np.array(seq, dtype=np.intp), goal,
         not (last.column and last.end[2] < last.start[2]), kinematics.slowing_m_s2, kinematics.airspeed_m_s,
-        math.hypot(max(kinematics.accel_m_s2, kinematics.vertical_accel_m_s2), kinematics.corner_accel_m_s2),
         (*flight.not_judged, *_left_out(flight), *turns),
     )  # fmt: skip
 

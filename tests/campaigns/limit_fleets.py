@@ -1,8 +1,9 @@
 """Fleets whose conflicts are resolved to just the separation that is asked: sampled, and flown in simulated time.
 
-Two or three vehicles cross flat ground, in sequence or together, waiting on the ground, at gates in the air or not at
-all, each early or late within its window. What the planner calls separated is sampled every 10 ms with every vehicle as
-early or late as it may be, and the stored missions are flown by the simulated autopilots, departures moved likewise.
+Two or three vehicles cross flat ground or hills, with or without zones in the middle, in sequence or together, waiting
+on the ground, at gates in the air or not at all, each early or late within its window. What the planner calls separated
+is sampled every 10 ms with every vehicle as early or late as it may be, and the stored missions are flown by the
+simulated autopilots, departures moved likewise.
 A resolved conflict is left just at the limit, so there is nothing to halve.
 """
 
@@ -62,9 +63,30 @@ def _asked(rng: np.random.Generator) -> dict[str, Any]:
     }  # fmt: skip
     if arrival["mode"] == "sequence":
         arrival["interval_s"] = float(rng.uniform(0.0, 25.0))
-    return {
-        "version": 1, "name": "fleet", "frame": {"origin": [36.6, -84.3], "amsl_m": 0}, "terrain": {"flat_m": 0},
+    asked: dict[str, Any] = {
+        "version": 1, "name": "fleet", "frame": {"origin": [36.6, -84.3], "amsl_m": 0}, "terrain": _ground(rng),
         "limits": {"min_agl_m": 40, "max_climb_deg": 30}, "vehicles": vehicles, "arrival": arrival,
+    }  # fmt: skip
+    if rng.random() < 0.4:
+        asked["no_fly"] = [
+            {"center": {"east_m": float(x), "north_m": float(y)}, "radius_m": float(r)}
+            for x, y, r in zip(*rng.uniform(-150.0, 150.0, (2, 2)), rng.uniform(20.0, 90.0, 2), strict=True)
+        ]
+    return asked
+
+
+def _ground(rng: np.random.Generator) -> dict[str, Any]:
+    """Flat ground, or hills that tracks climb over: speeds along them, and so times, differ from those over a plane."""
+    if rng.random() < 0.4:
+        return {"flat_m": 0}
+    return {
+        "peaks": [
+            {
+                "center": [float(x), float(y)], "height_m": float(height_m),
+                "decay_m": [float(d) for d in rng.uniform(120.0, 400.0, 2)],
+            }
+            for x, y, height_m in zip(*rng.uniform(-600.0, 600.0, (2, 4)), rng.uniform(10.0, 90.0, 4), strict=True)
+        ]
     }  # fmt: skip
 
 
