@@ -21,8 +21,9 @@ from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
 from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m, terminals
 from gcsplan.planners.profile.climb_laps import pins_of, ways_up, with_climbs
-from gcsplan.planners.profile.exact import Judge, Unsettled, settle, thinned
+from gcsplan.planners.profile.exact import Judge, Unsettled, settle
 from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, make_track
+from gcsplan.planners.simplify import fewer
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -188,7 +189,7 @@ def straight(problem: Problem, way_m: float) -> Floats | None:
         return None
     judge = Judge(problem)
     found = settle(problem, judge, stops, pinned, pin_m)
-    return None if isinstance(found, Unsettled) else thinned(problem, judge, *found, WORTH * _unit(problem) * way_m)
+    return None if isinstance(found, Unsettled) else fewer(problem, *found, WORTH * _unit(problem) * way_m)[0]
 
 
 def _unit(problem: Problem) -> float:
@@ -302,7 +303,7 @@ class _Work:
         late = time.perf_counter() > deadline_s
         if isinstance(found, Unsettled):
             return None, late
-        return thinned(self.problem, self.judge, *found, WORTH * self.way_m * _unit(self.problem)), late
+        return fewer(self.problem, *found, WORTH * self.way_m * _unit(self.problem))[0], late
 
     def _line(self, way: Floats) -> Line:
         track = self.router.track_of(way)

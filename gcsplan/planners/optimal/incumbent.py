@@ -14,9 +14,8 @@ from gcsplan.planners.lattice.planner import straight_bound
 from gcsplan.planners.optimal.corridor import Stops
 from gcsplan.planners.problem import Problem, Progress, Solution, Step
 from gcsplan.planners.profile.climb_laps import with_laps
-from gcsplan.planners.profile.exact import Judge, Unsettled, settle
+from gcsplan.planners.profile.exact import Judge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
-from gcsplan.planners.profile.waypoints import way_points
 from gcsplan.planners.simplify import fewer, polished
 from gcsplan.world.path import Path
 

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import ENDS_M, Problem
-from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle, thinned
+from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.track import Flown, Lacking, Shut, Track, distances, fly, lacking
+from gcsplan.planners.simplify import fewer
 from gcsplan.world.path import Path
 
 Floats = NDArray[np.float64]
@@ -66,7 +67,7 @@ def ways_up(problem: Problem, place: tuple[float, float], from_amsl: float, to_a
         pinned[[0, -1]] = True
         found = settle(part, judge, points, pinned, np.full(len(points), np.nan))
         if not isinstance(found, Unsettled):
-            return thinned(part, judge, *found, 0.0)
+            return fewer(part, *found, 0.0)[0]
     return None
 
 
@@ -116,7 +117,7 @@ def _lowered(problem: Problem, points: Floats) -> Floats | None:
         track = extended[0]
         settled = settle(problem, judge, track.points, track.pinned, track.pin_m)
         if not isinstance(settled, Unsettled):
-            found.append(thinned(problem, judge, *settled, 0.0))
+            found.append(fewer(problem, *settled, 0.0)[0])
     whole: list[Floats | None] = [points]
     if points[0, 2] > problem.start[2]:
         whole.insert(0, ways_up(problem, problem.start[:2], problem.start[2], float(points[0, 2])))

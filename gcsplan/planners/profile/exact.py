@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
-from gcsplan.planners.profile.waypoints import way_points
 from gcsplan.world.airspace import Legs, Tube, Violation
 
 Floats = NDArray[np.float64]
@@ -49,7 +48,6 @@ class Judge:
 
     problem: Problem
     passed: set[bytes] = field(default_factory=set)
-    failed: set[bytes] = field(default_factory=set)
 
     def violations(self, points: Floats) -> tuple[tuple[int, Violation], ...]:
         """Leg and violation, of a path (N, 3)."""
@@ -64,18 +62,35 @@ class Judge:
         self.passed.update(legs[k].tobytes() for i, k in enumerate(new) if i not in bad)
         return tuple((int(new[v.leg]), v) for v in found)
 
-    def clear(self, legs: Floats) -> Bools:
-        """(K,) whether each of the legs (K, 6), start and end, is legal."""
-        keys = [leg.tobytes() for leg in legs]
-        new = np.array([k for k, key in enumerate(keys) if key not in self.passed and key not in self.failed], np.intp)
-        if len(new):
-            good = self.problem.legal(legs[new, :3], legs[new, 3:])
-            for k, ok in zip(new, good, strict=True):
-                (self.passed if ok else self.failed).add(keys[k])
-        return np.array([key in self.passed for key in keys], bool)
-
     def _legs(self, legs: Floats) -> Legs:
         return Legs.between(legs[:, :3], legs[:, 3:], self.problem.limits)
+
+
+def way_points(problem: Problem, track: Track, flown: Flown) -> tuple[Floats, NDArray[np.bool_]]:
+    """(N, 3) every vertex of the track and of its profile, and (N,) which of them must stay."""
+    profile = flown.profile
+    s = np.concatenate([track.s_m, profile.s_m])
+    must = np.concatenate([track.pinned, np.zeros(len(profile.s_m), bool)])
+    order = np.lexsort((~must, s))
+    s, must = s[order], must[order]
+    # Vertices of both within a millimetre are one; the pinned one comes first.
+    group = np.concatenate([[0], np.cumsum(np.diff(s) > 1e-3)])
+    first = np.flatnonzero(np.concatenate([[True], np.diff(group) > 0]))
+    pins = np.zeros(len(first), bool)
+    np.logical_or.at(pins, group, must)
+    at = s[first]
+    for k in np.flatnonzero(pins):
+        at[k] = s[group == k][must[group == k]][0]
+    points = np.stack(
+        [
+            np.interp(at, track.s_m, track.points[:, 0]),
+            np.interp(at, track.s_m, track.points[:, 1]),
+            np.asarray(profile.at(at)),
+        ],
+        axis=-1,
+    )
+    points[0], points[-1] = problem.start, problem.goal
+    return points, pins
 
 
 def settle(
@@ -165,26 +180,3 @@ def _room(problem: Problem, track: Track, s_m: Floats) -> tuple[Floats, Floats]:
     east, north = (np.interp(s_m, track.s_m, track.points[:, k]) for k in range(2))
     air, limits = problem.airspace, problem.limits
     return np.asarray(problem.floors(east, north)), np.asarray(air.ceiling_amsl(east, north, limits))
-
-
-def thinned(problem: Problem, judge: Judge, points: Floats, pinned: Bools, worth: float) -> Floats:
-    """(M, 3) fewer way points: those are dropped whose absence is legal and costs less than ``worth`` all together."""
-    spent = 0.0
-    for _ in range(len(points)):
-        if len(points) < 3:
-            break
-        now = problem.leg_costs(points[:-1], points[1:])
-        rise = problem.leg_costs(points[:-2], points[2:]) - now[:-1] - now[1:]
-        wanted = np.flatnonzero((rise <= worth - spent) & ~pinned[1:-1])
-        legal = judge.clear(np.hstack([points[wanted], points[wanted + 2]]))
-        drop = np.zeros(len(points), bool)
-        wanted = wanted[legal]
-        for i in wanted[np.argsort(rise[wanted], kind="stable")] + 1:
-            extra = max(float(rise[i - 1]), 0.0)
-            if not drop[i - 1] and not drop[i + 1] and spent + extra <= worth:
-                drop[i] = True
-                spent += extra
-        if not drop.any():
-            break
-        points, pinned = points[~drop], pinned[~drop]
-    return points

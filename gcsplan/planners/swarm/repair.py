@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.exact import way_points
 from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
-from gcsplan.planners.profile.waypoints import thin, way_points
+from gcsplan.planners.simplify import fewer
 from gcsplan.planners.swarm import scene_kernels as k
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Legs, Violation
@@ -92,7 +93,7 @@ def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
         points, pinned = way_points(problem, track, flown)
         found = violations(problem, points)
         if not found:
-            few = thin(problem, points, pinned, WORTH * flown.cost)
+            few = fewer(problem, points, pinned, WORTH * flown.cost)[0]
             return points if violations(problem, few) else few
         s = distances(points[:, :2])
         for v in found:
