@@ -19,8 +19,9 @@ from scipy.sparse.csgraph import dijkstra
 from gcsplan.bench.terrain_problems import problems
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal import planner as optimal
-from gcsplan.planners.optimal.navmesh import mesh as mesh_module
-from gcsplan.planners.optimal.navmesh.grid import Mesh, Plane
+from gcsplan.planners.optimal.navmesh import polyanya, portals
+from gcsplan.planners.optimal.navmesh.grid import Plane
+from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import make_pieces, make_portals, sort_portals
 
 Floats = NDArray[np.float64]
@@ -45,32 +46,27 @@ def mesh_of(
     form: Floats = PLAIN,
     own: dict[int, Floats] | None = None,
     block: int = 4,
-    owner: NDArray[np.int32] | None = None,
-    low: dict[int, Floats] | None = None,
 ) -> Mesh:
-    """The mesh of an excess lattice; ``own`` (W, 4) the walls of cells that have their own, on the first sheet; ``low``
-    on the second, where ``owner`` tells which cells are there, too."""
+    """The mesh of an excess lattice; ``own`` (W, 4) the walls of cells that have their own."""
     ny, nx = excess.shape
     cells = (ny - 1) * (nx - 1)
     excess = np.ascontiguousarray(excess, np.float64)
     diagonal = np.zeros(cells, np.int8) if diagonal is None else diagonal
-    of, rows = np.zeros((cells, 1 if owner is None else 2), np.int32), [np.zeros(5)]
-    for sheet, there in enumerate((own, low)):
-        for k, walls in (there or {}).items():
-            for wall in walls:
-                rows.append(np.array([*wall, of[k, sheet]]))
-                of[k, sheet] = len(rows)
-    owner = np.zeros(0, np.int32) if owner is None else owner
+    of, rows = np.zeros(cells, np.int32), [np.zeros(5)]
+    for k, walls in (own or {}).items():
+        for wall in walls:
+            rows.append(np.array([*wall, of[k]]))
+            of[k] = len(rows)
     values = np.array(rows)
     i, j = np.meshgrid(np.arange(nx), np.arange(ny))
     x, y = (form[0, 0] * i + form[0, 1] * j, form[1, 0] * i + form[1, 1] * j)
-    piece = np.empty((cells, 2 * of.shape[1]), np.int32)
+    piece = np.empty((cells, 2), np.int32)
     span = np.tile(np.array([0, nx - 1], np.int32), (ny - 1, 1))
     around = np.tile(np.array([0, nx], np.int32), (ny, 1))
-    count = make_pieces(excess, of, values, diagonal, owner, around, span, piece, block)
+    count = make_pieces(excess, of, values, diagonal, around, span, piece, block)
     room = 32 * cells + 64
     ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
-    n = make_portals(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, np.empty(2))
+    n = make_portals(excess, of, values, diagonal, span, piece, x, y, ends, names, joins, np.empty(2))
     assert n <= room
     start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
     sort_portals(joins[:n], start, order)
@@ -91,10 +87,10 @@ def mesh_of(
             problem=SimpleNamespace(budget=Budget.endless()),
         ),
     )
-    named = 8 * (nx * ny + 1) * of.shape[1]
+    named = 8 * (nx * ny + 1)
     return Mesh(
-        plane, 1, 0, 0, excess, excess, diagonal, span, piece, start, ends[:n], names[:n], joins[:n], order, named
-    )  # fmt: skip
+        start, ends[:n], names[:n], joins[:n], order, named, plane, 1, 0, 0, excess, excess, diagonal, span, piece
+    )
 
 
 def below_zero(corners: Floats, values: Floats) -> Floats:
@@ -229,7 +225,7 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
             for j in range(len(places)):
                 if i == j:
                     continue
-                way = mesh.way(turned(places[i]), turned(places[j]))
+                way = mesh.track(turned(places[i]), turned(places[j]))
                 if way is None:
                     assert math.isinf(wide[i, j])
                     shut += 1
@@ -246,67 +242,6 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
     assert bent > 15
     assert shut > 0
     assert exact > 0.8 * compared
-
-
-def on_two_sheets(areas: tuple[Free, Free], inside: shapely.Geometry, places: Floats, more: Floats) -> Floats:
-    """(places, places) shortest ways over two free areas that are one outside a shape; bent at corners and ``more``."""
-    nodes = np.vstack([places, *(area.corners for area in areas), more])
-    n = len(nodes)
-    deep = shapely.contains_properly(_wider(inside, -1e-6), shapely.points(nodes))
-    i, j = np.triu_indices(n, 1)
-    length = np.maximum(np.hypot(*(nodes[i] - nodes[j]).T), 1e-12)
-    rows, cols, cost = [], [], []
-    for sheet, area in enumerate(areas):
-        seen = area.sight(nodes[i], nodes[j])
-        # What is not deep inside is on both sheets, and known by the first one's numbers.
-        rows.append(np.where(deep[i], i + sheet * n, i)[seen])
-        cols.append(np.where(deep[j], j + sheet * n, j)[seen])
-        cost.append(length[seen])
-    edges = np.unique(np.stack([np.concatenate(rows), np.concatenate(cols)]), axis=1, return_index=True)
-    graph = csr_array((np.concatenate(cost)[edges[1]], tuple(edges[0])), shape=(2 * n, 2 * n))
-    found = dijkstra(graph, directed=False, indices=np.arange(len(places)))
-    return np.asarray(found[:, : len(places)])
-
-
-@pytest.mark.slow
-def test_ways_over_two_sheets_change_them_outside_alone() -> None:
-    rng = np.random.default_rng(5)
-    compared = changed = 0
-    for _ in range(6):
-        size = int(rng.integers(7, 10))
-        cells = (size - 1) ** 2
-        excess = np.where(rng.random((size, size)) < 0.12, 1.0, -1.0) * rng.uniform(0.3, 1.0, (size, size))
-        diagonal = rng.integers(0, 2, cells).astype(np.int8)
-        first, last = (2, 2), (size - 3, size - 3)
-        j, i = np.divmod(np.arange(cells), size - 1)
-        owned = (j >= first[0]) & (j < last[0]) & (i >= first[1]) & (i < last[1])
-        # Each of the cells is shut on one sheet, or on neither.
-        which = rng.integers(0, 3, cells)
-        shut = [{int(k): np.full((1, 4), 1.0) for k in np.flatnonzero(owned & (which == n))} for n in (0, 1)]
-        mesh = mesh_of(excess, diagonal, PLAIN, shut[0], owner=owned.astype(np.int32), low=shut[1])
-        one, other = (Free(excess, diagonal, PLAIN, walls) for walls in shut)
-        inside = shapely.box(*(PLAIN[0, 0] * np.array([first[1], first[0], last[1], last[0]], float)))
-        places = one.places(rng, 24, PLAIN, excess.shape)
-        places = places[~shapely.contains_xy(_wider(inside, 0.01), places)][:8]
-        i, j = np.meshgrid(np.arange(first[1], last[1] + 1), np.arange(first[0], last[0] + 1))
-        rim = PLAIN[0, 0] * np.stack([i.ravel(), j.ravel()], axis=-1)
-        t = np.linspace(0.0, 1.0, 25)[:, None]
-        box = shapely.get_coordinates(inside)
-        between = np.vstack([a + t * (b - a) for a, b in pairwise(box)])
-        least = on_two_sheets((one, other), inside, places, between)
-        most = on_two_sheets((one.narrowed(), other.narrowed()), inside, places, rim)
-        whole = Free(excess, diagonal, PLAIN).distances(places, len(places))
-        for a in range(len(places)):
-            for b in range(len(places)):
-                way = mesh.way(turned(places[a]), turned(places[b])) if a != b else None
-                if a == b or (way is None and math.isinf(most[a, b])):
-                    continue
-                assert way is not None
-                assert least[a, b] * (1.0 - 1e-3) <= way.length_m <= most[a, b] * (1.0 + 1e-6)
-                compared += 1
-                changed += way.length_m > whole[a, b] * (1.0 + 1e-6)
-    assert compared > 100
-    assert changed > 20
 
 
 @pytest.mark.parametrize("form", EACH_FORM)
@@ -326,7 +261,7 @@ def test_where_walls_touch_exactly_ways_are_legal_and_shorter_than_round_the_tou
         lowest, highest = (f.distances(places, len(places)) for f in (most, least))
         for i in range(len(places)):
             for j in range(len(places)):
-                way = mesh.way(turned(places[i]), turned(places[j])) if i != j else None
+                way = mesh.track(turned(places[i]), turned(places[j])) if i != j else None
                 if way is not None:
                     assert way.length_m >= lowest[i, j] * (1.0 - 1e-6)
                     assert most.sight(way.points[:-1], way.points[1:]).all()
@@ -354,7 +289,7 @@ def test_a_way_is_never_longer_than_any_bent_line_that_is_free(seed: int, form: 
     )
     seen[:2] = False
     for by in places[seen]:
-        way = mesh.way(turned(a), turned(b))
+        way = mesh.track(turned(a), turned(b))
         assert way is not None
         assert way.length_m <= (math.dist(a, by) + math.dist(by, b)) * (1.0 + 1e-9)
 
@@ -367,7 +302,7 @@ def test_a_saddle_is_crossed_where_its_diagonal_says_so(corners: tuple[float, ..
     a, b = ((1.0, 0.5), (9.0, 9.5)) if low == 0 else ((9.0, 0.5), (1.0, 9.5))
     for diagonal, passed in ((low, True), (1 - low, False)):
         cut = np.array([diagonal], np.int8)
-        assert (mesh_of(excess, cut).way(a, b) is not None) == passed
+        assert (mesh_of(excess, cut).track(a, b) is not None) == passed
         assert math.isfinite(Free(excess, cut, PLAIN).distances(np.array([a, b]), 1)[0, 1]) == passed
 
 
@@ -386,7 +321,7 @@ def test_starts_on_nodes_edges_and_the_rim_find_the_same_way() -> None:
         true = free.distances(places, len(places)) if len(places) else np.zeros((0, 0))
         for a in range(len(places)):
             for b in range(len(places)):
-                way = mesh.way(turned(places[a]), turned(places[b])) if a != b else None
+                way = mesh.track(turned(places[a]), turned(places[b])) if a != b else None
                 if a != b and math.isfinite(true[a, b]):
                     assert way is not None
                     assert way.length_m == pytest.approx(true[a, b], rel=1e-6)
@@ -405,13 +340,13 @@ def test_a_limit_shuts_out_all_that_is_longer_and_nothing_else() -> None:
         if len(places) < 2:
             continue
         a, b = turned(places[0]), turned(places[1])
-        way = mesh.way(a, b)
+        way = mesh.track(a, b)
         if way is None:
             continue
-        again = mesh.way(a, b, way.length_m * (1.0 + 1e-9))
+        again = mesh.track(a, b, way.length_m * (1.0 + 1e-9))
         assert again is not None
         assert again.length_m == way.length_m
-        assert mesh.way(a, b, way.length_m * (1.0 - 1e-9)) is None
+        assert mesh.track(a, b, way.length_m * (1.0 - 1e-9)) is None
         compared += 1
     assert compared > 8
 
@@ -433,7 +368,7 @@ def test_a_flood_says_of_no_piece_that_it_is_farther_than_it_is(slack: float, fo
         true = free.narrowed().distances(places, 2)
         a, b = turned(places[0]), turned(places[1])
         way, guide = mesh.flood(a, b, math.inf, slack)
-        plain = mesh.way(a, b)
+        plain = mesh.track(a, b)
         assert (way is None) == (plain is None)
         if way is None or plain is None:
             continue
@@ -464,7 +399,7 @@ def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block
         if len(places) < 6:
             continue
         a, b = turned(places[0]), turned(places[1])
-        shortest = mesh.way(a, b)
+        shortest = mesh.track(a, b)
         if shortest is None:
             continue
         limit = shortest.length_m * float(rng.choice([1.0 + 1e-9, 1.02, 1.1, 1.4]))
@@ -473,7 +408,7 @@ def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block
         corridor = away.between(left, limit)
         left_out += int((~corridor).sum())
         for place in [places[0], *places[2:]]:
-            first, second = mesh.way(a, turned(place)), mesh.way(turned(place), b)
+            first, second = mesh.track(a, turned(place)), mesh.track(turned(place), b)
             if first is None or second is None or first.length_m + second.length_m >= limit:
                 continue
             points = np.vstack([first.points, second.points])
@@ -505,10 +440,10 @@ def test_a_guide_from_a_mesh_with_more_room_never_changes_the_answer(form: str, 
         a, b = turned(places[0]), turned(places[1])
         first, guide = roomy.flood(b, a, math.inf, slack)
         if first is None:
-            assert tight.way(a, b) is None
+            assert tight.track(a, b) is None
             continue
         limit = first.length_m * (1.0 + slack)
-        plain, guided = tight.way(a, b, limit), tight.way(a, b, limit, guide)
+        plain, guided = tight.track(a, b, limit), tight.track(a, b, limit, guide)
         assert (plain is None) == (guided is None)
         if plain is None or guided is None:
             continue
@@ -526,14 +461,14 @@ def test_no_search_circles_about_a_corner_along_edges_that_are_all_but_straight(
     """On this mission two portals in line with a corner led round and round it, until three million were looked at."""
     (one,) = [p for p in problems("main", 102, count=7) if p.name == "main 102/04, 10 zones"]
     given_up = []
-    real = mesh_module.search
+    real = polyanya.search
 
     def search(*arguments: Any) -> int:
         found = int(real(*arguments))
         given_up.append(found < 0)
         return found
 
-    monkeypatch.setattr(mesh_module, "search", search)
+    monkeypatch.setattr(portals, "search", search)
     optimal.plan(one.problem)
     assert len(given_up) > 5
     assert not any(given_up)
@@ -544,6 +479,6 @@ def test_nothing_is_found_from_where_nothing_is_free() -> None:
     excess[1:3, 1:3] = 5.0
     mesh: Any = mesh_of(excess)
     assert mesh.pieces_at((15.0, 15.0)) == []
-    assert mesh.way((15.0, 15.0), (1.0, 1.0)) is None
-    assert mesh.way((1.0, 1.0), (15.0, 15.0)) is None
+    assert mesh.track((15.0, 15.0), (1.0, 1.0)) is None
+    assert mesh.track((1.0, 1.0), (15.0, 15.0)) is None
     assert mesh.pieces_at((-50.0, 0.0)) == []

@@ -12,7 +12,8 @@ import shapely
 from gcsplan.bench.everyday_oracle import Plane, Unreachable
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh import outlines
-from gcsplan.planners.optimal.navmesh.outlines import Solids, TooLarge
+from gcsplan.planners.optimal.navmesh.outlines import Solids
+from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Refusal, Via
 from gcsplan.world.airspace import Airspace, Legs
@@ -138,7 +139,7 @@ def test_a_low_zone_is_flown_over_where_that_is_shorter() -> None:
 def test_what_would_be_too_large_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outlines, "MOST_CORNERS", 10)
     zones = [Zone("disc", Circle(0.0, 0.0, 300.0))]
-    with pytest.raises(TooLarge):
+    with pytest.raises(Exhausted):
         Solids(zones, 0.0, 1.0, 2e-3, Budget.endless(), outer=True).shortest(
             (-1e3, 0.0), (1e3, 0.0), np.ones(1, np.bool_)
         )

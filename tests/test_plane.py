@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gcsplan.planners.optimal.navmesh.clearance import AROUND, _around
-from gcsplan.planners.optimal.navmesh.grid import Mesh, Plane, make_plane
+from gcsplan.planners.optimal.navmesh.clearance import AROUND, _around, mesh_of
+from gcsplan.planners.optimal.navmesh.grid import Plane, make_plane
+from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.zone_shapes import convex_parts
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
@@ -188,7 +189,7 @@ def test_what_the_exact_check_passes_below_the_cap_is_free_in_the_mesh_for_bound
         ok = legal(problem, places, cap)
         passed += int(ok.sum())
         for fineness in (1, 3):
-            seen = free(plane.mesh(cap, True, fineness), places)
+            seen = free(mesh_of(plane, cap, True, fineness), places)
             assert seen[ok].all(), places[ok & ~seen]
     assert passed > 30
 
@@ -202,10 +203,10 @@ def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str
         problem, plane, cap = world_of(rng, world, limits, 1 + k % 2)
         places = inner(rng, 250, plane)
         for fineness in (1, 4):
-            mesh = plane.mesh(cap, False, fineness)
+            mesh = mesh_of(plane, cap, False, fineness)
             found = [np.zeros((0, 2))]
             for a, b in zip(places[:24:2], places[1:24:2], strict=True):
-                way = mesh.way((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
+                way = mesh.track((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
                 if way is not None:
                     # The ends may lie in the shut part of a triangle that is free in part.
                     found += [way.points[1:-1], 0.5 * (way.points[1:-2] + way.points[2:-1])]
@@ -235,9 +236,9 @@ def test_the_mesh_for_bounds_has_the_straight_way_wherever_the_exact_check_passe
                 np.full(len(a), problem.limits.track_error_m), np.full(len(a), problem.limits.altitude_error_m),
             )  # fmt: skip
             ok |= air.clear(legs, problem.limits)
-        mesh = plane.mesh(cap, True, 1 + k % 3)
+        mesh = mesh_of(plane, cap, True, 1 + k % 3)
         for p, q in zip(a[ok], b[ok], strict=True):
-            way = mesh.way((float(p[0]), float(p[1])), (float(q[0]), float(q[1])))
+            way = mesh.track((float(p[0]), float(p[1])), (float(q[0]), float(q[1])))
             assert way is not None, (p, q)
             assert way.length_m <= math.dist(p, q) * (1.0 + 1e-9), (p, q)
             held += 1
@@ -253,7 +254,7 @@ def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str,
     for k in range(4):
         problem, plane, cap = world_of(rng, world, "errors", 1 + k % 2)
         limits, surface = problem.limits, problem.airspace.surface
-        mesh = plane.mesh(cap, True, fineness)
+        mesh = mesh_of(plane, cap, True, fineness)
         places = inner(rng, 1500, plane)
         cell = (plane.all_at(places) - [mesh.col, mesh.row]) * fineness
         i, j = np.floor(cell).astype(np.intp).T
@@ -287,10 +288,10 @@ def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str,
         plane = make_plane(problem, EVERYWHERE, 1, stride, 6)
         places = inner(rng, 200, plane)
         ok = legal(problem, places, cap)
-        seen = free(plane.mesh(cap, True), places)
+        seen = free(mesh_of(plane, cap, True), places)
         assert seen[ok].all(), places[ok & ~seen]
         passed, shut = passed + int(ok.sum()), shut + int((~seen).sum())
-        tight = free(plane.mesh(cap, False), places)
+        tight = free(mesh_of(plane, cap, False), places)
         assert (seen | ~tight).all(), "a path's mesh has room where the bound's has none"
         assert fine.stride == 1
     assert passed > 30
@@ -313,7 +314,7 @@ def test_a_cropped_mesh_is_the_same_where_it_is_looked_at(world: str, low: bool)
         c, r = np.array([plane.at((float(p[0]), float(p[1]))) for p in places]).T
         here = wanted[np.floor(r).astype(int), np.floor(c).astype(int)]
         for fineness in (1, 2, 5):
-            whole, part = (free(plane.mesh(cap, low, fineness, w), places) for w in (None, wanted))
+            whole, part = (free(mesh_of(plane, cap, low, fineness, w), places) for w in (None, wanted))
             assert np.array_equal(part[here], whole[here])
             compared += int(here.sum())
         assert problem is plane.problem
@@ -326,14 +327,14 @@ def test_ways_are_no_longer_in_the_mesh_for_bounds_than_in_that_for_paths(world:
     compared = 0
     for _ in range(6):
         _, plane, cap = world_of(rng, world, "errors", 1)
-        low, high = plane.mesh(cap, True, 2), plane.mesh(cap, False, 2)
+        low, high = mesh_of(plane, cap, True, 2), mesh_of(plane, cap, False, 2)
         places = inner(rng, 80, plane)
         places = places[legal(plane.problem, places, cap)][:20]
         for a, b in zip(places[::2], places[1::2], strict=False):
             ends = (float(a[0]), float(a[1])), (float(b[0]), float(b[1]))
-            way = high.way(*ends)
+            way = high.track(*ends)
             if way is not None:
-                least = low.way(*ends)
+                least = low.track(*ends)
                 assert least is not None
                 assert math.dist(*ends) * (1.0 - 1e-9) <= least.length_m <= way.length_m * (1.0 + 1e-9)
                 compared += 1
@@ -350,9 +351,9 @@ def test_between_two_crossing_zones_there_is_room_only_where_their_levels_leave_
     problem = problem_of(surface, [lid, floor], LIMITS["bare"])
     plane = make_plane(problem, EVERYWHERE)
     middle = np.array([[300.0 + 1.0, 300.0 + 2.0]])
-    assert free(plane.mesh(500.0, True, 2), middle)[0] == (top < 300.0) == legal(problem, middle, 500.0)[0]
-    assert free(plane.mesh(500.0, False, 2), middle)[0] == (top < 300.0)
-    assert not free(plane.mesh(top - 5.0, True, 2), middle)[0]
+    assert free(mesh_of(plane, 500.0, True, 2), middle)[0] == (top < 300.0) == legal(problem, middle, 500.0)[0]
+    assert free(mesh_of(plane, 500.0, False, 2), middle)[0] == (top < 300.0)
+    assert not free(mesh_of(plane, top - 5.0, True, 2), middle)[0]
     assert not legal(problem, middle, top - 5.0)[0]
 
 

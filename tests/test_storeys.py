@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, Reached, Stop, Storeys
 from gcsplan.planners.optimal.corridor import End
 from gcsplan.planners.optimal.leg import Leg
+from gcsplan.planners.optimal.navmesh.clearance import mesh_of
+from gcsplan.planners.optimal.navmesh.free_altitudes import rooms, storeys
 from gcsplan.planners.optimal.navmesh.grid import make_plane
 from gcsplan.planners.optimal.navmesh.interval_kernels import spread
 from gcsplan.planners.problem import Problem
@@ -203,8 +205,8 @@ def test_every_altitude_that_is_legal_in_a_cell_lies_in_one_of_its_storeys(seed:
     leg = world(zones, heights, limits, (30.0, 30.0, 100.0), (570.0, 570.0, 100.0))
     problem = leg.problem
     plane = make_plane(problem, EVERYWHERE)
-    mesh = plane.mesh(250.0, True, single=True)
-    count, low, high = plane.storeys(mesh, *plane.rooms(mesh, 250.0), MOST, 1e-3)
+    mesh = mesh_of(plane, 250.0, True, single=True)
+    count, low, high = storeys(mesh, *rooms(mesh, 250.0), MOST, 1e-3)
     x, y = mesh.places()
     many = 0
     for j, i in product(range(12), range(12)):

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from gcsplan.planners.optimal.navmesh.clearance import mesh_of
 from gcsplan.planners.optimal.planner import search
 from gcsplan.planners.problem import Problem
 
@@ -26,7 +27,7 @@ def draw(problem: Problem) -> Figure:
     solution = incumbent.solution()
     leg = below.legs[0]
     plane = leg.plane
-    walls = plane.mesh(below.top_m, True).piece.max(axis=1).reshape(plane.inside.shape) < 0
+    walls = mesh_of(plane, below.top_m, True).piece.max(axis=1).reshape(plane.inside.shape) < 0
     room = leg.corridor(incumbent.cost)
     points = solution.path.points
     figure = Figure(figsize=(9.5, 5.6), layout="constrained")

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.optimal.navmesh.clearance import box_of
-from gcsplan.planners.optimal.navmesh.grid import Box, extent
+from gcsplan.planners.optimal.navmesh.grid import Box, box_of, extent
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle
 

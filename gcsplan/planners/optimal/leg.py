@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, Reached, Stop, Storeys
 from gcsplan.planners.optimal.cells import MOST_FINE, choose, has_room
 from gcsplan.planners.optimal.corridor import Corridor, End, Nearby, Spare
-from gcsplan.planners.optimal.navmesh.clearance import Cone, Relief, box_of, sampled
-from gcsplan.planners.optimal.navmesh.grid import Box, Plane, extent, finer_plane, make_plane, on_finer
-from gcsplan.planners.optimal.navmesh.mesh import Exhausted, Guide, Mesh, Way
+from gcsplan.planners.optimal.navmesh.clearance import Cone, Relief, mesh_of, sampled
+from gcsplan.planners.optimal.navmesh.free_altitudes import rooms, storeys
+from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, extent, finer_plane, make_plane, on_finer
+from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
+from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
 from gcsplan.planners.problem import Problem
 
@@ -80,8 +82,6 @@ class Leg:
         self._close: Nearby | None = None
         self._reached: tuple[Nearby, Reached] | None = None
         self.cells_of = choose(problem, start.place, self.straight_m, self._box(DETOURS[0]))
-        self.sheets = False
-        """Whether bounds hold tracks to pass each zone that has a floor and a ceiling over or under all of it."""
         self.closer = 1
         """Into how many parts a side the finer lattice's cells are cut once more, see `look_closer`."""
 
@@ -118,7 +118,7 @@ class Leg:
                 self.cells_of = choose(self.problem, self.start.place, self.straight_m, self._box(detour))
                 self.plane, self._twin = self._lattice(detour), None
                 self._detour = detour
-                self._mesh = self.plane.mesh(self.top_m, True)
+                self._mesh = mesh_of(self.plane, self.top_m, True)
             a, b = self.goal.place, self.start.place
             try:
                 way, self._guide = self._mesh.flood(a, b, within, slack)
@@ -173,7 +173,7 @@ class Leg:
         spare_m: Spare = (0.0, 0.0),
         over: Bools | None = None,
         exactly: Exactly | None = None,
-    ) -> Way | None:
+    ) -> GroundTrack | None:
         """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``, if it is shorter than
         ``limit_m``, and than `reach_m`.
 
@@ -189,7 +189,7 @@ class Leg:
             for place, by in exactly.shut if exactly is not None else ():
                 relief.lift(place[None], np.array([by]))
             for _ in range(LEARNT if exactly is not None else 1):
-                way = relief.mesh().way(self.start.place, self.goal.place, limit, guide)
+                way = relief.mesh().track(self.start.place, self.goal.place, limit, guide)
                 if way is None or exactly is None or not relief.learn(way.points):
                     return way
         except Exhausted:
@@ -212,7 +212,7 @@ class Leg:
             cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare) if climbs else []
             relief.hold(cones)
             try:
-                way = relief.mesh().way(self.start.place, self.goal.place, limit, guide)
+                way = relief.mesh().track(self.start.place, self.goal.place, limit, guide)
             except Exhausted as given_up:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:
@@ -223,34 +223,7 @@ class Leg:
             known = max(known, way.length_m)
             if enough:
                 break
-        return max(known, self._bound_of_sheets(relief, guide, limit)) if self.sheets else known
-
-    def _bound_of_sheets(self, relief: Relief, guide: Guide, limit_m: float) -> float:
-        """The same where none may get from under a zone to over it within the zone."""
-        mesh = relief.mesh(sheets=True)
-        if mesh.sheets == 1:
-            return 0.0
-        try:
-            way = mesh.way(self.start.place, self.goal.place, limit_m, guide)
-        except Exhausted as given_up:
-            return min(limit_m, given_up.seen_m)
-        return limit_m if way is None else way.length_m
-
-    def part_sheets(self, limit_m: float) -> bool:
-        """Let `bound` tell over from under, if tracks shorter than ``limit_m`` may get from one to the other in a zone;
-        whether they may."""
-        limit, limits = min(limit_m, self.reach_m), self.problem.limits
-        if not self.plane.shapes.either or math.isinf(max(limits.max_climb_slope, limits.max_descent_slope)):
-            return False
-        spare = max(limit - self.length_m, 0.0)
-        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare)
-        try:
-            relief, _ = self._relief(self.top_m, True, self.corridor(limit), limit)
-        except Exhausted:
-            return False
-        relief.hold(cones)
-        self.sheets = relief.mesh(sheets=True).sheets > 1
-        return self.sheets
+        return known
 
     def look_closer(self, limit_m: float, parts: int, cut: int) -> bool:
         """Look anew, at each cell of the finer lattice alone, at what tracks shorter than ``limit_m`` may meet; where
@@ -319,7 +292,7 @@ class Leg:
         if self._reached is None or self._reached[0] is not close:
             mesh, a, b = close.left.mesh, self.start, self.goal
             near = self._near(close, close.limit_m)
-            count, low, high = mesh.plane.storeys(mesh, close.low_m, close.high_m, MOST, SPARE_M)
+            count, low, high = storeys(mesh, close.low_m, close.high_m, MOST, SPARE_M)
             cell, nth = np.nonzero((np.arange(MOST) < count[:, None]) & near[:, None])
             every = Storeys(
                 (mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1),
@@ -350,21 +323,21 @@ class Leg:
                 mesh = left.mesh
                 ends = (away, self.start), (left, self.goal)
                 ways = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
-                found = Nearby(limit_m, away, left, *mesh.plane.rooms(mesh, self.top_m), *ways)
+                found = Nearby(limit_m, away, left, *rooms(mesh, self.top_m), *ways)
             self._close = found
         return self._close
 
     def _each_cell(self, plane: Plane, wanted: Bools, limit_m: float, ahead: Guide) -> Nearby | None:
         """Each of the ``wanted`` cells of a lattice alone; None where that is too much to look at. ``ahead``: from the
         start, over a mesh that leaves no less room."""
-        mesh = plane.mesh(self.top_m, True, 1, wanted, single=True)
+        mesh = mesh_of(plane, self.top_m, True, 1, wanted, single=True)
         a, b = self.start.place, self.goal.place
         try:
             left = mesh.flood(b, a, limit_m, math.inf, ahead)[1]
             away = mesh.flood(a, b, limit_m, math.inf, left)[1]
         except Exhausted:
             return None
-        return Nearby(limit_m, away, left, *plane.rooms(mesh, self.top_m), away.cells(), left.cells())
+        return Nearby(limit_m, away, left, *rooms(mesh, self.top_m), away.cells(), left.cells())
 
     def _over(self, cells: Bools) -> tuple[Plane, Bools]:
         """The finer lattice over some cells, and perhaps more, and which of its cells these are."""

@@ -12,8 +12,7 @@ what it must climb: between which heights every track that is short enough must 
 (`climb_bound`). For energy the cap itself is what costs: caps are searched from both sides until no height between two
 of them can hold anything better (`cap_search`). Close to the ends a path can be no higher than it has had track to
 climb, which moves the walls (`clearance`); and all along only those altitudes between zones can be flown at which can
-be climbed to, and back from, on a track that is short enough (`altitude_intervals`). A zone that can be passed over in
-one place and under in another lies on two sheets of the plane (`mesh_kernels`).
+be climbed to, and back from, on a track that is short enough (`altitude_intervals`).
 
 **Where that does not hold**, under a maximum AGL, or where the climb limit binds far from the ends, paths are searched
 on a lattice of reachable altitudes (`lattice`); the bound of the plane is true there as well.

@@ -41,7 +41,7 @@ MOST_CELLS = 50_000
 NAMES = (
     "straight", "outlines", "track_bound", "cap_search", "narrow_first", "lattice_first", "roadmap_first",
     "roadmap_3d", "roadmap_near", "fine_tracks", "detours", "detours_fine", "bound_corridor", "narrow_passage",
-    "narrow_closely", "contour_climb", "lattice", "local_roadmap", "cap_pairs", "length_bound", "space_bound", "sheets",
+    "narrow_closely", "contour_climb", "lattice", "local_roadmap", "cap_pairs", "length_bound", "space_bound",
     "altitude_intervals", "refinement",
 )  # fmt: skip
 """Of all searches; which a mission has depends on its objective and limits."""
@@ -136,7 +136,6 @@ class Searches:
             Search("length_bound", 0.9, known, nodes(1.0), on(halve), again=True, nearer=True),
             Search("space_bound", 0.3, lambda: self.plane.in_space, nodes(2.0), on(bound_by_caps)),
             Search("detours_fine", 0.3, known, nodes(4.0), self._over(self._past_finely)),
-            Search("sheets", 0.09, twice, nodes(8.0), self._over(self._part_sheets)),
             Search("altitude_intervals", 0.08, self._has_intervals, nodes(8.0), self._over(self._bound_by_intervals)),
             Search("refinement", 0.07, self._is_near, nodes(8.0), self._over(self._refine)),
         ]
@@ -270,11 +269,6 @@ class Searches:
             tight = pulled_tight(self.problem, incumbent.best, level, incumbent.budget.deadline_s)
             if tight is None or not incumbent.take_simpler(*tight, fine=True, longer=True):
                 break
-
-    def _part_sheets(self) -> None:
-        plane = self.plane
-        if sum(leg.part_sheets(plane.limit(leg)) for leg in plane.legs):
-            halve(plane)
 
     def _has_intervals(self) -> bool:
         incumbent = self.incumbent

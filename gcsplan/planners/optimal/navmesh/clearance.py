@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from itertools import combinations, product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +15,12 @@ from numpy.typing import NDArray
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.clearance_kernels import fill
 from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, look_around, walk_around
-from gcsplan.planners.optimal.navmesh.mesh import Exhausted, Mesh
+from gcsplan.planners.optimal.navmesh.grid import Plane, box_of
+from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import WALL, make_pieces, make_portals, sort_portals
-from gcsplan.planners.optimal.navmesh.zone_kernels import lift_lids, own_zones, stamp_zones
+from gcsplan.planners.optimal.navmesh.portals import Exhausted
+from gcsplan.planners.optimal.navmesh.zone_kernels import lift_lids, stamp_zones
 from gcsplan.planners.profile.track import divided
-
-if TYPE_CHECKING:
-    from gcsplan.planners.optimal.navmesh.grid import Plane
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -48,7 +46,7 @@ class Relief:
     """The nodes of the ``wanted`` cells of a plane, or of all, cut ``fineness`` times finer: how much too high the
     lowest is that can be flown at (*excess*), and the walls of the zones.
 
-    ``cap_m``, ``low`` as in `Plane.mesh`; ``ends``: where paths climb from, see `clearance_kernels.fill`; ``under``,
+    ``cap_m``, ``low`` as in `mesh_of`; ``ends``: where paths climb from, see `clearance_kernels.fill`; ``under``,
     ``over`` (zones,): which zones may be passed below their floors, above their ceilings; None for all. ``whole``: such
     meshes are asked for places all over them, and kept; others last until the plane's next relief. ``exact``: nodes are
     as high as the exact check has them, and not higher for what may be between them. Raises Exhausted
@@ -112,7 +110,8 @@ class Relief:
         self._boxes = plane.boxes(self.row, self.col, fineness, rows, cols)
         self._steep, self._exact, self._reach_m = steep, exact, plane.problem.airspace.beside_m(limits)
         self._up, self._down = (self._array(name, self.shape) for name in ("up", "down"))
-        self._of, self._values = np.empty((0, 0), np.int32), np.empty((0, WALL))
+        self._of = self._array("of", (self._diagonal.size,), np.int32)
+        self._values = np.empty((1 + plane.shapes.cells * fineness**2, WALL))
         self._laid = False
         self._held: list[Cone] = []
         self._lift: Floats
@@ -168,7 +167,7 @@ class Relief:
                 self.cap_m, RIM * cell_m / (self.plane.parts * self.fineness), self._lift, self._either,
             )  # fmt: skip
         if not self._laid:
-            self._lay(np.zeros(0, np.int32))
+            self._lay()
         self._held += cones
         lone = _apart(self._held, self.cap_m, 8.0 * cell_m)
         excess, lift, x, y = self._excess, self._lift, self._x, self._y
@@ -196,61 +195,52 @@ class Relief:
         # What cannot be reached so soon is no way over a zone either.
         self._laid = False
 
-    def mesh(self, *, single: bool = False, sheets: bool = False) -> Mesh:
-        """The mesh of what can be crossed. ``single``: each free cell is a piece of its own; ``sheets``: zones that are
-        passed over here and under there lie on two."""
-        limits = self.plane.problem.limits
+    def mesh(self, *, single: bool = False) -> Mesh:
+        """The mesh of what can be crossed. ``single``: each free cell is a piece of its own."""
+        if not self._laid:
+            self._lay()
         rows, cols = self.shape
-        owner = np.zeros(0, np.int32)
-        steepest = max(limits.max_climb_slope, limits.max_descent_slope)
-        if sheets and self.plane.shapes.either and math.isfinite(steepest):
-            owner = np.zeros(self._diagonal.size, np.int32)
-            if not own_zones(
-                self._span, self._excess, self._floor, self._ground, self._x, self._y, self._zones, self._edges,
-                self._boxes, steepest, owner,
-            ):  # fmt: skip
-                owner = owner[:0]
-        if len(owner) or not self._laid:
-            self._lay(owner)
         excess, of, values, diagonal, span = self._excess, self._of, self._values, self._diagonal, self._span
-        piece = self._array("piece", (diagonal.size, 2 * of.shape[1]), np.int32)
+        piece = self._array("piece", (diagonal.size, 2), np.int32)
         block = 1 if single else self.plane.block * self.fineness
-        count = make_pieces(excess, of, values, diagonal, owner, self._around, span, piece, block)
+        count = make_pieces(excess, of, values, diagonal, self._around, span, piece, block)
         room, part = 2 * count + 1024, np.empty(2)
         while True:
             ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
-            n = make_portals(
-                excess, of, values, diagonal, owner, span, piece, self._x, self._y, ends, names, joins, part
-            )
+            n = make_portals(excess, of, values, diagonal, span, piece, self._x, self._y, ends, names, joins, part)
             if n <= room:
                 break
             room = n
         start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
         sort_portals(joins[:n], start, order)
-        names, named = names[:n], 8 * (rows * cols + 1) * of.shape[1]
+        names, named = names[:n], 8 * (rows * cols + 1)
         if named > MANY * n:
             corner = names >= 0
             used, names[corner] = np.unique(names[corner], return_inverse=True)
             named = len(used)
         return Mesh(
-            self.plane, self.fineness, self.row, self.col, excess, self._floor, diagonal, span, piece, start, ends[:n],
-            names, joins[:n], order, named,
+            start, ends[:n], names, joins[:n], order, named, self.plane, self.fineness, self.row, self.col, excess,
+            self._floor, diagonal, span, piece,
         )  # fmt: skip
 
-    def _lay(self, owner: Ints) -> None:
-        """Lay the zones on the cells, twice on those that have an ``owner``."""
-        sheets = 2 if len(owner) else 1
-        if self._of.shape[1] != sheets:
-            self._of = self._array("of", (self._diagonal.size, sheets), np.int32)
-            self._values = np.empty((sheets * (1 + self.plane.shapes.cells * self.fineness**2), WALL))
-        walls = 0
-        for sheet in range(sheets):
-            walls = stamp_zones(
-                self._around, self._span, self._excess, self._floor, self._ground, self._steep, self.fineness,
-                self._reach_m, self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges,
-                self._boxes, self.low, owner, sheet, self._of, self._values, walls,
-            )  # fmt: skip
-        self._laid = sheets == 1
+    def _lay(self) -> None:
+        """Lay the zones on the cells."""
+        stamp_zones(
+            self._around, self._span, self._excess, self._floor, self._ground, self._steep, self.fineness,
+            self._reach_m, self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges, self._boxes,
+            self.low, self._of, self._values,
+        )  # fmt: skip
+        self._laid = True
+
+
+def mesh_of(
+    plane: Plane, cap_m: float, low: bool, fineness: int = 1, wanted: Bools | None = None, single: bool = False
+) -> Mesh:
+    """What of a plane can be crossed at or below ``cap_m``: by a bound's track (``low``: all of it) or by a path's.
+
+    ``wanted``: only these cells. ``single``: each free cell is a piece of its own. Raises Exhausted, see `Relief`.
+    """
+    return Relief(plane, cap_m, low, fineness, wanted, whole=single).mesh(single=single)
 
 
 def sampled(track: Floats, step_m: float) -> Floats:
@@ -267,14 +257,6 @@ def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:
         a[:2] == b[:2] or math.dist(a[:2], b[:2]) > reach_a + reach_b + more_m
         for (a, reach_a), (b, reach_b) in combinations(zip(cones, wide, strict=True), 2)
     )
-
-
-def box_of(wanted: Bools) -> tuple[int, int, int, int]:
-    """First row and column, and those after the last, of what is true; the first cell where nothing is."""
-    rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
-    if not len(rows):
-        return 0, 0, 1, 1
-    return int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1
 
 
 def _spans(wanted: Bools, fineness: int) -> Ints:

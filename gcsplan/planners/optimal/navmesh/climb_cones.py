@@ -25,7 +25,7 @@ SHUT = 3
 """What is known of a node that lies in a wall."""
 
 
-@kernel("i4[,] f8[,] f8[,] f8[,] i4[,] f8[,] f8[,] f8[,] f8[] i1[,] f8[,]")
+@kernel("i4[,] f8[,] f8[,] f8[,] i4[] f8[,] f8[,] f8[,] f8[] i1[,] f8[,]")
 def look_around(
     around: Ints, excess: Floats, floor: Floats, lift: Floats, of: Ints, values: Floats, x: Floats, y: Floats,
     cone: Floats, seen: NDArray[np.int8], away: Floats,
@@ -54,7 +54,7 @@ def look_around(
     return missing
 
 
-@kernel("i4[,] f8[,] f8[,] i4[,] f8[,] f8[,] f8[] i1[,] f8[,] i8 f8[,] i4[,] i1[,] f8[] i4[]")
+@kernel("i4[,] f8[,] f8[,] i4[] f8[,] f8[,] f8[] i1[,] f8[,] i8 f8[,] i4[,] i1[,] f8[] i4[]")
 def walk_around(
     around: Ints, excess: Floats, lift: Floats, of: Ints, x: Floats, y: Floats, cone: Floats, seen: NDArray[np.int8],
     away: Floats, missing: int, way: Floats, root: Ints, done: NDArray[np.int8], heap: Floats, ids: Ints,
@@ -118,7 +118,7 @@ def walk_around(
                     size = push(heap, ids, size, new, q * nx + p)
 
 
-@kernel("i4[,] f8[,] f8[,] f8[,] i1[,] i4[,] f8[,] f8[,] f8[,] f8[] b1 i1[,] f8[,]")
+@kernel("i4[,] f8[,] f8[,] f8[,] i1[,] i4[] f8[,] f8[,] f8[,] f8[] b1 i1[,] f8[,]")
 def hold_down(
     around: Ints, excess: Floats, floor: Floats, lift: Floats, either: NDArray[np.int8], of: Ints, values: Floats,
     x: Floats, y: Floats, cone: Floats, lone: bool, seen: NDArray[np.int8], away: Floats,
@@ -225,7 +225,7 @@ def _steps(excess: Floats, lift: Floats, of: Ints, i: int, j: int, p: int, q: in
                 _open(excess, lift, cj, ci) and _open(excess, lift, cj, ci + 1)
                 and _open(excess, lift, cj + 1, ci) and _open(excess, lift, cj + 1, ci + 1)
             )  # fmt: skip
-            if whole and of[cj * (nx - 1) + ci, 0] == 0:
+            if whole and of[cj * (nx - 1) + ci] == 0:
                 return True
     return False
 
@@ -236,7 +236,7 @@ def _walled(of: Ints, values: Floats, shape: tuple[int, int], j: int, i: int) ->
     ny, nx = shape
     for k in range(4):
         jj, ii = j - (k >> 1), i - ((k ^ (k >> 1)) & 1)
-        if 0 <= jj < ny - 1 and 0 <= ii < nx - 1 and not stands(of, values, jj * (nx - 1) + ii, 0, k, 0.0):
+        if 0 <= jj < ny - 1 and 0 <= ii < nx - 1 and not stands(of, values, jj * (nx - 1) + ii, k, 0.0):
             return False
     return True
 
@@ -272,7 +272,7 @@ def _sees(excess: Floats, lift: Floats, of: Ints, col: float, row: float, i: int
     for _ in range(abs(end_i - ci) + abs(end_j - cj) + 3):
         if not (0 <= ci < nx - 1 and 0 <= cj < excess.shape[0] - 1):
             return False
-        if of[cj * (nx - 1) + ci, 0] > 0:
+        if of[cj * (nx - 1) + ci] > 0:
             return False
         # The end's own cell may be free in part: it lies on the floor more often than not.
         if not (ends and ci == int(math.floor(col)) and cj == int(math.floor(row))) and not (

@@ -18,11 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
-from gcsplan.planners.optimal.navmesh.clearance import Relief, box_of
-from gcsplan.planners.optimal.navmesh.interval_kernels import cut_storeys
-from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent, nodes, places, slopes
-from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, TOP, TOP_2, UNDER, UNDER_2, narrow_rooms
+from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, TOP, TOP_2, UNDER, UNDER_2
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, Fit, Shapes, make_shapes
 from gcsplan.planners.problem import Problem
 
@@ -60,42 +57,6 @@ class Plane:
     """Places that were asked for, and where they lie on the lattice."""
     scratch: Scratch = field(default_factory=Scratch)
     """Room for meshes that are no longer needed when the next one is made."""
-
-    def mesh(
-        self, cap_m: float, low: bool, fineness: int = 1, wanted: NDArray[np.bool_] | None = None, single: bool = False
-    ) -> Mesh:
-        """What can be crossed at or below ``cap_m``: by a bound's way (``low``: all of it) or by a path's.
-
-        ``wanted``: only these cells. ``single``: each free cell is a piece of its own.
-        """
-        return Relief(self, cap_m, low, fineness, wanted, whole=single).mesh(single=single)
-
-    def rooms(self, mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
-        """(cells,) the lowest and the highest altitude, ``top_m`` at most, that can be flown at in each cell of a mesh
-        for bounds that is as fine as its plane; the wrong way round where there is none."""
-        low = mesh.lowest().reshape(mesh.excess.shape[0] - 1, -1)
-        high = np.full(low.shape, top_m)
-        narrow_rooms(*self._laid(mesh), low, high)
-        return low.ravel(), high.ravel()
-
-    def storeys(
-        self, mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: float
-    ) -> tuple[Ints, Floats, Floats]:
-        """How many storeys each cell of such a mesh has (cells,), ``most`` at most, by what zones leave of what `rooms`
-        tells of it, and (cells, most) from where to where they go, ``spare_m`` wider."""
-        low, high = np.empty((len(low_m), most)), np.empty((len(low_m), most))
-        low[:, 0], high[:, 0] = low_m - spare_m, high_m + spare_m
-        count = (low_m <= high_m).astype(np.int32)
-        cut_storeys(*self._laid(mesh), spare_m, count, low, high)
-        return count, low, high
-
-    def _laid(self, mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Ints, bool]:
-        """Ground and places of such a mesh's nodes, the shapes that are shut for certain and their boxes there, and
-        whether the ground is the terrain model's own."""
-        rows, cols = mesh.excess.shape
-        ground = np.ascontiguousarray(self.grounds[0][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols])
-        boxes = self.boxes(mesh.row, mesh.col, 1, rows, cols)
-        return ground, *mesh.places(), *self.shapes.low, boxes, self.stride == 1
 
     def zones(
         self, low: bool, under: NDArray[np.bool_] | None, over: NDArray[np.bool_] | None
@@ -188,6 +149,14 @@ def finer_plane(
     row0, row1 = max(plane.row1 - math.ceil(span * last_row), 0), plane.row1 - math.floor(span * row)
     finer = _lattice(plane.problem, (col0, row0, col1, row1), parts, stride, plane.stride, None, fit)
     return finer, on_finer(plane, cells, finer)
+
+
+def box_of(wanted: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """First row and column, and those after the last, of what is true; the first cell where nothing is."""
+    rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
+    if not len(rows):
+        return 0, 0, 1, 1
+    return int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1
 
 
 def on_finer(plane: Plane, cells: NDArray[np.bool_], finer: Plane) -> NDArray[np.bool_]:

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.budget import RATES
+from gcsplan.planners.optimal.navmesh.grid import Plane
 from gcsplan.planners.optimal.navmesh.mesh_kernels import in_reach, least_of_cells, least_of_portals, within
-from gcsplan.planners.optimal.navmesh.polyanya import search
+from gcsplan.planners.optimal.navmesh.portals import GroundTrack, Place, Portals
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE
-
-if TYPE_CHECKING:
-    from gcsplan.planners.optimal.navmesh.grid import Plane
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
-Place = tuple[float, float]
 
 BENT_M = LOOSE.bent_m
 """Most that a raster's line may bow between the corners of a block."""
@@ -29,34 +25,13 @@ ASIDE = 0.25
 MOST_OPENED, ANYHOW, OF_PORTAL = 3_000_000, 100_000, 64
 """Intervals that are looked at before a search is given up: in all, and, beyond some, for each portal. Where the goal
 is farther than the limit, and there are many ways around many corners, they would be many times that."""
-MOST_OF_SHEETS = 300_000
-"""The same where some cells are there twice."""
-
-
 NODE_BYTES = 200.0
 """What an opened interval takes, with those that it leaves unopened."""
 
 
-class Exhausted(Exception):
-    """A search was given up; all ways shorter than ``seen_m`` had been looked at, and none led to the goal."""
-
-    def __init__(self, seen_m: float) -> None:
-        super().__init__(f"no way of less than {seen_m:.1f} m, and too much to look at beyond")
-        self.seen_m = seen_m
-
-
 @dataclass(eq=False, slots=True)
-class Way:
-    """A shortest track over a mesh: ``points`` (N, 2) and its length."""
-
-    points: Floats
-    length_m: float
-
-
-@dataclass(eq=False, slots=True)
-class Mesh:
-    """Convex free pieces and their portals, see `mesh_kernels`; ``row``, ``col``: the plane's cell that it begins at;
-    ``named``: all names of portals' ends are less."""
+class Mesh(Portals):
+    """The pieces of a plane's free cells, see `mesh_kernels`; ``row``, ``col``: the plane's cell that it begins at."""
 
     plane: Plane
     fineness: int
@@ -67,17 +42,6 @@ class Mesh:
     diagonal: NDArray[np.int8]
     span: Ints
     piece: Ints
-    start: Ints
-    ends: Floats
-    names: NDArray[np.int64]
-    joins: Ints
-    order: Ints
-    named: int
-
-    @property
-    def sheets(self) -> int:
-        """How many there are; some cells are on all of them."""
-        return int(self.piece.shape[1] // 2)
 
     def lowest(self) -> Floats:
         """(cells,) the lowest floor of each; -inf where a corner is not looked at."""
@@ -145,84 +109,46 @@ class Mesh:
                     continue
                 u, v, k = c - i, r - j, j * (cols - 1) + i
                 lower = u >= v if self.diagonal[k] == 0 else u + v <= 1.0
-                for p in self.piece[k, 0 if lower else 1 :: 2].tolist():
-                    if p >= 0 and p not in found:
-                        found.append(p)
+                p = int(self.piece[k, 0 if lower else 1])
+                if p >= 0 and p not in found:
+                    found.append(p)
         return found
 
-    def way(
-        self,
-        start: Place,
-        goal: Place,
-        limit_m: float = math.inf,
-        guide: Guide | None = None,
-    ) -> Way | None:
-        """The shortest way that is shorter than ``limit_m``. ``guide``: distances to ``goal`` over a mesh that leaves
-        no less room."""
-        return self._search(start, goal, limit_m, -1.0, guide, np.zeros(0))
+    def track(
+        self, start: Place, goal: Place, limit_m: float = math.inf, guide: Guide | None = None
+    ) -> GroundTrack | None:
+        """The shortest track that is shorter than ``limit_m``. ``guide``: distances to ``goal`` over a mesh that leaves
+        no less room. Raises Exhausted."""
+        return self._search(start, goal, limit_m, -1.0, guide, None)
 
     def flood(
-        self,
-        start: Place,
-        goal: Place,
-        limit_m: float,
-        slack: float,
-        guide: Guide | None = None,
-    ) -> tuple[Way | None, Guide]:
-        """The same, and how far every piece is from ``start`` at least, as far as ways to ``goal`` lead that are
+        self, start: Place, goal: Place, limit_m: float, slack: float, guide: Guide | None = None
+    ) -> tuple[GroundTrack | None, Guide]:
+        """The same, and how far every piece is from ``start`` at least, as far as tracks to ``goal`` lead that are
         shorter than ``limit_m`` and than the shortest with ``slack`` (as a part of it) added."""
         met = np.full(len(self.joins), np.inf)
-        way = self._search(start, goal, limit_m, slack, guide, met)
-        entered = np.full(len(self.start) - 1, np.inf)
+        track = self._search(start, goal, limit_m, slack, guide, met)
+        entered = np.full(self.pieces, np.inf)
         least_of_portals(self.joins, met, entered)
         entered[self.pieces_at(start)] = 0.0
-        return way, Guide(self, start, met, entered)
+        return track, Guide(self, start, met, entered)
 
     def _search(
-        self,
-        start: Place,
-        goal: Place,
-        limit_m: float,
-        slack: float,
-        guide: Guide | None,
-        met: Floats,
-    ) -> Way | None:
+        self, start: Place, goal: Place, limit_m: float, slack: float, guide: Guide | None, met: Floats | None
+    ) -> GroundTrack | None:
         budget = self.plane.problem.budget
-        pieces, goal_pieces = self.pieces_at(start), self.pieces_at(goal)
-        if not pieces or not goal_pieces:
-            return None
-        sources = np.array([(*start, 0.0)] * len(pieces))
-        remaining = np.zeros(0) if guide is None else guide.over(self)
-        most = min(MOST_OPENED, ANYHOW + OF_PORTAL * len(self.joins)) if self.sheets == 1 else MOST_OF_SHEETS
+        most = min(MOST_OPENED, ANYHOW + OF_PORTAL * len(self.joins))
         most = int(min(most, budget.room_mb * 1e6 / NODE_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
-        room = max(1 << 19, 8 * len(self.start))  # what is not touched costs nothing
-        while True:
-            best, origin = np.zeros(self.named), np.zeros(self.named, np.int64)  # cost nothing until they are touched
-            node, link, name = np.empty((room, 8)), np.empty((room, 6), np.int32), np.empty((room, 3), np.int64)
-            portals = len(self.joins)
-            first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
-            out = np.empty((1 << 14, 3))
-            n = search(
-                self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span,
-                sources, np.array(pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32),
-                limit_m, slack, most, remaining, met,
-                node, link, name, np.empty(room), np.empty(room, np.int32), out,
-                np.zeros((portals if self.sheets > 1 else 0, 8)),
+        budget.spend("portal", len(self.joins))
+        opened = float(most)
+        try:
+            found, opened = self.shortest(
+                start, goal, self.pieces_at(start), self.pieces_at(goal), most, limit_m=limit_m, slack=slack,
+                remaining=None if guide is None else guide.over(self), met=met,
             )  # fmt: skip
-            if n != -1:
-                break
-            room *= 4
-            met[:] = np.inf
-        budget.spend("portal", portals)
-        budget.spend("opened", float(out[2, 2]))
-        if n == -2:
-            raise Exhausted(float(out[0, 0]))
-        if n <= 0:
-            return None
-        points = out[:n][::-1, :2].copy()
-        keep = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
-        keep[-1] = True
-        return Way(points[keep], float(out[1, 2]))
+        finally:
+            budget.spend("opened", opened)
+        return found
 
 
 @dataclass(eq=False, slots=True)
@@ -240,7 +166,7 @@ class Guide:
         # A finer lattice's meshes begin at corners of coarse cells.
         share = finer.plane.parts * self.mesh.plane.stride // (self.mesh.plane.parts * finer.plane.stride)
         ratio = finer.fineness * share // self.mesh.fineness
-        out = np.full(len(finer.start) - 1, np.inf)
+        out = np.full(finer.pieces, np.inf)
         cols, fine_cols = self.mesh.excess.shape[1] - 1, finer.excess.shape[1] - 1
         first_row, first_col = finer.plane.begins(self.mesh.plane)
         row, col = (finer.row + first_row) // share - self.mesh.row, (finer.col + first_col) // share - self.mesh.col
@@ -264,7 +190,7 @@ class Guide:
         ends. It may leave through the same one: a shortest way does so where finer walls stand that are not known here.
         """
         mesh = self.mesh
-        met = np.zeros(len(mesh.start) - 1, np.bool_)
+        met = np.zeros(mesh.pieces, np.bool_)
         met[[*mesh.pieces_at(self.place), *mesh.pieces_at(other.place)]] = True
         out = np.zeros(len(mesh.piece), np.bool_)
         within(mesh.joins, self.met, other.met, limit_m, met, mesh.piece, out)

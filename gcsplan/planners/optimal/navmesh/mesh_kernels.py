@@ -6,9 +6,6 @@ triangle is convex. Cells that are free as a whole are joined along their row in
 where the lattice bends (every ``block`` columns), so that every piece is convex.
 
 Only the portals are kept, the parts of edges that two pieces share: walls are where none is.
-
-Where a zone may be passed over in one place and under in another, but not in all of it either way, its cells are there
-twice, on two *sheets*: to get from one to the other one must leave the zone.
 """
 
 from __future__ import annotations
@@ -44,9 +41,9 @@ def _cut(p: float, q: float, t: Floats) -> bool:
 
 
 @device
-def _cut_own(of: Ints, values: Floats, k: int, sheet: int, start: int, end: int, t: Floats) -> bool:
+def _cut_own(of: Ints, values: Floats, k: int, start: int, end: int, t: Floats) -> bool:
     """Leave that of the part ``t`` of cell k's edge, from corner to corner, where none of its own walls stands."""
-    n = of[k, sheet]
+    n = of[k]
     while n > 0:
         if not _cut(values[n - 1, start], values[n - 1, end], t):
             return False
@@ -54,49 +51,31 @@ def _cut_own(of: Ints, values: Floats, k: int, sheet: int, start: int, end: int,
     return True
 
 
-@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] i4[,] i4[,] i8")
+@kernel("f8[,] i4[] f8[,] i1[] i4[,] i4[,] i4[,] i8")
 def make_pieces(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, around: Ints, span: Ints,
-    piece: Ints, block: int,
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], around: Ints, span: Ints, piece: Ints,
+    block: int,
 ) -> int:  # fmt: skip
-    """Number the pieces: ``piece`` (cells, 2 sheets), the lower and the upper triangle's, -1 where nothing is free.
+    """Number the pieces: ``piece`` (cells, 2), the lower and the upper triangle's, -1 where nothing is free.
 
     ``span`` (rows - 1, 2) the first column, and that after the last, of the cells of a row that may be free; ``around``
     see `clearance_kernels.blank`;
-    ``of`` (cells, sheets) number from 1 of the row in ``values`` (K, 5) of a cell's first own wall, or 0: excess at
+    ``of`` (cells,) number from 1 of the row in ``values`` (K, 5) of a cell's first own wall, or 0: excess at
     this node, the one in the next column, in the next column and row, and in the next row, and the number of its next
-    wall; ``diagonal`` (cells,) 0 from this node to the opposite one, 1 the other. ``owner`` (cells,) which cells are
-    there on the second sheet, too, and for which zone (0: they are not); empty where there is one sheet.
+    wall; ``diagonal`` (cells,) 0 from this node to the opposite one, 1 the other.
     """
-    count, nx = 0, excess.shape[1]
-    for j in range(len(span)):
-        for i in range(around[j, 0], min(around[j, 1], nx - 1)):
-            for half in range(piece.shape[1]):
-                piece[j * (nx - 1) + i, half] = -1
-    for sheet in range(of.shape[1]):
-        count = _number(excess, of, values, diagonal, owner, span, piece, block, sheet, count)
-    return count
-
-
-@device
-def _number(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, span: Ints, piece: Ints,
-    block: int, sheet: int, count: int,
-) -> int:  # fmt: skip
-    """Number the pieces of one sheet; returns how many there are by now."""
+    count = 0
     ny, nx = excess.shape
+    for j in range(ny - 1):
+        for i in range(around[j, 0], min(around[j, 1], nx - 1)):
+            piece[j * (nx - 1) + i, 0] = piece[j * (nx - 1) + i, 1] = -1
     for j in range(ny - 1):
         running = False
         for i in range(span[j, 0], span[j, 1]):
             k = j * (nx - 1) + i
-            if sheet > 0 and owner[k] == 0:
-                running = False
-                continue
-            if sheet > 0 and running and owner[k - 1] != owner[k]:
-                running = False
             a, b, c, d = excess[j, i], excess[j, i + 1], excess[j + 1, i + 1], excess[j + 1, i]
             whole = lower = upper = True
-            n = of[k, sheet]
+            n = of[k]
             while True:
                 if not (a <= 0.0 and b <= 0.0 and c <= 0.0 and d <= 0.0):
                     whole = False
@@ -112,20 +91,20 @@ def _number(
                 if not running or i % block == 0:
                     count += 1
                     running = True
-                piece[k, 2 * sheet] = piece[k, 2 * sheet + 1] = count - 1
+                piece[k, 0] = piece[k, 1] = count - 1
                 continue
             running = False
             for half in range(2):
                 if lower if half == 0 else upper:
-                    piece[k, 2 * sheet + half] = count
+                    piece[k, half] = count
                     count += 1
     return count
 
 
 @device
-def _side(piece: Ints, diagonal: NDArray[np.int8], k: int, sheet: int, right: bool) -> int:
+def _side(piece: Ints, diagonal: NDArray[np.int8], k: int, right: bool) -> int:
     """The piece at the left or right side of a cell."""
-    return piece[k, 2 * sheet + (0 if (diagonal[k] == 0) == right else 1)]
+    return piece[k, 0 if (diagonal[k] == 0) == right else 1]
 
 
 @device
@@ -142,9 +121,9 @@ def _put(
 
 
 @device
-def stands(of: Ints, values: Floats, cell: int, sheet: int, corner: int, above: float) -> bool:
+def stands(of: Ints, values: Floats, cell: int, corner: int, above: float) -> bool:
     """Whether one of a cell's own walls is higher than ``above`` at a corner."""
-    n = of[cell, sheet]
+    n = of[cell]
     while n > 0:
         if values[n - 1, corner] > above:
             return True
@@ -153,65 +132,38 @@ def stands(of: Ints, values: Floats, cell: int, sheet: int, corner: int, above: 
 
 
 @device
-def _is_corner(
-    excess: Floats, of: Ints, values: Floats, owner: Ints, piece: Ints, nx: int, ny: int, j: int, i: int
-) -> bool:
-    """Whether a node may lie on a wall, something around it is not free, or where sheets begin."""
+def _is_corner(excess: Floats, of: Ints, values: Floats, piece: Ints, nx: int, ny: int, j: int, i: int) -> bool:
+    """Whether a node may lie on a wall, or something around it is not free."""
     if i == 0 or j == 0 or i == nx - 1 or j == ny - 1 or excess[j, i] > OPEN:
         return True
     for k in range(4):
         c = (j - (k >> 1)) * (nx - 1) + i - ((k ^ (k >> 1)) & 1)
-        if len(owner) > 0 and owner[c] != owner[j * (nx - 1) + i]:
+        if (piece[c, 0] < 0 and piece[c, 1] < 0) or stands(of, values, c, k, OPEN):
             return True
-        for sheet in range(1 if len(owner) == 0 or owner[c] == 0 else 2):
-            if piece[c, 2 * sheet] < 0 and piece[c, 2 * sheet + 1] < 0:
-                return True
-            if stands(of, values, c, sheet, k, OPEN):
-                return True
     return False
 
 
 @device
-def _name(
-    excess: Floats, of: Ints, values: Floats, owner: Ints, piece: Ints, j: int, i: int, more: int
-) -> int:  # fmt: skip
+def _name(excess: Floats, of: Ints, values: Floats, piece: Ints, j: int, i: int) -> int:
     """A node's name; negative where no wall can stand."""
     ny, nx = excess.shape
-    name = 8 * (j * nx + i) + more
-    return name if _is_corner(excess, of, values, owner, piece, nx, ny, j, i) else -1 - name
+    name = 8 * (j * nx + i)
+    return name if _is_corner(excess, of, values, piece, nx, ny, j, i) else -1 - name
 
 
-@kernel("f8[,] i4[,] f8[,] i1[] i4[] i4[,] i4[,] f8[,] f8[,] f8[,] i8[,] i4[,] f8[]")
+@kernel("f8[,] i4[] f8[,] i1[] i4[,] i4[,] f8[,] f8[,] f8[,] i8[,] i4[,] f8[]")
 def make_portals(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, span: Ints, piece: Ints,
+    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], span: Ints, piece: Ints,
     x: Floats, y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats,
 ) -> int:  # fmt: skip
     """Every portal once: ``ends`` (room, 4) from x, y to x, y; ``names`` (room, 2) of its ends; ``joins`` (room, 2)
     the pieces at its left and right. Returns how many there are; room for fewer is filled.
 
-    A name is unique to a place, and to a sheet; it is not negative if a wall may stand there, so that a path may turn.
+    A name is unique to a place; it is not negative if a wall may stand there, so that a path may turn.
     """
-    n = _join(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, t, 0, 0, 0)
-    if len(owner) > 0:
-        n = _join(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, t, 1, 1, n)
-        n = _join(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, t, 0, 1, n)
-        n = _join(excess, of, values, diagonal, owner, span, piece, x, y, ends, names, joins, t, 1, 0, n)
-    return n
-
-
-@device
-def _join(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], owner: Ints, span: Ints, piece: Ints,
-    x: Floats, y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats, sheet: int, next_sheet: int,
-    n: int,
-) -> int:  # fmt: skip
-    """Find the portals between cells on a sheet and the next ones, upward and to the right, on one; from the n-th on.
-
-    Different sheets meet where a cell is not the same zone's as the next one.
-    """
+    n = 0
     ny, nx = excess.shape
     room = len(ends)
-    more = 8 * (ny * nx + 1) if sheet + next_sheet > 0 else 0
     for j in range(ny):
         # Along the row: pieces below (row j - 1) and above (row j).
         x0 = y0 = was_t = 0.0
@@ -225,68 +177,65 @@ def _join(
             found = False
             if i < last:
                 kb, ka = (j - 1) * (nx - 1) + i, j * (nx - 1) + i
-                if sheet == next_sheet or owner[kb] != owner[ka]:
-                    below, above = piece[kb, 2 * sheet + 1], piece[ka, 2 * next_sheet]
+                below, above = piece[kb, 1], piece[ka, 0]
                 if below >= 0 and above >= 0:
                     t[0], t[1] = 0.0, 1.0
                     found = _cut(excess[j, i], excess[j, i + 1], t)
-                    found = found and _cut_own(of, values, kb, sheet, 3, 2, t)
-                    found = found and _cut_own(of, values, ka, next_sheet, 0, 1, t)
+                    found = found and _cut_own(of, values, kb, 3, 2, t)
+                    found = found and _cut_own(of, values, ka, 0, 1, t)
             goes_on = found and was_t == 1.0 and t[0] == 0.0 and below == was_below and above == was_above
-            # Where sheets meet, one may have to turn at any corner of a cell.
-            goes_on = goes_on and (len(owner) == 0 or owner[kb] == owner[ka])
             if was_below >= 0 and not goes_on:
                 x1 = x[j, was] + was_t * (x[j, was + 1] - x[j, was])
                 y1 = y[j, was] + was_t * (y[j, was + 1] - y[j, was])
-                v1 = 8 * (j * nx + was) + more + 2
+                v1 = 8 * (j * nx + was) + 2
                 if was_t == 1.0:
-                    v1 = _name(excess, of, values, owner, piece, j, was + 1, more)
+                    v1 = _name(excess, of, values, piece, j, was + 1)
                 n = _put(ends, names, joins, n, room, x0, y0, x1, y1, v0, v1, was_above, was_below)
                 was_below = -1
             if found:
                 if not goes_on:
                     x0, y0 = x[j, i] + t[0] * (x[j, i + 1] - x[j, i]), y[j, i] + t[0] * (y[j, i + 1] - y[j, i])
-                    v0 = 8 * (j * nx + i) + more + 1
+                    v0 = 8 * (j * nx + i) + 1
                     if t[0] == 0.0:
-                        v0 = _name(excess, of, values, owner, piece, j, i, more)
+                        v0 = _name(excess, of, values, piece, j, i)
                 was, was_below, was_above, was_t = i, below, above, t[1]
         if j == ny - 1:
             break
         # Within the row: sides and diagonals of its cells.
         for i in range(span[j, 0], span[j, 1]):
             k = j * (nx - 1) + i
-            if i > 0 and (sheet == next_sheet or owner[k - 1] != owner[k]):
-                left = _side(piece, diagonal, k - 1, sheet, True)
-                right = _side(piece, diagonal, k, next_sheet, False)
+            if i > 0:
+                left = _side(piece, diagonal, k - 1, True)
+                right = _side(piece, diagonal, k, False)
                 t[0], t[1] = 0.0, 1.0
                 if (
                     left >= 0 and right >= 0 and left != right and _cut(excess[j, i], excess[j + 1, i], t)
-                    and _cut_own(of, values, k - 1, sheet, 1, 2, t) and _cut_own(of, values, k, next_sheet, 0, 3, t)
+                    and _cut_own(of, values, k - 1, 1, 2, t) and _cut_own(of, values, k, 0, 3, t)
                 ):  # fmt: skip
-                    edge = 8 * (j * nx + i) + more
+                    edge = 8 * (j * nx + i)
                     v0, v1 = edge + 3, edge + 4
                     if t[0] == 0.0:
-                        v0 = _name(excess, of, values, owner, piece, j, i, more)
+                        v0 = _name(excess, of, values, piece, j, i)
                     if t[1] == 1.0:
-                        v1 = _name(excess, of, values, owner, piece, j + 1, i, more)
+                        v1 = _name(excess, of, values, piece, j + 1, i)
                     dx, dy = x[j + 1, i] - x[j, i], y[j + 1, i] - y[j, i]
                     n = _put(
                         ends, names, joins, n, room, x[j, i] + t[0] * dx, y[j, i] + t[0] * dy,
                         x[j, i] + t[1] * dx, y[j, i] + t[1] * dy, v0, v1, left, right,
                     )  # fmt: skip
-            lower, upper = piece[k, 2 * sheet], piece[k, 2 * sheet + 1]
-            if sheet == next_sheet and lower >= 0 and upper >= 0 and lower != upper:
+            lower, upper = piece[k, 0], piece[k, 1]
+            if lower >= 0 and upper >= 0 and lower != upper:
                 # The lower triangle lies at the right of the diagonal, seen from the lower row.
                 i0, i1 = (i, i + 1) if diagonal[k] == 0 else (i + 1, i)
                 c0, c1 = (0, 2) if diagonal[k] == 0 else (1, 3)
                 t[0], t[1] = 0.0, 1.0
-                if _cut(excess[j, i0], excess[j + 1, i1], t) and _cut_own(of, values, k, sheet, c0, c1, t):
-                    edge = 8 * (j * nx + i) + more
+                if _cut(excess[j, i0], excess[j + 1, i1], t) and _cut_own(of, values, k, c0, c1, t):
+                    edge = 8 * (j * nx + i)
                     v0, v1 = edge + 5, edge + 6
                     if t[0] == 0.0:
-                        v0 = _name(excess, of, values, owner, piece, j, i0, more)
+                        v0 = _name(excess, of, values, piece, j, i0)
                     if t[1] == 1.0:
-                        v1 = _name(excess, of, values, owner, piece, j + 1, i1, more)
+                        v1 = _name(excess, of, values, piece, j + 1, i1)
                     dx, dy = x[j + 1, i1] - x[j, i0], y[j + 1, i1] - y[j, i0]
                     left, right = (upper, lower) if diagonal[k] == 0 else (lower, upper)
                     n = _put(
@@ -339,10 +288,10 @@ def least_of_cells(
                 continue
             if i != known:
                 least, known = np.inf, i
-                for half in range(piece.shape[1]):
+                for half in range(2):
                     if piece[j * cols + i, half] >= 0:
                         least = min(least, value[piece[j * cols + i, half]])
-            for half in range(fine_piece.shape[1]):
+            for half in range(2):
                 n = fine_piece[q * fine_cols + p, half]
                 if n >= 0 and least < out[n]:
                     out[n] = least
@@ -369,7 +318,7 @@ def within(
         if from_start[n] + from_goal[n] <= limit:
             met[joins[n, 0]] = met[joins[n, 1]] = True
     for k in range(len(piece)):
-        for half in range(piece.shape[1]):
+        for half in range(2):
             if piece[k, half] >= 0 and met[piece[k, half]]:
                 out[k] = True
 
@@ -385,7 +334,7 @@ def in_reach(
         for i in range(nx - 1):
             k = j * (nx - 1) + i
             least = np.inf
-            for half in range(piece.shape[1]):
+            for half in range(2):
                 if piece[k, half] >= 0:
                     least = min(least, entered[piece[k, half]])
             if least < np.inf:

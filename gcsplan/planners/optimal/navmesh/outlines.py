@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
-from gcsplan.planners.optimal.navmesh.polyanya import search
+from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place, Portals
 from gcsplan.world.zones import Circle, Zone
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
-Place = tuple[float, float]
 
 COARSE = 4
 """Chords of a quarter circle of every arc at first."""
@@ -42,18 +41,6 @@ MOST_CORNERS = 12_000
 BEYOND_M = 1.0
 """How far the mesh reaches beyond the outlines and the places."""
 MOST_OPENED = 1_000_000
-
-
-class TooLarge(Exception):
-    """A mesh would have more corners than `MOST_CORNERS`."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Track:
-    """A shortest track: ``points`` (N, 2), metres, and its length."""
-
-    points: Floats
-    length_m: float
 
 
 @dataclass(eq=False, slots=True)
@@ -158,89 +145,67 @@ def _around(angle: Floats, radius: float, *, outer: bool) -> Floats:
     return radius * np.stack([np.cos(angle + half), np.sin(angle + half)], axis=-1) / np.cos(half)[:, None]
 
 
-class Mesh:
-    """The free plane between polygons, in triangles, as far as the shortest track between two places can go."""
+class Triangles(Portals):
+    """The part of the free plane between polygons that holds two places, in triangles, as far as the shortest track
+    between them can go."""
 
-    def __init__(self, a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> None:
-        places = np.array([a, b])
-        bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
-        box = shapely.box(*(bounds[:, :2].min(axis=0) - BEYOND_M), *(bounds[:, 2:].max(axis=0) + BEYOND_M))
-        free = box.difference(shapely.union_all(shapes)) if shapes else box
-        if shapely.get_num_coordinates(free) > MOST_CORNERS:
-            raise TooLarge
-        parts = [p for p in shapely.get_parts(free) if shapely.dwithin(p, shapely.points(places), 1e-6).all()]
-        self.joined = bool(parts)
-        """Whether the places lie in one part of the free plane."""
-        if not parts:
-            return
-        corner = shapely.get_coordinates(shapely.get_parts(shapely.constrained_delaunay_triangles(parts[0])))
+    __slots__ = ("corner",)
+
+    def __init__(self, part: shapely.Polygon) -> None:
+        """Raises Exhausted where the triangles are not that part: then nothing is known."""
+        corner = shapely.get_coordinates(shapely.get_parts(shapely.constrained_delaunay_triangles(part)))
         corner = corner.reshape(-1, 4, 2)[:, :3]
         u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
         twice = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
         corner[twice < 0.0] = corner[twice < 0.0, ::-1]
-        if not math.isclose(0.5 * float(np.abs(twice).sum()), parts[0].area, rel_tol=1e-9, abs_tol=1e-6):
-            raise TooLarge  # the triangles are not the free plane: nothing is known
+        if not math.isclose(0.5 * float(np.abs(twice).sum()), part.area, rel_tol=1e-9, abs_tol=1e-6):
+            raise Exhausted(0.0)
         self.corner = corner
         _, name = np.unique(corner.reshape(-1, 2).view(np.complex128).ravel(), return_inverse=True)
         name = name.reshape(-1, 3)
-        self.named = int(name.max()) + 1
+        named = int(name.max()) + 1
         first, second = name.ravel(), np.roll(name, -1, axis=1).ravel()
-        key, back = first * self.named + second, second * self.named + first
+        key, back = first * named + second, second * named + first
         order = np.argsort(key)
         at = np.searchsorted(key[order], back).clip(0, len(key) - 1)
         other = order[at]
         here = np.flatnonzero((key[other] == back) & (first < second))
         other = other[here]
         ends = np.concatenate([corner.reshape(-1, 2)[here], corner.reshape(-1, 2)[other]], axis=1)
-        self.ends = np.ascontiguousarray(ends)
-        self.names = np.ascontiguousarray(np.stack([first[here], second[here]], axis=-1), np.int64)
-        self.joins = np.ascontiguousarray(np.stack([here // 3, other // 3], axis=-1), np.int32)
-        self.start, self.order = np.zeros(len(corner) + 1, np.int32), np.empty(2 * len(here), np.int32)
-        sort_portals(self.joins, self.start, self.order)
+        names = np.ascontiguousarray(np.stack([first[here], second[here]], axis=-1), np.int64)
+        joins = np.ascontiguousarray(np.stack([here // 3, other // 3], axis=-1), np.int32)
+        start, of_piece = np.zeros(len(corner) + 1, np.int32), np.empty(2 * len(here), np.int32)
+        sort_portals(joins, start, of_piece)
+        super().__init__(start, np.ascontiguousarray(ends), names, joins, of_piece, named)
 
-    def pieces_at(self, place: Place) -> NDArray[np.int32]:
+    def pieces_at(self, place: Place) -> list[int]:
         """The triangles that a place lies in, or on the border of."""
         d = np.array(place) - self.corner
         e = np.roll(self.corner, -1, axis=1) - self.corner
         left = (e[..., 0] * d[..., 1] - e[..., 1] * d[..., 0]) / np.maximum(np.hypot(e[..., 0], e[..., 1]), 1e-12)
-        return np.flatnonzero((left >= -1e-6).all(axis=1)).astype(np.int32)
+        return np.flatnonzero((left >= -1e-6).all(axis=1)).tolist()
 
-    def way(self, a: Place, b: Place) -> Track | None:
-        """The shortest track; None where there is none. Raises TooLarge where the search would open too much."""
-        if not self.joined:
-            return None
-        pieces, goal_pieces = self.pieces_at(a), self.pieces_at(b)
-        if not len(pieces) or not len(goal_pieces):
-            return None
-        portals, room, none, none_at = len(self.joins), 1 << 16, np.zeros(0), np.zeros((0, 8))
-        sources = np.array([(*a, 0.0)] * len(pieces))
-        while True:
-            node, link, name = np.empty((room, 8)), np.empty((room, 6), np.int32), np.empty((room, 3), np.int64)
-            best, origin, out = np.zeros(self.named), np.zeros(self.named, np.int64), np.zeros((1 << 14, 3))
-            first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
-            n = search(
-                self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span, sources,
-                pieces, np.array(b, np.float64), goal_pieces, math.inf, -1.0, MOST_OPENED, none, none, node, link, name,
-                np.empty(room), np.empty(room, np.int32), out, none_at,
-            )  # fmt: skip
-            if n != -1:
-                break
-            room *= 4
-        if n == -2:
-            raise TooLarge
-        if n <= 0:
-            return None
-        points = out[:n][::-1, :2].copy()
-        keep = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
-        keep[-1] = True
-        return Track(points[keep], float(out[1, 2]))
+
+def _shortest(a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> GroundTrack | None:
+    """The shortest track past some polygons; None where they part the places. Raises Exhausted."""
+    places = np.array([a, b])
+    bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
+    box = shapely.box(*(bounds[:, :2].min(axis=0) - BEYOND_M), *(bounds[:, 2:].max(axis=0) + BEYOND_M))
+    free = box.difference(shapely.union_all(shapes)) if shapes else box
+    if shapely.get_num_coordinates(free) > MOST_CORNERS:
+        raise Exhausted(0.0)
+    parts = [p for p in shapely.get_parts(free) if shapely.dwithin(p, shapely.points(places), 1e-6).all()]
+    if not parts:
+        return None
+    mesh = Triangles(parts[0])
+    return mesh.shortest(a, b, mesh.pieces_at(a), mesh.pieces_at(b), MOST_OPENED)[0]
 
 
 class Solids:
     """Zones that nobody enters, and the shortest tracks around them; what a track met is known to the next one.
 
     ``outer``: for paths, which keep ``hair_m`` more from every zone; else for bounds, which keep so much less. Raises
-    TooLarge where the meshes, or the work, would be beyond bounds.
+    Exhausted where the meshes, or the work, would be beyond bounds.
     """
 
     def __init__(
@@ -258,7 +223,7 @@ class Solids:
             if which[k] and self.outlines[k].refine(track):
                 self._known.add(k)
 
-    def shortest(self, a: Place, b: Place, which: NDArray[np.bool_]) -> Track | None:
+    def shortest(self, a: Place, b: Place, which: NDArray[np.bool_]) -> GroundTrack | None:
         """The shortest track from ``a`` to ``b`` past those zones; None where they enclose one of the places."""
         for _ in range(ROUNDS):
             known = [k for k in sorted(self._known) if which[k]]
@@ -276,11 +241,11 @@ class Solids:
                 return track
             if not self._budget.goes_on():
                 break
-        raise TooLarge
+        raise Exhausted(0.0)
 
-    def _past(self, a: Place, b: Place, known: list[int]) -> Track | None:
+    def _past(self, a: Place, b: Place, known: list[int]) -> GroundTrack | None:
         if not known:
-            return Track(np.array([a, b]), math.dist(a, b))
+            return GroundTrack(np.array([a, b]), math.dist(a, b))
         shapes = [s for k in known if not (s := self.outlines[k].shape).is_empty]
         self._budget.spend("corner", sum(shapely.get_num_coordinates(s) for s in shapes))
-        return Mesh(a, b, shapes).way(a, b)
+        return _shortest(a, b, shapes)

@@ -39,10 +39,7 @@ from gcsplan.planners.optimal.navmesh.polyanya_nodes import (
     TURNS,
     ahead_of,
     beaten,
-    end_of,
-    held,
     join,
-    lies_on,
     off_of,
     place_on,
     pop,
@@ -59,18 +56,18 @@ BAND = 0.005
 BANDS = 1e8
 """In metres more than any way; what it leaves of a number's precision orders the nodes of a band."""
 MOST_TURNS = 8
-"""No more pieces than this meet at one place of a sheet; who passes more of them turns in a circle around it."""
+"""No more pieces than this meet at one place; who passes more of them turns in a circle around it."""
 
 
 @kernel(
     "i4[] f8[,] i8[,] i4[,] i4[] f8[] i8[] i4[] i4[] f8[,] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[]"
-    " f8[,] i4[,] i8[,] f8[] i4[] f8[,] f8[,]"
+    " f8[,] i4[,] i8[,] f8[] i4[] f8[,]"
 )
 def search(
     start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats, origin: Names, first: Ints,
     widest: Ints, span: Floats, sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float,
     slack: float, most: int, remaining: Floats, met: Floats,
-    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats, spokes: Floats,
+    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats,
 ) -> int:  # fmt: skip
     """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
 
@@ -79,8 +76,7 @@ def search(
     portals,) and ``widest`` (portals,) zeros; ``span`` (portals, 2); ``node`` (room, 8), ``link`` (room, 6), ``name``
     (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining`` (pieces,): no way on from a piece's entrance
     is shorter. ``slack`` >= 0: go on after the goal is reached, as far as that much (as a part of the length) beyond
-    it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. ``spokes`` (portals,
-    8), zeros, where portals of a piece may lie on each other, from sheet to sheet, or else empty. Returns the number of
+    it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. Returns the number of
     corners, ends included, with ``out[0, 2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than
     ``limit``; -1: no room left; -2: more than ``most`` nodes were opened, paths shorter than ``out[0, 0]`` all of them.
     ``out[2, 2]`` is how many were opened.
@@ -89,7 +85,7 @@ def search(
     gx, gy = goal[0], goal[1]
     count = size = opened = 0
     reached = -1
-    flood, guided, sheets = len(met) > 0, len(remaining) > 0, len(spokes) > 0
+    flood, guided = len(met) > 0, len(remaining) > 0
     far, shortest = limit, np.inf
     band = max(BAND * math.sqrt((gx - sources_at[0, 0]) ** 2 + (gy - sources_at[0, 1]) ** 2), 1e-3)
     # What a node pushes is listed here as from, to and root; sources push all portals of their piece.
@@ -149,20 +145,9 @@ def search(
         width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
         if width_l < SAME_M or width_r < SAME_M:
             all_round = True  # the root is a corner of this convex piece
-            if turns >= (2 * MOST_TURNS if sheets else MOST_TURNS):
+            if turns >= MOST_TURNS:
                 continue
             turns += 1
-            if sheets and current >= 0:
-                # One may come round a place into a piece from several sheets: once is enough.
-                p = link[current, PORTAL]
-                k = end_of(ends, p, rx, ry)
-                if k >= 0 and 0.0 < spokes[p, 4 + k + (2 if joins[p, 1] == piece else 0)] <= cost + 1.0 + SAME_M:
-                    continue
-                for at in range(start[piece], start[piece + 1]):
-                    p = order[at]
-                    k = end_of(ends, p, rx, ry)
-                    if k >= 0:
-                        spokes[p, 4 + k + (2 if joins[p, 1] == piece else 0)] = cost + 1.0
         else:
             turns = 0
         is_goal = False
@@ -214,9 +199,6 @@ def search(
                                 along = -1
             if along >= 0:
                 t0, t1 = 1.0, 0.0
-            elif sheets and not all_round and not to_goal and lies_on(ax, ay, bx, by, qx, qy, lx, ly):
-                # Back to where one came from, on another sheet: round one end of what one came through.
-                t0, t1 = 2.0, -1.0
             elif not all_round:
                 # Signed distances off the two rays; beyond a ray is beyond what the root sees.
                 ra = ((qx - rx) * (ay - ry) - (qy - ry) * (ax - rx)) / width_r
@@ -285,20 +267,9 @@ def search(
                     ahead = max(ahead, ahead_of(nx, ny, x1, y1, x0, y0, gx, gy))
                 if ncost + ahead >= limit:
                     continue
-                if sheets and not to_goal:
-                    # Round a place there are many ways from sheet to sheet: what meets there is passed once, each way.
-                    k = end_of(ends, p, nx, ny)
-                    if k >= 0:
-                        k += 2 if forward else 0
-                        if 0.0 < spokes[p, k] <= ncost + 1.0 + SAME_M:
-                            continue
-                        spokes[p, k] = ncost + 1.0
                 if not to_goal:
                     if not forward:
                         s0, s1 = 1.0 - s1, 1.0 - s0
-                    here = first[2 * p + (1 if forward else 0)]
-                    if sheets and held(node, link, name, ends, p, here, nroot, ncost, s0, s1):
-                        continue
                     if widest[p] > 0 and span[p, 0] <= s0 and s1 <= span[p, 1]:
                         other = widest[p] - 1
                         if beaten(node, other, nx, ny, ncost, off, x0, y0, x1, y1):

@@ -93,28 +93,6 @@ def off_of(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> 
 
 
 @device
-def lies_on(ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float) -> bool:
-    """Whether segments lie on one line, and on each other in more than a place."""
-    ex, ey = bx - ax, by - ay
-    long = math.sqrt(ex * ex + ey * ey)
-    if long <= SAME_M or abs(ex * (cy - ay) - ey * (cx - ax)) > SAME_M * long:
-        return False
-    if abs(ex * (dy - ay) - ey * (dx - ax)) > SAME_M * long:
-        return False
-    c, d = (ex * (cx - ax) + ey * (cy - ay)) / long, (ex * (dx - ax) + ey * (dy - ay)) / long
-    return bool(min(max(c, d), long) - max(min(c, d), 0.0) > SAME_M)
-
-
-@device
-def end_of(ends: Floats, p: int, x: float, y: float) -> int:
-    """Which end of a portal a place is, 0 or 1; -1 if neither."""
-    for k in range(2):
-        if (ends[p, 2 * k] - x) ** 2 + (ends[p, 2 * k + 1] - y) ** 2 <= SAME_M * SAME_M:
-            return k
-    return -1
-
-
-@device
 def place_on(ends: Floats, p: int, x: float, y: float) -> float:
     """Where on a portal a place is, as a part of it."""
     ex, ey = ends[p, 2] - ends[p, 0], ends[p, 3] - ends[p, 1]
@@ -123,23 +101,6 @@ def place_on(ends: Floats, p: int, x: float, y: float) -> float:
         return 0.0
     t = ((x - ends[p, 0]) * ex + (y - ends[p, 1]) * ey) / square
     return 0.0 if t < 1e-9 else 1.0 if t > 1.0 - 1e-9 else t
-
-
-@device
-def held(
-    node: Floats, link: Ints, name: Names, ends: Floats, p: int, first: int, root: np.int64, cost: float, s0: float,
-    s1: float,
-) -> bool:  # fmt: skip
-    """Whether a node of a portal's list (numbers from 1) has this root, too, for no more, and holds the interval."""
-    k = first - 1
-    while k >= 0:
-        if link[k, PIECE] != GONE and name[k, ROOT] == root and node[k, COST] <= cost + SAME_M:
-            a = place_on(ends, p, node[k, RIGHT_X], node[k, RIGHT_Y])
-            b = place_on(ends, p, node[k, LEFT_X], node[k, LEFT_Y])
-            if min(a, b) <= s0 + 1e-9 and s1 - 1e-9 <= max(a, b):
-                return True
-        k = link[k, NEXT]
-    return False
 
 
 @device

@@ -59,15 +59,15 @@ def _level_at(zones: Floats, z: int, at: int, ground: Floats, up: Floats, down: 
 
 @device
 def _open(
-    zones: Floats, z: int, floor: float, allowed: float, ground: Floats, up: Floats, down: Floats, j: int, i: int,
-    over: bool, under: bool,
-) -> bool:  # fmt: skip
+    zones: Floats, z: int, floor: float, allowed: float, ground: Floats, up: Floats, down: Floats, j: int, i: int
+) -> bool:
     """Whether there is an altitude to fly at, over a zone, under it, or between the two of a pair."""
     bottom, top = (
         _level_at(zones, z, BOTTOM, ground, up, down, j, i), _level_at(zones, z, TOP, ground, up, down, j, i)
     )  # fmt: skip
+    under = zones[z, UNDER] > 0.0
     if zones[z, PAIR] == 0.0:
-        return (over and top <= allowed) or (under and floor <= bottom)
+        return top <= allowed or (under and floor <= bottom)
     bottom_2, top_2 = (
         _level_at(zones, z, BOTTOM_2, ground, up, down, j, i), _level_at(zones, z, TOP_2, ground, up, down, j, i)
     )  # fmt: skip
@@ -79,27 +79,25 @@ def _open(
     return under and top_2 <= min(bottom, allowed) and floor <= bottom
 
 
-@kernel(
-    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] i8 f8 b1 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] i8 i4[,] f8[,] i8"
-)
+@kernel("i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] i8 f8 b1 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] f8[,]")
 def stamp_zones(
     around: Ints, span: Ints, excess: Floats, floor: Floats, ground: Floats, steep: Floats, fineness: int, reach: float,
     exact: bool, up: Floats, down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, low: bool,
-    owner: Ints, sheet: int, of: Ints, values: Floats, count: int,
+    of: Ints, values: Floats,
 ) -> int:  # fmt: skip
     """Give cells that zones shut walls of their own: how deep in the shape they lie. Returns how many walls there are.
 
     ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells each may touch; ``around``,
-    ``span``, ``owner``, ``of``, ``values`` as in `mesh_kernels`, of the ``sheet``, which has none yet: a cell's owner
-    is passed over on the first and under on the second. ``low``: only what is shut for certain; else all that may be
-    shut. ``count``: walls that there are.
+    ``span``, ``of``, ``values`` as in `mesh_kernels`. ``low``: only what is shut for certain; else all that may be
+    shut.
 
     For paths, ``reach`` is within which a zone's ground tells its levels: at each node (``up``, ``down``, room for it)
     as ``steep`` (of the nodes of a lattice ``fineness`` times coarser) lets it be, or, ``exact``, as nodes are.
     """
     for j in range(len(span)):
         for i in range(around[j, 0], min(around[j, 1], excess.shape[1] - 1)):
-            of[j * (excess.shape[1] - 1) + i, sheet] = 0
+            of[j * (excess.shape[1] - 1) + i] = 0
+    count = 0
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         if _looks_beside(zones, z):
@@ -110,12 +108,9 @@ def stamp_zones(
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
             for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
                 cell = j * (excess.shape[1] - 1) + i
-                if sheet > 0 and owner[cell] == 0:
-                    continue
                 if min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0:
                     continue  # nothing there is free anyway
-                mine = len(owner) > 0 and owner[cell] == z + 1
-                over, under = not mine or sheet == 0, zones[z, UNDER] > 0.0 and (not mine or sheet > 0)
+                under = zones[z, UNDER] > 0.0
                 deepest, shallowest = -np.inf, np.inf
                 ways = 0
                 for k in range(4):
@@ -123,7 +118,7 @@ def stamp_zones(
                     wall[k] = depth(zones, edges, z, x[jj, ii], y[jj, ii])
                     deepest, shallowest = max(deepest, wall[k]), min(shallowest, wall[k])
                     allowed = floor[jj, ii] - excess[jj, ii]
-                    if _open(zones, z, floor[jj, ii], allowed, ground, up, down, jj, ii, over, under):
+                    if _open(zones, z, floor[jj, ii], allowed, ground, up, down, jj, ii):
                         ways += 1
                 if ways == 4:
                     continue
@@ -134,14 +129,11 @@ def stamp_zones(
                         jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
                         wall[k] = _level_at(zones, z, TOP, ground, up, down, jj, ii) - floor[jj, ii] + excess[jj, ii]
                         wall[k] += -twist if low else twist
-                    count = _put(of, sheet, values, cell, wall, count)
+                    count = _put(of, values, cell, wall, count)
                     continue
                 if low and ways > 0:
                     if deepest > 0.0 and zones[z, PAIR] == 0.0:
-                        count = _in_part(
-                            excess, floor, ground, zones, z, over, under, of, sheet, values, wall, shallowest, j, i,
-                            count,
-                        )  # fmt: skip
+                        count = _in_part(excess, floor, ground, zones, z, of, values, wall, shallowest, j, i, count)
                     continue
                 if not low:
                     dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
@@ -156,7 +148,7 @@ def stamp_zones(
                         more = 0.02 - deepest  # a disc that no corner lies near
                     for k in range(4):
                         wall[k] += more
-                count = _put(of, sheet, values, cell, wall, count)
+                count = _put(of, values, cell, wall, count)
     return count
 
 
@@ -241,50 +233,6 @@ def lift_lids(
                     either[j, i] = 1
 
 
-@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 i4[]")
-def own_zones(
-    span: Ints, excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats,
-    boxes: Ints, slope: float, owner: Ints,
-) -> int:  # fmt: skip
-    """Tell the cells that want two sheets (``owner``, zeros): the number from 1 of a shape that they lie in; how many.
-
-    Such a shape may be passed over in one place and not under, and the other way round in another. From under it to
-    over it is so far, at a climb of ``slope``, that turning in the wrong place of an edge of a cell does not matter.
-    """
-    nx, count = excess.shape[1], 0
-    for z in range(len(zones)):
-        if zones[z, PAIR] > 0.0 or zones[z, UNDER] == 0.0 or zones[z, TOP] == np.inf:
-            continue
-        over_alone = under_alone = 0
-        lowest_top, highest_bottom, long = np.inf, -np.inf, 0.0
-        for again in range(2):
-            for j in range(boxes[z, 2], boxes[z, 3] + 1):
-                for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
-                    over = under = 0
-                    inside = True
-                    for k in range(4):
-                        jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
-                        inside = inside and excess[jj, ii] < np.inf
-                        inside = inside and depth(zones, edges, z, x[jj, ii], y[jj, ii]) > 0.0
-                        if not inside:
-                            break
-                        bottom, top = level(zones, z, BOTTOM, ground[jj, ii]), level(zones, z, TOP, ground[jj, ii])
-                        lowest_top, highest_bottom = min(lowest_top, top), max(highest_bottom, bottom)
-                        over += 1 if top <= floor[jj, ii] - excess[jj, ii] else 0
-                        under += 1 if floor[jj, ii] <= bottom else 0
-                    if not inside:
-                        continue
-                    if again > 0 and owner[j * (nx - 1) + i] == 0:
-                        owner[j * (nx - 1) + i] = z + 1
-                        count += 1
-                    over_alone += 1 if over > 0 and under < 4 else 0
-                    under_alone += 1 if under > 0 and over < 4 else 0
-                    long = max(long, math.sqrt((x[j + 1, i + 1] - x[j, i]) ** 2 + (y[j + 1, i + 1] - y[j, i]) ** 2))
-            if over_alone == 0 or under_alone == 0 or not lowest_top - highest_bottom >= 2.0 * slope * long:
-                break
-    return count
-
-
 @device
 def over_ground(zones: Floats, z: int) -> bool:
     """Whether a level of a zone past which one may fly is told over ground."""
@@ -338,14 +286,14 @@ def narrow_rooms(
 
 
 @device
-def _put(of: Ints, sheet: int, values: Floats, cell: int, wall: Floats, count: int) -> int:
+def _put(of: Ints, values: Floats, cell: int, wall: Floats, count: int) -> int:
     """Give a cell a wall (its corners' values come first), if it stands anywhere; returns how many walls there are."""
     if max(max(wall[0], wall[1]), max(wall[2], wall[3])) <= 0.0:
         return count
     for k in range(4):
         values[count, k] = wall[k]
-    values[count, NEXT] = of[cell, sheet]
-    of[cell, sheet] = count + 1
+    values[count, NEXT] = of[cell]
+    of[cell] = count + 1
     return count + 1
 
 
@@ -363,8 +311,8 @@ def _twist(floor: Floats, ground: Floats, j: int, i: int) -> float:
 
 @device
 def _in_part(
-    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, over: bool, under: bool, of: Ints, sheet: int,
-    values: Floats, wall: Floats, least: float, j: int, i: int, count: int,
+    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, of: Ints, values: Floats, wall: Floats,
+    least: float, j: int, i: int, count: int,
 ) -> int:  # fmt: skip
     """Shut the part of a cell that certainly lies in a zone and can be passed neither over nor under it there.
 
@@ -373,7 +321,7 @@ def _in_part(
     lies nowhere above it. Where the ground is not what floors are measured from, its patch may be cut the wrong way,
     and nothing is said of what is below a level over it. Returns how many walls there are.
     """
-    spare = 0.0
+    spare, under = 0.0, zones[z, UNDER] > 0.0
     if zones[z, TOP_AGL] > 0.0 or (under and zones[z, BOTTOM_AGL] > 0.0):
         spare = _twist(floor, ground, j, i)
         if spare > 0.0 and under and zones[z, BOTTOM_AGL] > 0.0:
@@ -381,14 +329,12 @@ def _in_part(
     for k in range(4):
         jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
         g = ground[jj, ii]
-        shut = np.inf
-        if over:
-            shut = level(zones, z, TOP, g) - floor[jj, ii] + excess[jj, ii] - spare
+        shut = level(zones, z, TOP, g) - floor[jj, ii] + excess[jj, ii] - spare
         if under:
             shut = min(shut, floor[jj, ii] - level(zones, z, BOTTOM, g))
         # All of the cell is inside, if its corners are.
         wall[k] = shut if least > 0.0 else min(shut, wall[k])
-    return _put(of, sheet, values, j * (excess.shape[1] - 1) + i, wall, count)
+    return _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
 
 
 @device

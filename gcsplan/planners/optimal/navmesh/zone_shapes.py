@@ -57,7 +57,6 @@ class Shapes:
 
     A form is a half-plane a - b x - c y > 0, or a disc (radius, x, y, 1). ``boxes`` (K, 4) first and last column and
     row of the cells that each part may touch, ``owner`` (K, 2) its zones, ``cells`` how many cells all boxes have.
-    ``either``: whether there is one that may be passed over and under.
     """
 
     low: tuple[Floats, Floats]
@@ -65,7 +64,6 @@ class Shapes:
     boxes: Ints
     owner: NDArray[np.intp]
     cells: int
-    either: bool
 
 
 def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Shapes:
@@ -143,8 +141,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     size = (boxes[:, 1] - boxes[:, 0] + 1).clip(0) * (boxes[:, 3] - boxes[:, 2] + 1).clip(0)
     numbers = [number for number, *_ in found]
     owner = np.array([(n, n) for n in numbers] + [(numbers[a], numbers[b]) for a, b in pairs], np.intp).reshape(-1, 2)
-    either = any(zone.floor is not None and zone.ceiling is not None for _, zone, _ in found)
-    return Shapes(both[0], both[1], boxes, owner, int(size.sum()), either)
+    return Shapes(both[0], both[1], boxes, owner, int(size.sum()))
 
 
 def _follows(zone: Zone) -> bool:

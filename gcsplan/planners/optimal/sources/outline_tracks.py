@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.optimal.corridor import Stops, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.navmesh.outlines import Solids, TooLarge
+from gcsplan.planners.optimal.navmesh.outlines import Solids
+from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import terminals
 from gcsplan.world.zones import Zone
@@ -48,7 +49,7 @@ class OutlineTracks:
         which = ~((choice.under & self.under) | (choice.over & self.over))
         try:
             tracks = self._tracks(which, outer=True)
-        except TooLarge:
+        except Exhausted:
             return None
         if tracks is None:
             return None
@@ -59,7 +60,7 @@ class OutlineTracks:
         incumbent = self.incumbent
         try:
             tracks = self._tracks(~(self.under | self.over), outer=False)
-        except TooLarge:
+        except Exhausted:
             tracks = []
         if tracks is None:
             incumbent.proved_shut = True
@@ -77,7 +78,7 @@ class OutlineTracks:
         DetourSearch(incumbent, self.stops, False).run(roots, TRACKS, first=False, laps=laps)
 
     def _tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
-        """The shortest track of each leg past some zones; None where one has none. Raises TooLarge."""
+        """The shortest track of each leg past some zones; None where one has none. Raises Exhausted."""
         if outer not in self._solids:
             air, limits = self.problem.airspace, self.problem.limits
             hair_m = HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M

@@ -1,0 +1,103 @@
+"""Convex pieces of the plane, the portals between them, and the shortest tracks over those: `polyanya`, with memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.planners.optimal.navmesh.polyanya import search
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Place = tuple[float, float]
+
+MOST_CORNERS = 1 << 14
+"""Corners of a track, at most."""
+FIRST_NODES, NODES_OF_PIECE = 1 << 19, 8
+"""Search nodes that memory is asked for at first: so many, or that many for each piece. What is not touched costs
+nothing; where they do not suffice, the search begins again with four times as many."""
+
+
+class Exhausted(Exception):
+    """A search was given up; all tracks shorter than ``seen_m`` had been looked at, and none led to the goal."""
+
+    def __init__(self, seen_m: float) -> None:
+        super().__init__(f"no track of less than {seen_m:.1f} m, and too much to look at beyond")
+        self.seen_m = seen_m
+
+
+@dataclass(eq=False, slots=True)
+class GroundTrack:
+    """A line in the plane: ``points`` (N, 2) and its length."""
+
+    points: Floats
+    length_m: float
+
+
+@dataclass(eq=False, slots=True)
+class Portals:
+    """Portals as `polyanya.search` wants them: ``order`` (start[p] : start[p + 1]) lists those of piece p; ``ends``
+    (portals, 4), ``names`` (portals, 2) of both ends, all less than ``named``, ``joins`` (portals, 2) the pieces at the
+    left and at the right."""
+
+    start: Ints
+    ends: Floats
+    names: NDArray[np.int64]
+    joins: Ints
+    order: Ints
+    named: int
+
+    @property
+    def pieces(self) -> int:
+        """How many pieces there are."""
+        return len(self.start) - 1
+
+    def shortest(
+        self,
+        start: Place,
+        goal: Place,
+        start_pieces: Sequence[int],
+        goal_pieces: Sequence[int],
+        most: int,
+        *,
+        limit_m: float = math.inf,
+        slack: float = -1.0,
+        remaining: Floats | None = None,
+        met: Floats | None = None,
+    ) -> tuple[GroundTrack | None, float]:
+        """The shortest track that is shorter than ``limit_m``, and how many search nodes were opened, ``most`` at most.
+
+        ``slack``, ``remaining``, ``met``: see `polyanya.search`. Raises Exhausted where more would have to be opened.
+        """
+        if not len(start_pieces) or not len(goal_pieces):
+            return None, 0.0
+        portals, room = len(self.joins), max(FIRST_NODES, NODES_OF_PIECE * self.pieces)
+        sources = np.array([(*start, 0.0)] * len(start_pieces))
+        remaining, met = (np.zeros(0) if a is None else a for a in (remaining, met))
+        while True:
+            best, origin = np.zeros(self.named), np.zeros(self.named, np.int64)
+            node, link, name = np.empty((room, 8)), np.empty((room, 6), np.int32), np.empty((room, 3), np.int64)
+            first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
+            out = np.empty((MOST_CORNERS, 3))
+            n = search(
+                self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span, sources,
+                np.array(start_pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32), limit_m,
+                slack, most, remaining, met, node, link, name, np.empty(room), np.empty(room, np.int32), out,
+            )  # fmt: skip
+            if n != -1:
+                break
+            room *= 4
+            met[:] = np.inf
+        opened = float(out[2, 2])
+        if n == -2:
+            raise Exhausted(float(out[0, 0]))
+        if n <= 0:
+            return None, opened
+        points = out[:n][::-1, :2].copy()
+        keep = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
+        keep[-1] = True
+        return GroundTrack(points[keep], float(out[1, 2])), opened
