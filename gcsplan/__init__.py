@@ -17,8 +17,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gcsplan.pipeline import load_mission, plan
-    from gcsplan.scripting import rehearse, upload
+    from gcsplan.app.pipeline import load_mission, plan
+    from gcsplan.app.scripting import rehearse, upload
 
 __all__ = ["__version__", "load_mission", "plan", "rehearse", "upload"]
 __version__ = "0.1.0"
@@ -27,11 +27,11 @@ __version__ = "0.1.0"
 def __getattr__(name: str) -> object:
     """The functions for scripts, imported when they are asked for: the command line must start fast."""
     if name in ("load_mission", "plan"):
-        from gcsplan import pipeline
+        from gcsplan.app import pipeline
 
         return getattr(pipeline, name)
     if name in ("rehearse", "upload"):
-        from gcsplan import scripting
+        from gcsplan.app import scripting
 
         return getattr(scripting, name)
     raise AttributeError(f"module 'gcsplan' has no attribute {name!r}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.mavlink.mission import (
+from gcsplan.mavlink.mission.mission import (
     DELAY,
     DO_CHANGE_SPEED,
     GLOBAL,

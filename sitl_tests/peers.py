@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from gcsplan.mavlink.mission import MissionItem
+from gcsplan.mavlink.mission.mission import MissionItem
 from sitl_tests.wire_json import Row, numbers_of
 
 _HERE = Path(__file__).parent

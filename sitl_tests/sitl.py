@@ -14,9 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gcsplan.errors import LinkError
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.session import discover
-from gcsplan.mavlink.watch import VehicleState
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import discover
+from gcsplan.mavlink.link.watch import VehicleState
 
 VARIABLE = "GCSPLAN_SITL"
 WHY_SKIPPED = f"no autopilot: set {VARIABLE}=tcp:127.0.0.1:5760 (a running SITL) or to the path of an arducopter binary"

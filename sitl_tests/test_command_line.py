@@ -9,7 +9,7 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-from gcsplan.mavlink.files import read_mission_file
+from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.vehicle import Autopilot
 from sitl_tests.peers import MavsdkVehicle, item_of
 
@@ -32,7 +32,7 @@ MISSION = """
 
 def gcsplan(*words: str, cwd: Path) -> tuple[int, dict[str, Any], str]:
     """Exit code, the JSON document, and what was said to people."""
-    program = "import sys; from gcsplan.cli import main; sys.exit(main())"
+    program = "import sys; from gcsplan.cli.main import main; sys.exit(main())"
     done = subprocess.run(
         [sys.executable, "-c", program, *words, "--json"],
         cwd=cwd, capture_output=True, text=True, timeout=120, check=False,

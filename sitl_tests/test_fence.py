@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gcsplan.mavlink import steps
-from gcsplan.mavlink.compare import compare, faults
-from gcsplan.mavlink.fence import Fence, areas_of, fence_of
-from gcsplan.mavlink.files import write_plan
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.mission import FENCE, Mission
-from gcsplan.mavlink.session import Options, clear_mission, download_items, upload_items
+from gcsplan.mavlink.build.fence import Fence, areas_of, fence_of
+from gcsplan.mavlink.files.formats import write_plan
+from gcsplan.mavlink.link import steps
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import Options, clear_mission, download_items, upload_items
+from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.mission import FENCE, Mission
 from gcsplan.sim.server import SimServer
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.frame import Frame

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from gcsplan.check.judge import judge
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.sim import sitl as flown
 from gcsplan.sim.outcome import Part, Terms
 from gcsplan.sim.sitl_instances import sitl_instances

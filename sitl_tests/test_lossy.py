@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import pytest
 
-from gcsplan.mavlink.compare import compare, faults
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.mission import FENCE, MissionItem
-from gcsplan.mavlink.session import Options, Order, download_mission, upload_fleet, upload_items, upload_mission
-from gcsplan.mavlink.transfer import Timers
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import Options, Order, download_mission, upload_fleet, upload_items, upload_mission
+from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.mission import FENCE, MissionItem
+from gcsplan.mavlink.protocol.transfer import Timers
 from gcsplan.sim.server import SimServer
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission, a_vehicle

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from gcsplan.errors import GcsplanError
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.mission import MISSION
-from gcsplan.mavlink.session import Options, Order, upload_fleet, verify_mission
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import Options, Order, upload_fleet, verify_mission
+from gcsplan.mavlink.mission.mission import MISSION
 from gcsplan.sim.server import SimServer
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission, a_vehicle

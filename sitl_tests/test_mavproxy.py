@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from gcsplan.errors import GcsplanError
-from gcsplan.mavlink.compare import compare, faults
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.session import Options, Order, upload_fleet
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.sim.server import SimServer
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission, a_vehicle

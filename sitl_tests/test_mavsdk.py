@@ -8,17 +8,17 @@ from typing import Any
 
 import pytest
 
-from gcsplan.mavlink import steps
-from gcsplan.mavlink.files import write_plan, write_waypoints
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, TERRAIN, Mission, MissionItem
-from gcsplan.mavlink.session import (
+from gcsplan.mavlink.files.formats import write_plan, write_waypoints
+from gcsplan.mavlink.link import steps
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import (
     Options,
     clear_mission,
     upload_items,
     upload_mission,
     verify_mission,
 )
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, TERRAIN, Mission, MissionItem
 from gcsplan.sim.server import SimServer
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import HOME, a_mission, a_vehicle

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from pymavlink import mavwp
 
-from gcsplan.mavlink.files import read_mission_file, write_waypoints
-from gcsplan.mavlink.mission import float32
+from gcsplan.mavlink.files.formats import read_mission_file, write_waypoints
+from gcsplan.mavlink.mission.mission import float32
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission
 

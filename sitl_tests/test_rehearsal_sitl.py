@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from gcsplan.app.pipeline import plan
+from gcsplan.app.model import Plan
+from gcsplan.app.rehearsing import rehearse, rehearse_in_sitl
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import Plan, plan
-from gcsplan.rehearsing import rehearse, rehearse_in_sitl
 from sitl_tests import sitl
 
 binary = pytest.mark.skipif(

@@ -12,13 +12,9 @@ from typing import Any
 
 import pytest
 
-from gcsplan.mavlink import wire
-from gcsplan.mavlink.compare import faults
-from gcsplan.mavlink.frames import FrameParser, FrameWriter
-from gcsplan.mavlink.link import GCS, Link
-from gcsplan.mavlink.messages import Ack, Address, ClearAll, Count, Item, MissionMessage, Packet, Request, RequestList
-from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, TERRAIN, Home, Mission, MissionItem
-from gcsplan.mavlink.session import (
+from gcsplan.mavlink.link.frames import FrameParser, FrameWriter
+from gcsplan.mavlink.link.link import GCS, Link
+from gcsplan.mavlink.link.session import (
     Options,
     clear_mission,
     download_items,
@@ -26,6 +22,20 @@ from gcsplan.mavlink.session import (
     upload_items,
     upload_mission,
     verify_mission,
+)
+from gcsplan.mavlink.mission.compare import faults
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, TERRAIN, Home, Mission, MissionItem
+from gcsplan.mavlink.protocol import wire
+from gcsplan.mavlink.protocol.messages import (
+    Ack,
+    Address,
+    ClearAll,
+    Count,
+    Item,
+    MissionMessage,
+    Packet,
+    Request,
+    RequestList,
 )
 from gcsplan.sim.board import DENIED, INVALID_SEQUENCE
 from gcsplan.sim.vehicle import LoopbackVehicle

@@ -6,9 +6,9 @@ from functools import partial
 
 import pytest
 
-from gcsplan.mavlink import session
-from gcsplan.mavlink.transfer import Timers
-from gcsplan.steps import delivery
+from gcsplan.app import delivery
+from gcsplan.mavlink.link import session
+from gcsplan.mavlink.protocol.transfer import Timers
 
 _OPTIONS = session.Options
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from gcsplan.mavlink.messages import Packet
+from gcsplan.mavlink.protocol.messages import Packet
 
 
 @dataclass(frozen=True)

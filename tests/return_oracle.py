@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.mavlink.mission import (
+from gcsplan.mavlink.mission.mission import (
     LAND,
     RELATIVE,
     TAKEOFF,

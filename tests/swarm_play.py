@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.swarm.box import Floats, Run
-from gcsplan.swarm.table import get
+from gcsplan.optimisers.box import Floats, Run
+from gcsplan.optimisers.registry import get
 
 DRAWS = ("random", "uniform", "integers", "normal", "permutation")
 

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.autopilots import altitude_of_cm, encode_altitude, manner, max_items, stored
-from gcsplan.mavlink.mission import FENCE, FRAME_SYNONYMS, GLOBAL, RALLY, MissionItem, float32
-from gcsplan.mavlink.stored_ardupilot import RULES, read_back_altitudes, stored_cm
-from gcsplan.mavlink.stored_px4 import LOCATED, yaw
-from gcsplan.mavlink.stored_px4 import LOCATED as PX4_LOCATED
-from gcsplan.mavlink.stored_px4 import PLACELESS as PX4_PLACELESS
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm, encode_altitude, manner, max_items, stored
+from gcsplan.mavlink.mission.mission import FENCE, FRAME_SYNONYMS, GLOBAL, RALLY, MissionItem, float32
+from gcsplan.mavlink.mission.stored_ardupilot import RULES, read_back_altitudes, stored_cm
+from gcsplan.mavlink.mission.stored_px4 import LOCATED, yaw
+from gcsplan.mavlink.mission.stored_px4 import LOCATED as PX4_LOCATED
+from gcsplan.mavlink.mission.stored_px4 import PLACELESS as PX4_PLACELESS
 from gcsplan.sim.ardupilot_storage import keep_fence_item, keep_mission_item, keep_rally_item
 from gcsplan.sim.board import Refused
 from gcsplan.sim.px4_storage import keep_item

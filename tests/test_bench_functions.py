@@ -12,7 +12,7 @@ import pytest
 from gcsplan.bench.functions import _claims, _holm, ready, report, run, write
 from gcsplan.bench.functions_printed import PRINTED, RUNS, WOLVES, Printed
 from gcsplan.errors import InputError
-from gcsplan.swarm.functions import FUNCTIONS
+from gcsplan.optimisers.functions import FUNCTIONS
 
 POINT = [0.5, -1.0, 1.5]
 

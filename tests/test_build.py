@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.autopilots import stored
-from gcsplan.mavlink.build import BOW_M, LONGEST_LEG_M, MARGINS, Order, build_mission, split_legs
+from gcsplan.mavlink.build.multirotor import build_mission
+from gcsplan.mavlink.build.order import BOW_M, LONGEST_LEG_M, MARGINS, Order, split_legs
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.autopilots import stored
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.path import Path
 from tests.worlds import vehicle, world

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gcsplan.mavlink.outcome import Changed
-from gcsplan.mavlink.recheck import Recheck
+from gcsplan.mavlink.link.recheck import Recheck
+from gcsplan.mavlink.protocol.outcome import Changed
 from tests.campaigns.links import campaign, main
 
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from gcsplan import cli
+from gcsplan.app.checking import Batch, check_with_options, finding_lines
+from gcsplan.cli import main as cli
 from gcsplan.errors import InputError
 from gcsplan.mission_file.from_options import WorldOptions
-from gcsplan.steps.checking import Batch, check_with_options, finding_lines
 from gcsplan.vehicle import Autopilot
 from tests import corpus
 from tests.corpus import Case

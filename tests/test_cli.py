@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from gcsplan import cli
-from gcsplan.mavlink.files import read_mission_file
+from gcsplan.cli import main as cli
+from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -237,7 +237,7 @@ def test_help_and_version(run: Any) -> None:
 
 
 def test_a_bug_of_ours_is_exit_70_with_one_message(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from gcsplan import pipeline
+    from gcsplan.app import pipeline
 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("boom")
@@ -251,7 +251,7 @@ def test_a_bug_of_ours_is_exit_70_with_one_message(run: Any, monkeypatch: pytest
 
 
 def test_ctrl_c_is_exit_130(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from gcsplan import pipeline
+    from gcsplan.app import pipeline
 
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt

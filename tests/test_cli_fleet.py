@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from gcsplan import cli
+from gcsplan.cli import main as cli
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle

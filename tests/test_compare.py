@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gcsplan.mavlink.autopilots import altitude_of_cm, stored
-from gcsplan.mavlink.compare import command_name, compare, faults
-from gcsplan.mavlink.mission import FENCE, RALLY, Home, MissionItem, float32
-from gcsplan.mavlink.stored_ardupilot import read_back_altitudes
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm, stored
+from gcsplan.mavlink.mission.compare import command_name, compare, faults
+from gcsplan.mavlink.mission.mission import FENCE, RALLY, Home, MissionItem, float32
+from gcsplan.mavlink.mission.stored_ardupilot import read_back_altitudes
 from gcsplan.vehicle import Autopilot
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

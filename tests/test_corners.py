@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import yaml
 
+from gcsplan.app.pipeline import plan
 from gcsplan.check.judge import judge
 from gcsplan.check.tuning import Tuning
 from gcsplan.check.verdict import Verdict
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.build import corner_m
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.build.multirotor import corner_m
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import plan
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.world import World

@@ -10,7 +10,7 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 
-from gcsplan import pipeline
+from gcsplan.app import pipeline
 from gcsplan.errors import NoMission
 from gcsplan.planners.cures import with_cures
 from gcsplan.planners.optimal.planner import plan

@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 import yaml
 
+from gcsplan.app.checking import check_files
+from gcsplan.app.model import Plan
+from gcsplan.app.outputs import outputs_of
+from gcsplan.app.pipeline import plan
 from gcsplan.check.judge import judge
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.files import write_waypoints
-from gcsplan.mavlink.mission import Home, Mission
+from gcsplan.mavlink.files.formats import write_waypoints
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import Plan, plan
-from gcsplan.steps.checking import check_files
-from gcsplan.steps.outputs import outputs_of
 from tests import flown
 
 pytestmark = pytest.mark.slow

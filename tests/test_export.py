@@ -22,7 +22,7 @@ from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import ItemRow, Track, outline_deg
 from gcsplan.export.summary import ORDER, write_summary
 from gcsplan.mission_file.zone_draft import place_zones
-from gcsplan.mission_file.zone_geojson import read_zones
+from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone

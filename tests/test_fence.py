@@ -15,25 +15,26 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gcsplan import cli
+from gcsplan.app import delivery, fencing
 from gcsplan.check.judge import judge
+from gcsplan.cli import main as cli
 from gcsplan.errors import CheckFailed, InputError
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink import session
-from gcsplan.mavlink.autopilots import stored
-from gcsplan.mavlink.build import Order, build_mission
-from gcsplan.mavlink.compare import compare, faults
-from gcsplan.mavlink.fence import areas_of, fence_of
-from gcsplan.mavlink.files import read_mission_file, write_plan
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.messages import Address
-from gcsplan.mavlink.mission import FENCE, Mission, MissionItem
-from gcsplan.mavlink.transfer import VerifiedUpload
+from gcsplan.mavlink.build.fence import areas_of, fence_of
+from gcsplan.mavlink.build.multirotor import build_mission
+from gcsplan.mavlink.build.order import Order
+from gcsplan.mavlink.files.formats import read_mission_file, write_plan
+from gcsplan.mavlink.link import session
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.autopilots import stored
+from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
+from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.mavlink.protocol.transfer import VerifiedUpload
 from gcsplan.sim.loopback import loopback_fleet
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.steps import delivery, fencing
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
 from gcsplan.world.path import Path as FlightPath

@@ -17,9 +17,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.file_items import MAX_BYTES, PLAIN_XY, degrees_e7_of, degrees_text, float32_text
-from gcsplan.mavlink.files import read_mission_file, read_plan, read_waypoints, write_plan, write_waypoints
-from gcsplan.mavlink.mission import (
+from gcsplan.mavlink.files.file_items import MAX_BYTES, PLAIN_XY, degrees_e7_of, degrees_text, float32_text
+from gcsplan.mavlink.files.formats import read_mission_file, read_plan, read_waypoints, write_plan, write_waypoints
+from gcsplan.mavlink.files.plan_file import parse_plan
+from gcsplan.mavlink.files.waypoints_file import parse_waypoints
+from gcsplan.mavlink.mission.mission import (
     DO_CHANGE_SPEED,
     DO_JUMP,
     GLOBAL,
@@ -35,8 +37,6 @@ from gcsplan.mavlink.mission import (
     MissionItem,
     float32,
 )
-from gcsplan.mavlink.plan_file import parse_plan
-from gcsplan.mavlink.waypoints_file import parse_waypoints
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 

@@ -11,22 +11,22 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from gcsplan import console
+from gcsplan.app import delivery
+from gcsplan.app.jobs import Delivery, Job
 from gcsplan.bench import upload_fleet as upload_fleet_bench
+from gcsplan.cli import console
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, VehicleRefused
-from gcsplan.mavlink import session
-from gcsplan.mavlink.autopilots import altitude_of_cm
-from gcsplan.mavlink.compare import compare, faults
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.machine import Progress
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
-from gcsplan.mavlink.session import Options, Order, upload_fleet
-from gcsplan.mavlink.transfer import Timers
+from gcsplan.mavlink.link import session
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm
+from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.protocol.machine import Progress
+from gcsplan.mavlink.protocol.transfer import Timers
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.steps import delivery
-from gcsplan.steps.delivery import Delivery, Job
 from gcsplan.vehicle import Autopilot
 
 COPTER = Autopilot.ARDUCOPTER

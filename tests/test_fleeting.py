@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 import yaml
 
+from gcsplan.app.fleeting import route_of
+from gcsplan.app.model import Plan
+from gcsplan.app.outputs import outputs_of, summary_of
+from gcsplan.app.pipeline import plan
 from gcsplan.errors import InputError, NoMission
-from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.mission import mission as m
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import Plan, plan
-from gcsplan.steps.fleeting import route_of
-from gcsplan.steps.outputs import outputs_of, summary_of
 
 MISSIONS = Path(__file__).parents[1] / "missions"
 

@@ -7,8 +7,8 @@ import math
 import pytest
 
 from gcsplan.check.flight import Flight, follow
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 

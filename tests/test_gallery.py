@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from gcsplan import load_mission, plan
-from gcsplan.mavlink.compare import compare, faults
-from gcsplan.mavlink.files import read_mission_file
-from gcsplan.steps.outputs import homes_of, outputs_of
+from gcsplan.app.outputs import homes_of, outputs_of
+from gcsplan.mavlink.files.formats import read_mission_file
+from gcsplan.mavlink.mission.compare import compare, faults
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 SLOW = {"fleet-100", "fleet-4", "jacksboro-high"}

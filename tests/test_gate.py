@@ -7,12 +7,13 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import yaml
 
+from gcsplan.app.gate import SLACK_S, GateTime
+from gcsplan.app.model import Plan
+from gcsplan.app.outputs import summary_of
+from gcsplan.app.pipeline import plan
 from gcsplan.errors import InputError, UsageError
-from gcsplan.mavlink import mission as m
+from gcsplan.mavlink.mission import mission as m
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import Plan, plan
-from gcsplan.steps.gate import SLACK_S, GateTime
-from gcsplan.steps.outputs import summary_of
 from tests.test_fleeting import CROSS
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)

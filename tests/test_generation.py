@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from gcsplan import cli
+from gcsplan.cli import main as cli
 from gcsplan.errors import InputError
 from gcsplan.export import durable, generation, outdir
 from gcsplan.export.durable import PART, locked, write_whole
@@ -159,7 +159,7 @@ def test_a_signal_ends_a_command_with_a_message_and_its_code(tmp_path: Path, num
     os.mkfifo(pipe)
     write_outputs(tmp_path / "out", FIRST)
     before = tree(tmp_path / "out")
-    command = [sys.executable, "-m", "gcsplan.cli", "plan", str(pipe), "-o", str(tmp_path / "out"), "--json"]
+    command = [sys.executable, "-m", "gcsplan.cli.main", "plan", str(pipe), "-o", str(tmp_path / "out"), "--json"]
     process = subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         with pipe.open("w"):  # returns when it is read
@@ -176,7 +176,7 @@ def test_a_signal_ends_a_command_with_a_message_and_its_code(tmp_path: Path, num
 
 TERMINATED = """
 import os, signal, sys
-from gcsplan.commands.ending import end_in_good_order
+from gcsplan.cli.ending import end_in_good_order
 from gcsplan.export import outdir
 from tests.test_outdir import SECOND
 end_in_good_order()

@@ -22,15 +22,15 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan import cli, pipeline
-from gcsplan.commands.options import MISBEHAVIOURS
-from gcsplan.mavlink import session
-from gcsplan.mavlink.files import read_mission_file, write_plan
-from gcsplan.mavlink.messages import Packet, Request
+from gcsplan.app import delivery, outputs, pipeline
+from gcsplan.cli import main as cli
+from gcsplan.cli.options import MISBEHAVIOURS
+from gcsplan.mavlink.files.formats import read_mission_file, write_plan
+from gcsplan.mavlink.link import session
+from gcsplan.mavlink.protocol.messages import Packet, Request
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.steps import delivery, outputs
 from gcsplan.vehicle import Autopilot
 from tests.spoil import spoilt_bytes, spoilt_tree
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gcsplan.pipeline import load_mission, make_problem, world_of
+from gcsplan.app.pipeline import load_mission, world_of
+from gcsplan.app.problems import make_problem
 from gcsplan.report.idea import draw
 
 

@@ -11,9 +11,10 @@ import pytest
 
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.build import Order, build_mission
-from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.mavlink.build.multirotor import build_mission
+from gcsplan.mavlink.build.order import Order
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.sim.kinematics import Kinematics
 from gcsplan.sim.mission_flight import STEP_S, Flown, fly
 from gcsplan.sim.track import Track, make_track

@@ -17,11 +17,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError, LinkError
-from gcsplan.mavlink import wire
-from gcsplan.mavlink.drive import drive
-from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing, SigningKey, signing_key
-from gcsplan.mavlink.link import GCS, Channel, Heard, Job, Link, Steps, pump, run
-from gcsplan.mavlink.messages import (
+from gcsplan.mavlink.link.drive import drive
+from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, signing_key
+from gcsplan.mavlink.link.link import GCS, Channel, Heard, Job, Link, Steps, pump, run
+from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.mavlink.protocol import wire
+from gcsplan.mavlink.protocol.messages import (
     Ack,
     Address,
     ClearAll,
@@ -33,8 +34,7 @@ from gcsplan.mavlink.messages import (
     Request,
     RequestList,
 )
-from gcsplan.mavlink.mission import MissionItem
-from gcsplan.mavlink.transfer import Timers, Upload
+from gcsplan.mavlink.protocol.transfer import Timers, Upload
 
 VEHICLE = Address(1, 1)
 WAYPOINT = MissionItem(16, 3, (0.0, 0.0, 0.0, 0.0), 366_000_000, -843_800_000, 60.005)

@@ -12,12 +12,12 @@ PLAN = """
 import gc, sys
 sys.argv = ["gcsplan", "plan", sys.argv[1], "-o", sys.argv[2]]
 from gcsplan import cli
-from gcsplan.commands import memory
+from gcsplan.cli import memory
 try:
     cli.main()
 except SystemExit as ended:
     print(ended.code, gc.get_threshold()[0] == memory.OBJECTS)
-others = ("numba", "scipy", "pymavlink", "matplotlib", "gcsplan.steps.delivery", "gcsplan.way_home.rally",
+others = ("numba", "scipy", "pymavlink", "matplotlib", "gcsplan.app.delivery", "gcsplan.check.rtl.rally",
           "gcsplan.fleet.resolve", "gcsplan.report")
 print([name for name in others if name in sys.modules])
 """
@@ -33,7 +33,7 @@ def test_a_plan_that_is_sent_nowhere_imports_nothing_of_what_sends_or_draws(tmp_
 def test_a_process_can_settle_its_memory_more_than_once_and_where_the_c_library_cannot() -> None:
     words = """
 import ctypes, gc
-from gcsplan.commands.memory import OBJECTS, settle_memory
+from gcsplan.cli.memory import OBJECTS, settle_memory
 settle_memory()
 def none(name):
     raise OSError("no such library")

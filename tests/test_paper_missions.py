@@ -10,10 +10,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from gcsplan.app.pipeline import world_of
+from gcsplan.app.problems import make_problem
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.mission_file.schema import Encoding, SwarmCost
-from gcsplan.pipeline import make_problem, world_of
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get
 from gcsplan.planners.swarm.encodings import ENCODINGS

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 import yaml
 
+from gcsplan.app.model import Plan
+from gcsplan.app.outputs import outputs_of, summary_of
+from gcsplan.app.pipeline import plan, require_passing
 from gcsplan.errors import CheckFailed, InputError, NoMission
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.files import read_plan, read_waypoints
+from gcsplan.mavlink.files.formats import read_plan, read_waypoints
+from gcsplan.mavlink.mission import mission as m
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import Plan, plan, require_passing
-from gcsplan.steps.outputs import outputs_of, summary_of
 from gcsplan.vehicle import Autopilot
 
 DATA = Path(__file__).parent / "data"

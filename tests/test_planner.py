@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gcsplan.app.pipeline import load_mission, world_of
+from gcsplan.app.pipeline import plan as plan_mission
+from gcsplan.app.problems import make_problem
 from gcsplan.errors import InputError
-from gcsplan.pipeline import load_mission, make_problem, world_of
-from gcsplan.pipeline import plan as plan_mission
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.sources.roadmap_3d import is_steep, steep_path
 from gcsplan.planners.problem import Problem, Progress, Solution, Via

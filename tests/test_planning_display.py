@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from gcsplan import cli, console
-from gcsplan.commands import planning_display as display
-from gcsplan.commands.planning_display import PlanningBoard, planning_display
+from gcsplan.cli import console
+from gcsplan.cli import main as cli
+from gcsplan.cli import planning_display as display
+from gcsplan.cli.planning_display import PlanningBoard, planning_display
 from gcsplan.planners.problem import Progress
 
 MISSIONS = Path(__file__).parents[1] / "missions"

@@ -15,18 +15,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.mavlink import wire
-from gcsplan.mavlink.drive import drive
-from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing, SigningKey, checksum
-from gcsplan.mavlink.link import GCS, Link, pump, run
-from gcsplan.mavlink.link import Job as PumpJob
-from gcsplan.mavlink.messages import Ack, Address, Count, Item, Request
-from gcsplan.mavlink.mission import FENCE, MissionItem
-from gcsplan.mavlink.outcome import Accepted
-from gcsplan.mavlink.prompt import Prepared, PromptAnswers
-from gcsplan.mavlink.transfer import Timers, Upload, VerifiedUpload
-from gcsplan.mavlink.transport import Udp
-from gcsplan.mavlink.url import parse_url
+from gcsplan.mavlink.link.drive import drive
+from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, checksum
+from gcsplan.mavlink.link.link import GCS, Link, pump, run
+from gcsplan.mavlink.link.link import Job as PumpJob
+from gcsplan.mavlink.link.prompt import Prepared, PromptAnswers
+from gcsplan.mavlink.link.transport import Udp
+from gcsplan.mavlink.link.url import parse_url
+from gcsplan.mavlink.mission.mission import FENCE, MissionItem
+from gcsplan.mavlink.protocol import wire
+from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Request
+from gcsplan.mavlink.protocol.outcome import Accepted
+from gcsplan.mavlink.protocol.transfer import Timers, Upload, VerifiedUpload
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot

@@ -14,11 +14,9 @@ from typing import Any
 import pytest
 
 from gcsplan.errors import GcsplanError, LinkError, VehicleRefused
-from gcsplan.mavlink.frames import FrameWriter
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.messages import Ack, Address, Count, Item, Packet, Request, RequestList
-from gcsplan.mavlink.mission import FENCE, Home, Mission, MissionItem
-from gcsplan.mavlink.session import (
+from gcsplan.mavlink.link.frames import FrameWriter
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import (
     Options,
     Order,
     clear_mission,
@@ -28,6 +26,8 @@ from gcsplan.mavlink.session import (
     upload_mission,
     verify_mission,
 )
+from gcsplan.mavlink.mission.mission import FENCE, Home, Mission, MissionItem
+from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Packet, Request, RequestList
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -236,7 +236,7 @@ def test_who_speaks_after_a_silence_is_looked_at_before_it_is_answered() -> None
         air.at("a").clear()
 
         def ask() -> None:
-            from gcsplan.mavlink import wire
+            from gcsplan.mavlink.protocol import wire
 
             sent.clear()
             air.written = lambda peer, data: sent.append(data)

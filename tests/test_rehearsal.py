@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gcsplan.app.pipeline import plan
+from gcsplan.app.rehearsing import parts_of, terms_of
 from gcsplan.check.judge import judge
 from gcsplan.errors import CheckFailed, InputError
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import plan
-from gcsplan.rehearsing import parts_of, terms_of
 from gcsplan.sim.outcome import Part, Rehearsal, Terms, percentile_95
 from gcsplan.sim.rehearsal import on_board, rehearse
 from gcsplan.sim.trace import Trace, examine, meetings

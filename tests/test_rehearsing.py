@@ -15,11 +15,12 @@ import pytest
 import typer
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from gcsplan.commands.rehearse import rehearse as command
+from gcsplan.app.model import Plan
+from gcsplan.app.pipeline import plan
+from gcsplan.app.rehearsing import parts_of, rehearse, rehearse_in_sitl, seats_of, terms_of
+from gcsplan.cli.rehearse import rehearse as command
 from gcsplan.errors import CheckFailed, LinkError, UsageError, VehicleRefused
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import Plan, plan
-from gcsplan.rehearsing import parts_of, rehearse, rehearse_in_sitl, seats_of, terms_of
 from gcsplan.sim import hub, sitl
 from gcsplan.sim.mission_flight import fly
 from gcsplan.sim.outcome import Part, Terms
@@ -118,7 +119,7 @@ def test_a_violation_ends_the_command_with_four_and_is_said_in_both_ways(
 def test_words_that_do_not_go_together_are_refused_before_anything_is_planned(
     file: Path, more: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gcsplan.pipeline.plan", lambda *_, **__: pytest.fail("it was planned"))
+    monkeypatch.setattr("gcsplan.app.pipeline.plan", lambda *_, **__: pytest.fail("it was planned"))
     with pytest.raises(UsageError):
         command(file, **more)
 

@@ -18,22 +18,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from gcsplan.app.model import Plan
+from gcsplan.app.pipeline import load_mission, plan
+from gcsplan.app.report_page import render
 from gcsplan.check.judge import judge
+from gcsplan.check.rtl.everywhere import way_home
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Rules, separation
-from gcsplan.mavlink.build import Order, build_mission
-from gcsplan.pipeline import Plan, load_mission, plan
+from gcsplan.mavlink.build.multirotor import build_mission
+from gcsplan.mavlink.build.order import Order
 from gcsplan.report import fleet_view, markup
 from gcsplan.report.chart import Axes, ticks
-from gcsplan.report.page import BARE_DEM, render, render_check, render_page
+from gcsplan.report.page import BARE_DEM, render_check, render_page
 from gcsplan.report.picture import figures
 from gcsplan.report.relief import UNKNOWN, extent_of, relief_of
 from gcsplan.report.samples import distance_m, line_of, passages
 from gcsplan.report.scene_data import triangles, zone_meshes
 from gcsplan.report.subject import Page, Subject
 from gcsplan.vehicle import Energy, Vehicle
-from gcsplan.way_home.everywhere import way_home
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from gcsplan.check.rtl.everywhere import way_home
 from gcsplan.report.page import render_page
-from gcsplan.way_home.everywhere import way_home
 from tests import browser as chromium
 from tests.browser import Browser
 from tests.test_report import HOSTILE, fleet_page, small_page

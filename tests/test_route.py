@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from gcsplan.check.flight import Flight, follow
 from gcsplan.check.spline import chords, towards
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 

@@ -12,14 +12,15 @@ import pytest
 import yaml
 
 import gcsplan
+from gcsplan.app import delivery
+from gcsplan.app.model import Plan
+from gcsplan.app.pipeline import plan
+from gcsplan.app.scripting import rehearse, upload
 from gcsplan.errors import CheckFailed, UsageError
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import Plan, plan
-from gcsplan.scripting import rehearse, upload
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.steps import delivery
 from gcsplan.vehicle import Autopilot
 from tests.impatient import be_impatient
 from tests.test_fleeting import CROSS

@@ -13,16 +13,12 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
 from gcsplan.errors import CheckFailed, GcsplanError, InputError, LinkError, ReadBackDiffers, VehicleRefused
-from gcsplan.mavlink import steps
-from gcsplan.mavlink.autopilots import altitude_of_cm
-from gcsplan.mavlink.compare import compare, faults
-from gcsplan.mavlink.frames import SigningKey
-from gcsplan.mavlink.link import Heard, Link
-from gcsplan.mavlink.messages import Address
-from gcsplan.mavlink.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
-from gcsplan.mavlink.parameters import judge_parameters
-from gcsplan.mavlink.preflight import preflight
-from gcsplan.mavlink.session import (
+from gcsplan.mavlink.link import steps
+from gcsplan.mavlink.link.frames import SigningKey
+from gcsplan.mavlink.link.link import Heard, Link
+from gcsplan.mavlink.link.parameters import judge_parameters
+from gcsplan.mavlink.link.preflight import preflight
+from gcsplan.mavlink.link.session import (
     Options,
     Order,
     clear_mission,
@@ -34,8 +30,12 @@ from gcsplan.mavlink.session import (
     upload_mission,
     verify_mission,
 )
-from gcsplan.mavlink.transfer import Progress, Timers
-from gcsplan.mavlink.watch import BOOT, CRITICAL, POWEROFF, STANDBY, UNINIT, VehicleState, Watch
+from gcsplan.mavlink.link.watch import BOOT, CRITICAL, POWEROFF, STANDBY, UNINIT, VehicleState, Watch
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm
+from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
+from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.mavlink.protocol.transfer import Progress, Timers
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle

@@ -20,10 +20,10 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from gcsplan.errors import InputError, LinkError, UsageError
-from gcsplan.mavlink import wire
-from gcsplan.mavlink.frames import FrameParser, FrameWriter
-from gcsplan.mavlink.messages import Address, Count, Item, Request
-from gcsplan.mavlink.mission import MissionItem
+from gcsplan.mavlink.link.frames import FrameParser, FrameWriter
+from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.mavlink.protocol import wire
+from gcsplan.mavlink.protocol.messages import Address, Count, Item, Request
 from gcsplan.sim.hub import FORGOTTEN_AFTER_S, MOST_CLIENTS, Client, Hub
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer

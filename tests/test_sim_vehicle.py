@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import UsageError
-from gcsplan.mavlink.messages import (
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, MissionItem, float32
+from gcsplan.mavlink.protocol.messages import (
     Ack,
     Address,
     ClearAll,
@@ -22,7 +23,6 @@ from gcsplan.mavlink.messages import (
     Request,
     RequestList,
 )
-from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, MissionItem, float32
 from gcsplan.sim.misbehaviour import Misbehaviour, spoilt
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot

@@ -8,11 +8,11 @@ from typing import Any, TypeVar, cast
 import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
-from gcsplan.mavlink.autopilots import ARDUPILOTMEGA, GENERIC
-from gcsplan.mavlink.link import Channel, Heard, Link, Steps
-from gcsplan.mavlink.messages import Address
-from gcsplan.mavlink.steps import discover_steps, parameter_steps
-from gcsplan.mavlink.watch import STANDBY, UNINIT, VehicleState, Watch
+from gcsplan.mavlink.link.link import Channel, Heard, Link, Steps
+from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
+from gcsplan.mavlink.link.watch import STANDBY, UNINIT, VehicleState, Watch
+from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, GENERIC
+from gcsplan.mavlink.protocol.messages import Address
 
 T = TypeVar("T")
 VEHICLE = Address(1, 1)

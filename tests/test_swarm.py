@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gcsplan.swarm.box import Floats
-from gcsplan.swarm.driver import Result, minimise
-from gcsplan.swarm.functions import FUNCTIONS
-from gcsplan.swarm.table import TABLE, get, names
+from gcsplan.optimisers.box import Floats
+from gcsplan.optimisers.driver import Result, minimise
+from gcsplan.optimisers.functions import FUNCTIONS
+from gcsplan.optimisers.registry import TABLE, get, names
 
 every = pytest.mark.parametrize("name", names())
 DIM, BUDGET, RUNS = 30, 6000, 3

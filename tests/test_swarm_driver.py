@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.swarm.box import WORST, Floats, Run, Steps, clipped, partners
-from gcsplan.swarm.driver import State, minimise
-from gcsplan.swarm.table import Entry, get
+from gcsplan.optimisers.box import WORST, Floats, Run, Steps, clipped, partners
+from gcsplan.optimisers.driver import State, minimise
+from gcsplan.optimisers.registry import Entry, get
 
 
 def row(update: object, **rest: object) -> Entry:

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gcsplan.app.pipeline import plan
 from gcsplan.errors import InputError, NoMission
-from gcsplan.pipeline import plan
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.registry import TABLE, get, names
 from gcsplan.planners.swarm import planner as swarm_planner
@@ -180,7 +180,7 @@ def test_an_earlier_vehicle_bends_the_path_of_the_next() -> None:
 
 
 def test_every_row_names_its_source_and_a_known_optimiser() -> None:
-    from gcsplan.swarm.table import TABLE as OPTIMISERS
+    from gcsplan.optimisers.registry import TABLE as OPTIMISERS
 
     assert names()[0] == "optimal"
     for name in names()[1:]:

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from gcsplan.swarm.bees import roulette
-from gcsplan.swarm.box import Floats
-from gcsplan.swarm.budgerigars import LEVY_SPREAD
+from gcsplan.optimisers.bees import roulette
+from gcsplan.optimisers.box import Floats
+from gcsplan.optimisers.budgerigars import LEVY_SPREAD
 from tests.swarm_play import Play, bowl, clip, crowd
 
 N, D, T = 6, 3, 10

@@ -10,8 +10,8 @@ import math
 import numpy as np
 import pytest
 
-from gcsplan.swarm.box import Floats
-from gcsplan.swarm.wolves import FACTORS
+from gcsplan.optimisers.box import Floats
+from gcsplan.optimisers.wolves import FACTORS
 from tests.swarm_play import Play, bowl, clip, crowd
 
 N, D, T = 7, 4, 8

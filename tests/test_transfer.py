@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.messages import (
+from gcsplan.mavlink.mission.mission import ALL, FENCE, MISSION, RALLY, MissionItem
+from gcsplan.mavlink.protocol.messages import (
     Ack,
     Address,
     ClearAll,
@@ -22,9 +23,8 @@ from gcsplan.mavlink.messages import (
     Request,
     RequestList,
 )
-from gcsplan.mavlink.mission import ALL, FENCE, MISSION, RALLY, MissionItem
-from gcsplan.mavlink.outcome import CANCELLED, DENIED, ERROR, INVALID_SEQUENCE, NO_SPACE, code_cure, code_words
-from gcsplan.mavlink.transfer import (
+from gcsplan.mavlink.protocol.outcome import CANCELLED, DENIED, ERROR, INVALID_SEQUENCE, NO_SPACE, code_cure, code_words
+from gcsplan.mavlink.protocol.transfer import (
     Accepted,
     Clear,
     Download,

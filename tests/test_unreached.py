@@ -9,8 +9,8 @@ import pytest
 
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from tests.worlds import vehicle, world
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.url import DEFAULT_BAUD, Endpoint, parse_url
+from gcsplan.mavlink.link.url import DEFAULT_BAUD, Endpoint, parse_url
 
 
 @pytest.mark.parametrize(

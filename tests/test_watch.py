@@ -8,12 +8,12 @@ from typing import Any
 import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
-from gcsplan.mavlink.link import Heard
-from gcsplan.mavlink.messages import Address
-from gcsplan.mavlink.numbers import finite, place, whole
-from gcsplan.mavlink.parameters import decode_value, judge_fence_parameters, judge_parameters
-from gcsplan.mavlink.patience import Patience
-from gcsplan.mavlink.watch import STANDBY, VehicleState, Watch
+from gcsplan.mavlink.link.link import Heard
+from gcsplan.mavlink.link.numbers import finite, place, whole
+from gcsplan.mavlink.link.parameters import decode_value, judge_fence_parameters, judge_parameters
+from gcsplan.mavlink.link.watch import STANDBY, VehicleState, Watch
+from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.mavlink.protocol.patience import Patience
 from tests.test_session import mission
 
 ODD = (math.nan, math.inf, -math.inf, 3.4e38, -1.0, 1e-40, 2.0**31)

@@ -14,17 +14,27 @@ from numpy.typing import NDArray
 
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
-from gcsplan.mavlink.autopilots import manner
-from gcsplan.mavlink.mission import LAND, RELATIVE, RTL, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT, Home, Mission
-from gcsplan.mavlink.mission import MissionItem as Item
+from gcsplan.check.rtl.everywhere import WayHome, study_of, way_home
+from gcsplan.check.rtl.rally import rally_items
+from gcsplan.check.rtl.rules import Target, returns
+from gcsplan.check.rtl.stretches import rel_home
+from gcsplan.check.rtl.study import CLEAR, LEGAL
+from gcsplan.check.rtl.trail import trail_of
+from gcsplan.check.rtl.walls import Walls
+from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.mission import (
+    LAND,
+    RELATIVE,
+    RTL,
+    TAKEOFF,
+    VTOL_LAND,
+    VTOL_TAKEOFF,
+    WAYPOINT,
+    Home,
+    Mission,
+)
+from gcsplan.mavlink.mission.mission import MissionItem as Item
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.way_home.everywhere import WayHome, study_of, way_home
-from gcsplan.way_home.rally import rally_items
-from gcsplan.way_home.rules import Target, returns
-from gcsplan.way_home.stretches import rel_home
-from gcsplan.way_home.study import CLEAR, LEGAL
-from gcsplan.way_home.trail import trail_of
-from gcsplan.way_home.walls import Walls
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone

@@ -11,10 +11,11 @@ import pytest
 import shapely
 import yaml
 
+from gcsplan.app.pipeline import plan, world_of
+from gcsplan.app.problems import make_problem
 from gcsplan.bench.everyday_oracle import Plane, Unreachable
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import MissionFile, load_mission
-from gcsplan.pipeline import make_problem, plan, world_of
 from gcsplan.planners.border import border, enclosed, exit_cost, goes_on, margin_for, within_m
 from gcsplan.planners.optimal import planner
 from gcsplan.planners.optimal.window import plan_over

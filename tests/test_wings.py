@@ -14,6 +14,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from gcsplan.app.checking import check_files
+from gcsplan.app.fleeting import route_of
+from gcsplan.app.model import Plan
+from gcsplan.app.outputs import outputs_of
+from gcsplan.app.pipeline import plan
+from gcsplan.app.wing_ends import starts
 from gcsplan.check.arcs import SAG_M, bend
 from gcsplan.check.climb_out import above_slant, flared, slant_room
 from gcsplan.check.flight import follow
@@ -23,20 +29,15 @@ from gcsplan.check.tracking import l1_off_m, tracking_m
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.timing import Course
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.autopilots import stored
-from gcsplan.mavlink.build import Order
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
-from gcsplan.mavlink.wings import Wing, build_wing, flown_m, parted, tangents_m, thinned
+from gcsplan.mavlink.build.fixed_wing import build_wing, flown_m, parted, tangents_m, thinned
+from gcsplan.mavlink.build.order import Order, Wing
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.autopilots import stored
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import VehicleRequest, load_mission
-from gcsplan.pipeline import Plan, plan
 from gcsplan.planners.problem import Problem
 from gcsplan.sim.kinematics import Kinematics
 from gcsplan.sim.track import make_track
-from gcsplan.steps.checking import check_files
-from gcsplan.steps.fleeting import route_of
-from gcsplan.steps.outputs import outputs_of
-from gcsplan.steps.wing_ends import starts
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.path import Path
 from gcsplan.world.world import World

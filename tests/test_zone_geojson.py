@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file import zone_geojson
 from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, circle, looks_swapped, place_zones, polygon, zones_sha256
-from gcsplan.mission_file.zone_geojson import ZoneFile, read_zones
+from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 

@@ -20,12 +20,13 @@ from typing import Any
 
 import yaml
 
+from gcsplan.app.pipeline import world_of
+from gcsplan.app.problems import make_problem
 from gcsplan.bench.everyday_missions import KINDS, Everyday, draw
 from gcsplan.bench.everyday_oracle import Plane, Unreachable
 from gcsplan.bench.terrain_measure import Memory, passes, percentile
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import make_problem, world_of
 from gcsplan.planners.optimal.searches import require_names
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner

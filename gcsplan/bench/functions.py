@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from gcsplan.bench.functions_printed import PRINTED, RUNS, WOLVES, Printed
 from gcsplan.errors import InputError
 from gcsplan.export.outdir import write_whole
-from gcsplan.swarm.driver import minimise
-from gcsplan.swarm.functions import FUNCTIONS
-from gcsplan.swarm.table import get
+from gcsplan.optimisers.driver import minimise
+from gcsplan.optimisers.functions import FUNCTIONS
+from gcsplan.optimisers.registry import get
 
 CLAIMED = "ssgwo"  # the paper says that it has the least mean, or shares it, on every function
 SETTINGS = ("middle", "shifted")

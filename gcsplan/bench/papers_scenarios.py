@@ -16,7 +16,7 @@ import numpy as np
 
 from gcsplan.bench.papers_printed import PRINTED, Least
 from gcsplan.errors import InputError, unknown_name
-from gcsplan.mavlink.build import Margins
+from gcsplan.mavlink.build.order import Margins
 from gcsplan.mission_file import MissionFile
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get as get_planner
@@ -205,7 +205,8 @@ class Set:
 @lru_cache(maxsize=20)
 def prepare(name: str, text: str) -> Set:
     """The mission ``text`` of scenario ``name``; no margin is kept for the wire, since nothing is sent."""
-    from gcsplan.pipeline import load_mission, make_problem, world_of
+    from gcsplan.app.pipeline import load_mission, world_of
+    from gcsplan.app.problems import make_problem
 
     source = load_mission(f"{name}.yaml", text=text)
     world = world_of(source)

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from gcsplan.bench.check import LIMITS, scene
 from gcsplan.bench.papers_scenarios import SCENARIOS, mission_text, prepare, settings_of
 from gcsplan.errors import InputError
+from gcsplan.optimisers.driver import minimise
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.swarm.encodings import Code
 from gcsplan.planners.swarm.objectives import Cost, get_objective
 from gcsplan.planners.swarm.scene import Scene
-from gcsplan.swarm.driver import minimise
 
 Floats = NDArray[np.float64]
 

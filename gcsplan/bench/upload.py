@@ -18,12 +18,12 @@ from importlib.util import find_spec
 from typing import Any
 
 from gcsplan.errors import InputError, LinkError
-from gcsplan.mavlink.drive import drive
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.link import run as run_steps
-from gcsplan.mavlink.messages import Address
-from gcsplan.mavlink.mission import RELATIVE, WAYPOINT, MissionItem
-from gcsplan.mavlink.transfer import Accepted, Upload, VerifiedUpload
+from gcsplan.mavlink.link.drive import drive
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.link import run as run_steps
+from gcsplan.mavlink.mission.mission import RELATIVE, WAYPOINT, MissionItem
+from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.mavlink.protocol.transfer import Accepted, Upload, VerifiedUpload
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot

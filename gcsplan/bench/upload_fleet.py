@@ -13,10 +13,10 @@ from typing import Any
 
 from gcsplan.bench.upload import START, items_of
 from gcsplan.errors import GcsplanError, InputError, LinkError
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.mission import Home, Mission
-from gcsplan.mavlink.results import UploadResult
-from gcsplan.mavlink.session import Options, Order, upload_fleet
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.results import UploadResult
+from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from gcsplan.check.pace import Pace
 from gcsplan.check.spline import Vector
 from gcsplan.check.stretch import Flight, Place, Stretch, StretchKind
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
 

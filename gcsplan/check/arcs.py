@@ -25,12 +25,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.check.returning import circle_growth
+from gcsplan.check.rtl.returning import circle_growth
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
 

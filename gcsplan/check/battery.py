@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import groupby, repeat
 from typing import Any
 
-from gcsplan.check.returning import flat_m
+from gcsplan.check.rtl.returning import flat_m
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.vehicle import Vehicle

@@ -25,12 +25,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.check.aboard import Aboard
-from gcsplan.check.returning import circle_growth, flat_m
+from gcsplan.check.rtl.returning import circle_growth, flat_m
 from gcsplan.check.spline import towards
 from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot
 
 PARACHUTE, RELEASE = 208, 2.0

@@ -29,12 +29,12 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from gcsplan.check.arcs import bend
-from gcsplan.check.returning import circle_growth, flat_m
+from gcsplan.check.rtl.returning import circle_growth, flat_m
 from gcsplan.check.spline import Vector, towards
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
 

@@ -32,12 +32,12 @@ import numpy as np
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
 from gcsplan.check.commands import LOITER_TO_ALT, flown_otherwise, moves_nothing
-from gcsplan.check.returning import PLANE_LOITER_RADIUS_M, circle_growth, flat_m, return_home
 from gcsplan.check.route import DO_JUMP_TAG, fly_in_order
+from gcsplan.check.rtl.returning import PLANE_LOITER_RADIUS_M, circle_growth, flat_m, return_home
 from gcsplan.check.spline import chords, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
 PLANE_GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane GLIDE_SLOPE_MIN, default

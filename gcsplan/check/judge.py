@@ -21,8 +21,8 @@ from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
-from gcsplan.mavlink.autopilots import manner
-from gcsplan.mavlink.mission import Mission
+from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Floats, LegReport, Violation
 from gcsplan.world.frame import EARTH_RADIUS_M, FARTHEST_M

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from gcsplan.mavlink.mission import MissionItem
+from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
 AIRSPEED, GROUND_SPEED, CLIMB, DESCENT = 0.0, 1.0, 2.0, 3.0  # SPEED_TYPE

@@ -17,8 +17,8 @@ from typing import Protocol
 
 from gcsplan.check.commands import LAND_STARTS
 from gcsplan.check.stretch import Flight, Unreached
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 
 JUMP_TAG, DO_JUMP_TAG = 600, 601
 MOST_JUMPS = 15  # AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS on small boards, 100 on large ones; the rest count as used up

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
-from gcsplan.mavlink.mission import Mission
+from gcsplan.mavlink.mission.mission import Mission
 
 
 @dataclass(frozen=True, slots=True)

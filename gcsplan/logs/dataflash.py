@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
-from gcsplan.logs.flight_log import FlightLog
+from gcsplan.logs.flight_log import FlightLog, together
 
 HEAD = b"\xa3\x95"
 FIX_3D = 3
@@ -102,17 +102,3 @@ def _require(file: Path, places: list[Any], batteries: dict[int, list[tuple[floa
             "LOG_BITMASK must hold the battery",
             where=str(file),
         )
-
-
-def together(batteries: dict[int, list[tuple[float, float]]]) -> list[tuple[float, float]]:
-    """The power of all batteries, at the readings of the one with the most."""
-    series = sorted(batteries.values(), key=len, reverse=True)
-    if len(series) == 1:
-        return series[0]
-    import numpy as np
-
-    base = np.array(sorted(series[0]))
-    for other in series[1:]:
-        rows = np.array(sorted(other))
-        base[:, 1] += np.interp(base[:, 0], rows[:, 0], rows[:, 1])
-    return [(float(t), float(w)) for t, w in base]

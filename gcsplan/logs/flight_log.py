@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,39 +56,6 @@ class FlightLog:
         return cls(name, at[:, 0], east, north, at[:, 3], watts[:, 0], watts[:, 1], notes)
 
 
-def read_log(file: Path, *, columns: Mapping[str, str] | None = None, sysid: int | None = None) -> FlightLog:
-    """The flight in ``file``: ArduPilot's .bin (.BIN, .log is refused), a .tlog, or CSV by its name's ending.
-
-    ``columns``: names of a CSV's columns; ``sysid``: which vehicle of a .tlog. Raises InputError with the cure.
-    """
-    if not file.exists():
-        raise InputError("there is no such file", where=str(file))
-    if file.is_dir():
-        raise InputError("is a folder; give one log, or several", where=str(file))
-    if file.stat().st_size == 0:
-        raise InputError("is empty: the log was not closed, or not copied whole", where=str(file))
-    kind = file.suffix.lower()
-    if columns and kind != ".csv":
-        raise InputError("--csv-columns is for CSV files", where=str(file))
-    if kind == ".csv":
-        from gcsplan.logs.table import read_csv
-
-        return read_csv(file, columns or {})
-    if kind == ".bin":
-        from gcsplan.logs.dataflash import read_dataflash
-
-        return read_dataflash(file)
-    if kind in (".tlog", ".rlog"):
-        from gcsplan.logs.telemetry import read_telemetry
-
-        return read_telemetry(file, sysid)
-    cure = {
-        ".ulg": "PX4's logs: make CSV of vehicle_global_position and battery_status with ulog2csv, join them by time",
-        ".log": "a text log: give the .bin that it was made from",
-    }.get(kind, f"the ending {kind or '(none)'} is not known")
-    raise InputError(f"{cure}. Read are ArduPilot's .bin, MAVLink .tlog, and .csv", where=str(file))
-
-
 def _sorted(rows: Sequence[tuple[float, ...]]) -> Floats:
     """By time, one row for each reading of the clock."""
     if not rows:
@@ -108,3 +74,15 @@ def _in_metres(lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
     north = EQUATOR_M * (1.0 - ECCENTRICITY_2) / w**1.5 * np.radians(lat_deg - lat_deg[0])
     turned = (lon_deg - lon_deg[0] + 180.0) % 360.0 - 180.0
     return EQUATOR_M / math.sqrt(w) * math.cos(lat) * np.radians(turned), north
+
+
+def together(batteries: dict[int, list[tuple[float, float]]]) -> list[tuple[float, float]]:
+    """The power of all batteries, at the readings of the one with the most."""
+    series = sorted(batteries.values(), key=len, reverse=True)
+    if len(series) == 1:
+        return series[0]
+    base = np.array(sorted(series[0]))
+    for other in series[1:]:
+        rows = np.array(sorted(other))
+        base[:, 1] += np.interp(base[:, 0], rows[:, 0], rows[:, 1])
+    return [(float(t), float(w)) for t, w in base]

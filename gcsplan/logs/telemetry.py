@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
-from gcsplan.logs.dataflash import together
-from gcsplan.logs.flight_log import FlightLog
+from gcsplan.logs.flight_log import FlightLog, together
 
 UNKNOWN_MV = 65535
 POSITION, BATTERY, STATUS = "GLOBAL_POSITION_INT", "BATTERY_STATUS", "SYS_STATUS"

@@ -17,7 +17,7 @@ from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys, rea
 from gcsplan.mission_file.vehicles import make_vehicle
 from gcsplan.mission_file.world import Box, make_spec, settle_zones
 from gcsplan.mission_file.zone_draft import ZoneDraft, one_line, place_zones, zones_sha256
-from gcsplan.mission_file.zone_geojson import read_zones
+from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of

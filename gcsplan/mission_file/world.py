@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.schema import FrameKeys, LocalPoint, TerrainKeys, ZoneKeys
 from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, check_degrees, circle, polygon
-from gcsplan.mission_file.zone_geojson import read_zones
+from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.peaks import Peak
 from gcsplan.world.surface import Surface

@@ -1,98 +1,16 @@
-"""Zones from other people's files: GeoJSON (RFC 7946) and KML.
-
-Polygons are prisms, Points with ``radius_m`` cylinders; ``floor_agl_m``, ``ceiling_agl_m``, ``floor_amsl_m``,
-``ceiling_amsl_m`` stand in a feature's properties, or in a Placemark's ExtendedData. What cannot be understood is
-refused, never skipped: a zone that is left out is a zone that is flown through. A hole counts as no-fly.
-"""
+"""Zones from GeoJSON (RFC 7946): Polygons are prisms, Points with ``radius_m`` cylinders; a hole counts as no-fly."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, circle, polygon
-
-MAX_BYTES = 20_000_000
-MAX_ZONES = 20_000
-LARGEST_M = 1e6
-"""A height or radius beyond it is a slip."""
-
-LEVEL_KEYS = ("floor_agl_m", "ceiling_agl_m", "floor_amsl_m", "ceiling_amsl_m")
-
-
-@dataclass
-class ZoneFile:
-    """What one file holds; ``problems`` are its mistakes, each with its place."""
-
-    path: Path
-    zones: list[ZoneDraft] = field(default_factory=list)
-    problems: list[Problem] = field(default_factory=list)
-    holes: int = 0
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Said to the user."""
-        if not self.holes:
-            return ()
-        return (f"{self.path.name}: {self.holes} hole(s) in polygons count as no-fly",)
-
-    def add_ring(self, name: str, where: str, ring: list[tuple[float, float]], bounds: Bounds, key: str) -> None:
-        """A polygon's outline, (latitude, longitude)."""
-        if self._room(where):
-            draft = polygon(name, where, ring, bounds, self.problems, key=key)
-            self.zones += [draft] if draft is not None else []
-
-    def add_circle(
-        self, name: str, where: str, centre: tuple[float, float], radius_m: float | None, bounds: Bounds
-    ) -> None:
-        """A point, (latitude, longitude), which must have a radius."""
-        if radius_m is None:
-            self.problems.append(Problem(where, "a Point needs radius_m to be a zone"))
-        elif self._room(where):
-            draft = circle(name, where, centre, radius_m, bounds, self.problems)
-            self.zones += [draft] if draft is not None else []
-
-    def _room(self, where: str) -> bool:
-        if len(self.zones) >= MAX_ZONES:
-            raise InputError(f"the file has more than {MAX_ZONES} zones", where=where)
-        return True
-
-
-def read_zones(path: Path, *, where: str) -> ZoneFile:
-    """Zones of a .geojson, .json or .kml file.
-
-    ``where`` names the key that asked for it. Mistakes in single features are collected in ``problems``; a file that
-    cannot be read at all raises InputError.
-    """
-    kind = path.suffix.lower()
-    if kind not in (".geojson", ".json", ".kml"):
-        hint = " (unpack a .kmz first: it is a zip of a .kml)" if kind == ".kmz" else ""
-        raise InputError(f"zones are read from .geojson, .json and .kml files, given {path.name}{hint}", where=where)
-    data = _bytes(path, where)
-    if kind == ".kml":
-        from gcsplan.mission_file.zone_kml import read_kml
-
-        return read_kml(path, data)
-    return read_geojson(path, data)
-
-
-def _bytes(path: Path, where: str) -> bytes:
-    try:
-        if not path.is_file():
-            raise InputError(f"{path} is not there (paths are relative to the mission file)", where=where)
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise InputError(f"{path} has {size} bytes, more than {MAX_BYTES}; simplify or split it", where=where)
-        return path.read_bytes()
-    except (OSError, ValueError) as why:
-        if isinstance(why, InputError):
-            raise
-        raise InputError(f"{path} cannot be read: {why}", where=where) from None
+from gcsplan.mission_file.zone_draft import Bounds
+from gcsplan.mission_file.zone_file import LARGEST_M, LEVEL_KEYS, ZoneFile
 
 
 def read_geojson(path: Path, data: bytes) -> ZoneFile:

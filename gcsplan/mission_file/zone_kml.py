@@ -16,7 +16,7 @@ from defusedxml.common import DefusedXmlException
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.zone_draft import Bounds
-from gcsplan.mission_file.zone_geojson import LARGEST_M, LEVEL_KEYS, ZoneFile
+from gcsplan.mission_file.zone_file import LARGEST_M, LEVEL_KEYS, ZoneFile
 
 MAX_DEPTH = 60
 _SHAPES = ("Polygon", "Point", "LineString", "LinearRing", "Model", "Track", "MultiTrack")

@@ -20,7 +20,7 @@ class Entry:
     """One planner; ``module`` holds its ``plan`` and is imported on the first call only.
 
     ``paper`` is its source, empty where it is our own; ``defaults`` its parameters as `Problem` has them, or of a
-    swarm (``optimiser``, a name of `gcsplan.swarm.table`) as ``Problem.options`` has them.
+    swarm (``optimiser``, a name of `gcsplan.optimisers.registry`) as ``Problem.options`` has them.
     """
 
     name: str

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report.chart import Axes, Floats, chart_html
 from gcsplan.report.markup import esc, num, place, table, tools
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.profile_view import unit_of
 from gcsplan.report.samples import Line
 from gcsplan.report.subject import Page, Subject
-from gcsplan.way_home.verdict import WayHome
 
 TALL = 0.3
 

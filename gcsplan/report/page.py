@@ -12,11 +12,11 @@ import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gcsplan import __version__
+from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report import tables
 from gcsplan.report.fleet_view import fleet_html
 from gcsplan.report.home_view import home_html, home_lines
@@ -26,15 +26,10 @@ from gcsplan.report.profile_view import profile_html, profile_legend, unit_of
 from gcsplan.report.relief import Relief, extent_of, relief_of
 from gcsplan.report.samples import MOST_SAMPLES, Line, Passage, line_of, passages
 from gcsplan.report.scene_data import exaggeration, zone_meshes
-from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check, page_of_plan
-from gcsplan.way_home.verdict import WayHome
+from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check
 from gcsplan.world.world import World
 
-if TYPE_CHECKING:
-    from gcsplan.pipeline import Plan
-    from gcsplan.steps.delivery import Delivery
-
-__all__ = ["render", "render_check", "render_page"]
+__all__ = ["render_check", "render_page"]
 
 BARE_DEM = "bare DEM: trees, masts and wires are not in it"
 OPEN_VEHICLES = 3
@@ -42,11 +37,6 @@ OPEN_VEHICLES = 3
 MOST_CARDS = 6
 """Of more vehicles the key figures stand in one table."""
 SCRIPTS = ("base.js", "view.js", "charts.js", "mesh.js", "scene.js", "start.js")
-
-
-def render(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Mapping[str, WayHome] | None = None) -> str:
-    """The report of ``plan`` as HTML text, with how its uploads ended; ``homes``: vehicle to its way home."""
-    return render_page(page_of_plan(plan, deliveries, homes))
 
 
 def render_check(

@@ -1,11 +1,11 @@
-"""Pictures of a plan as PNG: the map from above, each vehicle's altitude profile, and the fleet in time."""
+"""Pictures of a report's page as PNG: the map from above, each vehicle's altitude profile, and the fleet in time."""
 
 from __future__ import annotations
 
 import io
 from itertools import combinations
 from pathlib import Path as FilePath
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 import numpy as np
 from matplotlib import rc_context
@@ -23,52 +23,50 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.report import space_picture
 from gcsplan.report.fleet_view import apart_m, flown_m, instants
 from gcsplan.report.samples import line_of
+from gcsplan.report.subject import Page
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Zone
-
-if TYPE_CHECKING:
-    from gcsplan.pipeline import Plan
 
 TRACK_COLOURS = ("#d62728", "#1f77b4", "#9467bd", "#e377c2", "#17becf", "#bcbd22")
 ZONE_COLOUR = "#ff7f0e"
 PIXELS = 900
 
 
-def draw(plan: Plan) -> Figure:
-    """Map and profiles of ``plan``; everything in metres, labelled."""
-    rows = len(plan.vehicles)
-    west, south, east, north = _extent(plan)
+def draw(page: Page) -> Figure:
+    """Map and profiles of ``page``; everything in metres, labelled."""
+    rows = len(page.subjects)
+    west, south, east, north = _extent(page)
     map_inches = min(max(9.0 * (north - south) / (east - west) + 0.8, 2.5), 14.0)
     figure = Figure(figsize=(11, map_inches + 2.6 * rows), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(1 + rows, 1, height_ratios=[map_inches] + [2.6] * rows)
-    _map(axes[0], plan, (west, south, east, north))
-    for ax, vehicle, colour in zip(axes[1:], plan.vehicles, _colours(rows), strict=True):
-        _profile(ax, plan.world, vehicle.verdict, vehicle.request.vehicle.limits.min_agl_m, colour)
+    _map(axes[0], page, (west, south, east, north))
+    for ax, vehicle, colour in zip(axes[1:], page.subjects, _colours(rows), strict=True):
+        _profile(ax, page.world, vehicle.verdict, vehicle.vehicle.limits.min_agl_m, colour)
         ax.set_title(f"{vehicle.name}: {vehicle.verdict.length_m:,.0f} m", loc="left", fontsize=10)
     return figure
 
 
-def save(plan: Plan, file: FilePath | IO[bytes]) -> None:
+def save(page: Page, file: FilePath | IO[bytes]) -> None:
     """Write `draw`'s picture as PNG."""
     with rc_context({"text.parse_math": False}):  # a dollar sign in a name is one
-        draw(plan).savefig(file, format="png", dpi=110, metadata={"Software": None})
+        draw(page).savefig(file, format="png", dpi=110, metadata={"Software": None})
 
 
-def figures(plan: Plan) -> dict[str, bytes]:
+def figures(page: Page) -> dict[str, bytes]:
     """File name to PNG of each figure alone: report-map.png, report-space.png, report-profile.png, and a fleet's
     report-fleet.png."""
-    drawn = {"report-map.png": _map_alone(plan), "report-profile.png": _profiles_alone(plan)}
+    drawn = {"report-map.png": _map_alone(page), "report-profile.png": _profiles_alone(page)}
     tracks = [
         (v.name, colour, line)
-        for v, colour in zip(plan.vehicles, _colours(len(plan.vehicles)), strict=True)
-        if (line := line_of(v.verdict, plan.world, v.request.vehicle.limits, samples=400)) is not None
+        for v, colour in zip(page.subjects, _colours(len(page.subjects)), strict=True)
+        if (line := line_of(v.verdict, page.world, v.vehicle.limits, samples=400)) is not None
     ]
-    space = space_picture.draw(plan.source.name, plan.world, tracks)
+    space = space_picture.draw(page.title, page.world, tracks)
     if space is not None:
         drawn["report-space.png"] = space
-    if plan.fleet is not None and len(plan.vehicles) > 1:
-        drawn["report-fleet.png"] = _fleet_alone(plan)
+    if any(s.motion is not None for s in page.subjects):
+        drawn["report-fleet.png"] = _fleet_alone(page)
     out = {}
     with rc_context({"text.parse_math": False}):
         for name, figure in drawn.items():
@@ -84,27 +82,26 @@ def _figure(width: float, height: float) -> Figure:
     return figure
 
 
-def _map_alone(plan: Plan) -> Figure:
-    extent = _extent(plan)
+def _map_alone(page: Page) -> Figure:
+    extent = _extent(page)
     west, south, east, north = extent
     figure = _figure(11, min(max(9.0 * (north - south) / (east - west) + 0.8, 2.5), 14.0))
-    _map(figure.subplots(), plan, extent)
+    _map(figure.subplots(), page, extent)
     return figure
 
 
-def _profiles_alone(plan: Plan) -> Figure:
-    rows = len(plan.vehicles)
+def _profiles_alone(page: Page) -> Figure:
+    rows = len(page.subjects)
     figure = _figure(11, 2.8 * rows)
     axes = figure.subplots(rows, 1, squeeze=False)[:, 0]
-    for ax, vehicle, colour in zip(axes, plan.vehicles, _colours(rows), strict=True):
-        _profile(ax, plan.world, vehicle.verdict, vehicle.request.vehicle.limits.min_agl_m, colour)
+    for ax, vehicle, colour in zip(axes, page.subjects, _colours(rows), strict=True):
+        _profile(ax, page.world, vehicle.verdict, vehicle.vehicle.limits.min_agl_m, colour)
         ax.set_title(f"{vehicle.name}: {vehicle.verdict.length_m:,.0f} m", loc="left", fontsize=10)
     return figure
 
 
-def _fleet_alone(plan: Plan) -> Figure:
-    assert plan.fleet is not None
-    motions = list(enumerate(plan.fleet.motions))
+def _fleet_alone(page: Page) -> Figure:
+    motions = [(k, s.motion) for k, s in enumerate(page.subjects) if s.motion is not None]
     times = instants(motions)
     figure = _figure(11, 6.5)
     way, apart = figure.subplots(2, 1, sharex=True)
@@ -116,8 +113,8 @@ def _fleet_alone(plan: Plan) -> Figure:
     some = ~np.isnan(every).all(axis=0)
     if some.any():
         apart.plot(times[some], np.nanmin(every[:, some], axis=0), color="#111111", lw=1.4, label="nearest two")
-    if plan.fleet.separation is not None:
-        needed = plan.fleet.separation.rules.needed_m
+    if page.separation is not None:
+        needed = page.separation.rules.needed_m
         apart.axhline(needed, color="#d62728", lw=1.0, ls="--", label=f"needed, {needed:g} m")
     apart.set(xlabel="time, s", ylabel="apart, m", ylim=(0, None))
     apart.legend(fontsize=8)
@@ -136,35 +133,35 @@ def track_en(world: World, verdict: Verdict) -> NDArray[np.float64]:
     return np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
 
 
-def _extent(plan: Plan) -> tuple[float, float, float, float]:
+def _extent(page: Page) -> tuple[float, float, float, float]:
     """West, south, east, north of all tracks with room around."""
-    every = np.concatenate([track_en(plan.world, v.verdict) for v in plan.vehicles])[:, :2]
+    every = np.concatenate([track_en(page.world, v.verdict) for v in page.subjects])[:, :2]
     low, high = every.min(axis=0), every.max(axis=0)
     pad = max(0.12 * float((high - low).max()), 50.0)
     return float(low[0] - pad), float(low[1] - pad), float(high[0] + pad), float(high[1] + pad)
 
 
-def _map(ax: Axes, plan: Plan, extent: tuple[float, float, float, float]) -> None:
-    tracks = [track_en(plan.world, v.verdict) for v in plan.vehicles]
+def _map(ax: Axes, page: Page, extent: tuple[float, float, float, float]) -> None:
+    tracks = [track_en(page.world, v.verdict) for v in page.subjects]
     west, south, east, north = extent
     columns = PIXELS
     lines = max(2, round(PIXELS * (north - south) / (east - west)))
     e, n = np.meshgrid(np.linspace(west, east, columns), np.linspace(north, south, lines))
-    ground = plan.world.airspace.surface.ground_at(e, n)
+    ground = page.world.airspace.surface.ground_at(e, n)
     shown = np.where(np.isnan(ground), np.nanmin(ground), ground)
     step = (east - west) / columns
     shade = LightSource(azdeg=315, altdeg=40).hillshade(shown, vert_exag=1.5, dx=step, dy=step)
     ax.imshow(shade, extent=(west, east, south, north), cmap="gray", vmin=0, vmax=1)
     tint = ax.imshow(ground, extent=(west, east, south, north), cmap="terrain", alpha=0.45)
     ax.figure.colorbar(tint, ax=ax, label="ground, m AMSL")
-    for zone in plan.world.airspace.zones:
+    for zone in page.world.airspace.zones:
         ax.add_patch(_zone_patch(zone))
         x0, y0, x1, y1 = zone.bounds
         if x1 > west and x0 < east and y1 > south and y0 < north:
             middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
             halo = [withStroke(linewidth=2.0, foreground="white", alpha=0.7)]
             ax.annotate(_zone_words(zone), middle, ha="center", va="center", fontsize=6.5, path_effects=halo, zorder=4)
-    for vehicle, track, colour in zip(plan.vehicles, tracks, _colours(len(tracks)), strict=True):
+    for vehicle, track, colour in zip(page.subjects, tracks, _colours(len(tracks)), strict=True):
         ax.plot(track[:, 0], track[:, 1], color=colour, lw=2, label=vehicle.name, marker=".", ms=5)
         ax.plot(*track[0, :2], "o", color=colour, ms=9, mec="white")
         ax.plot(*track[-1, :2], "s", color=colour, ms=9, mec="white")
@@ -172,7 +169,7 @@ def _map(ax: Axes, plan: Plan, extent: tuple[float, float, float, float]) -> Non
     ax.set_aspect("equal")
     handles, _ = ax.get_legend_handles_labels()
     ax.legend(handles=[*handles, Patch(fc=ZONE_COLOUR, alpha=0.4, label="no-fly")], loc="upper right")
-    ax.set_title(f"{plan.source.name}: planner {plan.planner}", loc="left")
+    ax.set_title(f"{page.title}: planner {dict(page.facts).get('planner', 'none')}", loc="left")
 
 
 def _zone_patch(zone: Zone) -> CirclePatch | PolygonPatch:

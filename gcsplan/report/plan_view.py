@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report.marks import Mark, marks_html
 from gcsplan.report.markup import esc, least, num, place
 from gcsplan.report.relief import TINTS, Extent, Relief, nice_step, tints
 from gcsplan.report.samples import Line, distance_m
 from gcsplan.report.subject import Page, Subject
-from gcsplan.way_home.verdict import WayHome
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Zone
 

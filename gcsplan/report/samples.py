@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.check.verdict import Verdict
-from gcsplan.mavlink.mission import TERRAIN
+from gcsplan.mavlink.mission.mission import TERRAIN
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone

@@ -1,22 +1,18 @@
-"""What the page is about: one `Page`, a `Subject` for each vehicle; made from a plan or from checked files."""
+"""What the page is about: one `Page`, a `Subject` for each vehicle; here made from checked files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
+from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Separation
 from gcsplan.vehicle import Vehicle
-from gcsplan.way_home.verdict import WayHome
 from gcsplan.world.world import World
-
-if TYPE_CHECKING:
-    from gcsplan.pipeline import Plan
-    from gcsplan.steps.delivery import Delivery
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +67,7 @@ class Page:
 
 
 class CheckedFile(Protocol):
-    """What a check of one file gives (`gcsplan.steps.checking.Checked`)."""
+    """What a check of one file gives (`gcsplan.app.checking.Checked`)."""
 
     @property
     def file(self) -> object: ...
@@ -81,37 +77,6 @@ class CheckedFile(Protocol):
     def verdict(self) -> Verdict: ...
     @property
     def notes(self) -> tuple[str, ...]: ...
-
-
-def page_of_plan(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Mapping[str, WayHome] | None = None) -> Page:
-    """The page of a plan, with how its uploads ended, and the way home of each vehicle named in ``homes``."""
-    uploads = {d.vehicle: d.as_dict() for d in deliveries}
-    source, fleet = plan.source, plan.fleet
-    facts = [("planner", plan.planner), ("objective", plan.objective), ("seed", str(plan.seed)),
-             ("altitude frame", source.altitude_frame)]  # fmt: skip
-    several = fleet is not None and len(plan.vehicles) > 1
-    if fleet is not None and several and fleet.mode != "none":
-        apart = f", {fleet.interval_s:g} s apart" if fleet.mode == "sequence" else ""
-        facts += [("arrival", f"{fleet.mode}: {', '.join(fleet.order)}{apart}")]
-    subjects = []
-    for v in plan.vehicles:
-        certificate = Certificate(
-            v.problem.objective, "m" if v.problem.objective == "length" else "J",
-            v.cost, v.solution.lower_bound, v.gap_percent, v.solution.stopped_by,
-        )  # fmt: skip
-        slot = fleet.slot(v.name) if fleet is not None and several else None
-        notes = (*v.notes, *v.solution.notes, *v.verdict.notes, *(slot.notes if slot is not None else ()))
-        subjects.append(
-            Subject(
-                v.name, v.verdict, v.request.vehicle, certificate, tuple(dict.fromkeys(notes)),
-                fleet.motion(v.name) if fleet is not None and several else None, slot,
-                (homes or {}).get(v.name), uploads.get(v.name),
-            )
-        )  # fmt: skip
-    return Page(
-        source.name, plan.world, tuple(subjects), dict(source.inputs), tuple(facts), tuple(dict.fromkeys(plan.notes)),
-        fleet.separation if fleet is not None else None, fleet.order if fleet is not None else (),
-    )  # fmt: skip
 
 
 def page_of_check(

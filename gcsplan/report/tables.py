@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gcsplan.check.verdict import LegFigures
-from gcsplan.mavlink.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import manner
 from gcsplan.report.markup import THIN, esc, least, minutes, num, place, table
 from gcsplan.report.plan_view import zone_heights
 from gcsplan.report.profile_view import passed

@@ -20,6 +20,6 @@
 ====================  ========================================================================================
 
 The protocol's half is written from the autopilots' sources and on purpose without a line shared with
-`gcsplan.mavlink.transfer` and `gcsplan.mavlink.autopilots`, the flight's half without one shared with `gcsplan.fleet`:
-where two disagree, one of them is wrong about the aircraft.
+`gcsplan.mavlink.protocol.transfer` and `gcsplan.mavlink.mission.autopilots`, the flight's half without one shared with
+`gcsplan.fleet`: where two disagree, one of them is wrong about the aircraft.
 """

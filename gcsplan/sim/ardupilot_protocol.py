@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from gcsplan.mavlink.messages import (
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Home, MissionItem
+from gcsplan.mavlink.protocol.messages import (
     Ack,
     Address,
     ClearAll,
@@ -19,7 +20,6 @@ from gcsplan.mavlink.messages import (
     Request,
     RequestList,
 )
-from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, Home, MissionItem
 from gcsplan.sim import ardupilot_storage as storage
 from gcsplan.sim.board import (
     ACCEPTED,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from gcsplan.mavlink.mission import (
+from gcsplan.mavlink.mission.mission import (
     FENCE,
     GLOBAL,
     LOITER_TURNS,

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Protocol
 
-from gcsplan.mavlink.messages import Address, MissionMessage
-from gcsplan.mavlink.mission import FENCE, MISSION, RALLY, Home, MissionItem, float32
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Home, MissionItem, float32
+from gcsplan.mavlink.protocol.messages import Address, MissionMessage
 
 # MAV_MISSION_RESULT.
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5

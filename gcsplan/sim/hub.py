@@ -12,9 +12,9 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from gcsplan.errors import UsageError
-from gcsplan.mavlink import wire
-from gcsplan.mavlink.frames import FrameParser, FrameWriter, Signing
-from gcsplan.mavlink.messages import Address, Packet
+from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing
+from gcsplan.mavlink.protocol import wire
+from gcsplan.mavlink.protocol.messages import Address, Packet
 from gcsplan.sim.telemetry import Message, Telemetry
 from gcsplan.sim.vehicle import LoopbackVehicle
 

@@ -13,8 +13,8 @@ import random
 from dataclasses import dataclass
 
 from gcsplan.errors import Problem, UsageError
-from gcsplan.mavlink.messages import Packet
-from gcsplan.mavlink.mission import MISSION, MissionItem, float32
+from gcsplan.mavlink.mission.mission import MISSION, MissionItem, float32
+from gcsplan.mavlink.protocol.messages import Packet
 from gcsplan.sim.board import Refused
 
 FIELDS = ("x", "y", "z", "param1", "param2", "param3", "param4", "command", "frame", "autocontinue")

@@ -11,7 +11,7 @@ import numpy as np
 
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
-from gcsplan.mavlink.mission import Mission
+from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.trace import Judged, Meeting, Trace, examine, meetings
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World

@@ -8,7 +8,8 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping
 
-from gcsplan.mavlink.messages import (
+from gcsplan.mavlink.mission.mission import ALL, FENCE, MISSION, RALLY, MissionItem
+from gcsplan.mavlink.protocol.messages import (
     Ack,
     Address,
     ClearAll,
@@ -19,7 +20,6 @@ from gcsplan.mavlink.messages import (
     Request,
     RequestList,
 )
-from gcsplan.mavlink.mission import ALL, FENCE, MISSION, RALLY, MissionItem
 from gcsplan.sim import px4_storage as storage
 from gcsplan.sim.board import (
     ACCEPTED,

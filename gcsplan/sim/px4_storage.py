@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from gcsplan.mavlink.mission import FENCE, MISSION, NO_POSITION, RALLY, MissionItem, float32
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, NO_POSITION, RALLY, MissionItem, float32
 from gcsplan.sim.board import ERROR, INVALID_PARAM1, UNSUPPORTED, UNSUPPORTED_FRAME, Refused
 
 Keep = Callable[[float], float]

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.mission import Mission
-from gcsplan.mavlink.session import Options, Order, upload_fleet
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.kinematics import Kinematics
 from gcsplan.sim.mission_flight import fly
 from gcsplan.sim.outcome import Part, Rehearsal, Tally, Terms, energy_of

@@ -19,7 +19,7 @@ from multiprocessing.connection import Connection
 from types import TracebackType
 
 from gcsplan.errors import LinkError, UsageError
-from gcsplan.mavlink.url import parse_url
+from gcsplan.mavlink.link.url import parse_url
 from gcsplan.sim.hub import Hub
 from gcsplan.sim.sockets import TcpTransport, Transport, UdpTransport
 from gcsplan.sim.vehicle import LoopbackVehicle

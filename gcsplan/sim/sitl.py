@@ -20,14 +20,14 @@ import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.errors import GcsplanError, LinkError, UsageError, VehicleRefused
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.frames import signing_key
-from gcsplan.mavlink.link import Channel, Job, Link, Steps, pump
-from gcsplan.mavlink.messages import Address
-from gcsplan.mavlink.session import Options, Order, upload_fleet
-from gcsplan.mavlink.steps import discover_steps, parameter_steps
-from gcsplan.mavlink.url import parse_url
-from gcsplan.mavlink.watch import VehicleState, Watch
+from gcsplan.mavlink.link.frames import signing_key
+from gcsplan.mavlink.link.link import Channel, Job, Link, Steps, pump
+from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
+from gcsplan.mavlink.link.url import parse_url
+from gcsplan.mavlink.link.watch import VehicleState, Watch
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.sim.outcome import Part, Rehearsal, Tally, Terms, energy_of
 from gcsplan.sim.trace import Trace
 from gcsplan.vehicle import Autopilot

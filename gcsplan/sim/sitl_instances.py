@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from gcsplan.errors import LinkError, UsageError
-from gcsplan.mavlink.link import Link
+from gcsplan.mavlink.link.link import Link
 from gcsplan.sim.outcome import Part
 from gcsplan.sim.sitl import Seat
 

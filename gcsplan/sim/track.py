@@ -17,7 +17,7 @@ from gcsplan.check.arcs import bend
 from gcsplan.check.flight import follow
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.errors import InputError
-from gcsplan.mavlink.mission import Mission
+from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.kinematics import Kinematics
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World

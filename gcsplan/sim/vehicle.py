@@ -16,8 +16,8 @@ import dataclasses
 import random
 from collections.abc import Callable, Sequence
 
-from gcsplan.mavlink.messages import Ack, Address, Count, Item, MissionMessage, Packet, Request, RequestList
-from gcsplan.mavlink.mission import MISSION, Home, MissionItem
+from gcsplan.mavlink.mission.mission import MISSION, Home, MissionItem
+from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, MissionMessage, Packet, Request, RequestList
 from gcsplan.sim.ardupilot_protocol import ArduPilotManner
 from gcsplan.sim.ardupilot_storage import home_item
 from gcsplan.sim.board import Board, Manner

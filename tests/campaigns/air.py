@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from gcsplan.mavlink.frames import Signing
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.transport import Heard, Peer
+from gcsplan.mavlink.link.frames import Signing
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.transport import Heard, Peer
 
 STATION = "ground station"
 EPOCH_S = 1_800_000_000.0

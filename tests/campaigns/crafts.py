@@ -8,12 +8,12 @@ from typing import Any
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
-from gcsplan.mavlink import wire
-from gcsplan.mavlink.compare import compare, faults
-from gcsplan.mavlink.frames import FrameWriter, Signing
-from gcsplan.mavlink.messages import Ack, Address, Count, Item, Request
-from gcsplan.mavlink.mission import MISSION, Home, MissionItem
-from gcsplan.mavlink.transport import Peer
+from gcsplan.mavlink.link.frames import FrameWriter, Signing
+from gcsplan.mavlink.link.transport import Peer
+from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.mission import MISSION, Home, MissionItem
+from gcsplan.mavlink.protocol import wire
+from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Request
 from gcsplan.sim.hub import Hub
 from gcsplan.sim.misbehaviour import spoilt
 from gcsplan.sim.parameters import REAL32, Parameters

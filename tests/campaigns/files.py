@@ -30,7 +30,7 @@ from typing import Any
 
 import typer
 
-from gcsplan import cli
+from gcsplan.cli import main as cli
 from tests.campaigns.disk import workshop
 from tests.campaigns.hostile import KINDS, write_clean
 

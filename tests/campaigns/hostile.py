@@ -21,7 +21,7 @@ import rasterio
 import yaml
 from rasterio.transform import Affine
 
-from gcsplan.mavlink.files import read_mission_file, write_plan
+from gcsplan.mavlink.files.formats import read_mission_file, write_plan
 from gcsplan.vehicle import Autopilot
 from tests import corpus
 from tests.spoil import ODD, places, spoilt_bytes, spoilt_tree

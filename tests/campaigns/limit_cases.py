@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
-from gcsplan.mavlink import mission as m
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame

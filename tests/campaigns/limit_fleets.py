@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from gcsplan.app.model import Plan
+from gcsplan.app.pipeline import plan
+from gcsplan.app.rehearsing import parts_of, terms_of
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import Plan, plan
-from gcsplan.rehearsing import parts_of, terms_of
 from gcsplan.sim.rehearsal import rehearse
 
 STEP_S = 0.01

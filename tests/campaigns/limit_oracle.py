@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.mavlink.mission import MissionItem
+from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.limit_cases import WING_RADIUS_M, Case
 from tests.oracle import Oracle
@@ -407,8 +407,8 @@ def battery_needed_j(case: Case) -> float:
 
 def read_again(case: Case, text: str, plan: bool) -> Case:
     """The case with its mission read from a written file."""
-    from gcsplan.mavlink.plan_file import read_plan
-    from gcsplan.mavlink.waypoints_file import read_waypoints
+    from gcsplan.mavlink.files.plan_file import read_plan
+    from gcsplan.mavlink.files.waypoints_file import read_waypoints
 
     read = read_plan if plan else read_waypoints
     mission = read(text, autopilot=case.mission.autopilot, where="campaign", home_hint=case.mission.home)

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gcsplan.mavlink.plan_file import write_plan
-from gcsplan.mavlink.waypoints_file import write_waypoints
+from gcsplan.mavlink.files.plan_file import write_plan
+from gcsplan.mavlink.files.waypoints_file import write_waypoints
 from tests.campaigns.limit_cases import FAMILIES, Case, Knob, knobs, make_case
 from tests.campaigns.limit_fleets import fleet_at_limit
 from tests.campaigns.limit_oracle import ALLOWED, battery_needed_j, read_again, worst

@@ -26,17 +26,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from gcsplan.app import delivery
 from gcsplan.errors import GcsplanError
-from gcsplan.mavlink import wire
-from gcsplan.mavlink.autopilots import altitude_of_cm
-from gcsplan.mavlink.frames import FrameParser, Signing, SigningKey
-from gcsplan.mavlink.link import Link
-from gcsplan.mavlink.messages import Address
-from gcsplan.mavlink.mission import Home, Mission, MissionItem
-from gcsplan.mavlink.transport import Peer
+from gcsplan.mavlink.link.frames import FrameParser, Signing, SigningKey
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.transport import Peer
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.mavlink.protocol import wire
+from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.steps import delivery
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.air import Air, Hang, Radio
 from tests.campaigns.crafts import Craft, Forger, OddParameters, Recorder

@@ -27,10 +27,11 @@ from numpy.typing import NDArray
 from pyproj import Transformer
 from scipy.ndimage import binary_erosion, gaussian_filter, maximum_filter
 
+from gcsplan.app.pipeline import world_of
+from gcsplan.app.problems import make_problem
 from gcsplan.bench.everyday_oracle import Plane, Unreachable
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import load_mission
-from gcsplan.pipeline import make_problem, world_of
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.world.frame import Frame, centre_of

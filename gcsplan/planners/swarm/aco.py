@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import unknown_name
+from gcsplan.optimisers.driver import History, Result
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal import check_ends
 from gcsplan.planners.swarm import scene_kernels as k
@@ -24,7 +25,6 @@ from gcsplan.planners.swarm.encodings import LATERAL, Code
 from gcsplan.planners.swarm.objectives import Cost, Earlier, get_objective
 from gcsplan.planners.swarm.planner import Found, Settings, finish, judged
 from gcsplan.planners.swarm.scene import Scene
-from gcsplan.swarm.driver import History, Result
 
 Floats = NDArray[np.float64]
 

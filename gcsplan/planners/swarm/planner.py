@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.errors import unknown_name
+from gcsplan.optimisers.driver import Result, State, minimise
+from gcsplan.optimisers.registry import get as get_optimiser
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal import check_ends
 from gcsplan.planners.registry import VOLUME_KEYS
@@ -25,8 +27,6 @@ from gcsplan.planners.swarm.encodings import Code
 from gcsplan.planners.swarm.objectives import Cost, Earlier, get_objective
 from gcsplan.planners.swarm.repair import repair, violations
 from gcsplan.planners.swarm.scene import Scene
-from gcsplan.swarm.driver import Result, State, minimise
-from gcsplan.swarm.table import get as get_optimiser
 from gcsplan.world.airspace import Violation
 from gcsplan.world.path import Path
 

@@ -1,0 +1,335 @@
+"""Anybody's `.waypoints` and `.plan` files, each held against the world of a mission file, or one made of options."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from gcsplan.app.fencing import own_fence
+from gcsplan.app.pipeline import world_of
+from gcsplan.check.judge import TERRAIN_ERROR_M, judge
+from gcsplan.check.rtl.verdict import WayHome
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import CheckFailed, InputError, Problem, UsageError
+from gcsplan.mavlink.files.file_items import HAS_PLACE, MissionFileRead
+from gcsplan.mavlink.files.formats import read_mission_file
+from gcsplan.mavlink.mission.mission import (
+    LOITER_TIME,
+    LOITER_TURNS,
+    LOITER_UNLIM,
+    NO_POSITION,
+    SPLINE_WAYPOINT,
+    Home,
+    Mission,
+    MissionItem,
+)
+from gcsplan.mission_file import MissionFile, VehicleRequest, load_mission
+from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.world import World
+
+SAME_PLACE_M = 1.0
+"""A home row within this of the vehicle's start is the start."""
+
+
+CIRCLES = frozenset({LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, 31})
+DEFAULT_CIRCLE_M = 150.0
+"""More than a plane's own circle takes at any altitude."""
+
+SPLINE_BULGE = 0.6
+"""A spline's tangents together are four times its length at most, so it bulges by 16/27 of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """One file, the vehicle that it is for, and the verdict in ``world``.
+
+    ``fence``, ``rally``: the file's own. ``terrain_error_m`` is what terrain-frame legs were judged with. ``way_home``
+    where that was asked for.
+    """
+
+    file: Path
+    vehicle: Vehicle
+    request: VehicleRequest
+    mission: Mission
+    verdict: Verdict
+    notes: tuple[str, ...]
+    world: World
+    fence: tuple[MissionItem, ...] = ()
+    rally: tuple[MissionItem, ...] = ()
+    terrain_error_m: float = TERRAIN_ERROR_M
+    way_home: WayHome | None = None
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Several files: those that were judged, and what is wrong with the others. ``inputs``: of the world."""
+
+    name: str
+    checked: tuple[Checked, ...]
+    unreadable: tuple[tuple[str, InputError], ...] = ()
+    inputs: Mapping[str, object] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def split_name(argument: str) -> tuple[str | None, Path]:
+    """``uav1=FILE`` or ``FILE``: the vehicle's name if given, and the file."""
+    name, equals, file = argument.partition("=")
+    if equals and re.fullmatch(r"[A-Za-z0-9_-]+", name) and not os.path.exists(argument):
+        return name, Path(file)
+    return None, Path(argument)
+
+
+def match(source: MissionFile, argument: str) -> tuple[VehicleRequest, Path]:
+    """The vehicle that a file is for: named, or of the file's stem, or the only one. Raises UsageError if unclear."""
+    name, file = split_name(argument)
+    by_name = {r.vehicle.name: r for r in source.vehicles}
+    if name is not None:
+        if name not in by_name:
+            raise UsageError(f"{argument}: the mission file has no vehicle {name!r}; it has {', '.join(by_name)}")
+        return by_name[name], file
+    if file.stem in by_name:
+        return by_name[file.stem], file
+    if len(by_name) == 1:
+        return next(iter(by_name.values())), file
+    raise UsageError(f"{argument}: which vehicle is it for? Write NAME={file} with one of {', '.join(by_name)}")
+
+
+def check_files(source: MissionFile, arguments: Sequence[str]) -> list[Checked]:
+    """Judge each FILE or NAME=FILE in the world of ``source``; InputError and UsageError for what is not readable."""
+    batch = check_batch(source, arguments)
+    if batch.unreadable:
+        if len(batch.unreadable) == 1:
+            raise batch.unreadable[0][1]
+        raise InputError.of([p for _, error in batch.unreadable for p in error.problems])
+    return list(batch.checked)
+
+
+def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: bool = False) -> Batch:
+    """Judge each FILE or NAME=FILE in the world of ``source``; a file that cannot be read leaves the others standing.
+
+    ``returns``: judge the way home from everywhere too. Where a file goes beyond the terrain that was loaded for the
+    mission, more of it is loaded. Raises UsageError where it is not clear for which vehicle a file is.
+    """
+    requests = [match(source, argument) for argument in arguments]
+    read: list[tuple[VehicleRequest, Path, MissionFileRead]] = []
+    unreadable = []
+    for argument, (request, file) in zip(arguments, requests, strict=True):
+        try:
+            start = Home.at(*request.start_deg, request.start[2])
+            found = read_mission_file(file, autopilot=request.vehicle.autopilot, home_hint=start)
+            read.append((request, file, _at_start(found, start, request.vehicle)))
+        except InputError as error:
+            unreadable.append((argument, error))
+    source = _reaching(source, [place for _, _, r in read for place in places_of(r.mission)])
+    world = world_of(source)
+    error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
+    checked = [_judged(request, file, r, world, error_m, returns) for request, file, r in read]
+    return Batch(source.name, tuple(checked), tuple(unreadable), source.inputs, source.notes)
+
+
+def _at_start(read: MissionFileRead, start: Home, vehicle: Vehicle) -> MissionFileRead:
+    """The mission as ``vehicle`` flies it from its start: no autopilot flies from a file's home row."""
+    from gcsplan.mavlink.link.preflight import distance_m  # with the dialect behind it, which planning can do without
+
+    mission, notes = replace(read.mission, name=vehicle.name, sysid=vehicle.sysid), list(read.notes)
+    home, place = mission.home, (start.lat_e7 / 1e7, start.lon_e7 / 1e7)
+    if home.lat_e7 == 0 and home.lon_e7 == 0:
+        notes.append("the file's home row is blank: the vehicle's start in the mission file was taken for home")
+        mission = replace(mission, home=start)
+    elif distance_m(home.lat_e7 / 1e7, home.lon_e7 / 1e7, *place) > SAME_PLACE_M:
+        notes.append("the file's home row lies elsewhere: the vehicle's start in the mission file was taken for home")
+        mission = replace(mission, home=start)
+    return replace(read, mission=mission, notes=tuple(notes))
+
+
+def places_of(mission: Mission) -> list[tuple[float, float]]:
+    """Latitude and longitude of home and of every item that has a place."""
+    home = mission.home
+    placed = [i for i in mission.items if i.command in HAS_PLACE and i.frame != NO_POSITION and (i.x or i.y)]
+    return [(home.lat_e7 / 1e7, home.lon_e7 / 1e7), *((i.lat_deg, i.lon_deg) for i in placed)]
+
+
+def beyond_m(mission: Mission) -> float:
+    """How far from its places a mission may fly: its widest circle, and the bulge of its splines."""
+    circles = [p for i in mission.items if i.command in CIRCLES for p in i.params[1:3]]
+    widest = max((min(abs(p), 3000.0) for p in circles if math.isfinite(p)), default=0.0)
+    if any(i.command == SPLINE_WAYPOINT for i in mission.items):
+        lat, lon = (max(x) - min(x) for x in zip(*places_of(mission), strict=True))
+        widest += SPLINE_BULGE * 111_195.0 * math.hypot(lat, lon)
+    return float(widest) + DEFAULT_CIRCLE_M
+
+
+def _reaching(source: MissionFile, places: Sequence[tuple[float, float]]) -> MissionFile:
+    """``source``, with terrain loaded as far as ``places`` go; the same where it holds them, or was not read here."""
+    world = world_of(source)
+    on_earth = [p for p in places if abs(p[0]) <= 90.0 and abs(p[1]) <= 180.0]
+    unknown = [p for p in on_earth if math.isnan(world.ground_amsl(*p))]
+    if not unknown or not source.path.is_file():
+        return source
+    return load_mission(source.path, around=unknown)
+
+
+def check_with_options(
+    options: WorldOptions, autopilot: Autopilot | None, arguments: Sequence[str], *, returns: bool = False
+) -> Batch:
+    """Judge each FILE in the world that ``options`` make.
+
+    ``autopilot`` None takes a `.plan`'s own, and ArduCopter for a `.waypoints` file, which names none. Files that lie
+    too far apart for one plane get one each. ``returns``: judge the way home from everywhere too. Raises InputError
+    where the options are off.
+    """
+    opened = OpenWorld(options)
+    hint = None if options.home is None else Home.at(*options.home, 0.0)
+    read: list[tuple[str, Path, MissionFileRead]] = []
+    unreadable: list[tuple[str, InputError]] = []
+    for argument in arguments:
+        file = Path(argument)
+        try:
+            found = read_mission_file(file, autopilot=autopilot, home_hint=hint, otherwise=Autopilot.ARDUCOPTER)
+            read.append((argument, file, _with_home(found, hint, argument)))
+        except InputError as error:
+            unreadable.append((argument, error))
+    every = [place for _, _, r in read for place in places_of(r.mission)]
+    shared: tuple[World, dict[str, object]] | None = None
+    if read:
+        try:
+            shared = opened.around(every, max(beyond_m(r.mission) for _, _, r in read))
+        except InputError:
+            if len(read) == 1:
+                raise
+    checked: list[Checked] = []
+    inputs: dict[str, object] = dict(shared[1]) if shared is not None else {}
+    for argument, file, r in read:
+        try:
+            world, told = shared if shared is not None else opened.around(places_of(r.mission), beyond_m(r.mission))
+            inputs = inputs or dict(told)
+            request = _request(opened, r.mission, file.stem, world)
+            checked.append(_judged(request, file, r, world, options.terrain_error_m, returns))
+        except InputError as error:
+            unreadable.append((argument, error))
+    notes = inputs.pop("notes", ())
+    return Batch("check", tuple(checked), tuple(unreadable), inputs, notes if isinstance(notes, tuple) else ())
+
+
+def _with_home(read: MissionFileRead, given: Home | None, argument: str) -> MissionFileRead:
+    """The mission with the home that the options give, if any. Raises InputError where none is known."""
+    home = read.mission.home
+    if given is not None:
+        note = () if home == given else ("--home was taken for the file's home",)
+        return replace(read, mission=replace(read.mission, home=given), notes=(*read.notes, *note))
+    if home.lat_e7 == home.lon_e7 == 0:
+        raise InputError(
+            "the file's home is blank (0, 0), and altitudes count from it: give it with --home LAT,LON", where=argument
+        )
+    return read
+
+
+def _request(opened: OpenWorld, mission: Mission, name: str, world: World) -> VehicleRequest:
+    at = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
+    east, north = (float(x) for x in world.frame.to_plane(*at))
+    place = (east, north, world.ground_amsl(*at))
+    vehicle = opened.vehicle(re.sub(r"[^A-Za-z0-9_-]", "_", name) or "file", mission.autopilot.value)
+    return VehicleRequest(vehicle, place, place, at, at, rtl_rel_home_m=opened.options.rtl_rel_home_m)
+
+
+def _judged(
+    request: VehicleRequest, file: Path, read: MissionFileRead, world: World, terrain_error_m: float, returns: bool
+) -> Checked:
+    vehicle, mission, notes = request.vehicle, read.mission, list(read.notes)
+    if mission.autopilot is not vehicle.autopilot:
+        raise InputError(f"is for {mission.autopilot}, and {vehicle.name} is {vehicle.autopilot}", where=str(file))
+    ground = world.ground_amsl(mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7)
+    if not math.isnan(ground) and "--home was taken for the file's home" in notes:
+        mission = replace(mission, home=replace(mission.home, amsl_m=round(ground, 2)))
+    mission = replace(mission, name=vehicle.name, sysid=vehicle.sysid)
+    verdict = judge(
+        mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m, misses=True
+    )
+    verdict, told = own_fence(read.fence, verdict, vehicle, world)
+    notes += told
+    if verdict.legs and verdict.legs[-1].kind == "cruise" and not any("without end" in n for n in verdict.notes):
+        notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")
+    home: WayHome | None = None
+    if returns:
+        from gcsplan.check.rtl.everywhere import way_home
+
+        rtl_m = request.rtl_rel_home_m
+        home = way_home(verdict, vehicle, world, rtl_rel_home_m=rtl_m, terrain_error_m=terrain_error_m)
+        notes += home.notes
+    return Checked(
+        file, vehicle, request, mission, verdict, tuple(notes), world, read.fence, read.rally, terrain_error_m, home
+    )
+
+
+def passes(c: Checked, *, allow_unjudged: bool) -> bool:
+    """Whether a checked mission may fly: no limit is broken, on the way home neither if that was asked for."""
+    judged = [c.verdict.safe, *([c.way_home.safe] if c.way_home is not None else [])]
+    return False not in judged and (allow_unjudged or None not in judged)
+
+
+def finding_lines(c: Checked, *, allow_unjudged: bool = False) -> list[str]:
+    """One line for each finding, ``file:item: kind: message``, as compilers and linters write theirs."""
+    lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(f.message)}" for f in c.verdict.findings]
+    unjudged = list(c.verdict.not_judged)
+    if c.way_home is not None:
+        lines += [f"{c.file}:{s.from_seq}: way_home: {s.describe()}" for s in c.way_home.unsafe]
+        if c.way_home.battery is not None and c.way_home.battery.short:
+            battery = c.way_home.battery
+            lines.append(f"{c.file}:{battery.no_return_seq or 0}: way_home: {battery.describe()}")
+        unjudged += [f"the way home: {words}" for words in c.way_home.not_judged if words not in unjudged]
+    if not allow_unjudged:
+        lines += [f"{c.file}:{_item_in(w)}: not_judged: {_without_item(w)}" for w in unjudged]
+    return lines
+
+
+def _item_in(words: str) -> int:
+    found = re.match(r"item (\d+)", words)
+    return int(found[1]) if found else 0
+
+
+def _without_item(words: str) -> str:
+    return re.sub(r"^item \d+(?:[ :]+|$)(?:\((\w+)\): )?", "", words)
+
+
+def failure(
+    checked: Iterable[Checked], *, allow_unjudged: bool, unreadable: Sequence[tuple[str, InputError]] = ()
+) -> dict[str, Any] | None:
+    """The ``error`` of ``check --json``: what cannot be read, which limits are broken, or what could not be judged.
+
+    None if all may fly.
+    """
+    bad = [c for c in checked if not passes(c, allow_unjudged=allow_unjudged)]
+    if not bad and not unreadable:
+        return None
+    broken = any(c.verdict.safe is False or (c.way_home is not None and c.way_home.safe is False) for c in bad)
+    lines = [f"{c.vehicle.name}: {line}" for c in bad for line in c.verdict.describe().splitlines()]
+    lines += [line for c in bad for line in finding_lines(c) if ": way_home: " in line or "the way home: " in line]
+    lines += [str(error) for _, error in unreadable]
+    reason = "bad_input" if unreadable else "violation" if broken else "not_judged"
+    problems: list[Problem] = [p for _, error in unreadable for p in error.problems]
+    document: dict[str, Any] = {
+        "code": InputError.exit_code if unreadable else CheckFailed.exit_code,
+        "reason": reason,
+        "message": "\n".join(lines),
+        "where": ", ".join([*(str(c.file) for c in bad), *(name for name, _ in unreadable)]),
+    }
+    if problems:
+        document["problems"] = [{"where": p.where, "message": p.message} for p in problems]
+    return document
+
+
+def more_of(c: Checked) -> dict[str, Any]:
+    """What ``check --json`` says of one file beside its verdict: the nearest misses, every leg, its own lists."""
+    return {
+        "nearest_misses": [asdict(miss) for miss in c.verdict.misses],
+        "time_s": c.verdict.time_s,
+        "legs": [asdict(leg) for leg in c.verdict.legs],
+        "fence_items": len(c.fence),
+        "rally_points": len(c.rally),
+    } | ({"way_home": c.way_home.as_dict()} if c.way_home is not None else {})

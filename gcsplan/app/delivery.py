@@ -1,0 +1,309 @@
+"""Sending plans and files to vehicles: who gets what, over which link, and how it ended.
+
+One link for each URL; several vehicles on one URL are told apart by system id. For ``sim`` the caller hands in what
+starts a loopback vehicle for each UAV where its mission starts; the results say *simulated*.
+
+Links and transfers are imported by what opens one: most plans are sent nowhere, and the dialect is slow to import.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gcsplan.app.checking import Checked, split_name
+from gcsplan.app.fencing import not_fenced, upload_fences
+from gcsplan.app.jobs import LINK, SIM, Delivery, Job, Options, ProgressCall
+from gcsplan.app.model import Plan
+from gcsplan.app.orders import order_of, teller
+from gcsplan.app.withdrawal import withdrawn
+from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
+from gcsplan.export.outdir import write_whole
+from gcsplan.mavlink.files.formats import read_mission_file, write_plan, write_waypoints
+from gcsplan.mavlink.link.url import parse_url
+from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Mission
+from gcsplan.mission_file import MissionFile
+from gcsplan.vehicle import Autopilot, Vehicle
+
+if TYPE_CHECKING:
+    from gcsplan.mavlink.link.link import Link
+    from gcsplan.mavlink.link.results import UploadResult
+
+LISTEN_S = 1.5
+"""How long to listen for a second source of a system id's heartbeats, which come once a second."""
+KINDS = {"mission": MISSION, "fence": FENCE, "rally": RALLY}
+Simulator = Callable[[Sequence[Mission]], AbstractContextManager[str]]
+"""Starts a vehicle for each mission; the context is the URL where all of them answer."""
+
+
+def targets(where: Sequence[str], vehicles: Sequence[Vehicle]) -> dict[str, str]:
+    """Vehicle name to URL (or `SIM`) of all ``--upload`` words; empty without any. Raises UsageError."""
+    by_name = {v.name: v for v in vehicles}
+    chosen: dict[str, str] = {}
+    single: dict[str, str] = {}
+    for word in where:
+        name, equals, url = word.partition("=")
+        if equals and re.fullmatch(r"[A-Za-z0-9_-]+", name):
+            if name not in by_name:
+                known = ", ".join(by_name)
+                raise UsageError(f"--upload {word}: the mission file has no vehicle {name!r}; it has {known}")
+            single[name] = url if url == SIM else _url(url, word)
+        elif word == LINK:
+            missing = [v.name for v in vehicles if not v.link]
+            if missing:
+                raise UsageError(f"--upload link: {', '.join(missing)} has no `link` in the mission file")
+            chosen |= {v.name: _url(v.link or "", f"link of {v.name}") for v in vehicles}
+        else:
+            url = SIM if word == SIM else _url(word, word)
+            chosen |= dict.fromkeys(by_name, url)
+    return chosen | single
+
+
+def _url(text: str, word: str) -> str:
+    """``text`` as a URL in its one form; ``word`` is what the user wrote. Raises UsageError."""
+    try:
+        return parse_url(text).url
+    except InputError as error:
+        near = [w for w in (SIM, LINK) if w == word.strip().lower()]
+        hint = f"; did you mean {near[0]}?" if near else f". Besides URLs there are {SIM}, {LINK} and NAME=URL"
+        raise UsageError(f"{error.message}{hint}", where=f"upload to {word!r}") from None
+
+
+def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[Job]:
+    """The uploads of a plan; vehicles without a target are left out."""
+    source = plan.source
+    return [
+        Job(
+            v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
+            source.terrain_error_m,
+        )
+        for v in plan.vehicles if v.name in where
+    ]  # fmt: skip
+
+
+def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) -> list[Job]:
+    """The uploads of checked files; ``word`` as of ``--upload``. Raises UsageError for two files of one vehicle."""
+    seen: dict[str, Path] = {}
+    for c in checked:
+        if seen.setdefault(c.vehicle.name, c.file) is not c.file:
+            raise UsageError(f"{seen[c.vehicle.name]} and {c.file} are both for {c.vehicle.name}: give one of them")
+    to = targets([word], [r.vehicle for r in source.vehicles])
+    missing = [c.vehicle.name for c in checked if c.vehicle.name not in to]
+    if missing:
+        raise UsageError(f"--to {word} says nothing of {', '.join(missing)}")
+    return [
+        Job(
+            c.vehicle.name, to[c.vehicle.name], c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m,
+            c.terrain_error_m,
+        )
+        for c in checked
+    ]  # fmt: skip
+
+
+def unchecked_job(argument: str, url: str, sysid: int) -> Job:
+    """A file for ``--unchecked``; the vehicle itself says which autopilot it is where the file does not."""
+    name, file = split_name(argument)
+    endpoint = parse_url(url)
+    require_file(file)
+    autopilot = None
+    if file.suffix.lower() != ".plan":
+        with _open(url) as link:
+            autopilot = _autopilot_of(link, sysid)
+    read = read_mission_file(file, autopilot=autopilot)
+    return Job(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
+
+
+def _open(url: str) -> Link:
+    """The link at ``url``, signed where the environment holds a key."""
+    from gcsplan.mavlink.link.frames import signing_key
+    from gcsplan.mavlink.link.link import Link
+
+    return Link(url, key=signing_key())
+
+
+def _autopilot_of(link: Link, sysid: int) -> Autopilot:
+    from gcsplan.mavlink.link import session
+
+    state = session.discover(link, sysid, listen_s=LISTEN_S)
+    for autopilot in Autopilot:
+        table = manner(autopilot)
+        if state.mav_autopilot == table.mav_autopilot and state.mav_type in table.mav_types:
+            return autopilot
+    raise VehicleRefused(
+        f"vehicle {sysid} calls itself {state.what}, and gcsplan knows {', '.join(Autopilot)}: give a .plan file, "
+        f"which names its autopilot"
+    )
+
+
+def deliver(
+    jobs: Sequence[Job], options: Options, progress: ProgressCall | None = None, *, simulator: Simulator | None = None
+) -> list[Delivery]:
+    """Upload every job, all at once, read back, compare, and check what was read back; in the order given."""
+    from gcsplan.mavlink.link import session
+    from gcsplan.mavlink.link.link import Link
+
+    with ExitStack() as stack:
+        links: dict[str, Link] = {}
+        simulated = [job for job in jobs if job.url == SIM]
+        if simulated:
+            if simulator is None:
+                raise UsageError("nothing here can simulate a vehicle")
+            url = stack.enter_context(simulator([job.mission for job in simulated]))
+            links[SIM] = stack.enter_context(Link(url))  # unsigned: it never leaves this machine
+        failed: dict[str, LinkError] = {}
+        for url in dict.fromkeys(job.url for job in jobs if job.url != SIM):
+            try:
+                links[url] = stack.enter_context(_open(url))
+            except LinkError as error:  # the other vehicles' links may be well
+                failed[url] = error
+        if failed and options.atomic:  # known before anything was sent: nobody's old mission need be lost
+            where = ", ".join(failed)
+            held = LinkError(f"nothing was sent, all or nothing: the link {where} did not open")
+            return [_delivery(job, failed.get(job.url) or held) for job in jobs]
+        fenced = _fenced(jobs, links, options)
+        barred = not_fenced(fenced)
+        if barred and options.atomic:
+            held = LinkError("nothing was sent but fences, all or nothing: another vehicle's fence is not on board")
+            return [_delivery(job, barred.get(job.name) or held) for job in jobs]
+        orders = {
+            job.name: order_of(
+                job,
+                links[job.url],
+                options,
+                progress,
+                simulated=job.url == SIM,
+                listen_s=0.0 if job.url == SIM else LISTEN_S,
+            )
+            for job in jobs
+            if job.url in links and job.name not in barred
+        }
+        results = session.upload_fleet(list(orders.values()), ended=teller(progress))
+        ended = dict(zip(orders, results, strict=True))
+        done = [
+            _with_fence(
+                _delivery(
+                    job,
+                    ended.get(job.name) or barred.get(job.name) or failed.get(job.url)
+                    or LinkError("the link did not open"),
+                ),
+                fenced.get(job.name),
+            )
+            for job in jobs
+        ]  # fmt: skip
+        return withdrawn(done, orders, ended) if options.atomic else done
+
+
+def _fenced(jobs: Sequence[Job], links: Mapping[str, Link], options: Options) -> dict[str, UploadResult | GcsplanError]:
+    if not any(job.fence is not None for job in jobs):
+        return {}
+    from gcsplan.mavlink.link import session
+
+    settings = session.Options(
+        allow_armed=options.allow_armed, ignore_position=options.ignore_position, listen_s=LISTEN_S,
+        timeout_s=options.timeout_s,
+    )  # fmt: skip
+    return upload_fences(jobs, links, settings)
+
+
+def _with_fence(delivery: Delivery, fence: UploadResult | GcsplanError | None) -> Delivery:
+    if fence is None or isinstance(fence, GcsplanError):
+        return delivery
+    told = {"outcome": fence.outcome, "verified": fence.verified, "items": fence.items, "seconds": fence.seconds}
+    words = f"a fence of {fence.items} item(s) is on board too, read back and compared"
+    return replace(
+        delivery,
+        warnings=tuple(dict.fromkeys((words, *delivery.warnings, *fence.warnings))),
+        details=dict(delivery.details or {}) | {"fence": told},
+    )
+
+
+def _delivery(job: Job, ended: UploadResult | GcsplanError) -> Delivery:
+    if isinstance(ended, GcsplanError):
+        outcome = "refused" if isinstance(ended, VehicleRefused) else "unknown"
+        return Delivery(
+            job.name, job.url, outcome, False, len(job.mission.wire_items()), 0.0, simulated=job.url == SIM,
+            message=str(ended), code=ended.exit_code, reason=ended.reason,
+        )  # fmt: skip
+    error = ended.error()
+    return Delivery(
+        job.name, job.url if job.url == SIM else ended.url, ended.outcome, ended.verified, ended.items, ended.seconds,
+        ended.retries, ended.simulated, str(error) if error else "", ended.warnings,
+        error.exit_code if error else 0, error.reason if error else "", ended.as_dict(),
+    )  # fmt: skip
+
+
+def exit_code(deliveries: Sequence[Delivery]) -> int:
+    """The worst of 70 (our bug), 7, 6, 5 (then 4): a fleet's exit code; 0 if all are verified."""
+    codes = {d.code for d in deliveries}
+    order = (GcsplanError.exit_code, ReadBackDiffers.exit_code, LinkError.exit_code, VehicleRefused.exit_code)
+    return next((c for c in order if c in codes), max(codes, default=0))
+
+
+def failure(deliveries: Sequence[Delivery]) -> dict[str, Any] | None:
+    """The ``error`` of ``--json``: of those that failed the worst kind; None if all are verified."""
+    code = exit_code(deliveries)
+    if code == 0:
+        return None
+    worst = [d for d in deliveries if d.code == code]
+    return {
+        "code": code,
+        "reason": worst[0].reason,
+        "message": "\n".join(f"{d.vehicle}: {d.message}" for d in worst),
+        "where": ", ".join(dict.fromkeys(d.url for d in worst)),
+    }
+
+
+def require_file(file: Path) -> None:
+    """Raise InputError where there is no such file, before a vehicle is looked for."""
+    if not os.path.exists(file):
+        raise InputError("there is no such file", where=str(file))
+
+
+def verify_file(file: Path, url: str, sysid: int, *, timeout_s: float = 60.0) -> Delivery:
+    """Compare a file with what is on board; nothing is written to the vehicle."""
+    from gcsplan.mavlink.link import session
+
+    require_file(file)
+    with _open(url) as link:
+        autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
+        read = read_mission_file(file, autopilot=autopilot)
+        mission = replace(read.mission, sysid=sysid)
+        job = Job(file.stem, link.url, mission)
+        options = session.Options(listen_s=LISTEN_S, timeout_s=timeout_s)
+        done = _delivery(job, session.verify_mission(link, mission, options=options))
+    return replace(done, warnings=(*read.notes, *done.warnings))
+
+
+def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) -> int:
+    """Write the mission on board to a `.waypoints` or `.plan` file; returns the number of its wire items."""
+    if file.suffix.lower() not in (".waypoints", ".plan"):
+        raise UsageError(f"-o {file}: a name that ends in .waypoints or .plan is wanted")
+    if file.is_dir() or not file.parent.is_dir():
+        raise UsageError(f"-o {file}: a file in a directory that is there is wanted")
+    from gcsplan.mavlink.link import session
+
+    with _open(url) as link:
+        autopilot = _autopilot_of(link, sysid)
+        mission = session.download_mission(
+            link, sysid, autopilot, name=file.stem, options=session.Options(listen_s=0.0, timeout_s=timeout_s)
+        )
+    text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
+    write_whole(file, text)
+    return len(mission.wire_items())
+
+
+def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False, timeout_s: float = 60.0) -> None:
+    """Clear one list on board and read back that it is empty."""
+    from gcsplan.mavlink.link import session
+
+    if kind not in KINDS:
+        raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
+    with _open(url) as link:
+        options = session.Options(listen_s=LISTEN_S, allow_armed=allow_armed, timeout_s=timeout_s)
+        session.clear_mission(link, sysid, KINDS[kind], options=options).raise_for_outcome()

@@ -1,0 +1,249 @@
+"""All vehicles together: when each leaves and how fast it flies, so that they arrive as asked and keep apart.
+
+The routes are those of the missions as the autopilots store them. A schedule gives departures, holds and speeds; each
+mission is built anew with its own and judged again; then every pair is held against the separation, and what conflicts
+is resolved or refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.app.detours import Detours
+from gcsplan.app.gate import SLACK_S, GateTime, gated
+from gcsplan.app.model import Brief, FleetPlan, VehiclePlan
+from gcsplan.app.planning import rebuilt
+from gcsplan.app.slants import circling_m, slants_of
+from gcsplan.errors import NoMission
+from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.separation import Conflict, Place, Rules, separation
+from gcsplan.fleet.timing import Course, Route, motion_error_m
+from gcsplan.mission_file import ArrivalRequest
+from gcsplan.world.world import World
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+TERRAIN_STEP_M = 25.0
+LATER_S = 600.0
+"""By which all arrivals may move, where nobody asked for their time, to keep a fleet apart."""
+ARDUPILOT_DEGREE_M = 111318.84502145034
+"""Location.h, `LOCATION_SCALING_FACTOR`. An ArduCopter flew east and west 0.2 % faster than commanded, at 37° N."""
+SEPARATION_M = 30.0
+"""Judged where the file asks for no arrival."""
+
+__all__ = ["crew_of", "fleet_of", "route_of"]
+
+
+def fleet_of(
+    vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None = None
+) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
+    """The vehicles' missions with their speeds and gates, and the fleet's time table.
+
+    With ``gate`` everybody waits in the air until its own second of the day. Raises NoMission: ``time`` where they
+    cannot arrive as asked, ``separation`` where they cannot keep apart.
+    """
+    world, arrival = brief.world, brief.source.arrival
+    crews = [crew_of(v, world) for v in vehicles]
+    notes: list[str] = []
+    if arrival is None:
+        plan = schedule(crews, "none")
+    else:
+        detours = Detours(vehicles, brief, rules_of(arrival, vehicles), lambda v: route_of(v, world))
+        plan, notes = _scheduled(crews, arrival, detours)
+        if len(vehicles) > 1:
+            plan = _kept_apart(plan, vehicles, crews, brief, arrival, detours)
+        vehicles = [detours.plan_of(v.name, plan.of(v.name).route) for v in vehicles]
+        crews = [crew_of(v, world) for v in vehicles]
+    slots = [plan.of(v.name) for v in vehicles]
+    opens: list[int | None] = [None] * len(slots)
+    if gate is not None:
+        with_gates = gated(crews, slots)
+        slots, opens = [slot for slot, _ in with_gates], [opens_s for _, opens_s in with_gates]
+    flown = tuple(
+        rebuilt(
+            v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s,
+            gate_utc=None if gate is None or opens_s is None else gate.of_day(opens_s),
+        )
+        for v, slot, opens_s in zip(vehicles, slots, opens, strict=True)
+    )  # fmt: skip
+    motions = tuple(_motion(v, slot, world) for v, slot in zip(flown, slots, strict=True))
+    found = separation(motions, rules_of(arrival, flown)) if len(flown) > 1 else None
+    if found is not None:
+        notes += found.notes
+        if not found.safe and arrival is not None:  # the missions as built are what flies: the last word
+            raise NoMission(_told(found.conflicts, world), reason="separation")
+        if not found.safe:
+            notes.append(
+                f"the file asks for no `arrival`, so nothing keeps the vehicles apart; released together, "
+                f"{_told(found.conflicts, world)}"
+            )
+    if gate is not None:
+        notes.append(
+            f"the gates open from T+0 = {gate.start:%Y-%m-%d %H:%M:%S} UTC on: a vehicle that comes to its gate after "
+            f"its second waits there for nearly a day; release each by its time, {SLACK_S:g} s are to spare"
+        )
+    return flown, FleetPlan(plan.mode, plan.order, plan.interval_s, tuple(slots), motions, found, tuple(notes))
+
+
+def crew_of(v: VehiclePlan, world: World) -> Crew:
+    """A vehicle and its route, as the fleet's rooms take them."""
+    return Crew(v.request.vehicle, route_of(v, world))
+
+
+def route_of(v: VehiclePlan, world: World) -> Route:
+    """What the mission flies, as judged, in metres: from the top of take-off to the approach, and how it ends.
+
+    Where a mission of a paper begins in the air and ends at its goal, there are no columns. Legs of the terrain frame
+    are cut every `TERRAIN_STEP_M`: between way points they rise and sink with the ground.
+    """
+    request, legs = v.request, v.verdict.legs
+    flown = [leg for leg in legs if leg.on_path]
+    ends = np.array([flown[0].start, *(leg.end for leg in flown)])
+    points = np.column_stack([world.frame.to_plane(ends[:, 0], ends[:, 1]), ends[:, 2]])
+    first = legs.index(flown[0])
+    gate_s = math.fsum(leg.hold_s for leg in legs[:first] if math.isfinite(leg.hold_s))
+    holds = np.array([gate_s, *(leg.hold_s for leg in flown)])
+    ideal = request.end == "none" and request.start_amsl_m is not None
+    ground = legs[0].start[2]
+    ends_with = [leg for leg in legs[first:] if not leg.on_path]
+    last = ends_with[-1] if ends_with else flown[-1]
+    numbers = np.array([leg.seq for leg in flown], dtype=np.intp)
+    if v.order.altitude_frame == "terrain":
+        points, holds, numbers = _over_ground(points, holds, numbers, world)
+    items = np.array([legs[0].seq, *numbers, last.seq], dtype=np.intp)
+    pace = _pace(points, legs[0].start[:2], world) if request.vehicle.lays_curves else None
+    climb_out, glide = slants_of(v, world)
+    return Route(
+        v.name, points,
+        start_ground_amsl_m=None if ideal else ground,
+        goal_ground_amsl_m=last.end[2] if request.end == "land" else None,
+        end=request.end,
+        rtl_amsl_m=None if request.rtl_rel_home_m is None else ground + request.rtl_rel_home_m,
+        holds_s=holds,
+        items=items,
+        climb_out=climb_out,
+        glide=glide,
+        pace=pace,
+    )  # fmt: skip
+
+
+def _pace(points: Floats, home_deg: tuple[float, float], world: World) -> Floats:
+    """(N,) metres over ground in one of ArduPilot's, along each leg and last on the way straight home.
+
+    It takes a degree of latitude for equally long everywhere, and one of longitude for that times the cosine of the
+    latitude halfway between home and the way point (Location.cpp, `get_vector_xy_from_origin_NE`).
+    """
+    lat, lon = world.frame.to_degrees(points[:, 0], points[:, 1]).T
+    north = (lat - home_deg[0]) * ARDUPILOT_DEGREE_M
+    span = (lon - home_deg[1] + 180.0) % 360.0 - 180.0
+    east = span * ARDUPILOT_DEGREE_M * np.cos(np.radians(0.5 * (lat + home_deg[0])))
+    own = np.hypot(np.roll(east, -1) - east, np.roll(north, -1) - north)
+    true = np.linalg.norm(np.roll(points[:, :2], -1, axis=0) - points[:, :2], axis=1)
+    return np.where(own > 0.01, true / np.maximum(own, 0.01), 1.0)
+
+
+def _over_ground(points: Floats, holds: Floats, numbers: Ints, world: World) -> tuple[Floats, Floats, Ints]:
+    """Points cut in such a way that each leg keeps its height above ground, interpolated between its ends."""
+    ground_at = world.airspace.surface.ground_at
+    agl = points[:, 2] - ground_at(points[:, 0], points[:, 1])
+    out, waits, owners = [points[:1]], [holds[:1]], []
+    for i in range(1, len(points)):
+        a, b = points[i - 1], points[i]
+        parts = max(1, math.ceil(math.hypot(*(b - a)[:2]) / TERRAIN_STEP_M))
+        t = np.arange(1, parts + 1) / parts
+        flat = a[:2] + t[:, None] * (b - a)[:2]
+        amsl = ground_at(flat[:, 0], flat[:, 1]) + agl[i - 1] + t * (agl[i] - agl[i - 1])
+        out.append(np.column_stack([flat, np.where(np.isnan(amsl), a[2] + t * (b[2] - a[2]), amsl)]))
+        waits.append(np.append(np.zeros(parts - 1), holds[i]))
+        owners.append(np.full(parts, numbers[i - 1]))
+    return np.concatenate(out), np.concatenate(waits), np.concatenate(owners)
+
+
+def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) -> Rules:
+    """The separation that is asked, with how far the motions may be from the true ones."""
+    error_m = max(motion_error_m(v.request.vehicle) + circling_m(v) for v in vehicles)
+    leaving = frozenset(v.name for v in vehicles if v.request.end == "none")
+    if arrival is None:
+        return Rules(SEPARATION_M, error_m=error_m, leaving=leaving)
+    return Rules(
+        arrival.separation_m,
+        error_m=error_m,
+        window_s=arrival.window_s,
+        pad_clear_s=math.inf if arrival.pad_clear_s is None else arrival.pad_clear_s,
+        leaving=leaving,
+    )
+
+
+def _scheduled(crews: Sequence[Crew], arrival: ArrivalRequest, detours: Detours) -> tuple[Schedule, list[str]]:
+    """The schedule that is asked for, and notes on it.
+
+    Where the file does not say whose clock counts, it is the first one's, else that of the whole fleet.
+    """
+
+    def asked(clock: Literal["first", "fleet"]) -> Schedule:
+        return schedule(
+            crews, arrival.mode,
+            order="best" if arrival.best_order else arrival.order,
+            interval_s=arrival.interval_s, hold=arrival.hold, clock=clock, arrive_s=arrival.arrive_s,
+            longer=detours.longer,
+        )  # fmt: skip
+
+    try:
+        return asked(arrival.clock or "first"), []
+    except NoSchedule:
+        if arrival.clock is not None or arrival.arrive_s is not None or arrival.mode != "sequence":
+            raise
+    plan = asked("fleet")
+    first = plan.slots[0]
+    early_s = min(c.fast_s for c in map(Craft, crews) if c.name == first.name)
+    return plan, [
+        f"{first.name}, the first, arrives at {first.arrive_s:.1f} s instead of {early_s:.1f} s, so that the others "
+        f"can follow {plan.interval_s:g} s apart (clock: fleet)"
+    ]
+
+
+def _kept_apart(
+    plan: Schedule,
+    vehicles: Sequence[VehiclePlan],
+    crews: Sequence[Crew],
+    brief: Brief,
+    arrival: ArrivalRequest,
+    detours: Detours,
+) -> Schedule:
+    """The schedule with its conflicts resolved: departures, speeds, holds, other paths."""
+    from gcsplan.fleet.resolve import resolve  # most plans are of one vehicle
+
+    settled = resolve(
+        plan, crews, rules_of(arrival, vehicles),
+        priority=arrival.order if brief.by_priority else None,
+        hold=arrival.hold,
+        later_s=0.0 if arrival.arrive_s is not None else LATER_S,
+        replan=detours,
+        where=lambda place: words_of(brief.world, place),
+    )  # fmt: skip
+    return settled.schedule
+
+
+def _motion(v: VehiclePlan, slot: Slot, world: World) -> TimedPath:
+    """The motion of the mission as built: its hold stands in it already, unless a time of day ends it."""
+    course = Course(route_of(v, world), v.request.vehicle)
+    return course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s if v.order.gate_utc else 0.0)
+
+
+def words_of(world: World, place: Place) -> str:
+    """A place as a person finds it on a map."""
+    lat, lon = (float(x) for x in world.frame.to_degrees(place[0], place[1]))
+    return f"{lat:.6f}, {lon:.6f}, {place[2]:.0f} m AMSL"
+
+
+def _told(conflicts: Sequence[Conflict], world: World) -> str:
+    lines = [f"  {c.describe(lambda place: words_of(world, place))}" for c in conflicts[:8]]
+    more = f"\n  and {len(conflicts) - 8} more" if len(conflicts) > 8 else ""
+    return "the vehicles come too near to each other:\n" + "\n".join(lines) + more

@@ -1,0 +1,75 @@
+"""What is sent to a vehicle, what the user allows, and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.build.fence import Fence
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.protocol.machine import Progress
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.world import World
+
+SIM, LINK = "sim", "link"
+ProgressCall = Callable[[str, Progress], None]
+"""Called with a vehicle's name and where its upload is; at the end the phase is the outcome in a word."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the user allows. ``atomic``: if one upload fails, the missions that others took are cleared again.
+
+    ``timeout_s``: the user's patience, of `gcsplan.mavlink.protocol.patience`.
+    """
+
+    allow_armed: bool = False
+    ignore_position: bool = False
+    unchecked: bool = False
+    atomic: bool = False
+    timeout_s: float = 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own)."""
+
+    name: str
+    url: str
+    mission: Mission
+    verdict: Verdict | None = None
+    vehicle: Vehicle | None = None
+    world: World | None = None
+    rtl_rel_home_m: float | None = None
+    terrain_error_m: float = 0.0
+    fence: Fence | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Delivery:
+    """How one upload or comparison ended. ``message`` is the error in words, empty if there is none."""
+
+    vehicle: str
+    url: str
+    outcome: str
+    verified: bool
+    items: int
+    seconds: float
+    retries: int = 0
+    simulated: bool = False
+    message: str = ""
+    warnings: tuple[str, ...] = ()
+    code: int = 0
+    reason: str = ""
+    details: Mapping[str, Any] | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: the fixed keys first."""
+        fixed = {
+            "url": self.url, "outcome": self.outcome, "verified": self.verified, "simulated": self.simulated,
+            "items": self.items, "seconds": self.seconds, "retries": self.retries,
+        }  # fmt: skip
+        more = {"message": self.message, "warnings": list(self.warnings)} | dict(self.details or {})
+        return fixed | {key: value for key, value in more.items() if value and key not in fixed}

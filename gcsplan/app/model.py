@@ -1,0 +1,106 @@
+"""What planning gives: a `Plan` of a whole mission file, with a `VehiclePlan` for each vehicle and the `FleetPlan`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from gcsplan.check.verdict import Verdict
+from gcsplan.fleet.arrival import Slot
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.separation import Encounter, Separation
+from gcsplan.mavlink.build.order import Order
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.planners.problem import Problem, Solution
+from gcsplan.world.world import World
+
+
+@dataclass(frozen=True, eq=False)
+class Brief:
+    """How all vehicles of a mission file are planned: ``run`` is the planner, ``options`` what only it knows.
+
+    ``by_priority``: each vehicle is planned with those before it in view, and gives way to them.
+    """
+
+    source: MissionFile
+    world: World
+    run: Callable[[Problem], Solution]
+    objective: str
+    seed: int
+    options: Mapping[str, object]
+    by_priority: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class VehiclePlan:
+    """One vehicle's request and everything that became of it; ``brief``: over which terrain it was planned."""
+
+    request: VehicleRequest
+    problem: Problem
+    solution: Solution
+    mission: Mission
+    verdict: Verdict
+    speed_m_s: float
+    notes: tuple[str, ...] = ()
+    order: Order = field(default_factory=Order)
+    brief: Brief | None = None
+
+    @property
+    def name(self) -> str:
+        """The vehicle's name."""
+        return str(self.request.vehicle.name)
+
+    @property
+    def cost(self) -> float:
+        """Metres or joules of the path as it is flown, by the objective."""
+        return self.verdict.path_energy_j if self.problem.objective == "energy" else self.verdict.length_m
+
+    @property
+    def gap_percent(self) -> float | None:
+        """How far the flown path may be above the best, percent of the bound; None without a bound."""
+        bound = self.solution.lower_bound
+        return None if not bound else max(0.0, 100.0 * (self.cost / bound - 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class FleetPlan:
+    """When each vehicle is where. ``slots`` and ``motions`` stand in the order of the plan's vehicles.
+
+    ``order`` is that of arrival. ``separation`` is None for a single vehicle.
+    """
+
+    mode: str
+    order: tuple[str, ...]
+    interval_s: float
+    slots: tuple[Slot, ...]
+    motions: tuple[TimedPath, ...]
+    separation: Separation | None = None
+    notes: tuple[str, ...] = ()
+
+    def slot(self, name: str) -> Slot:
+        """The slot of a vehicle."""
+        return next(s for s in self.slots if s.name == name)
+
+    def motion(self, name: str) -> TimedPath:
+        """The motion of a vehicle."""
+        return next(m for m in self.motions if m.name == name)
+
+    @property
+    def closest(self) -> Encounter | None:
+        """The pair that comes nearest to each other in the air; None where no two ever fly at a time."""
+        return None if self.separation is None else self.separation.least
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A whole mission file, planned; ``planner`` is the one that was used."""
+
+    source: MissionFile
+    world: World
+    planner: str
+    objective: str
+    seed: int
+    vehicles: tuple[VehiclePlan, ...]
+    notes: tuple[str, ...] = ()
+    fleet: FleetPlan | None = None

@@ -1,0 +1,81 @@
+"""A job as the session wants it: its limits, the check of what is read back, and whom to tell how it ended."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from gcsplan.check.judge import judge
+from gcsplan.check.tuning import Tuning
+from gcsplan.errors import GcsplanError, VehicleRefused
+from gcsplan.mavlink.mission.mission import Mission
+
+if TYPE_CHECKING:
+    from gcsplan.app.jobs import Job, Options, ProgressCall
+    from gcsplan.mavlink.link import session
+    from gcsplan.mavlink.link.link import Link
+    from gcsplan.mavlink.link.results import UploadResult
+
+
+def teller(progress: ProgressCall | None) -> session.EndCall | None:
+    """What tells ``progress`` how each order ended, in a word."""
+    if progress is None:
+        return None
+    from gcsplan.mavlink.protocol.machine import Progress
+
+    def tell(order: session.Order, ended: UploadResult | GcsplanError) -> None:
+        count = len(order.mission.wire_items())
+        refused = isinstance(ended, VehicleRefused)
+        word: str = ("refused" if refused else "unknown") if isinstance(ended, GcsplanError) else ended.outcome
+        verified = not isinstance(ended, GcsplanError) and ended.verified
+        if not isinstance(ended, GcsplanError) and ended.changed:
+            word = f"verified, {ended.changed}" if verified else f"stopped, {ended.changed}"
+        told = "verified" if verified and word == "accepted" else f"{word}!"
+        progress(order.mission.name, Progress(told, count if verified else 0, count))
+
+    return tell
+
+
+def order_of(
+    job: Job, link: Link, options: Options, progress: ProgressCall | None, *, simulated: bool, listen_s: float
+) -> session.Order:
+    """``job`` as an order of the session over ``link``; ``listen_s``: how long to listen for rivals."""
+    from gcsplan.mavlink.link import session
+
+    ground_m = None
+    if job.world is not None:
+        home = job.mission.home
+        ground_m = job.world.ground_amsl(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
+        ground_m = None if math.isnan(ground_m) else ground_m
+    settings = session.Options(
+        unchecked=options.unchecked or (job.verdict is not None and job.verdict.safe is None),
+        allow_armed=options.allow_armed,
+        ignore_position=options.ignore_position,
+        ground_amsl_m=ground_m,
+        rtl_rel_home_m=job.rtl_rel_home_m,
+        simulated=simulated,
+        timeout_s=options.timeout_s,
+        listen_s=listen_s,
+    )
+    return session.Order(link, job.mission, job.verdict, settings, _judge_again(job), progress)
+
+
+def _judge_again(job: Job) -> session.Judge | None:
+    """The check on what was read back: what a vehicle holds is what it will fly."""
+    if job.world is None or job.vehicle is None or job.verdict is None:
+        return None
+    world, vehicle, first = job.world, job.vehicle, job.verdict
+
+    def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
+        # Home on board is where the vehicle stands now; altitudes count from where the mission was planned to start.
+        verdict = judge(
+            replace(read_back, home=job.mission.home), vehicle, world, rtl_rel_home_m=job.rtl_rel_home_m,
+            terrain_error_m=job.terrain_error_m, tuning=Tuning.of(values),
+        )  # fmt: skip
+        if verdict.safe is True or (verdict.safe is None and first.safe is None):
+            return None
+        return verdict.describe()
+
+    return again

@@ -1,0 +1,254 @@
+"""What `plan` writes: every file of a plan as text, from one plan alone, the same bytes for the same plan."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from gcsplan import __version__
+from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
+from gcsplan.check.verdict import LegFigures, Verdict
+from gcsplan.export.geojson import write_geojson
+from gcsplan.export.kml import write_kml
+from gcsplan.export.profile import write_profile
+from gcsplan.export.rows import ItemRow, Track
+from gcsplan.export.summary import write_summary
+from gcsplan.fleet.motion import TimedPath
+from gcsplan.mavlink.files.formats import write_plan, write_waypoints
+from gcsplan.mavlink.mission.compare import command_name
+from gcsplan.mavlink.mission.mission import MissionItem
+
+if TYPE_CHECKING:
+    from gcsplan.app.jobs import Delivery
+    from gcsplan.check.rtl.verdict import WayHome
+
+Homes: TypeAlias = "Mapping[str, WayHome]"
+
+
+def outputs_of(
+    plan: Plan,
+    homes: Homes = MappingProxyType({}),
+    fences: Mapping[str, Sequence[MissionItem]] = MappingProxyType({}),
+    *,
+    rally: bool = False,
+) -> dict[str, str]:
+    """File name to text, of all that INTERFACE's ``plan -o DIR`` names but the report and the upload.
+
+    ``homes``: vehicle to its way home, where that was judged; it stands in the summary then. ``fences``: vehicle to
+    the items of its fence, for the `.plan`; with ``rally`` the rally points that were proposed stand there too.
+    """
+    tracks = [_track(v) for v in plan.vehicles]
+    frame, zones = plan.world.frame, plan.world.airspace.zones
+    files = {}
+    for v in plan.vehicles:
+        files[f"{v.name}.waypoints"] = write_waypoints(v.mission)
+        points = _rally_items(homes[v.name]) if rally and v.name in homes else ()
+        files[f"{v.name}.plan"] = write_plan(
+            v.mission, vehicle=v.request.vehicle, fence=fences.get(v.name, ()), rally=points
+        )
+    files["mission.kml"] = write_kml(plan.source.name, tracks, zones, frame)
+    files["mission.geojson"] = write_geojson(plan.source.name, tracks, zones, frame)
+    motions = {m.name: m for m in plan.fleet.motions} if plan.fleet is not None else {}
+    files["profile.csv"] = write_profile(
+        [row for v in plan.vehicles for row in item_rows(v.name, v.verdict, motions.get(v.name))]
+    )
+    files["summary.json"] = write_summary(summary_of(plan, homes=homes))
+    return files
+
+
+def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
+    from gcsplan.check.rtl.rally import rally_items
+
+    return rally_items(home.rally)
+
+
+def homes_of(plan: Plan) -> dict[str, WayHome]:
+    """The way home of every vehicle, from everywhere on its mission: about a second for 20 km."""
+    from gcsplan.check.rtl.everywhere import way_home
+
+    return {
+        v.name: way_home(
+            v.verdict, v.request.vehicle, plan.world,
+            rtl_rel_home_m=v.request.rtl_rel_home_m, terrain_error_m=plan.source.terrain_error_m,
+        )
+        for v in plan.vehicles
+    }  # fmt: skip
+
+
+def report_of(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Homes = MappingProxyType({})) -> str:
+    """``report.html``: one page that needs no network."""
+    from gcsplan.app.report_page import render
+
+    return render(plan, deliveries, homes)
+
+
+def figures_of(plan: Plan) -> dict[str, bytes]:
+    """File name to PNG of each figure alone: map, profiles, and a fleet's time and separation."""
+    from gcsplan.app.report_page import page_of_plan
+    from gcsplan.report import picture
+
+    return picture.figures(page_of_plan(plan))
+
+
+def picture_of(plan: Plan) -> bytes:
+    """Map and profiles as PNG."""
+    from gcsplan.app.report_page import page_of_plan
+    from gcsplan.report import picture
+
+    buffer = io.BytesIO()
+    picture.save(page_of_plan(plan), buffer)
+    return buffer.getvalue()
+
+
+def upload_text(plan: Plan, deliveries: Sequence[Delivery], homes: Homes = MappingProxyType({})) -> str:
+    """``upload.json``: the summary with the clock readings and each vehicle's upload."""
+    return write_summary(summary_of(plan, deliveries, homes), clocks=True)
+
+
+def summary_of(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Homes = MappingProxyType({})) -> dict[str, Any]:
+    """The summary of INTERFACE.md as plain values, clock readings included."""
+    uploads = {d.vehicle: d for d in deliveries}
+    return {
+        "name": plan.source.name,
+        "gcsplan": __version__,
+        "planner": plan.planner,
+        "objective": plan.objective,
+        "seed": plan.seed,
+        "inputs": dict(plan.source.inputs),
+        "vehicles": [
+            _vehicle(v, plan.fleet, uploads.get(v.name))
+            | ({"way_home": homes[v.name].as_dict()} if v.name in homes else {})
+            for v in plan.vehicles
+        ],
+        "fleet": _fleet(plan),
+        "notes": list(dict.fromkeys(plan.notes)),
+    }
+
+
+def _fleet(plan: Plan) -> dict[str, Any]:
+    fleet, arrival = plan.fleet, plan.source.arrival
+    several = fleet is not None and len(fleet.slots) > 1
+    closest = fleet.closest if fleet is not None else None
+    return {
+        "mode": fleet.mode if fleet is not None else "none",
+        "order": list(fleet.order) if fleet is not None and several else [],
+        "min_separation_m": closest.distance_m if closest else None,
+        "closest": {"vehicles": list(closest.vehicles), "time_s": closest.time_s} if closest else None,
+        "interval_s": fleet.interval_s if fleet is not None and fleet.mode == "sequence" else None,
+        "separation_m": arrival.separation_m if arrival is not None and several else None,
+    }
+
+
+def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, delivery: Delivery | None) -> dict[str, Any]:
+    slot = None if fleet is None else fleet.slot(v.name)
+    verdict = v.verdict
+    lowest, nearest = verdict.lowest, verdict.nearest
+    length = v.problem.objective == "length"
+    bound = v.solution.lower_bound
+    return {
+        "name": v.name,
+        "items": len(v.mission.wire_items()),
+        "length_m": verdict.length_m,
+        "lower_bound_m": bound if length else None,
+        "gap_percent": v.gap_percent,
+        "energy_j": verdict.path_energy_j,
+        "lower_bound_j": None if length else bound,
+        "flight_energy_j": verdict.energy_j,
+        "battery_used_percent": verdict.battery_used_percent,
+        "min_agl_m": lowest.min_agl_m if lowest else None,
+        "min_agl_at": {"leg": lowest.seq, "lat": lowest.min_agl_at[0], "lon": lowest.min_agl_at[1]} if lowest else None,
+        "min_zone_clearance_m": nearest.zone_clearance_m if nearest else None,
+        "nearest_zone": nearest.nearest_zone if nearest else None,
+        "max_climb_deg": verdict.max_climb_deg,
+        "speed_m_s": v.speed_m_s,
+        "depart_s": slot.depart_s if slot else 0.0,
+        "arrive_s": slot.arrive_s if slot else verdict.arrive_s,
+        "planning_s": v.solution.planning_s,
+        "first_path_s": v.solution.first_path_s,
+        "stopped_by": v.solution.stopped_by,
+        "search": [asdict(step) for step in v.solution.search],
+        "safe": verdict.safe,
+        "not_judged": list(verdict.not_judged),
+        "hold_s": slot.hold_s if slot else 0.0,
+        "notes": list(dict.fromkeys((*v.notes, *v.solution.notes, *verdict.notes, *(slot.notes if slot else ())))),
+        "upload": delivery.as_dict() if delivery else None,
+    } | _of_search(v)
+
+
+def _of_search(v: VehiclePlan) -> dict[str, Any]:
+    """What a search by samples made, before it was mended; nothing of other planners."""
+    if v.solution.raw_violations is None:
+        return {}
+    return {"raw_violations": v.solution.raw_violations, "repaired": v.solution.repaired}
+
+
+def verdict_of(name: str, verdict: Verdict) -> dict[str, Any]:
+    """A verdict as plain values, for ``check --json``."""
+    lowest, nearest = verdict.lowest, verdict.nearest
+    return {
+        "file": name,
+        "vehicle": verdict.mission.name,
+        "safe": verdict.safe,
+        "items": len(verdict.mission.wire_items()),
+        "length_m": verdict.length_m,
+        "energy_j": verdict.energy_j,
+        "battery_used_percent": verdict.battery_used_percent,
+        "min_agl_m": lowest.min_agl_m if lowest else None,
+        "min_zone_clearance_m": nearest.zone_clearance_m if nearest else None,
+        "nearest_zone": nearest.nearest_zone if nearest else None,
+        "max_climb_deg": verdict.max_climb_deg,
+        "violations": [asdict(f) for f in verdict.findings],
+        "not_judged": list(verdict.not_judged),
+        "notes": list(verdict.notes),
+    }
+
+
+def item_rows(vehicle: str, verdict: Verdict, motion: TimedPath | None = None) -> list[ItemRow]:
+    """A row for each wire item; the figures of all stretches that are flown for it.
+
+    Times count from the fleet's common start, by ``motion``; without one from leaving the ground, by the verdict.
+    """
+    until: dict[int, float] = {}
+    if motion is not None and motion.pieces is not None:
+        until = dict(zip(motion.pieces.tolist(), motion.times_s[1:].tolist(), strict=True))  # the last one of each
+    flown: dict[int, list[LegFigures]] = {}
+    for leg in verdict.legs:
+        flown.setdefault(leg.seq, []).append(leg)
+    home = verdict.legs[0].start if verdict.legs else None
+    rows, spent_j, clock_s = [], 0.0, 0.0
+    for seq, item in enumerate(verdict.mission.wire_items()):
+        name = command_name(item.command)
+        legs = flown.get(seq)
+        if not legs:
+            at_home = seq == 0 and verdict.mission.first_seq == 1 and home is not None
+            place = home if at_home and home else (None, None, None)
+            rows.append(ItemRow(vehicle, seq, name, place[0], place[1], place[2], 0.0 if at_home else None))
+            continue
+        energy_j = math.fsum(leg.energy_j for leg in legs)
+        spent_j += energy_j
+        # A hold at the gate has no piece of its own: its seconds stand with the take-off.
+        clock_s = until.get(seq, clock_s) if until else clock_s + math.fsum(leg.time_s for leg in legs)
+        low = [leg.min_agl_m for leg in legs if not leg.column and not math.isnan(leg.min_agl_m)]
+        steep = max((leg.climb_deg for leg in legs), key=abs)
+        lat, lon, amsl = legs[-1].end
+        rows.append(
+            ItemRow(
+                vehicle, seq, name, lat, lon, amsl, legs[-1].agl_end_m, min(low) if low else None,
+                math.fsum(leg.length_m for leg in legs), steep, energy_j, spent_j, clock_s,
+            )
+        )  # fmt: skip
+    return rows
+
+
+def _track(v: VehiclePlan) -> Track:
+    legs = v.verdict.legs
+    places = np.array([legs[0].start, *(leg.end for leg in legs)])
+    commands = {seq: command_name(item.command) for seq, item in enumerate(v.mission.wire_items())}
+    labels = ("home", *(f"{leg.seq} {commands.get(leg.seq, '')}".strip() for leg in legs))
+    return Track(v.name, places[:, 0], places[:, 1], places[:, 2], labels)

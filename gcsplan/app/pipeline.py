@@ -1,0 +1,107 @@
+"""The way of the data: mission file → world → path → mission → verdict → outputs → vehicles.
+
+Each step is one function that takes what the step before it gave. `plan` is what `from gcsplan import plan` gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from pathlib import Path as FilePath
+
+from gcsplan.app.fleeting import fleet_of
+from gcsplan.app.gate import GateTime
+from gcsplan.app.model import Brief, Plan, VehiclePlan
+from gcsplan.app.planning import over_one_terrain
+from gcsplan.app.refusals import plan_or_explain
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import CheckFailed, InputError
+from gcsplan.mission_file import MissionFile, load_mission
+from gcsplan.planners.problem import Progress
+from gcsplan.planners.registry import VOLUME_KEYS
+from gcsplan.planners.registry import get as get_planner
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.world import World
+
+__all__ = ["load_mission", "plan", "world_of"]
+
+
+def world_of(source: MissionFile) -> World:
+    """The frame and airspace of a mission file."""
+    return World(source.frame, Airspace(source.surface, source.zones, scale=source.airspace_scale))
+
+
+def plan(
+    source: MissionFile | str | FilePath,
+    *,
+    planner: str | None = None,
+    objective: str | None = None,
+    seed: int | None = None,
+    options: Mapping[str, object] | None = None,
+    gate_utc: datetime | None = None,
+    progress: Callable[[str, Progress], None] | None = None,
+) -> Plan:
+    """Plan every vehicle of a mission file; nothing is written or sent.
+
+    ``planner``, ``objective`` (length | energy), ``seed`` and ``options`` (what only some planners know, such as a
+    swarm's ``encoding``) override the file's. ``gate_utc``: the common start as a time of day; every ArduCopter then
+    waits in the air until its own second. ``progress(vehicle, what)`` is called now and then. Raises InputError for a
+    bad file, NoMission where no safe mission exists or was found.
+    """
+    if not isinstance(source, MissionFile):
+        source = load_mission(source)
+    asked = source.planner
+    name = planner or asked.name
+    entry = get_planner(name)
+    goal = objective or asked.objective
+    if goal not in ("length", "energy"):
+        raise InputError(f"objective must be length or energy, given {goal!r}")
+    number = asked.seed if seed is None else seed
+    told = _options(source, name) | dict(options or {})
+    by_priority = bool(entry.optimiser) and (told.get("cost") or entry.defaults.get("cost")) == "msfoa"
+    brief = Brief(source, world_of(source), entry.plan, goal, number, told, by_priority and len(source.vehicles) > 1)
+    brief, vehicles = over_one_terrain(brief, _one_by_one(brief, progress), progress)
+    source = brief.source
+    flown, fleet = fleet_of(vehicles, brief, None if gate_utc is None else GateTime(gate_utc))
+    notes = list(source.notes)
+    if len(flown) > 1 and source.arrival is None:
+        notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
+    notes += fleet.notes
+    return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet)
+
+
+def _one_by_one(brief: Brief, progress: Callable[[str, Progress], None] | None) -> list[VehiclePlan]:
+    """Every vehicle's own plan, in the file's order; by priority, each has those before it in view (MSFOA)."""
+    requests = {r.vehicle.name: r for r in brief.source.vehicles}
+    arrival = brief.source.arrival
+    plans: dict[str, VehiclePlan] = {}
+    for name in arrival.order if brief.by_priority and arrival is not None else requests:
+        request = requests[name]
+        tell = None if progress is None else lambda what, who=name: progress(who, what)
+        more: dict[str, object] = {}
+        if brief.by_priority:
+            earlier = tuple(plan.solution.path.points for plan in plans.values())
+            more = {"earlier": earlier, "speed_m_s": request.vehicle.speed_max_m_s}
+        plans[name] = plan_or_explain(brief, request, tell, options=more)
+    return [plans[name] for name in requests]
+
+
+def _options(source: MissionFile, planner: str) -> dict[str, object]:
+    """The file's own options for a planner; of another one than it names, only what suits any."""
+    told = dict(source.planner.extras)
+    own = told.get("parameters")
+    if planner != source.planner.name and isinstance(own, Mapping):
+        told["parameters"] = {k: v for k, v in own.items() if k in VOLUME_KEYS}
+    return told
+
+
+def require_passing(verdicts: Mapping[str, Verdict], *, allow_unjudged: bool = False) -> None:
+    """Raise CheckFailed unless every verdict is safe (or merely unjudged, where that is allowed)."""
+    bad = {name: v for name, v in verdicts.items() if v.safe is False or (v.safe is None and not allow_unjudged)}
+    if bad:
+        broken = any(v.safe is False for v in bad.values())
+        lines = "\n".join(f"{name}:\n  " + v.describe().replace("\n", "\n  ") for name, v in bad.items())
+        raise CheckFailed(
+            f"{'limits are broken' if broken else 'not everything could be judged'}\n{lines}",
+            reason="violation" if broken else "not_judged",
+        )

@@ -1,0 +1,121 @@
+"""One vehicle: from its request to a path, to a mission, to a verdict on it as the autopilot stores it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from gcsplan.app.model import Brief, VehiclePlan
+from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.app.wings import plan_wing
+from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.build.order import MARGINS, Margins, Order
+from gcsplan.mission_file import VehicleRequest
+from gcsplan.planners.problem import Progress
+from gcsplan.vehicle import Autopilot
+from gcsplan.world.limits import Limits
+from gcsplan.world.world import World
+
+__all__ = ["over_one_terrain", "plan_vehicle", "rebuilt"]
+
+ATTEMPTS = 4
+"""Plans for one vehicle, each with larger margins than the one before, until the decoded mission passes."""
+
+
+def plan_vehicle(
+    brief: Brief,
+    request: VehicleRequest,
+    progress: Callable[[Progress], None] | None = None,
+    *,
+    searched: World | None = None,
+    limits: Limits | None = None,
+    options: Mapping[str, object] | None = None,
+) -> VehiclePlan:
+    """One vehicle's path, mission and verdict. Raises InputError, NoMission.
+
+    ``searched`` and ``limits``: a world with more zones, and tighter limits, to look for another path in; the verdict
+    is on the mission file's own. ``options`` are for the planner, on top of the brief's.
+    """
+    source, vehicle = brief.source, request.vehicle
+    asked = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))
+    world = brief.world if searched is None else searched
+    told = {**brief.options, **(options or {})}
+    if vehicle.turn_radius_m > 0.0:
+        return plan_wing(brief, request, asked, world, told, progress)
+    margins, failed = MARGINS, None
+    for _ in range(ATTEMPTS):
+        problem, notes = make_problem(source, asked, world, brief.objective, brief.seed, margins, progress, told)
+        solution = run_planner(brief.run, problem, vehicle, world)
+        over = looked_over(brief, solution)
+        for spaced in (True, False):  # way points nearer than the acceptance radii are dropped where that is legal
+            order = Order(request.end, source.altitude_frame, spaced=spaced)
+            mission, verdict = built(over, request, solution, order)
+            if not verdict.findings:
+                return VehiclePlan(
+                    request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order, over
+                )
+        failed = verdict
+        if not any(f.seq > mission.first_seq for f in verdict.findings if f.kind != "battery"):
+            break  # no margin mends a battery or a take-off column
+        all_along = source.altitude_frame == "terrain" or vehicle.autopilot is Autopilot.ARDUPLANE
+        margins = _larger(margins, verdict, all_along=all_along)
+    assert failed is not None
+    raise unsafe(failed, vehicle)
+
+
+def over_one_terrain(
+    brief: Brief, vehicles: Sequence[VehiclePlan], progress: Callable[[str, Progress], None] | None = None
+) -> tuple[Brief, list[VehiclePlan]]:
+    """All vehicles over the widest terrain that any of them needed, each judged there; planned anew where it fails."""
+    wide = widest(brief, vehicles)
+    out = []
+    for v in vehicles:
+        if v.brief is None or v.brief.source is wide.source:
+            out.append(v)
+            continue
+        mission, verdict = built(wide, v.request, v.solution, v.order)
+        if not verdict.findings:
+            out.append(replace(v, mission=mission, verdict=verdict, brief=wide))
+            continue
+        tell = None if progress is None else lambda what, who=v.name: progress(who, what)
+        out.append(plan_vehicle(wide, v.request, tell))
+    return wide, out
+
+
+def rebuilt(
+    v: VehiclePlan,
+    brief: Brief,
+    *,
+    speed_m_s: float,
+    hold_s: float = 0.0,
+    gate_utc: tuple[int, int, int] | None = None,
+) -> VehiclePlan:
+    """The same path flown at another speed, after ``hold_s`` (whole seconds) at the gate: its mission, judged anew.
+
+    Raises NoMission where that one breaks a limit: a hold costs energy, and an item.
+    """
+    order = replace(v.order, speed_m_s=speed_m_s, hold_s=0 if gate_utc else round(hold_s), gate_utc=gate_utc)
+    if order == v.order:
+        return v
+    mission, verdict = built(widest(brief, [v]), v.request, v.solution, order)
+    if verdict.findings:
+        raise unsafe(verdict, v.request.vehicle)
+    return replace(v, mission=mission, verdict=verdict, speed_m_s=speed_m_s, order=order)
+
+
+def widest(brief: Brief, plans: Sequence[VehiclePlan]) -> Brief:
+    """Of ``brief`` and those that vehicles were planned under the one that looks over the most terrain."""
+    return max([brief, *(v.brief for v in plans if v.brief is not None)], key=lambda b: b.source.level)
+
+
+def _larger(margins: Margins, verdict: Verdict, *, all_along: bool) -> Margins:
+    """Margins for another attempt.
+
+    ``all_along``: what is off is off on many legs, not at one hilltop: a terrain-frame leg over sloping ground, and
+    ArduPlane's, which changes height by less than GLIDE_SLOPE_MIN at once.
+    """
+    heights = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
+    low_m = max((f.by for f in verdict.findings if f.kind in heights), default=0.0) if all_along else 0.0
+    return Margins(
+        3.0 * margins.altitude_m + 1.05 * low_m, 3.0 * margins.track_m, 3.0 * margins.bow_m, 3.0 * margins.slope
+    )

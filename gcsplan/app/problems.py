@@ -1,0 +1,243 @@
+"""From a vehicle's request to the planner's `Problem`, and from its solution to a mission that was judged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gcsplan.app.model import Brief
+from gcsplan.check.judge import judge
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import InputError, NoMission
+from gcsplan.mavlink.build.multirotor import build_mission, corner_m
+from gcsplan.mavlink.build.order import LONGEST_LEG_M, MARGINS, Margins, Order
+from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.world import World
+from gcsplan.world.zones import Zone
+
+BYTES_PER_NODE = 64.0
+"""What a wider window takes in memory for each of its nodes, terrain included: 58 bytes were measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wider:
+    """A problem's ``widen``: the same question over more terrain of its mission file.
+
+    ``source`` and ``world`` are those that the problem is of; ``zones``: those of the search alone.
+    """
+
+    source: MissionFile
+    world: World
+    request: VehicleRequest
+    zones: tuple[Zone, ...]
+    objective: str
+    seed: int
+    margins: Margins
+
+    def __call__(self, margin_m: float, budget_mb: float) -> Problem | None:
+        """See `Problem.widen`."""
+        cells = math.floor(budget_mb * 2**20 / BYTES_PER_NODE)
+        wide = None if self.source.wider is None else self.source.wider(margin_m, cells)
+        if wide is None:
+            return None
+        there = next(r for r in wide.vehicles if r.vehicle.name == self.request.vehicle.name)
+        request = replace(self.request, start=there.start, goal=there.goal)
+        air = Airspace(wide.surface, (*wide.zones, *self.zones), scale=wide.airspace_scale)
+        world = World(wide.frame, air)
+        try:
+            return make_problem(wide, request, world, self.objective, self.seed, self.margins)[0]
+        except (InputError, NoMission):
+            return None  # an end that is legal by a hair here is not there
+
+
+def looked_over(brief: Brief, solution: Solution) -> Brief:
+    """``brief`` over the terrain that a solution was found in: more than it was asked for, where that was needed."""
+    over = None if solution.problem is None else solution.problem.widen
+    if not isinstance(over, Wider):
+        return brief
+    world = over.world
+    if over.zones:  # a search's own zones are nobody else's
+        air = Airspace(world.airspace.surface, over.source.zones, scale=over.source.airspace_scale)
+        world = World(world.frame, air)
+    return replace(brief, source=over.source, world=world)
+
+
+def built(brief: Brief, request: VehicleRequest, solution: Solution, order: Order) -> tuple[Mission, Verdict]:
+    vehicle, source = request.vehicle, brief.source
+    mission = build_mission(solution.path, brief.world, vehicle, request.start_deg, order)
+    _require_room(mission, vehicle)
+    return mission, judge(
+        mission, vehicle, brief.world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=source.terrain_error_m
+    )
+
+
+def _require_room(mission: Mission, vehicle: Vehicle) -> None:
+    limit, count = manner(vehicle.autopilot).max_items, len(mission.wire_items())
+    if count > limit:
+        raise NoMission(
+            f"{vehicle.name}: the mission has {count} items and {vehicle.autopilot} takes {limit}: put the goal "
+            f"nearer, or plan it in stages",
+            reason="too_many_items",
+        )
+
+
+def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
+    """No mission: the one that was found does not pass as the autopilot would fly it."""
+    words = "\n".join(f"  {f.message}" for f in verdict.findings[:8])
+    if all(f.kind == "battery" for f in verdict.findings):
+        return NoMission(f"{vehicle.name}: {verdict.findings[0].message}", reason="battery")
+    return NoMission(
+        f"{vehicle.name}: a path was found, but the mission as {vehicle.autopilot} flies it breaks limits:\n{words}",
+        reason="infeasible",
+    )
+
+
+def make_problem(
+    source: MissionFile,
+    request: VehicleRequest,
+    world: World,
+    objective: str,
+    seed: int,
+    margins: Margins = MARGINS,
+    progress: Callable[[Progress], None] | None = None,
+    options: Mapping[str, object] | None = None,
+) -> tuple[Problem, tuple[str, ...]]:
+    """The planner's question for one vehicle, with the wire's margins in its limits, and notes for the user.
+
+    The ends are in whole centimetres above home. A ``takeoff_agl_m`` that meets min AGL and the altitude error but
+    not the slope of the ground within the track error is raised, and a note says so; a lower one is bad input.
+    """
+    vehicle = request.vehicle
+    given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
+    margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
+    limits = _with_margins(vehicle.limits, margins, terrain=source.altitude_frame == "terrain", source=source)
+    air = world.airspace
+    datum = request.start[2]
+    notes: list[str] = []
+
+    def end_point(what: str, place: tuple[float, float, float], key: str, wanted_agl_m: float | None) -> float:
+        east, north, ground = place
+        low = lowest_amsl(air, east, north, limits)
+        needed = limits.min_agl_m + vehicle.limits.altitude_error_m
+        if wanted_agl_m is not None and wanted_agl_m < needed - 1e-6:
+            raise InputError(
+                f"must be at least min_agl_m + altitude_error_m = {needed:g}, given {wanted_agl_m:g}: "
+                f"the path begins and ends there",
+                where=f"{source.path}: vehicles.{vehicle.name}.{key}",
+            )
+        if math.isinf(low):
+            raise NoMission(
+                f"{vehicle.name}: the ground within reach of the {what} is unknown to the terrain model",
+                reason="infeasible",
+            )
+        amsl = max(low, ground + (wanted_agl_m or 0.0))
+        amsl = datum + math.ceil((amsl - datum) * 100.0 - 1e-6) / 100.0
+        if wanted_agl_m is not None and amsl - ground > wanted_agl_m + 0.011:
+            notes.append(
+                f"{key} {wanted_agl_m:g} raised to {amsl - ground:.2f}: so far the ground rises within the track error"
+            )
+        return amsl
+
+    start_agl = request.takeoff_agl_m
+    goal_agl = request.approach_agl_m
+    if start_agl is None and request.start_amsl_m is not None and request.start_amsl_m > request.start[2]:
+        start_agl = request.start_amsl_m - request.start[2]
+    if goal_agl is None and request.goal_amsl_m is not None and request.goal_amsl_m > request.goal[2]:
+        goal_agl = request.goal_amsl_m - request.goal[2]
+    start_amsl = end_point("start", request.start, "takeoff_agl_m", start_agl)
+    goal_amsl = end_point("goal", request.goal, "approach_agl_m", goal_agl)
+    via = tuple(
+        Via(e, n, None if agl is None else float(air.surface.ground_at(e, n)) + agl) for e, n, agl in request.via
+    )
+    asked = source.planner
+    own = world.airspace.zones[len(source.zones) :]
+    wider = Wider(source, world, request, own, objective, seed, given)
+    problem = Problem(
+        airspace=air,
+        limits=limits,
+        start=(request.start[0], request.start[1], start_amsl),
+        goal=(request.goal[0], request.goal[1], goal_amsl),
+        via=via,
+        objective="energy" if objective == "energy" else "length",
+        vertical_j_per_m=vehicle.energy.vertical_j_per_m,
+        horizontal_j_per_m=vehicle.energy.horizontal_j_per_m,
+        turn_radius_m=vehicle.turn_radius_m,
+        seed=seed,
+        gap_percent=asked.gap_percent,
+        budget_s=asked.budget_s,
+        budget_mb=asked.budget_mb,
+        progress=progress,
+        options=dict(asked.extras if options is None else options),
+        widen=None if source.wider is None else wider,
+    )
+    if vehicle.autopilot is Autopilot.ARDUPLANE and vehicle.turn_radius_m <= 0.0:
+        notes.append(
+            "arduplane with turn_radius_m 0 is flown as a VTOL (QuadPlane): vertical take-off and landing; corners "
+            "are cut and the landing place is overshot while braking: track_error_m must hold both"
+        )
+    return problem, tuple(notes)
+
+
+def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) -> float:
+    """The lowest altitude that a path may begin or end with, in whichever direction it leaves; inf over unknown ground.
+
+    A path's room is bounded piece by piece (`Airspace.tube`), a little above what hovering at the point would need.
+    """
+    low = float(air.floor_amsl(east_m, north_m, limits))
+    for east, north in ((0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)):
+        tube = air.tube([(east_m, north_m), (east_m + east, north_m + north)], limits)
+        low = max(low, float(tube.floor_m.max()))
+    return low
+
+
+def _largest_bow_m(world: World) -> float:
+    """Bow of the longest leg that may be flown in this world (small in the papers' 100 m worlds)."""
+    surface = world.airspace.surface
+    rows, cols = surface.ground_m.shape
+    corners = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
+    north_m = float(corners[:, 1].max())
+    half_m = 0.5 * min(LONGEST_LEG_M, float(np.linalg.norm(np.ptp(corners, axis=0))))
+    ends = world.frame.to_degrees([-half_m, half_m], [north_m, north_m])
+    return float(world.frame.bow_m(ends[0], ends[1])[0]) + 1e-3
+
+
+def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: MissionFile) -> Limits:
+    """The limits a planner is held to: the vehicle's, less what the wire's rounding and the bow may take."""
+
+    def less(angle_deg: float) -> float:
+        return math.degrees(math.atan(math.tan(math.radians(angle_deg)) * (1.0 - margins.slope)))
+
+    return replace(
+        limits,
+        track_error_m=limits.track_error_m + margins.track_m + margins.bow_m,
+        altitude_error_m=limits.altitude_error_m + margins.altitude_m + (source.terrain_error_m if terrain else 0.0),
+        max_climb_deg=limits.max_climb_deg if limits.max_climb_deg >= 90 else less(limits.max_climb_deg),
+        max_descent_deg=limits.max_descent_deg if limits.max_descent_deg >= 90 else less(limits.max_descent_deg),
+    )
+
+
+def run_planner(run: Callable[[Problem], Solution], problem: Problem, vehicle: Vehicle, world: World) -> Solution:
+    try:
+        return run(problem)
+    except Refusal as refusal:
+        raise in_degrees(refusal, vehicle, world) from refusal
+    except NoMission as refusal:
+        raise NoMission(f"{vehicle.name}: {refusal.message}", reason=refusal.reason) from refusal  # type: ignore[arg-type]
+
+
+def in_degrees(refusal: Refusal, vehicle: Vehicle, world: World) -> NoMission:
+    """A planner's refusal as the user reads it: whose it is, and its place in degrees."""
+    place = ""
+    if refusal.east_m is not None and refusal.north_m is not None:
+        lat, lon = (float(x) for x in world.frame.to_degrees(refusal.east_m, refusal.north_m))
+        place = f" ({refusal.place_of + ' ' if refusal.place_of else ''}at {lat:.6f}, {lon:.6f})"
+    return NoMission(f"{vehicle.name}: {refusal.message}{place}", reason=refusal.reason)  # type: ignore[arg-type]

@@ -1,0 +1,65 @@
+"""One vehicle's plan, or why there is none and what would help: a value that is reported gave a whole mission.
+
+What would help is tried with the limits and zones as the mission file has them, through the same steps as any plan:
+with the margins for the wire, the climb-out and glide of a fixed wing, and the verdict on the mission as stored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from gcsplan.app.model import Brief, VehiclePlan
+from gcsplan.app.planning import plan_vehicle
+from gcsplan.app.problems import in_degrees, make_problem
+from gcsplan.errors import NoMission
+from gcsplan.mission_file import VehicleRequest
+from gcsplan.planners.cures import with_cures
+from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
+from gcsplan.world.world import World
+
+__all__ = ["plan_or_explain"]
+
+
+def plan_or_explain(
+    brief: Brief,
+    request: VehicleRequest,
+    progress: Callable[[Progress], None] | None = None,
+    *,
+    options: Mapping[str, object] | None = None,
+) -> VehiclePlan:
+    """`plan_vehicle`; where there is no mission, the NoMission says what would help. Raises InputError, NoMission."""
+    try:
+        return plan_vehicle(brief, request, progress, options=options)
+    except NoMission as refused:
+        bare = refused.__cause__
+        if not isinstance(bare, Refusal) or not bare.untried:
+            raise
+        why = _explained(brief, request, bare, progress, options)
+    raise in_degrees(why, request.vehicle, brief.world) from why
+
+
+def _explained(
+    brief: Brief,
+    request: VehicleRequest,
+    bare: Refusal,
+    progress: Callable[[Progress], None] | None,
+    options: Mapping[str, object] | None,
+) -> Refusal:
+    vehicle = request.vehicle
+
+    def plan(changed: Problem) -> Solution:
+        planner = replace(brief.source.planner, gap_percent=changed.gap_percent, budget_s=changed.budget_s)
+        tried = replace(
+            brief,
+            source=replace(brief.source, planner=planner),
+            world=World(brief.world.frame, changed.airspace),
+        )
+        asked = replace(request, vehicle=replace(vehicle, limits=changed.limits))
+        return plan_vehicle(tried, asked, changed.progress, options=options).solution
+
+    problem, _ = make_problem(
+        brief.source, request, brief.world, brief.objective, brief.seed, progress=progress, options=options
+    )
+    # As the user wrote them: the margins for the wire come on top, when a change of them is planned.
+    return with_cures(replace(problem, limits=vehicle.limits), bare, plan)

@@ -1,0 +1,114 @@
+"""From a plan to its rehearsal: who leaves when, and what the fleet is held to.
+
+from gcsplan import load_mission, plan
+from gcsplan.app.rehearsing import rehearse
+
+result = rehearse(plan(load_mission("fleet.yaml")))
+print(result.safe, result.p95_s, result.order_flown)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gcsplan.app.model import Plan, VehiclePlan
+from gcsplan.errors import UsageError
+from gcsplan.sim.outcome import Part, Rehearsal, Terms
+
+if TYPE_CHECKING:
+    from gcsplan.sim.wind import Weather
+
+__all__ = ["Part", "Rehearsal", "Terms", "parts_of", "rehearse", "rehearse_in_sitl", "seats_of", "terms_of"]
+
+
+def parts_of(planned: Plan) -> list[Part]:
+    """Every vehicle's part, with the departures and arrivals of the fleet's time table."""
+    return [_part(planned, v) for v in planned.vehicles]
+
+
+def _part(planned: Plan, v: VehiclePlan) -> Part:
+    request = v.request
+    leaves = request.end == "none"
+    slot = None if planned.fleet is None else planned.fleet.slot(v.name)
+    return Part(
+        request.vehicle, v.mission, v.verdict,
+        depart_s=0.0 if slot is None else slot.depart_s,
+        arrive_s=v.verdict.arrive_s if slot is None else slot.arrive_s,
+        rtl_rel_home_m=request.rtl_rel_home_m,
+        airborne=leaves and request.start_amsl_m is not None,
+        leaves=leaves,
+    )  # fmt: skip
+
+
+def terms_of(planned: Plan) -> Terms:
+    """What the mission file asks of the fleet: its order if it is a sequence, and its separation."""
+    arrival = planned.source.arrival
+    if arrival is None or len(planned.vehicles) < 2:
+        return Terms()
+    order = planned.fleet.order if planned.fleet is not None and arrival.mode == "sequence" else ()
+    pad_clear_s = math.inf if arrival.pad_clear_s is None else arrival.pad_clear_s
+    return Terms(order, arrival.separation_m, pad_clear_s)
+
+
+def rehearse(
+    planned: Plan,
+    *,
+    weather: Weather | None = None,
+    runs: int = 1,
+    seed: int = 1,
+    airspeed_m_s: float | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Rehearsal:
+    """Upload to a simulated vehicle for each UAV, fly all in simulated time, judge; see `sim.rehearsal`."""
+    from gcsplan.sim.rehearsal import rehearse as run
+
+    return run(
+        parts_of(planned), planned.world, terms_of(planned), weather=weather, runs=runs, seed=seed,
+        airspeed_m_s=airspeed_m_s, progress=progress,
+    )  # fmt: skip
+
+
+def rehearse_in_sitl(
+    planned: Plan,
+    *,
+    binary: Path | None = None,
+    addresses: Mapping[str, str] | None = None,
+    speedup: float | None = None,
+    i_know: bool = False,
+    tell: Callable[[str, str], None] | None = None,
+) -> Rehearsal:
+    """The same with real ArduCopter SITL: one is started of ``binary`` for each vehicle without one of ``addresses``.
+
+    Raises UsageError where a vehicle has neither; see `sim.sitl` for the rest.
+    """
+    from gcsplan.sim.sitl import Seat, rehearse_sitl, require_here
+    from gcsplan.sim.sitl_instances import SPEEDUP, sitl_instances
+
+    parts, given = parts_of(planned), dict(addresses or {})
+    if not i_know:
+        require_here(list(given.values()))
+    seats = {name: Seat(name, url) for name, url in given.items()}
+    if binary is None:
+        return rehearse_sitl(parts, planned.world, terms_of(planned), seats, i_know=i_know, tell=tell)
+    without = [p for p in parts if p.vehicle.name not in seats]
+    with sitl_instances(binary, without, speedup=SPEEDUP if speedup is None else speedup) as started:
+        return rehearse_sitl(parts, planned.world, terms_of(planned), seats | started, i_know=i_know, tell=tell)
+
+
+def seats_of(words: Sequence[str], names: Sequence[str]) -> dict[str, str]:
+    """Vehicle to URL of ``--sitl`` words, NAME=URL each, or one URL alone for a single vehicle. Raises UsageError."""
+    found: dict[str, str] = {}
+    for word in words:
+        name, equals, url = word.partition("=")
+        if not equals and len(names) == 1:
+            name, url = names[0], word
+        elif not equals:
+            raise UsageError(f"--sitl {word}: NAME=URL is wanted, for each of {', '.join(names)}")
+        if name not in names:
+            raise UsageError(f"--sitl {word}: the mission file has no vehicle {name!r}; it has {', '.join(names)}")
+        if found.setdefault(name, url) is not url:
+            raise UsageError(f"--sitl {word}: {name} has the address {found[name]} already")
+    return found

@@ -1,0 +1,47 @@
+"""The report of a plan: its `Page`, with how its uploads ended, and that page as HTML and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from gcsplan.app.jobs import Delivery
+from gcsplan.app.model import Plan
+from gcsplan.check.rtl.verdict import WayHome
+from gcsplan.report.page import render_page
+from gcsplan.report.subject import Certificate, Page, Subject
+
+
+def render(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Mapping[str, WayHome] | None = None) -> str:
+    """The report of ``plan`` as HTML text, with how its uploads ended; ``homes``: vehicle to its way home."""
+    return render_page(page_of_plan(plan, deliveries, homes))
+
+
+def page_of_plan(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Mapping[str, WayHome] | None = None) -> Page:
+    """The page of a plan, with how its uploads ended, and the way home of each vehicle named in ``homes``."""
+    uploads = {d.vehicle: d.as_dict() for d in deliveries}
+    source, fleet = plan.source, plan.fleet
+    facts = [("planner", plan.planner), ("objective", plan.objective), ("seed", str(plan.seed)),
+             ("altitude frame", source.altitude_frame)]  # fmt: skip
+    several = fleet is not None and len(plan.vehicles) > 1
+    if fleet is not None and several and fleet.mode != "none":
+        apart = f", {fleet.interval_s:g} s apart" if fleet.mode == "sequence" else ""
+        facts += [("arrival", f"{fleet.mode}: {', '.join(fleet.order)}{apart}")]
+    subjects = []
+    for v in plan.vehicles:
+        certificate = Certificate(
+            v.problem.objective, "m" if v.problem.objective == "length" else "J",
+            v.cost, v.solution.lower_bound, v.gap_percent, v.solution.stopped_by,
+        )  # fmt: skip
+        slot = fleet.slot(v.name) if fleet is not None and several else None
+        notes = (*v.notes, *v.solution.notes, *v.verdict.notes, *(slot.notes if slot is not None else ()))
+        subjects.append(
+            Subject(
+                v.name, v.verdict, v.request.vehicle, certificate, tuple(dict.fromkeys(notes)),
+                fleet.motion(v.name) if fleet is not None and several else None, slot,
+                (homes or {}).get(v.name), uploads.get(v.name),
+            )
+        )  # fmt: skip
+    return Page(
+        source.name, plan.world, tuple(subjects), dict(source.inputs), tuple(facts), tuple(dict.fromkeys(plan.notes)),
+        fleet.separation if fleet is not None else None, fleet.order if fleet is not None else (),
+    )  # fmt: skip

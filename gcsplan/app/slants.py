@@ -1,0 +1,43 @@
+"""Of a fixed wing's plan, what a time table needs besides the path: climb-out, glide, and the circle at the end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.app.model import VehiclePlan
+from gcsplan.check.rtl.returning import PLANE_LOITER_RADIUS_M, circle_growth
+from gcsplan.check.verdict import LegFigures
+from gcsplan.world.world import World
+
+__all__ = ["circling_m", "slants_of"]
+
+Floats = NDArray[np.float64]
+
+
+def slants_of(v: VehiclePlan, world: World) -> tuple[Floats | None, Floats | None]:
+    """The climb-out and the glide of a fixed wing, (K, 3) metres each; None for what stands in the air, or is not."""
+    if v.order.wing is None:
+        return None, None
+    legs = v.verdict.legs
+    first = next(i for i, leg in enumerate(legs) if leg.on_path)
+    down = [leg for leg in legs[first:] if leg.kind == "land"]
+    return _line(legs[:first], world), _line(down, world) if down else None
+
+
+def circling_m(v: VehiclePlan) -> float:
+    """How far from its last point a vehicle may be that circles there for good; 0 for any other."""
+    wing = v.order.wing
+    if wing is None or v.request.end not in ("loiter", "rtl"):
+        return 0.0  # a climb in circles is in the motion
+    highest = max(leg.end[2] for leg in v.verdict.legs)
+    radius = wing.circle_m if v.request.end == "loiter" else PLANE_LOITER_RADIUS_M
+    return max(radius, math.ceil(v.request.vehicle.turn_radius_m)) * circle_growth(highest)
+
+
+def _line(legs: Sequence[LegFigures], world: World) -> Floats:
+    places = np.array([legs[0].start, *(leg.end for leg in legs)])
+    return np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])

@@ -1,0 +1,240 @@
+"""A fixed wing's plan: a climb-out, a path of arcs, and an approach, laid end to end.
+
+A path of arcs (`planners.turns`) has no heading at its ends, and a fixed wing has one at both. So the ends are laid
+first: straight out of the start as far as it must climb, on the wanted heading or on the first legal one next to the
+way it is to go, a piece straight on to begin the first turn from, and further turns where the heading is far off; the
+same way into the goal, backwards, where it is to land. The planner joins them; the turns at the joints are corners as
+any other. Then the mission is built, and judged as flown.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.app.model import Brief, VehiclePlan
+from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.app.wing_ends import FlightEnd, circle_m, goals, starts
+from gcsplan.check.arcs import UNFITTING
+from gcsplan.check.rtl.returning import circle_growth
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import NoMission
+from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
+from gcsplan.mavlink.build.order import MARGINS, Margins, Order, Wing
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mission_file import VehicleRequest
+from gcsplan.planners.problem import Problem, Progress, Solution
+from gcsplan.world.path import Path
+from gcsplan.world.world import World
+
+__all__ = ["plan_wing"]
+
+Floats = NDArray[np.float64]
+
+ATTEMPTS = 5
+
+MOST_JOINTS = 8
+"""Pairs of climb-outs and approaches for which a path is looked for."""
+
+PART_OF_SLOPE = 0.9993
+"""Arcs are judged by their chords, which are shorter, and so steeper."""
+
+ACCEPTED_M, CHORDS_M = 1.0, 0.2
+"""What a turn begins early by, since acceptance radii are whole metres, and what arcs are judged wider by."""
+
+
+def plan_wing(
+    brief: Brief,
+    request: VehicleRequest,
+    asked: VehicleRequest,
+    world: World,
+    told: Mapping[str, object],
+    progress: Callable[[Progress], None] | None = None,
+) -> VehiclePlan:
+    """One fixed wing's path, mission and verdict, as `planning.plan_vehicle`. Raises InputError, NoMission.
+
+    ``asked``, ``world``, ``told``: the request under the limits, the world, and the planner's options of the search.
+    """
+    source, vehicle = brief.source, request.vehicle
+    margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
+    sharp: Floats | None = None
+    failed: VehiclePlan | None = None
+    for _ in range(ATTEMPTS):
+        problem, notes = make_problem(source, asked, world, brief.objective, brief.seed, margins, progress, told)
+        try:
+            problem = _with_goal_circle(problem, asked)
+            if sharp is None:
+                straight = replace(problem, turn_radius_m=0.0, progress=None)
+                sharp = run_planner(brief.run, straight, vehicle, world).path.points
+            plan = _joined(brief, request, asked, problem, sharp, world)
+        except NoMission:
+            if failed is None:
+                raise
+            break  # with so much more room there is none: what was found before is told
+        if not plan.verdict.findings:
+            return replace(plan, notes=(*notes, *plan.notes))
+        failed = plan
+        if not _mendable(plan):
+            break
+        margins = _larger(margins, plan.verdict)
+    assert failed is not None
+    raise unsafe(failed.verdict, vehicle)
+
+
+def _joined(
+    brief: Brief, request: VehicleRequest, asked: VehicleRequest, problem: Problem, sharp: Floats, world: World
+) -> VehiclePlan:
+    """The mission between the first ends that a path can be joined to; it need not be legal yet."""
+    vehicle = request.vehicle
+    for tried, (start, goal) in enumerate(_pairs(problem, asked, sharp)):
+        if tried == MOST_JOINTS:
+            break
+        inner = _inner(problem, start, goal)
+        solution = _whole(problem, run_planner(brief.run, inner, vehicle, world), start, goal)
+        order = _order(brief, asked, start, goal)
+        if not _fits(solution.path.points, order, vehicle.turn_radius_m):
+            continue
+        over = looked_over(brief, solution)
+        mission, verdict = built(over, request, solution, order)
+        if any(words.endswith(UNFITTING) for words in verdict.not_judged):
+            continue
+        speed = vehicle.speed_max_m_s
+        return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_words(start, goal)), order, over)
+    raise NoMission(
+        f"{vehicle.name}: paths with turns of turn_radius_m {vehicle.turn_radius_m:g} were found, but none that joins "
+        f"the climb-out and the approach: give another takeoff_heading_deg, or move start or goal",
+        reason="not_found",
+    )
+
+
+def _pairs(problem: Problem, asked: VehicleRequest, sharp: Floats) -> Iterator[tuple[FlightEnd, FlightEnd | None]]:
+    for start in starts(problem, asked, sharp):
+        for goal in goals(problem, asked, sharp):
+            yield start, goal
+
+
+def _mendable(plan: VehiclePlan) -> bool:
+    """Whether more room may help: what the ends or the battery break, it does not."""
+    items, first = plan.mission.items, plan.mission.first_seq
+    mended = {i + first for i, item in enumerate(items) if item.command in (m.WAYPOINT, m.LOITER_UNLIM)}
+    return any(f.seq in mended for f in plan.verdict.findings if f.kind != "battery")
+
+
+def _larger(margins: Margins, verdict: Verdict) -> Margins:
+    """Margins for another attempt, by what the last one missed: heights and distances each by themselves."""
+    heights = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
+    low_m = max((f.by for f in verdict.findings if f.kind in heights), default=0.0)
+    near_m = max((f.by for f in verdict.findings if f.kind == "zone"), default=0.0)
+    steep = max((f.by / f.limit for f in verdict.findings if f.kind in ("climb", "descent")), default=0.0)
+    return Margins(
+        margins.altitude_m + 0.02 + 1.05 * low_m,
+        margins.track_m + 0.03 + 1.05 * near_m,
+        3.0 * margins.bow_m,
+        margins.slope + (0.001 + 1.5 * steep if steep else 0.0),
+    )
+
+
+def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
+    """The goal as high as it must be for what is flown around it: a loiter's circle, a turn for home."""
+    east, north, amsl = problem.goal
+    around = {"loiter": circle_m(problem) * circle_growth(amsl + 100.0), "rtl": 2.0 * problem.turn_radius_m}
+    reach_m = around.get(request.end)
+    if reach_m is None:
+        return problem
+    wide = replace(problem.limits, track_error_m=problem.limits.track_error_m + reach_m)
+    low = float(problem.airspace.floor_amsl(east, north, wide))
+    if math.isinf(low):
+        raise NoMission(
+            f"{request.vehicle.name}: the ground within {reach_m:.0f} m of the goal is unknown to the terrain model",
+            reason="infeasible",
+        )
+    datum = request.start[2]
+    raised = max(amsl, datum + math.ceil((low - datum) * 100.0 - 1e-6) / 100.0)
+    return replace(problem, goal=(east, north, raised))
+
+
+# -- joined --------------------------------------------------------------------------------------------------------
+
+
+def _inner(problem: Problem, start: FlightEnd, goal: FlightEnd | None) -> Problem:
+    """The planner's part: from where the climb-out and its turns end to where the approach begins."""
+    first = tuple(float(x) for x in start.chain[-1])
+    last = problem.goal if goal is None else tuple(float(x) for x in goal.chain[-1])
+    return replace(problem, start=first, goal=last)  # type: ignore[arg-type]
+
+
+def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightEnd | None) -> Solution:
+    """The solution with the ends laid before and behind it; the bound holds for missions with just these ends."""
+    inner = solution.path.points
+    before = np.vstack([start.leaves, start.chain[:-1]])
+    behind = np.empty((0, 3)) if goal is None else np.vstack([goal.chain[-2::-1], goal.top])
+    points = thinned(np.vstack([before[1:], inner, behind]), problem.turn_radius_m)
+    points = _slowed(points, start.leaves, problem)
+    everything = np.vstack([before, inner, behind])
+    # Each end is as long as its straight pieces; its turns, those at the joints among them, may cut corners.
+    radius = problem.turn_radius_m
+    run = np.hypot(*np.diff(everything[:, :2], axis=0).T)
+    spare = 2.0 * tangents_m(everything, radius) - 2.0 * radius * np.arctan(tangents_m(everything, radius) / radius)
+    n, k = len(before), len(behind)
+    ends_m = float(run[:n].sum() - spare[: n + 1].sum())
+    ends_m += float(run[len(run) - k :].sum() - spare[len(spare) - k - 1 :].sum()) if k else 0.0
+    per_m = problem.horizontal_j_per_m if problem.objective == "energy" else 1.0
+    bound = None if solution.lower_bound is None else solution.lower_bound + max(ends_m, 0.0) * per_m
+    note = "the lower bound is that of missions with this climb-out" + (" and this approach" if goal else "")
+    return replace(solution, path=Path(points), flown=None, lower_bound=bound, notes=(*solution.notes, note))
+
+
+def _slowed(points: Floats, leaves: Floats, problem: Problem) -> Floats:
+    """``points`` lowered where they are too steep: arcs at the joints, which no planner knows of, shorten legs."""
+    flown = flown_m(np.vstack([leaves, points]), problem.turn_radius_m)[1:]
+    up, down = (PART_OF_SLOPE * s for s in (problem.limits.max_climb_slope, problem.limits.max_descent_slope))
+    z = points[:, 2].copy()
+    for i in range(1, len(z) - 1):
+        z[i] = min(z[i], z[i - 1] + up * flown[i - 1])
+    for i in range(len(z) - 2, 0, -1):
+        z[i] = min(z[i], z[i + 1] + down * flown[i])
+    return np.column_stack([points[:, :2], z])
+
+
+def _order(brief: Brief, request: VehicleRequest, start: FlightEnd, goal: FlightEnd | None) -> Order:
+    top = tuple(float(x) for x in start.top)
+    touch = None if goal is None else tuple(float(x) for x in goal.ground)
+    circle = float(math.ceil(request.vehicle.turn_radius_m)) if request.end == "loiter" else 0.0
+    up = None if start.circle is None else tuple(float(x) for x in start.circle)
+    wing = Wing(top, touch, circle, up, start.circle_m)  # type: ignore[arg-type]
+    return Order(request.end, brief.source.altitude_frame, wing=wing)
+
+
+def _fits(points: Floats, order: Order, radius: float) -> bool:
+    """Whether the arcs at all corners, the joints too, have room between their way points."""
+    assert order.wing is not None
+    whole = np.array([order.wing.leaves, *points, *([] if order.wing.touch is None else [order.wing.touch])])
+    tangent = tangents_m(whole, radius)
+    run = np.hypot(*np.diff(whole[:, :2], axis=0).T)
+    return bool((tangent[:-1] + tangent[1:] <= run + 0.05).all())
+
+
+def _words(start: FlightEnd, goal: FlightEnd | None) -> Sequence[str]:
+    """What the user is told of the ends."""
+    heading = (90.0 - math.degrees(start.heading)) % 360.0
+    far_m = math.dist(start.top[:2], start.ground[:2])
+    words = [
+        f"launch it on a heading of {heading:.0f}°: it climbs straight ahead for {far_m:.0f} m to "
+        f"{start.top[2] - start.ground[2]:.0f} m above home"
+    ]
+    if start.circle is not None:
+        words[0] += (
+            f", and goes on in circles of {abs(start.circle_m):.0f} m up to {start.circle[2] - start.ground[2]:.0f} m"
+        )
+    if goal is not None:
+        heading = (270.0 - math.degrees(goal.heading)) % 360.0
+        far_m = math.dist(goal.top[:2], goal.ground[:2])
+        words.append(
+            f"it lands on a heading of {heading:.0f}°, gliding straight for {far_m:.0f} m from "
+            f"{goal.top[2] - goal.ground[2]:.0f} m above the goal"
+        )
+    return words

@@ -1,0 +1,51 @@
+"""All or nothing: what a fleet's vehicles took is cleared again where one upload failed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from gcsplan.errors import GcsplanError, LinkError
+
+if TYPE_CHECKING:
+    from gcsplan.app.jobs import Delivery
+    from gcsplan.mavlink.link import session
+    from gcsplan.mavlink.link.results import UploadResult
+
+
+def withdrawn(
+    deliveries: Sequence[Delivery],
+    orders: Mapping[str, session.Order],
+    ended: Mapping[str, UploadResult | GcsplanError],
+) -> list[Delivery]:
+    """All or nothing: where one is not verified, the missions that vehicles took are cleared and read back as gone.
+
+    Cleared is what was accepted, or may have been: a vehicle that never took anything of ours keeps its own. To one
+    that is no longer as it was when it was checked nothing further is sent: it keeps what it has, and that is said.
+    """
+    from gcsplan.mavlink.link import session
+
+    failures = [d.vehicle for d in deliveries if d.code]
+    if not failures:
+        return list(deliveries)
+    results = {name: result for name, result in ended.items() if not isinstance(result, GcsplanError)}
+    taken = [name for name, r in results.items() if r.outcome in ("accepted", "unknown") and not r.changed]
+    again = [replace(orders[name], options=replace(orders[name].options, listen_s=0.0)) for name in taken]
+    seen = {orders[name].mission.name: results[name].state for name in taken}
+    cleared = dict(zip(taken, session.clear_fleet(again, seen), strict=True))
+    why = f"not verified: {', '.join(failures)}"
+    return [_after_clearing(d, cleared[d.vehicle], why) if d.vehicle in cleared else d for d in deliveries]
+
+
+def _after_clearing(d: Delivery, cleared: UploadResult | GcsplanError, why: str) -> Delivery:
+    error = cleared if isinstance(cleared, GcsplanError) else cleared.error()
+    if error is not None:
+        told = f"; {d.message}" if d.message else ""
+        return replace(
+            d, verified=False, code=d.code or LinkError.exit_code, reason=d.reason or LinkError.default_reason,
+            message=f"all or nothing ({why}), but it could not be cleared and still holds the mission: {error}{told}",
+        )  # fmt: skip
+    told = f"; {d.message}" if d.message else ""
+    words = f"the mission was cleared again, all or nothing ({why}): the vehicle holds none now{told}"
+    return replace(d, outcome="withdrawn", verified=False, message=words)

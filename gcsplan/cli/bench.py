@@ -1,0 +1,189 @@
+"""``gcsplan bench …``: every measurement; each is one call into `gcsplan.bench`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gcsplan.cli.ending import emit, put
+from gcsplan.cli.options import JsonOption
+from gcsplan.errors import UsageError
+
+bench_app = typer.Typer(
+    help="Measurements: planners on real terrain, the papers' tables, legs checked, uploads.", no_args_is_help=True
+)
+
+
+WithoutOption = Annotated[
+    list[str] | None,
+    typer.Option("--without", metavar="NAME", help="A search that the default planner does without; repeatable."),
+]
+
+
+def _tell(result: dict[str, Any], report: Callable[[Any], str], as_json: bool) -> None:
+    if as_json:
+        emit(result)
+    else:
+        put(report(result) + "\n")
+
+
+@bench_app.command("check", short_help="Legs checked a second.")
+def bench_check(
+    legs: Annotated[int, typer.Option(metavar="N", help="Random one-kilometre legs.")] = 200_000,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the legs.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """How many one-kilometre legs are checked in a second, on the sample terrain."""
+    from gcsplan.bench import check as bench
+
+    result = bench.run(legs=legs, seed=seed)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("upload", short_help="Upload beside MAVSDK's; a fleet beside its slowest.")
+def bench_upload(
+    items: Annotated[
+        int | None, typer.Option(metavar="N", help="Items of each mission [default: 600; of a fleet 50]")
+    ] = None,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each, in turn.")] = 15,
+    fleet: Annotated[
+        int | None, typer.Option(metavar="N", help="Instead: N vehicles at once, beside the slowest of them alone.")
+    ] = None,
+    drop: Annotated[float, typer.Option(metavar="P", help="With --fleet: part of the packets that is lost.")] = 0.05,
+    as_json: JsonOption = False,
+) -> None:
+    """Upload to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
+    if fleet is not None:
+        from gcsplan.bench import upload_fleet
+
+        measured = upload_fleet.run(fleet=fleet, items=50 if items is None else items, drop=drop)
+        _tell(measured, upload_fleet.report, as_json)
+        return
+    from gcsplan.bench import upload as bench
+
+    items = 600 if items is None else items
+    result = bench.run(items=items, runs=runs)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("functions", short_help="SSGWO's nine functions.")
+def bench_functions(
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each (paper: 50).")] = 50,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
+    jobs: Annotated[int | None, typer.Option(metavar="N", help="Processes [default: all cores]")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="CSV and Markdown go there.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """SSGWO's tables 1 and 2 run again, the printed numbers beside ours, optima in the middle and moved."""
+    from gcsplan.bench import functions as bench
+
+    if out is not None:
+        bench.ready(out)  # before the long run
+    result = bench.run(runs=runs, seed=seed, jobs=jobs)
+    if out is not None:
+        bench.write(result, out)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("terrain", short_help="Planners over real terrain, beside OMPL and mealpy.")
+def bench_terrain(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables and figure go there.")] = Path(
+        "bench-terrain"
+    ),
+    kinds: Annotated[str, typer.Option(metavar="LIST", help="Kinds of problems.")] = "main,energy,band,large,many,turn",
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the problems.")] = 1,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of ours; medians are told.")] = 9,
+    seconds: Annotated[str, typer.Option(metavar="LIST", help="OMPL's seconds.")] = "1,10",
+    rivals: Annotated[bool, typer.Option("--rivals/--no-rivals", help="Run OMPL too (extra `bench`).")] = True,
+    swarms: Annotated[bool, typer.Option("--swarms/--no-swarms", help="Run mealpy too (extra `bench`).")] = True,
+    kept: Annotated[bool, typer.Option("--kept", help="Rivals' answers already in DIR only.")] = False,
+    minute: Annotated[bool, typer.Option("--minute", help="Ours once more with 60 s.")] = False,
+    errors: Annotated[bool, typer.Option("--errors", help="With the clearance and errors of a real mission.")] = False,
+    gap: Annotated[float, typer.Option("--gap", metavar="PERCENT", help="Certified gap at which ours may stop.")] = 0.1,
+    count: Annotated[int | None, typer.Option(metavar="N", help="Problems of each group [default: all]")] = None,
+    without: WithoutOption = None,
+) -> None:
+    """A set of planning problems made by a seed; every planner held to the same exact check."""
+    from rich.console import Console
+
+    from gcsplan.bench import terrain, terrain_report
+    from gcsplan.cli.console import say
+
+    try:
+        budgets = [float(s) for s in seconds.split(",")]
+    except ValueError:
+        raise UsageError(f"--seconds takes numbers such as 1,10, given {seconds!r}") from None
+    result = terrain.run(
+        out, seed=seed, kinds=kinds.split(","), runs=runs, seconds=budgets, rivals=rivals, swarms=swarms,
+        kept_only=kept, long=minute, errors=errors, count=count, tell=say, gap_percent=gap,
+        without=without or (),
+    )  # fmt: skip
+    Console(width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
+
+
+@bench_app.command("everyday", short_help="A working day's missions, beside a visibility graph.")
+def bench_everyday(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables go there.")] = Path("bench-everyday"),
+    seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds of the missions.")] = "1",
+    count: Annotated[int, typer.Option(metavar="N", help="Missions of each seed.")] = 100,
+    kinds: Annotated[str | None, typer.Option(metavar="LIST", help="Kinds of missions [default: all]")] = None,
+    without: WithoutOption = None,
+) -> None:
+    """Short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat ground, hills, the sample DEM."""
+    from gcsplan.bench import everyday
+    from gcsplan.bench.everyday_missions import KINDS
+    from gcsplan.cli.console import say
+
+    try:
+        numbers = [int(s) for s in seeds.split(",")]
+    except ValueError:
+        raise UsageError(f"--seeds takes whole numbers such as 1,2,3, given {seeds!r}") from None
+    asked = KINDS if kinds is None else kinds.split(",")
+    outcomes = everyday.run(out, seeds=numbers, count=count, kinds=asked, without=without or (), tell=say)
+    put(everyday.report(outcomes))
+
+
+@bench_app.command("papers", short_help="The five papers' tables run again.")
+def bench_papers(
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="Runs and report; the same command goes on there.")
+    ] = Path("papers"),
+    scenario: Annotated[
+        list[str] | None, typer.Option("--scenario", metavar="NAME", help="Of missions/papers; repeatable [all].")
+    ] = None,
+    algorithm: Annotated[
+        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="Of the papers' own; repeatable [all].")
+    ] = None,
+    runs: Annotated[int | None, typer.Option(metavar="N", help="Of each [the paper's number, 30 where none].")] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
+    jobs: Annotated[int | None, typer.Option(metavar="N", help="Local processes [all cores].")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler instead (extra `cluster`).")
+    ] = None,
+    missions: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the mission files are.")] = None,
+    speed: Annotated[
+        bool, typer.Option("--speed", help="Measure speed instead, beside mealpy's (extra `bench`).")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Every scenario and algorithm of the five papers, beside their printed numbers, straight line and optimum."""
+    if speed:
+        from gcsplan.bench import papers_speed
+
+        measured = papers_speed.run(missions=missions)
+        if as_json:
+            emit(measured)
+        else:
+            put(papers_speed.report(measured))
+        return
+    from gcsplan.bench import papers, papers_report
+
+    result = papers.run(scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions)
+    files = papers_report.write(result, out)
+    if as_json:
+        emit(papers.plain(result) | {"files": [str(file) for file in files]})
+    else:
+        put(papers_report.report(result))

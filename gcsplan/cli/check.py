@@ -1,0 +1,219 @@
+"""`gcsplan check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gcsplan.cli.ending import complain, emit, printable
+from gcsplan.cli.options import JsonOption, UnjudgedOption
+from gcsplan.errors import InputError, UsageError
+
+if TYPE_CHECKING:
+    from gcsplan.app.checking import Batch, Checked
+    from gcsplan.mission_file.from_options import WorldOptions
+
+Number = float | None
+
+
+def check(
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="[MISSION.yaml] FILE",
+            help="A mission file, in whose world they are checked (or --dem and --min-agl), and .waypoints or .plan "
+            "files; NAME=FILE says for which vehicle of the mission a file is.",
+        ),
+    ],
+    dem: Annotated[list[str] | None, typer.Option(metavar="FILE", help="Terrain; may be repeated.")] = None,
+    vertical_datum: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of the terrain: EGM96, EGM2008, …")
+    ] = None,
+    geoid_grid: Annotated[str | None, typer.Option(metavar="FILE", help="For an ellipsoidal DEM.")] = None,
+    crs: Annotated[str | None, typer.Option(metavar="EPSG:N", help="Of a DEM that does not say.")] = None,
+    obstacle_height: Annotated[Number, typer.Option(metavar="M", help="Of trees and houses, everywhere.")] = None,
+    zones: Annotated[
+        list[str] | None, typer.Option(metavar="FILE", help="No-fly zones, .geojson or .kml; may be repeated.")
+    ] = None,
+    min_agl: Annotated[Number, typer.Option(metavar="M", help="Lowest height above ground.")] = None,
+    max_agl: Annotated[Number, typer.Option(metavar="M", help="Highest height above ground.")] = None,
+    max_amsl: Annotated[Number, typer.Option(metavar="M", help="Highest altitude above sea level.")] = None,
+    clearance: Annotated[Number, typer.Option(metavar="M", help="From zones and rising ground [default: 30]")] = None,
+    track_error: Annotated[Number, typer.Option(metavar="M", help="How far off track it may be [default: 3]")] = None,
+    altitude_error: Annotated[Number, typer.Option(metavar="M", help="Likewise in height [default: 5]")] = None,
+    max_climb: Annotated[Number, typer.Option(metavar="DEG", help="Steepest climb.")] = None,
+    max_descent: Annotated[Number, typer.Option(metavar="DEG", help="Steepest descent [default: --max-climb]")] = None,
+    autopilot: Annotated[
+        str | None, typer.Option(metavar="NAME", help="arducopter, arduplane or px4, where the file does not say.")
+    ] = None,
+    home: Annotated[
+        str | None, typer.Option(metavar="LAT,LON", help="Where the vehicle arms, instead of the file's home.")
+    ] = None,
+    speed: Annotated[Number, typer.Option(metavar="M_S", help="Cruise speed, where the file sets none.")] = None,
+    climb_rate: Annotated[Number, typer.Option(metavar="M_S", help="Fastest climb [default: 2.5]")] = None,
+    descent_rate: Annotated[Number, typer.Option(metavar="M_S", help="Fastest descent [default: 1.5]")] = None,
+    rtl_altitude: Annotated[
+        Number, typer.Option(metavar="M", help="Above home, at which the vehicle returns (its own parameter).")
+    ] = None,
+    way_home: Annotated[
+        bool,
+        typer.Option(
+            "--way-home", help="Also judge the return (RTL) from every point of every leg: terrain, zones, battery."
+        ),
+    ] = False,
+    allow_unjudged: UnjudgedOption = False,
+    quiet: Annotated[
+        bool, typer.Option("-q", "--quiet", help="Only findings, one a line: file:item: message. Nothing if all pass.")
+    ] = False,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="Also write the report: map, profiles, tables.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Do these .waypoints or .plan files (anybody's) fly safely?
+
+    In a mission file's world:    gcsplan check mission.yaml uav1.plan
+
+    Or with options alone:    gcsplan check *.plan --dem dem.tif --vertical-datum EGM96 --zones zones.kml --min-agl 60
+
+    Every leg is judged along its whole length, as the autopilot flies it: jumps, loiters, take-off, landing, speeds,
+    each altitude frame. Ends with 0 if all pass, 4 on a violation or on anything that could not be judged, 2 on a file
+    that cannot be read.
+    """
+    from gcsplan.app import checking, outputs
+    from gcsplan.export.outdir import steady
+
+    given: dict[str, object] = {
+        "--dem": dem, "--vertical-datum": vertical_datum, "--geoid-grid": geoid_grid, "--crs": crs,
+        "--obstacle-height": obstacle_height, "--zones": zones, "--min-agl": min_agl, "--max-agl": max_agl,
+        "--max-amsl": max_amsl, "--clearance": clearance, "--track-error": track_error,
+        "--altitude-error": altitude_error, "--max-climb": max_climb, "--max-descent": max_descent,
+        "--autopilot": autopilot, "--home": home, "--speed": speed, "--climb-rate": climb_rate,
+        "--descent-rate": descent_rate, "--rtl-altitude": rtl_altitude,
+    }  # fmt: skip
+    given = {k: v for k, v in given.items() if v not in (None, [])}
+    if report is not None and (report.suffix.lower() not in (".html", ".htm") or not report.parent.is_dir()):
+        raise UsageError(f"--report {report}: a name that ends in .html, in a directory that is there, is wanted")
+    make = _in_mission if _is_mission(files[0]) else _with_options
+    with steady(checking.split_name(file)[1] for file in files if not _is_mission(file)):
+        batch = make(files, given, way_home)
+    failed = checking.failure(batch.checked, allow_unjudged=allow_unjudged, unreadable=batch.unreadable)
+    if report is not None:
+        _report(batch, report)
+    if as_json:
+        verdicts = [outputs.verdict_of(str(c.file), c.verdict) | checking.more_of(c) for c in batch.checked]
+        document = {"name": batch.name, "inputs": dict(batch.inputs), "notes": list(batch.notes), "verdicts": verdicts}
+        emit(document, failed)
+        for _, error in batch.unreadable:
+            complain(error)
+    elif quiet:
+        _say_findings(batch, allow_unjudged)
+    else:
+        _say_all(batch)
+    raise typer.Exit(0 if failed is None else int(failed["code"]))
+
+
+def _is_mission(argument: str) -> bool:
+    return Path(argument).suffix.lower() in (".yaml", ".yml")
+
+
+def _in_mission(files: list[str], given: dict[str, object], returns: bool) -> Batch:
+    from gcsplan.app import checking, pipeline
+
+    if given:
+        raise UsageError(f"{', '.join(given)}: the mission file says that; leave it out, or give no mission file")
+    if len(files) < 2:
+        raise UsageError(f"which files are to be checked in the world of {files[0]}? Give .waypoints or .plan files")
+    return checking.check_batch(pipeline.load_mission(Path(files[0])), files[1:], returns=returns)
+
+
+def _with_options(files: list[str], given: dict[str, object], returns: bool) -> Batch:
+    from gcsplan.app import checking
+    from gcsplan.vehicle import Autopilot
+
+    missing = [name for name in ("--dem", "--min-agl") if name not in given]
+    if missing:
+        raise UsageError(
+            f"in which world? Give a mission file (.yaml) first, or {' and '.join(missing)} (see gcsplan check --help)"
+        )
+    name = given.get("--autopilot")
+    if name is not None and name not in tuple(Autopilot):
+        raise UsageError(f"--autopilot {name}: {', '.join(Autopilot)} is wanted")
+    pilot = None if name is None else Autopilot(str(name))
+    return checking.check_with_options(_options(given), pilot, files, returns=returns)
+
+
+def _options(given: dict[str, object]) -> WorldOptions:
+    from gcsplan.mission_file.from_options import OPTIONS, WorldOptions
+
+    def under(*keys: str) -> dict[str, object]:
+        return {key: given[OPTIONS[key]] for key in keys if OPTIONS[key] in given}
+
+    limits = ("min_agl_m", "max_agl_m", "max_amsl_m", "horizontal_clearance_m", "track_error_m", "altitude_error_m",
+              "max_climb_deg", "max_descent_deg")  # fmt: skip
+    vehicle = under("climb_m_s", "descent_m_s")
+    if isinstance(speed := given.get("--speed"), float):
+        vehicle["speed_m_s"] = [min(speed, 3.0), speed]
+    zones, rtl = given.get("--zones"), given.get("--rtl-altitude")
+    return WorldOptions(
+        terrain=under("dem", "vertical_datum", "geoid_grid", "crs", "obstacle_height_m"),
+        zones=tuple(str(z) for z in zones) if isinstance(zones, list) else (),
+        limits={k: float(str(v)) for k, v in under(*limits).items()},
+        vehicle=vehicle,
+        home=_place(str(given["--home"])) if "--home" in given else None,
+        rtl_rel_home_m=rtl if isinstance(rtl, float) else None,
+    )
+
+
+def _place(text: str) -> tuple[float, float]:
+    parts = text.replace(" ", "").split(",")
+    try:
+        lat, lon = (float(p) for p in parts)
+    except ValueError:
+        lat = lon = 999.0
+    if not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
+        raise UsageError(f"--home {text}: LAT,LON in degrees is wanted, for example 36.6,-84.38")
+    return lat, lon
+
+
+def _say_all(batch: Batch) -> None:
+    from gcsplan.cli.console import console, say, say_notes, verdict_table
+    from gcsplan.export.profile_text import profile_lines
+
+    say_notes(batch.notes)
+    for c in batch.checked:
+        say_notes(c.notes)
+        verdict_table(f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})", c.verdict)
+        for miss in c.verdict.misses:
+            say(miss.describe())
+        for line in profile_lines(c.verdict, c.world):
+            say(line)
+        if c.way_home is not None:
+            console.print(c.way_home.describe(), style="red" if c.way_home.safe is False else None, markup=False)
+    for _, error in batch.unreadable:
+        complain(error)
+
+
+def _say_findings(batch: Batch, allow_unjudged: bool) -> None:
+    from gcsplan.app.checking import finding_lines
+    from gcsplan.cli.console import say
+
+    for c in batch.checked:
+        for line in finding_lines(c, allow_unjudged=allow_unjudged):
+            say(printable(line))
+    for argument, error in batch.unreadable:
+        for problem in error.problems:
+            say(printable(f"{problem}" if problem.where.startswith(argument) else f"{argument}: {problem}"))
+
+
+def _report(batch: Batch, file: Path) -> None:
+    from gcsplan.export.outdir import write_whole
+    from gcsplan.report.page import render_check
+
+    worlds: list[Checked] = list({id(c.world): c for c in batch.checked}.values())
+    if len(worlds) != 1:
+        raise InputError("a report shows files of one area; none could be judged, or they lie too far apart")
+    notes = [*batch.notes, *(f"not read, and not on this page: {error}" for _, error in batch.unreadable)]
+    write_whole(file, render_check(batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=notes))

@@ -1,0 +1,285 @@
+"""What a person reads: tables, progress, and the words around them, on standard error, never on standard output."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from gcsplan.app.gate import GateTime
+    from gcsplan.app.jobs import Delivery
+    from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
+    from gcsplan.check.rtl.verdict import WayHome
+    from gcsplan.check.verdict import Verdict
+    from gcsplan.mavlink.protocol.machine import Progress as Transfer
+
+PLAIN_WIDTH = 130  # of a log file or a pipe, where nobody says how wide it is
+WIDEST = 100_000
+
+console = Console(stderr=True, highlight=False, soft_wrap=True)
+if not console.is_terminal:
+    console.width = PLAIN_WIDTH
+
+
+def number(value: float | None, decimals: int = 0, unit: str = "") -> str:
+    """A figure for a table; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:,.{decimals}f}{unit}".replace(",", "\u2009")
+
+
+def _table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
+    table = Table(
+        title=title, title_justify="left", box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0)
+    )
+    for name, right in columns:
+        table.add_column(name, justify="right" if right else "left", no_wrap=True)
+    return table
+
+
+def _width(table: Table) -> int:
+    """Columns of the terminal that ``table`` takes if nothing is cut."""
+    return console.measure(table, options=console.options.update(width=WIDEST)).maximum
+
+
+def _print(table: Table) -> None:
+    """Whole, even where the terminal is too narrow and breaks its lines: a verdict that is cut off is none."""
+    width = _width(table)
+    wide = console if width <= console.width else Console(stderr=True, highlight=False, soft_wrap=True, width=width)
+    wide.print(table)
+
+
+def verdict_word(safe: bool | None) -> str:
+    """Safe, UNSAFE or not judged, coloured."""
+    return {True: "[green]safe[/]", False: "[bold red]UNSAFE[/]", None: "[yellow]not judged[/]"}[safe]
+
+
+def plan_table(plan: Plan) -> None:
+    """A column for each vehicle of a plan, and the limit beside what was reached; for large fleets a row for each."""
+    rows = [_plan_row(v, plan.fleet) for v in plan.vehicles]
+    title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
+    table = _table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
+    for row in rows:
+        table.add_row(*row.values())
+    if len(rows) > 4 and _width(table) <= console.width:
+        _print(table)
+    else:
+        each = next((n for n in (4, 3, 2) if all(_width(t) <= console.width for t in _columns(title, rows, n))), 1)
+        for table in _columns(title, rows, each):
+            _print(table)
+    _say_fleet(plan)
+    say_notes(plan.notes)
+    say_notes_of([(v.name, n) for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)])
+    if plan.fleet is not None:
+        notes = [(slot.name, note) for slot in plan.fleet.slots for note in slot.notes]
+        say_notes_of([(name, note.removeprefix(f"{name} ")) for name, note in notes])
+    if plan.source.inputs.get("bare_dem"):
+        console.print("[yellow]bare DEM: trees, masts and wires are not in it[/]")
+
+
+def _say_fleet(plan: Plan) -> None:
+    """How the fleet arrives, and how near two of it come to each other."""
+    fleet, arrival = plan.fleet, plan.source.arrival
+    if fleet is None or len(fleet.slots) < 2:
+        return
+    how = f"{fleet.interval_s:g} s apart" if fleet.mode == "sequence" else ""
+    if fleet.mode != "none":
+        say(f"arrival: {fleet.mode}{f', {how}' if how else ''}; order {', '.join(fleet.order)}")
+    closest = fleet.closest
+    if fleet.separation is None:
+        return
+    asked = f" of {arrival.separation_m:g}" if arrival is not None else ""
+    if closest is None:
+        say("separation: no two vehicles are in the air at the same time")
+    else:
+        a, b = closest.vehicles
+        say(f"separation: {closest.distance_m:.1f} m{asked} m, {a} and {b} at T+{closest.time_s:.1f} s")
+
+
+def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[Table]:
+    """Tables with a column for each of ``rows``, at most ``each`` of them beside each other."""
+    tables = []
+    for first in range(0, len(rows), each):
+        some = rows[first : first + each]
+        table = _table("" if first else title, [("", False), *((row["vehicle"], True) for row in some)])
+        for name in list(rows[0])[1:]:
+            table.add_row(name, *(row[name] for row in some))
+        tables.append(table)
+    return tables
+
+
+def _plan_row(v: VehiclePlan, fleet: FleetPlan | None) -> dict[str, str]:
+    verdict = v.verdict
+    slot = None if fleet is None else fleet.slot(v.name)
+    held = f" + {slot.hold_s:.0f} at the gate" if slot and slot.hold_s > 0 else ""
+    lowest, nearest = verdict.lowest, verdict.nearest
+    limits = v.request.vehicle.limits
+    climb = f" of {limits.max_climb_deg:g}" if limits.max_climb_deg < 90 else ""
+    return {
+        "vehicle": v.name,
+        "items": str(len(v.mission.wire_items())),
+        "length, m": number(verdict.length_m),
+        "above the bound, %": number(v.gap_percent, 2),
+        "energy, kJ": number(verdict.energy_j / 1000),
+        "battery, %": number(verdict.battery_used_percent),
+        "lowest AGL, m": f"{number(lowest.min_agl_m, 1)} of {limits.min_agl_m:g}" if lowest else "–",
+        "nearest zone, m": f"{number(nearest.zone_clearance_m, 1)} {escape(nearest.nearest_zone)}" if nearest else "–",
+        "steepest, °": f"{number(verdict.max_climb_deg, 1)}{climb}",
+        "speed, m/s": number(v.speed_m_s, 2),
+        "departs, s": number(slot.depart_s if slot else 0.0, 1) + held,
+        "arrives, s": number(slot.arrive_s if slot else verdict.arrive_s, 1),
+        "verdict": verdict_word(verdict.safe),
+    }
+
+
+def verdict_table(name: str, verdict: Verdict) -> None:
+    """One row for each flown stretch of a mission."""
+    columns = [("item", True), ("", False), ("leg m", True), ("to AMSL m", True), ("AGL m", True),
+               ("lowest AGL m", True), ("climb °", True), ("nearest zone m", True), ("energy kJ", True),
+               ("time s", True)]  # fmt: skip
+    bad = {f.seq for f in verdict.findings}
+    rows = [
+        (
+            str(leg.seq), leg.kind, number(leg.length_m), number(leg.end[2], 1), number(leg.agl_end_m, 1),
+            "–" if leg.column else number(leg.min_agl_m, 1), number(leg.climb_deg, 1),
+            f"{number(leg.zone_clearance_m)} {escape(leg.nearest_zone)}" if leg.nearest_zone else "–",
+            number(leg.energy_j / 1000, 1), number(leg.time_s),
+        )
+        for leg in verdict.legs
+    ]  # fmt: skip
+    for shown in (10, 9, 8):  # on a narrow terminal time and energy are left out: the limits are what counts
+        table = _table(f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe)}", columns[:shown])
+        for leg, row in zip(verdict.legs, rows, strict=True):
+            table.add_row(*row[:shown], style="red" if leg.seq in bad else None)
+        if _width(table) <= console.width:
+            break
+    _print(table)
+    say_notes(verdict.notes)
+    if verdict.findings or verdict.not_judged:
+        console.print(verdict.describe(), style="red" if verdict.findings else "yellow", markup=False)
+
+
+def delivery_table(deliveries: Sequence[Delivery], title: str = "upload") -> None:
+    """One row for each vehicle that something was sent to, or compared with."""
+    sent = title == "upload"
+    columns = [("vehicle", False), ("link", False), ("items", True), *([("outcome", False)] if sent else []),
+               ("read back", False), ("s", True), ("retries", True)]  # fmt: skip
+    table = _table(f"[bold]{title}[/]", columns)
+    for d in deliveries:
+        told = {"accepted": "[green]accepted[/]", "withdrawn": "[yellow]withdrawn[/]"}.get(
+            d.outcome, f"[bold red]{d.outcome}[/]"
+        )
+        verified = "[green]verified[/]" if d.verified else "[bold red]not verified[/]"
+        link = escape(d.url) + (" [bold yellow]simulated[/]" if d.simulated else "")
+        outcome = [told] if sent else []  # a comparison sends nothing
+        table.add_row(escape(d.vehicle), link, str(d.items), *outcome, verified, number(d.seconds, 2), str(d.retries))
+    _print(table)
+    say_notes_of([(d.vehicle, w) for d in deliveries for w in d.warnings])
+    for d in deliveries:
+        if d.message:
+            console.print(f"{d.vehicle}: {d.message}", style="red", markup=False)
+
+
+def release_table(plan: Plan, deliveries: Sequence[Delivery], gate: GateTime | None = None) -> None:
+    """When to start each vehicle of a fleet, for whoever does it: we never arm or start one."""
+    if plan.fleet is None or len(plan.fleet.slots) < 2:
+        return
+    ready = {d.vehicle for d in deliveries if d.verified and not d.code}
+    columns = [("vehicle", False), ("release, T+ s", True), ("at the goal, T+ s", True), ("", False)]
+    table = _table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
+    for slot in sorted(plan.fleet.slots, key=lambda s: s.depart_s):
+        state = "" if slot.name in ready else "[bold red]not ready[/]"
+        table.add_row(escape(slot.name), number(slot.depart_s, 1), number(slot.arrive_s, 1), state)
+    _print(table)
+    if gate is not None:
+        say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")
+
+
+def homes_table(homes: Mapping[str, WayHome]) -> None:
+    """One row for each vehicle whose way home was judged."""
+    if not homes:
+        return
+    columns = [("vehicle", False), ("return at, m above home", True), ("lowest safe from everywhere", True),
+               ("not safe from, m", True), ("rally points", True), ("way home", False)]  # fmt: skip
+    table = _table("[bold]way home[/]  the autopilot's own return, from every point of the mission", columns)
+    for name, home in homes.items():
+        at = f"{home.rtl_rel_home_m:g} {escape(home.parameter)}" + (" (default)" if home.assumed else "")
+        rally = str(len(home.rally)) if home.rally else "–"
+        lowest = number(home.lowest_rel_home_m, 1)
+        table.add_row(escape(name), at, lowest, number(home.unsafe_m), rally, verdict_word(home.safe))
+    _print(table)
+
+
+def say_notes(notes: Sequence[str]) -> None:
+    """Notes, each once, in the order given."""
+    for note in dict.fromkeys(notes):
+        console.print(f"note: {note}", style="dim", markup=False)
+
+
+def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
+    """Notes on vehicles, (name, note) each: what holds for several is said once, with all their names."""
+    names: dict[str, list[str]] = {}
+    for name, note in dict.fromkeys(notes):
+        names.setdefault(note, []).append(name)
+    say_notes([f"{', '.join(of)}: {note}" for note, of in names.items()])
+
+
+@contextmanager
+def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer], None]]:
+    """A live table of transfers, on a terminal only: call the result with (name, progress)."""
+    if not console.is_terminal:
+        yield lambda name, told: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    columns = (
+        TextColumn("{task.description}"), TextColumn("{task.fields[phase]}"), BarColumn(), MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )  # fmt: skip
+    with Bars(*columns, console=console, transient=True) as bars:
+        tasks = {name: bars.add_task(escape(name), total=None, phase="looking for it") for name in names}
+
+        def update(name: str, told: Transfer) -> None:
+            ended = {"verified": "[green]verified[/]"}.get(told.phase)
+            if told.phase.endswith("!"):
+                ended = f"[bold red]{told.phase.removesuffix('!')}[/]"
+            bars.update(tasks[name], completed=told.done, total=told.total, phase=ended or told.phase)
+            if ended:
+                bars.stop_task(tasks[name])
+
+        yield update
+
+
+def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
+    """The planners, one a row, on standard output: it is what was asked for."""
+    table = _table("planners", [("name", False)])
+    for name in ("what it does", "paper", "defaults"):
+        table.add_column(name)
+    for row in rows:
+        defaults = row["defaults"]
+        words = ", ".join(f"{k} {v}" for k, v in defaults.items()) if isinstance(defaults, Mapping) else ""
+        table.add_row(str(row["name"]), str(row["summary"]), str(row["paper"]) or "–", words or "–")
+    out = Console(highlight=False)
+    if not out.is_terminal:
+        out.width = PLAIN_WIDTH
+    out.print(table)
+
+
+def say(message: str) -> None:
+    """One line."""
+    console.print(message, markup=False)
+
+
+def rows_table(title: str, rows: Sequence[Mapping[str, str]], *, left: Sequence[str] = ("vehicle",)) -> None:
+    """Rows of words by the names of their columns; numbers stand to the right, ``left`` to the left."""
+    table = _table(title, [(name, name not in left) for name in rows[0]])
+    for row in rows:
+        table.add_row(*row.values())
+    _print(table)

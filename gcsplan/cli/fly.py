@@ -1,0 +1,56 @@
+"""Simulated vehicles: `gcsplan sim`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gcsplan.cli.options import AutopilotOption, ListenOption, MisbehaveOption, SimSysidOption
+from gcsplan.errors import UsageError
+
+
+def sim(
+    mission: Annotated[
+        Path | None, typer.Argument(metavar="MISSION.yaml", help="One vehicle for each of the mission's.")
+    ] = None,
+    listen: ListenOption = "udpin:127.0.0.1:14560",
+    autopilot: AutopilotOption = None,
+    sysid: SimSysidOption = None,
+    misbehave: MisbehaveOption = "",
+) -> None:
+    """A loopback vehicle (or one for each of the mission's vehicles) that takes missions like a real one.
+
+    Ctrl-C ends it.
+    """
+    from gcsplan.cli.console import say
+    from gcsplan.sim.misbehaviour import Misbehaviour
+    from gcsplan.sim.server import SimServer, serve
+    from gcsplan.sim.vehicle import LoopbackVehicle
+    from gcsplan.vehicle import Autopilot
+
+    trouble = Misbehaviour.parse(misbehave)
+    if mission is not None and (autopilot is not None or sysid is not None):
+        raise UsageError("--autopilot and --sysid go without a mission file: its vehicles have their own")
+    if mission is not None:
+        from gcsplan.app.pipeline import load_mission
+
+        stands = [
+            (r.vehicle.sysid, r.vehicle.autopilot, r.start_deg, r.start[2]) for r in load_mission(mission).vehicles
+        ]
+    elif autopilot is None or autopilot in list(Autopilot):
+        kind = Autopilot(autopilot or Autopilot.ARDUCOPTER)
+        stands = [(sysid or 1, kind, (36.6, -84.38), 471.0)]  # a valley of the sample terrain
+    else:
+        raise UsageError(f"--autopilot {autopilot}: one of {', '.join(Autopilot)} is wanted")
+    vehicles = [
+        LoopbackVehicle(number, kind, lat_deg=place[0], lon_deg=place[1], amsl_m=amsl_m, misbehave=trouble)
+        for number, kind, place, amsl_m in stands
+    ]
+
+    def ready(server: SimServer) -> None:
+        names = ", ".join(f"system {v.sysid} ({v.autopilot})" for v in vehicles)
+        say(f"simulating {names}; connect to {server.url_for_gcs}; Ctrl-C ends it")
+
+    serve(vehicles, listen, on_ready=ready)

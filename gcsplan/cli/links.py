@@ -1,0 +1,166 @@
+"""What talks to vehicles: `gcsplan upload`, `verify`, `download`, `clear`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gcsplan.cli.ending import emit, talking
+from gcsplan.cli.options import (
+    LINKS,
+    ArmedOption,
+    AtomicOption,
+    FenceInfiniteOption,
+    FenceOption,
+    FilesArgument,
+    JsonOption,
+    PlaceOption,
+    SysidOption,
+    TimeoutOption,
+    ToOption,
+    TypeOption,
+    UncheckedSysidOption,
+    UnjudgedOption,
+)
+from gcsplan.errors import UsageError
+
+
+def upload(
+    files: FilesArgument,
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            metavar="URL",
+            help=f"Where the vehicles are: {LINKS} With --mission also `link`, `sim` or NAME=URL, as in plan --upload.",
+        ),
+    ],
+    mission: Annotated[
+        Path | None, typer.Option(metavar="MISSION.yaml", help="Mission file whose world the files are checked in.")
+    ] = None,
+    unchecked: Annotated[bool, typer.Option("--unchecked", help="Send without any check of safety.")] = False,
+    sysid: UncheckedSysidOption = None,
+    allow_unjudged: UnjudgedOption = False,
+    allow_armed: ArmedOption = False,
+    ignore_position: PlaceOption = False,
+    atomic: AtomicOption = False,
+    fence: FenceOption = False,
+    fence_infinite: FenceInfiniteOption = False,
+    timeout: TimeoutOption = 60.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Check mission files, upload them, read them back, and compare.
+
+    A file goes out only with a passing verdict in --mission's world, or with --unchecked. The file's name (uav1.plan)
+    or NAME= says which vehicle of the mission it is for.
+    """
+    from gcsplan.app import checking, delivery, fencing, pipeline
+    from gcsplan.app.jobs import Options
+    from gcsplan.cli.console import delivery_table, say_notes, say_notes_of, transfer_progress, verdict_table
+    from gcsplan.export.outdir import require_settled, steady
+    from gcsplan.sim.loopback import loopback_fleet
+
+    if (mission is None) == (not unchecked):
+        raise UsageError("give either --mission FILE, in whose world the files are checked, or --unchecked")
+    if unchecked and (fence or fence_infinite):
+        raise UsageError("--fence is made of the zones of a mission file: give --mission FILE instead of --unchecked")
+    options = Options(
+        allow_armed=allow_armed, ignore_position=ignore_position, unchecked=unchecked, atomic=atomic,
+        timeout_s=timeout,
+    )  # fmt: skip
+    if mission is not None:
+        if sysid is not None:
+            raise UsageError(
+                "--sysid goes with --unchecked: with --mission each vehicle's number is the mission file's"
+            )
+        source = pipeline.load_mission(mission)
+        delivery.targets([to], [r.vehicle for r in source.vehicles])  # a slip in the URL shows before the tables do
+        with steady(checking.split_name(file)[1] for file in files):
+            checked = checking.check_files(source, files)
+        if not as_json:
+            for c in checked:
+                say_notes(c.notes)
+                verdict_table(f"{c.file} as {c.vehicle.name}", c.verdict)
+        verdicts = {c.vehicle.name: c.verdict for c in checked}
+        pipeline.require_passing(verdicts, allow_unjudged=allow_unjudged)
+        jobs = delivery.jobs_of_files(source, checked, to)
+        if fence or fence_infinite:
+            jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
+            say_notes_of(fence_notes)
+    else:
+        if len(files) > 1:
+            raise UsageError("--unchecked takes one FILE, for the vehicle --sysid; send the others one by one")
+        require_settled([checking.split_name(files[0])[1]])
+        jobs = [delivery.unchecked_job(files[0], to, sysid or 1)]
+    names = [job.name for job in jobs]
+    with talking(names), transfer_progress(names) as moved_on:
+        deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
+    if as_json:
+        emit({"vehicles": [{"name": d.vehicle} | d.as_dict() for d in deliveries]}, delivery.failure(deliveries))
+    else:
+        delivery_table(deliveries)
+    raise typer.Exit(delivery.exit_code(deliveries))
+
+
+def verify(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The .waypoints or .plan that should be on board.")],
+    to: ToOption,
+    sysid: SysidOption = 1,
+    timeout: TimeoutOption = 60.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Is exactly this file on board? Reads the mission back and compares; sends nothing else."""
+    from gcsplan.app import delivery
+    from gcsplan.cli.console import delivery_table
+    from gcsplan.export.outdir import require_settled
+
+    require_settled([file])
+    done = delivery.verify_file(file, to, sysid, timeout_s=timeout)
+    if as_json:
+        emit(done.as_dict(), delivery.failure([done]))
+    else:
+        delivery_table([done], title="verify")
+    raise typer.Exit(delivery.exit_code([done]))
+
+
+def download(
+    source: Annotated[str, typer.Option("--from", metavar="URL", help=f"Where the vehicle is: {LINKS}")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="FILE", help="File to write, .waypoints or .plan; replaced if there.")
+    ],
+    sysid: SysidOption = 1,
+    timeout: TimeoutOption = 60.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Read the mission on board into a file."""
+    from gcsplan.app import delivery
+    from gcsplan.cli.console import say
+
+    items = delivery.download_to(source, sysid, out, timeout_s=timeout)
+    if as_json:
+        emit({"file": str(out), "items": items})
+    else:
+        say(f"{items} item{'' if items == 1 else 's'} written to {out}")
+
+
+def clear(
+    to: ToOption,
+    sysid: SysidOption = 1,
+    kind: TypeOption = "mission",
+    allow_armed: ArmedOption = False,
+    timeout: TimeoutOption = 60.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Remove the mission, fence or rally points on board, and read back that nothing is left."""
+    from gcsplan.app import delivery
+    from gcsplan.cli.console import say
+
+    with talking([f"vehicle {sysid}"]):
+        delivery.clear(to, sysid, kind, allow_armed=allow_armed, timeout_s=timeout)
+    if as_json:
+        emit({"cleared": kind, "sysid": sysid})
+    else:
+        what = {"rally": "list of rally points"}.get(kind, kind)
+        say(f"the {what} of vehicle {sysid} is empty now")

@@ -1,0 +1,83 @@
+"""The command line: parse, one call, print, exit code. Heavy rooms are imported by the command that needs them."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated, NoReturn
+
+import typer
+
+from gcsplan.cli import check, energy, fly, links, plan, rehearse
+from gcsplan.cli.bench import bench_app
+from gcsplan.cli.ending import Interrupted, end_in_good_order, explained, fail, interrupted, put, speak_plainly
+from gcsplan.cli.memory import settle_memory
+from gcsplan.errors import GcsplanError, InputError
+
+app = typer.Typer(
+    name="gcsplan",
+    help="Plans MAVLink missions over real terrain, proves every metre of them, uploads and verifies them.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit codes: 0 done, 2 bad input, 3 no mission, 4 violation, 5 refused, 6 unknown or dead link, "
+    "7 read-back differs, 70 a bug of ours, 129, 130, 143 interrupted (SIGHUP, Ctrl-C, SIGTERM).",
+)
+app.add_typer(bench_app, name="bench")
+app.command(short_help="Plan a mission file; upload and verify if asked.")(plan.plan)
+app.command(short_help="Plan, fly it all in a simulator, judge.")(rehearse.rehearse)
+app.command(short_help="Does a file fly safely in a mission's world?")(check.check)
+app.command(short_help="Check files, upload them, read them back, compare.")(links.upload)
+app.command(short_help="Is exactly this file on board?")(links.verify)
+app.command()(links.download)
+app.command(short_help="Remove the mission, fence or rally points.")(links.clear)
+app.command(short_help="Loopback vehicles that take missions.")(fly.sim)
+app.command("fit-energy", short_help="The energy model out of flight logs.")(energy.fit_energy)
+app.command()(plan.planners)
+
+
+@app.callback(invoke_without_command=True)
+def root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback with an error.")] = False,
+) -> None:
+    """Options of all commands."""
+    if version:
+        from gcsplan import __version__
+
+        put(f"{__version__}\n")
+        raise typer.Exit
+
+
+def main() -> NoReturn:
+    """Entry point: runs a command and ends with its exit code; one message, no traceback (``--debug`` shows it)."""
+    debug = "--debug" in sys.argv
+    arguments = [a for a in sys.argv[1:] if a != "--debug"]
+    as_json = "--json" in arguments
+    speak_plainly()
+    settle_memory()
+    try:
+        end_in_good_order()
+        # Outside standalone mode click hands typer.Exit's code back instead of exiting.
+        code = app(args=arguments, prog_name="gcsplan", standalone_mode=False)
+        if code == Interrupted.exit_code:  # what typer makes of Ctrl-C
+            raise KeyboardInterrupt
+        put("")
+        sys.exit(code if isinstance(code, int) else 0)
+    except GcsplanError as error:
+        fail(error, as_json, debug)
+    except (KeyboardInterrupt, typer.Abort):
+        fail(interrupted(), as_json, debug)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except MemoryError:
+        words = "not enough memory for this: give a smaller area, coarser terrain, fewer zones or items"
+        fail(InputError(words, reason="memory"), as_json, debug)
+    except Exception as error:  # the one place where a bug of ours becomes an exit code
+        fail(explained(error), as_json, debug)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,223 @@
+"""`gcsplan plan` and `gcsplan planners`."""
+
+from __future__ import annotations
+
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gcsplan.cli.ending import emit, talking
+from gcsplan.cli.options import (
+    LINKS,
+    ArmedOption,
+    AtomicOption,
+    JsonOption,
+    MissionArgument,
+    PlaceOption,
+    TimeoutOption,
+    UnjudgedOption,
+)
+from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
+
+if TYPE_CHECKING:
+    from gcsplan.app.jobs import Delivery, Job
+
+SHOWN = 15
+"""Names of written files that are told; a fleet has hundreds."""
+
+
+def plan(
+    mission: MissionArgument,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="DIR", help="Output directory [default: ./<mission stem>]")
+    ] = None,
+    planner: Annotated[str | None, typer.Option(metavar="NAME", help="A name from `gcsplan planners`.")] = None,
+    objective: Annotated[str | None, typer.Option(metavar="WHAT", help="length or energy.")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of everything random.")] = None,
+    encoding: Annotated[
+        str | None, typer.Option(metavar="NAME", help="A swarm's encoding: box, sections, polar, bspline, offsets.")
+    ] = None,
+    cost: Annotated[
+        str | None, typer.Option(metavar="NAME", help="A swarm's cost: krill, ssgwo, msfoa, abo, ib-abc.")
+    ] = None,
+    upload: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WHERE",
+            help="A URL for all vehicles, NAME=URL for one, `link` (the mission file's links) or `sim` (simulated "
+            f"vehicles). May be repeated. URLs: {LINKS}",
+        ),
+    ] = None,
+    gate_utc: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="The common start as a time of day, UTC (18:30:00): every vehicle waits in the air for its own "
+            "second. ArduCopter alone; needs --allow-unjudged, for nobody knows how long it will wait.",
+        ),
+    ] = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Also write report.html: map, profiles, way home, fleet; one page.")
+    ] = False,
+    way_home: Annotated[
+        bool, typer.Option("--way-home", help="Judge the return home from everywhere (--report does so too).")
+    ] = False,
+    rally: Annotated[
+        bool,
+        typer.Option("--rally", help="Write the rally points that the way home proposes into each .plan."),
+    ] = False,
+    fence: Annotated[
+        bool,
+        typer.Option("--fence", help="Zones without floor and ceiling as a fence: in the .plan, and sent first."),
+    ] = False,
+    fence_infinite: Annotated[
+        bool, typer.Option("--fence-infinite", help="As --fence, with zones that have a height as if they had none.")
+    ] = False,
+    png: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.png|DIR",
+            help="Also draw map and profiles to this picture; into a directory: each figure as a picture of its own.",
+        ),
+    ] = None,
+    allow_unjudged: UnjudgedOption = False,
+    allow_armed: ArmedOption = False,
+    ignore_position: PlaceOption = False,
+    atomic: AtomicOption = False,
+    timeout: TimeoutOption = 60.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan a mission file, write its outputs, and upload and verify them if asked.
+
+    Without --upload nothing is ever sent. The outputs are written whole or not at all; where no safe mission
+    exists, earlier outputs are moved to DIR/previous, so that no old mission is flown by mistake.
+    """
+    from gcsplan.app import outputs, pipeline
+    from gcsplan.app.gate import GateTime
+    from gcsplan.cli.console import (
+        delivery_table,
+        homes_table,
+        plan_table,
+        release_table,
+        say,
+        say_notes_of,
+        transfer_progress,
+    )
+    from gcsplan.cli.planning_display import planning_display
+    from gcsplan.export.outdir import add_output, can_hold, retire_outputs, settle_outputs, write_outputs, write_whole
+    from gcsplan.planners import registry
+
+    directory = Path(mission.stem) if out is None else out
+    gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
+    if planner is not None:
+        try:
+            registry.get(planner)
+        except InputError as error:
+            raise UsageError(f"--planner: {error}") from None
+    if objective not in (None, "length", "energy"):
+        raise UsageError(f"--objective {objective}: length or energy is wanted")
+    each = png is not None and (png.is_dir() or png == directory)
+    named = png is not None and png.suffix.lower() == ".png" and (png.parent.is_dir() or png.parent == directory)
+    if png is not None and not (each or named):
+        raise UsageError(f"--png {png}: a directory, or a name that ends in .png in one that is there, is wanted")
+    if settle_outputs(directory):
+        say(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
+    try:
+        source = pipeline.load_mission(mission)
+        targets: dict[str, str] = {}
+        if upload or fence or fence_infinite:  # else nothing of what sends is needed
+            from gcsplan.app import delivery, fencing
+            from gcsplan.app.jobs import Options
+
+            targets = delivery.targets(upload or [], [r.vehicle for r in source.vehicles])
+        names = [r.vehicle.name for r in source.vehicles]
+        with planning_display(names, objective or source.planner.objective) as tell:
+            told = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
+            planned = pipeline.plan(
+                source,
+                planner=planner,
+                objective=objective,
+                seed=seed,
+                options=told,
+                progress=tell,
+                gate_utc=None if gate is None else gate.start,
+            )
+        pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
+        homes = outputs.homes_of(planned) if report or way_home or rally else {}
+        jobs: list[Job] = []
+        if upload or fence or fence_infinite:
+            jobs = delivery.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""))
+        fence_notes: list[tuple[str, str]] = []
+        if fence or fence_infinite:  # one that the mission would breach is found before anything is written
+            jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
+        fences = {job.name: job.fence.items for job in jobs if job.fence is not None}
+        files = outputs.outputs_of(planned, homes, fences, rally=rally)
+        if report:
+            files["report.html"] = outputs.report_of(planned, (), homes)
+    except UsageError:
+        raise  # a slip on the command line says nothing against an earlier mission
+    except (InputError, NoMission, CheckFailed):
+        try:
+            if retire_outputs(directory):
+                say(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
+        except InputError as error:  # why there is no mission matters more
+            say(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
+        raise
+    pictures: dict[Path, bytes] = {}
+    if png is not None and each:
+        pictures = {png / name: content for name, content in outputs.figures_of(planned).items()}
+    elif png is not None:
+        pictures = {png: outputs.picture_of(planned)}
+    # Pictures of this plan that lie beside it are a part of it, and go with it.
+    beside = [file for file in pictures if can_hold(directory, file)]
+    in_the_way = write_outputs(directory, {**files, **{file.name: pictures.pop(file) for file in beside}})
+    for file, content in pictures.items():
+        write_whole(file, content)
+    if in_the_way:
+        say(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
+    if not as_json:
+        plan_table(planned)
+        homes_table(homes)
+        say_notes_of(fence_notes)
+        shown = [*list(files)[:SHOWN], f"… and {len(files) - SHOWN} more"] if len(files) > SHOWN + 1 else list(files)
+        say(f"written to {directory}{os.sep}: {', '.join(shown)}")
+    deliveries: list[Delivery] = []
+    if targets:
+        from gcsplan.sim.loopback import loopback_fleet
+
+        if gate is not None:
+            gate.require_ahead(datetime.now(UTC))  # planning took its time
+        options = Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout)
+        names = [job.name for job in jobs]
+        with talking(names), transfer_progress(names) as moved_on:
+            deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
+        if not as_json:
+            delivery_table(deliveries)
+            release_table(planned, deliveries, gate)
+        try:
+            add_output(directory, "upload.json", outputs.upload_text(planned, deliveries, homes))
+            if report:
+                add_output(directory, "report.html", outputs.report_of(planned, deliveries, homes))
+        except InputError as error:  # what became of the upload matters more
+            say(f"note: what became of the upload is not written: {error}")
+    if as_json:
+        emit(outputs.summary_of(planned, deliveries, homes), delivery.failure(deliveries) if targets else None)
+    raise typer.Exit(delivery.exit_code(deliveries) if targets else 0)
+
+
+def planners(as_json: JsonOption = False) -> None:
+    """The table of planners, with paper and default parameters."""
+    from gcsplan.cli.console import planners_table
+    from gcsplan.planners import registry
+
+    rows = [
+        {"name": e.name, "summary": e.summary, "paper": e.paper, "defaults": dict(e.defaults)}
+        for e in registry.TABLE.values()
+    ]
+    if as_json:
+        emit({"planners": rows})
+    else:
+        planners_table(rows)

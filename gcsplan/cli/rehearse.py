@@ -1,0 +1,132 @@
+"""`gcsplan rehearse`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gcsplan.cli.ending import emit, talking
+from gcsplan.cli.options import JsonOption, MissionArgument, UnjudgedOption
+from gcsplan.errors import UsageError
+
+if TYPE_CHECKING:
+    from gcsplan.app.model import Plan
+    from gcsplan.sim.outcome import Rehearsal
+
+
+def rehearse(
+    mission: MissionArgument,
+    planner: Annotated[str | None, typer.Option(metavar="NAME", help="A name from `gcsplan planners`.")] = None,
+    wind: Annotated[float, typer.Option(metavar="M_S", help="A steady wind.")] = 0.0,
+    wind_from: Annotated[
+        float | None,
+        typer.Option(metavar="DEG", help="Where it blows from [default: another direction in each run]"),
+    ] = None,
+    gusts: Annotated[float, typer.Option(metavar="M_S", help="Gusts, as a standard deviation.")] = 0.0,
+    noise_m: Annotated[float, typer.Option(metavar="M", help="Position error, as a standard deviation.")] = 0.0,
+    airspeed: Annotated[
+        float | None,
+        typer.Option(metavar="M_S", help="The most through the air [default: 1.2 times the fastest cruise]"),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of wind, gusts and noise.")] = 1,
+    runs: Annotated[int, typer.Option(metavar="K", min=1, max=10_000, help="Fly it so often, with other weather.")] = 1,
+    sitl: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=URL",
+            help="Fly it with a running ArduCopter SITL, one for each vehicle: uav1=tcp:127.0.0.1:5760. It is armed "
+            "and started.",
+        ),
+    ] = None,
+    sitl_binary: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH", help="Start an ArduCopter SITL of this program for each other vehicle."),
+    ] = None,
+    speedup: Annotated[
+        float | None, typer.Option(metavar="X", help="With --sitl-binary: how fast its clock runs [default: 5]")
+    ] = None,
+    i_know: Annotated[
+        bool,
+        typer.Option("--i-know", help="With --sitl: arm and start what is not on this machine, or is no simulator."),
+    ] = False,
+    allow_unjudged: UnjudgedOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan, upload to simulated vehicles, fly them all in simulated time, and judge arrivals, separation and limits.
+
+    What is flown is what the vehicles stored. Times come out of how a vehicle moves, and share nothing with what
+    planned them. Exit code 4 where a limit was broken, the order or the separation was lost.
+    """
+    from gcsplan.app import pipeline, rehearsing
+    from gcsplan.cli.console import say, say_notes
+    from gcsplan.cli.planning_display import planning_display
+    from gcsplan.sim.wind import Weather
+
+    weather = Weather(wind, wind_from, gusts, noise_m)
+    if airspeed is not None and not airspeed > 0.0:
+        raise UsageError(f"--airspeed {airspeed:g}: a speed above 0 is wanted")
+    in_sitl = bool(sitl) or sitl_binary is not None
+    if in_sitl and (not weather.calm or runs > 1 or airspeed is not None):
+        raise UsageError("--wind, --gusts, --noise-m, --airspeed and --runs are the built-in simulator's, not --sitl's")
+    if speedup is not None and sitl_binary is None:
+        raise UsageError("--speedup goes with --sitl-binary")
+    source = pipeline.load_mission(mission)
+    names = [r.vehicle.name for r in source.vehicles]
+    addresses = rehearsing.seats_of(sitl or [], names)
+    with planning_display(names, source.planner.objective) as tell:
+        planned = pipeline.plan(source, planner=planner, progress=tell)
+    pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
+    if in_sitl:
+        with talking(names):
+            result = rehearsing.rehearse_in_sitl(
+                planned, binary=sitl_binary, addresses=addresses, speedup=speedup, i_know=i_know,
+                tell=None if as_json else lambda name, what: say(f"{name} {what}"),
+            )  # fmt: skip
+    else:
+        result = rehearsing.rehearse(planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed)
+    error = result.error(allow_unjudged=allow_unjudged)
+    if as_json:
+        told = None
+        if error is not None:
+            told = {"code": error.exit_code, "reason": error.reason, "message": error.message, "where": str(mission)}
+        emit({"name": source.name} | result.as_dict(), told)
+    else:
+        _show(planned, result)
+        say_notes(result.notes)
+        for line in _ending(result):
+            say(line)
+    raise typer.Exit(error.exit_code if error is not None else 0)
+
+
+def _show(planned: Plan, result: Rehearsal) -> None:
+    """A row for each vehicle."""
+    from gcsplan.cli.console import rows_table
+
+    by = "built-in simulator" if result.simulator == "gcsplan" else "ArduCopter SITL"
+    runs = f", {result.runs} runs" if result.runs > 1 else ""
+    rows_table(f"rehearsal of {planned.source.name}  {by}{runs}", result.rows())
+
+
+def _ending(result: Rehearsal) -> list[str]:
+    """Order, separation and violations in words."""
+    lines = []
+    kept = f" in {result.order_kept_runs} of {result.runs} runs" if result.runs > 1 else ""
+    if result.terms.order and (result.order_kept_runs or result.runs > 1):
+        lines.append(f"order of arrival {', '.join(result.terms.order)}: kept{kept}")
+    if result.closest is not None:
+        a, b = result.closest.names
+        least = f"least separation {result.closest.distance_m:.1f} m ({a} and {b}, at {result.closest.time_s:.0f} s)"
+        if result.terms.separation_m is not None:
+            kept = f", kept in {result.separation_kept_runs} of {result.runs} runs" if result.runs > 1 else ""
+            least += f" of {result.terms.separation_m:g} m asked{kept}"
+        lines.append(least)
+    if result.runs > 1 and result.p95_s is not None:
+        lines.append(f"95 % of all arrivals lie within {result.p95_s:.2f} s of the plan")
+    lines += [f"violation: {b.describe(result.runs)}" for b in result.breaches]
+    lines += [f"not flown: {what}" for what in result.not_judged]
+    lines.append(
+        {True: "flown as planned", False: "VIOLATIONS were found", None: "not everything was flown"}[result.safe]
+    )
+    return lines

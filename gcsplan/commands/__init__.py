@@ -1,1 +1,0 @@
-"""The commands, a module for each kind: options in, one call, tables or JSON out."""

@@ -1,0 +1,39 @@
+"""A flight log of any kind that is read: ArduPilot's .bin, MAVLink .tlog, CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from gcsplan.errors import InputError
+from gcsplan.logs.dataflash import read_dataflash
+from gcsplan.logs.flight_log import FlightLog
+from gcsplan.logs.table import read_csv
+from gcsplan.logs.telemetry import read_telemetry
+
+
+def read_log(file: Path, *, columns: Mapping[str, str] | None = None, sysid: int | None = None) -> FlightLog:
+    """The flight in ``file``: ArduPilot's .bin (.BIN, .log is refused), a .tlog, or CSV by its name's ending.
+
+    ``columns``: names of a CSV's columns; ``sysid``: which vehicle of a .tlog. Raises InputError with the cure.
+    """
+    if not file.exists():
+        raise InputError("there is no such file", where=str(file))
+    if file.is_dir():
+        raise InputError("is a folder; give one log, or several", where=str(file))
+    if file.stat().st_size == 0:
+        raise InputError("is empty: the log was not closed, or not copied whole", where=str(file))
+    kind = file.suffix.lower()
+    if columns and kind != ".csv":
+        raise InputError("--csv-columns is for CSV files", where=str(file))
+    if kind == ".csv":
+        return read_csv(file, columns or {})
+    if kind == ".bin":
+        return read_dataflash(file)
+    if kind in (".tlog", ".rlog"):
+        return read_telemetry(file, sysid)
+    cure = {
+        ".ulg": "PX4's logs: make CSV of vehicle_global_position and battery_status with ulog2csv, join them by time",
+        ".log": "a text log: give the .bin that it was made from",
+    }.get(kind, f"the ending {kind or '(none)'} is not known")
+    raise InputError(f"{cure}. Read are ArduPilot's .bin, MAVLink .tlog, and .csv", where=str(file))

@@ -1,0 +1,1 @@
+"""From a path to mission items, and from zones to a fence."""

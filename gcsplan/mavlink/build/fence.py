@@ -1,0 +1,201 @@
+"""No-fly zones as the items of a MAVLink fence, and back.
+
+A fence item is a circle or one corner of a polygon and has **no height**: a zone with a floor or a ceiling cannot be
+told. It is left out, or becomes a fence from the ground to the sky where that is asked for. A circle keeps its radius,
+rounded up to whole centimetres; a polygon's corners lie within `STRAIGHT_M` of its outline. Items are in frame 0:
+ArduPilot refuses frame 2, and no autopilot keeps the altitude.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.errors import InputError
+from gcsplan.mavlink.files.plan_fence import CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, POLYGON_OUT
+from gcsplan.mavlink.mission.autopilots import manner, max_items
+from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7
+from gcsplan.vehicle import Autopilot
+from gcsplan.world.zones import Circle, Polygon, Zone
+
+if TYPE_CHECKING:
+    from gcsplan.world.frame import Frame
+
+Floats = NDArray[np.float64]
+STRAIGHT_M = 0.1
+"""A corner of the outline that lies this near to the line between its neighbours is left out."""
+
+MOST_CORNERS = 255  # of one polygon on ArduPilot: the number is kept in a byte (AC_PolyFence_loader.cpp)
+ROOM_BYTES = {Autopilot.ARDUCOPTER: 560, Autopilot.ARDUPLANE: 672}  # StorageManager.cpp, StorageFence
+HEAD_BYTES, CIRCLE_BYTES, POLYGON_BYTES, CORNER_BYTES = 5, 13, 2, 8  # AC_PolyFence_loader.cpp; 42 circles fit a copter
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """One area of a fence: as a zone without floor and ceiling; ``inclusion``: to be stayed inside of."""
+
+    zone: Zone
+    inclusion: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Fence:
+    """A fence for one autopilot: its items in wire order, the zones in it, and what is to be said (``told``).
+
+    ``left_out`` names the zones that a fence has no words for.
+    """
+
+    items: tuple[MissionItem, ...]
+    zones: tuple[Zone, ...]
+    left_out: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()
+
+
+def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infinite: bool = False) -> Fence:
+    """The fence that keeps an aircraft out of ``zones``.
+
+    Zones with a floor or a ceiling are left out and named, or with ``infinite`` taken as if they had neither. A circle
+    inside another one is dropped. Raises InputError where the autopilot cannot keep so much.
+    """
+    told: list[str] = []
+    bounded = [z for z in zones if z.floor is not None or z.ceiling is not None]
+    taken = list(zones) if infinite else [z for z in zones if z.floor is None and z.ceiling is None]
+    if bounded and infinite:
+        told.append(f"a fence has no height: {_names(bounded)} would be forbidden from the ground to the sky on board")
+    elif bounded:
+        told.append(
+            f"a fence has no height: {_names(bounded)} {'is' if len(bounded) == 1 else 'are'} left out of it, having a "
+            f"floor or a ceiling"
+        )
+    inside = [z for k, z in enumerate(taken) if any(_holds(o, z, j < k) for j, o in enumerate(taken) if j != k)]
+    if inside:
+        told.append(f"{_names(inside)} {'lies' if len(inside) == 1 else 'lie'} inside another circle of the fence")
+    taken = [z for z in taken if z not in inside]
+    items: list[MissionItem] = []
+    for zone in taken:
+        items += _circle(zone.shape, frame) if isinstance(zone.shape, Circle) else _corners(zone, frame)
+    _require_room(taken, items, autopilot)
+    left_out = () if infinite else tuple(z.name for z in bounded)
+    return Fence(tuple(items), tuple(taken), left_out, tuple(told))
+
+
+def areas_of(items: Sequence[MissionItem], frame: Frame) -> list[Area]:
+    """The areas of a fence from its wire items; return points (5000) are passed over.
+
+    Raises InputError for a polygon that is not whole, a radius that is none, and other commands.
+    """
+    areas: list[Area] = []
+    index = 0
+    while index < len(items):
+        item = items[index]
+        number = len(areas) + 1
+        if item.command in (CIRCLE_IN, CIRCLE_OUT):
+            radius_m = item.params[0]
+            if not 0.0 < radius_m < math.inf:
+                raise InputError(f"item {index} of the fence is a circle with a radius of {radius_m:g} m")
+            east, north = (float(x) for x in frame.to_plane(item.lat_deg, item.lon_deg))
+            shape: Circle | Polygon = Circle(east, north, radius_m)
+            index += 1
+        elif item.command in (POLYGON_IN, POLYGON_OUT):
+            count = item.params[0]
+            corners = items[index : index + int(count)] if math.isfinite(count) and count >= 3 else []
+            whole = [c for c in corners if c.command == item.command and c.params[0] == count]
+            if len(whole) < 3 or len(whole) != count:
+                raise InputError(f"item {index} of the fence begins a polygon of {count:g} corners that is not whole")
+            ring = frame.to_plane([c.lat_deg for c in whole], [c.lon_deg for c in whole])
+            shape = Polygon(np.ascontiguousarray(ring if _area(ring) > 0.0 else ring[::-1]))
+            index += len(whole)
+        elif item.command == 5000:
+            index += 1
+            continue
+        else:
+            raise InputError(f"item {index} of the fence is command {item.command}, which no fence has")
+        areas.append(Area(Zone(f"fence {number}", shape), item.command in (CIRCLE_IN, POLYGON_IN)))
+    return areas
+
+
+def _circle(circle: Circle, frame: Frame) -> list[MissionItem]:
+    lat, lon = (float(x) for x in frame.to_degrees(circle.east_m, circle.north_m))
+    cm = circle.radius_m * 100.0
+    radius_m = math.ceil(cm - max(1e-6, 1.2e-7 * cm)) / 100.0  # what comes back as float32 is the same again
+    return [MissionItem(CIRCLE_OUT, GLOBAL, (radius_m, 0.0, 0.0, 0.0), degrees_e7(lat), degrees_e7(lon))]
+
+
+def _corners(zone: Zone, frame: Frame) -> list[MissionItem]:
+    assert isinstance(zone.shape, Polygon)
+    ring = _straightened(zone.shape.vertices)
+    places = frame.to_degrees(ring[:, 0], ring[:, 1])
+    count = float(len(ring))
+    return [
+        MissionItem(POLYGON_OUT, GLOBAL, (count, 0.0, 0.0, 0.0), degrees_e7(lat), degrees_e7(lon))
+        for lat, lon in places.tolist()
+    ]
+
+
+def _straightened(ring: Floats) -> Floats:
+    """The ring without corners that lie on the line between those that are kept, within `STRAIGHT_M`."""
+    start = int(np.hypot(*(ring - ring.mean(axis=0)).T).argmax())  # a corner for certain
+    points = np.roll(ring, -start, axis=0)
+    kept = [0]
+    while kept[-1] < len(points):
+        here, last = kept[-1], kept[-1] + 1
+        for end in range(here + 2, len(points) + 1):
+            a, b = points[here], points[end % len(points)]
+            along = b - a
+            length = float(np.hypot(*along))
+            between = points[here + 1 : end] - a
+            if length <= 0.0:
+                break
+            off = np.abs(between[:, 0] * along[1] - between[:, 1] * along[0]) / length
+            part = between @ along / length**2
+            if off.max() > STRAIGHT_M or part.min() < 0.0 or part.max() > 1.0:
+                break
+            last = end
+        kept.append(last)
+    chosen = kept[:-1]
+    return points[chosen] if len(chosen) >= 3 else ring
+
+
+def _require_room(zones: Sequence[Zone], items: Sequence[MissionItem], autopilot: Autopilot) -> None:
+    label = manner(autopilot).label
+    cure = "leave zones out, or join them into fewer and simpler ones"
+    for zone in zones:
+        if isinstance(zone.shape, Polygon) and autopilot.is_ardupilot:
+            count = len(_straightened(zone.shape.vertices))
+            if count > MOST_CORNERS:
+                raise InputError(f"the zone {zone.name!r} has {count} corners; {label} keeps {MOST_CORNERS}: {cure}")
+    circles = sum(isinstance(z.shape, Circle) for z in zones)
+    polygons = len(zones) - circles
+    corners = len(items) - circles
+    what = f"{circles} circle(s) and {polygons} polygon(s) with {corners} corners"
+    most = max_items(autopilot, FENCE)
+    if len(items) > most:
+        raise InputError(f"the fence has {len(items)} items ({what}) and {label} keeps {most}: {cure}")
+    room = ROOM_BYTES.get(autopilot)
+    needed = HEAD_BYTES + CIRCLE_BYTES * circles + POLYGON_BYTES * polygons + CORNER_BYTES * corners
+    if room is not None and needed > room:
+        fits = (room - HEAD_BYTES) // CIRCLE_BYTES
+        raise InputError(f"the fence of {what} does not fit: {label} has room for {fits} circles, or so: {cure}")
+
+
+def _holds(outer: Zone, inner: Zone, first: bool) -> bool:
+    """True where a circle holds another one; of two that are the same the ``first`` holds the other."""
+    a, b = outer.shape, inner.shape
+    if not (isinstance(a, Circle) and isinstance(b, Circle)):
+        return False
+    slack = a.radius_m - b.radius_m - math.hypot(a.east_m - b.east_m, a.north_m - b.north_m)
+    return slack >= 0.0 and (a.radius_m > b.radius_m or first)
+
+
+def _area(ring: Floats) -> float:
+    x, y = ring[:, 0], ring[:, 1]
+    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def _names(zones: Sequence[Zone]) -> str:
+    return ", ".join(repr(z.name) for z in zones)

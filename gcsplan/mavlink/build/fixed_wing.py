@@ -1,0 +1,172 @@
+"""A fixed wing's mission on the wire: take-off straight ahead, way points that are flown by, and how it ends.
+
+- NAV_TAKEOFF: param1 is the least pitch in whole degrees; ArduPlane holds the heading it is launched on. The place of
+  the item is where the climb-out leads to, for whoever launches it, and for whoever checks the file.
+- NAV_WAYPOINT: param2, the acceptance radius, is the tangent length of the corner, rounded up to whole metres: there
+  the turn begins. ArduPlane keeps a byte of it, so a corner that needs more is given two way points, on one arc.
+- No DO_LAND_START before a landing: with it ArduPlane does not arm unless RTL_AUTOLAND is set.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.mavlink.build.order import Order, split_legs
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.path import Path
+from gcsplan.world.world import World
+
+__all__ = ["build_wing", "flown_m", "parted", "pitch_deg", "tangents_m", "thinned"]
+
+Floats = NDArray[np.float64]
+
+FARTHEST_ACCEPTED_M = 255.0
+"""What ArduPlane keeps of an acceptance radius at most."""
+
+ROUNDED_M = 1e-3
+"""A tangent this little beyond whole metres is not rounded up: the turn begins so much late."""
+
+LEAST_ACCEPTED_M = 1.0
+
+LOITER_TO_ALT = 31
+
+NEAREST_M, SLIGHT_M = 3.0, 0.5
+"""Way points nearer than the first are one, if the arc at one of them begins within the second."""
+
+
+def pitch_deg(vehicle: Vehicle) -> int:
+    """The pitch of its take-off: whole degrees, not above ``max_climb_deg``."""
+    return math.floor(vehicle.limits.max_climb_deg + 1e-9)
+
+
+def turns_of(points: Floats) -> Floats:
+    """(N - 2,) turn at each inner point, radians, left positive; 0 where the way does not go on."""
+    way = np.diff(points[:, :2], axis=0)
+    heading = np.arctan2(way[:, 1], way[:, 0])
+    turn = (np.diff(heading) + math.pi) % (2.0 * math.pi) - math.pi
+    moves = np.hypot(*way.T) > 1e-6
+    return np.asarray(np.where(moves[:-1] & moves[1:], turn, 0.0))
+
+
+def tangents_m(points: Floats, radius_m: float) -> Floats:
+    """(N,) how far before and behind each point its arc reaches; 0 at both ends."""
+    inner = radius_m * np.tan(0.5 * np.minimum(np.abs(turns_of(points)), math.pi - 1e-6))
+    return np.concatenate([[0.0], inner, [0.0]])
+
+
+def flown_m(points: Floats, radius_m: float) -> Floats:
+    """(N - 1,) metres flown over ground from the middle of one point's arc to the middle of the next one's."""
+    tangent = tangents_m(points, radius_m)
+    half = np.concatenate([[0.0], 0.5 * radius_m * np.abs(turns_of(points)), [0.0]])
+    run = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    return np.asarray(half[:-1] + np.abs(run - tangent[:-1] - tangent[1:]) + half[1:])
+
+
+def thinned(points: Floats, radius_m: float) -> Floats:
+    """``points`` without those that hardly turn and lie so near to another one that no turn fits between; ends stay."""
+    while len(points) > 2:
+        tangent = tangents_m(points, radius_m)
+        run = np.hypot(*np.diff(points[:, :2], axis=0).T)
+        for k in np.flatnonzero(run < np.maximum(tangent[:-1] + tangent[1:] - 0.01, NEAREST_M)).tolist():
+            inner = [i for i in (k, k + 1) if 0 < i < len(points) - 1 and tangent[i] < SLIGHT_M]
+            if inner:
+                points = np.delete(points, min(inner, key=lambda i: float(tangent[i])), axis=0)
+                break
+        else:
+            break
+    return points
+
+
+def parted(points: Floats, radius_m: float) -> Floats:
+    """``points`` with each corner that needs more acceptance than there is replaced by two on the same arc.
+
+    Their altitudes are those of the middles of their halves, so that the altitude along what is flown stays.
+    """
+    while True:
+        tangent = tangents_m(points, radius_m)
+        far = np.flatnonzero(tangent > FARTHEST_ACCEPTED_M - 1.0)
+        if not len(far):
+            return points
+        k = int(far[0])
+        turn = abs(float(turns_of(points)[k - 1]))
+        short = radius_m * math.tan(0.25 * turn)
+        back, on = points[k - 1] - points[k], points[k + 1] - points[k]
+        flown = flown_m(points, radius_m)
+        quarter = 0.25 * radius_m * turn
+        pair = []
+        for way, run in ((back, flown[k - 1]), (on, flown[k])):
+            flat = (tangent[k] - short) * way[:2] / math.hypot(way[0], way[1])
+            pair.append([*(points[k, :2] + flat), points[k, 2] + way[2] * quarter / max(run, 1e-9)])
+        points = np.vstack([points[:k], pair, points[k + 1 :]])
+
+
+def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float, float], order: Order) -> Mission:
+    """The mission that flies ``path`` (way points to be flown by) between the ends that ``order.wing`` gives."""
+    wing = order.wing
+    assert wing is not None
+    if order.hold_s > 0 or order.gate_utc is not None:
+        raise ValueError(f"{vehicle.name} cannot wait in the air: a fixed wing goes on at once")
+    if order.altitude_frame == "terrain":
+        raise ValueError(f"{vehicle.name}: a fixed wing's turns are planned for altitudes above home or sea level")
+    datum = world.ground_amsl(*(m.degrees_e7(x) / 1e7 for x in home_deg))
+    home = Home.at(*home_deg, round(datum, 2))
+    radius = vehicle.turn_radius_m
+    points = split_legs(parted(path.points, radius), world)
+    base = datum if order.altitude_frame == "relative" else 0.0
+    frame = m.RELATIVE if order.altitude_frame == "relative" else m.GLOBAL
+    cm = _heights_cm(points, base, vehicle)
+    # The turn at the first point is from the climb-out, that at the last into the glide.
+    whole = np.array([wing.leaves, *points, *([] if wing.touch is None else [wing.touch])])
+    tangent = tangents_m(whole, radius)[1 : len(points) + 1]
+    places = world.frame.to_degrees(points[:, 0], points[:, 1])
+
+    def item(
+        command: int, place: Floats, frame: int, cm: int, params: tuple[float, float, float, float]
+    ) -> MissionItem:
+        z = altitude_of_cm(cm, vehicle.autopilot)
+        return MissionItem(command, frame, params, m.degrees_e7(float(place[0])), m.degrees_e7(float(place[1])), z)
+
+    top = world.frame.to_degrees(wing.top[0], wing.top[1])
+    speed = vehicle.speed_max_m_s if order.speed_m_s is None else order.speed_m_s
+    items = [
+        item(
+            m.TAKEOFF, top, m.RELATIVE, round((wing.top[2] - datum) * 100), (float(pitch_deg(vehicle)), 0.0, 0.0, 0.0)
+        ),
+        MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (0.0, speed, -1.0, 0.0)),
+    ]
+    if wing.up is not None:
+        place, up_cm = world.frame.to_degrees(wing.up[0], wing.up[1]), round((wing.up[2] - datum) * 100)
+        items.insert(1, item(LOITER_TO_ALT, place, m.RELATIVE, up_cm, (0.0, wing.up_m, 0.0, 0.0)))
+    for i in range(len(points)):
+        if i == len(points) - 1 and order.end == "loiter":
+            items.append(item(m.LOITER_UNLIM, places[i], frame, int(cm[i]), (0.0, 0.0, wing.circle_m, 0.0)))
+            continue
+        accepted = min(max(LEAST_ACCEPTED_M, math.ceil(float(tangent[i]) - ROUNDED_M)), FARTHEST_ACCEPTED_M)
+        items.append(item(m.WAYPOINT, places[i], frame, int(cm[i]), (0.0, accepted, 0.0, 0.0)))
+    if wing.touch is not None:
+        touch = world.frame.to_degrees(wing.touch[0], wing.touch[1])
+        items.append(item(m.LAND, touch, m.RELATIVE, round((wing.touch[2] - datum) * 100), (0.0, 0.0, 0.0, 0.0)))
+    elif order.end == "rtl":
+        items.append(MissionItem(m.RTL, m.NO_POSITION))
+    return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)
+
+
+def _heights_cm(points: Floats, base_m: float, vehicle: Vehicle) -> NDArray[np.int_]:
+    """Heights over ``base_m`` in whole centimetres, no leg as it is flown steeper than its limit by the rounding."""
+    wanted = (points[:, 2] - base_m) * 100.0
+    run_cm = flown_m(points, vehicle.turn_radius_m) * 100.0 - 3.0
+    # Arcs are judged by their chords, which are shorter by less than a thousandth.
+    up, down = 0.999 * vehicle.limits.max_climb_slope, 0.999 * vehicle.limits.max_descent_slope
+    cm = np.rint(wanted).astype(int)
+    for i in range(1, len(cm) - 1):
+        high = cm[i - 1] + math.floor(up * run_cm[i - 1]) if math.isfinite(up) else cm[i]
+        low = cm[i - 1] - math.floor(down * run_cm[i - 1]) if math.isfinite(down) else cm[i]
+        if abs(np.clip(cm[i], low, high) - wanted[i]) <= 1.5:
+            cm[i] = np.clip(cm[i], low, high)
+    return cm

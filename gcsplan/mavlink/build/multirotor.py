@@ -1,0 +1,133 @@
+"""From a path in metres to a `Mission` on the wire.
+
+Altitudes go out in whole centimetres, degrees in whole 1e-7; the path's planner kept margins for both (`MARGINS`).
+Legs are split until the line straight in the plane and the one straight in degrees lie within `BOW_M`, so that it
+does not matter which of the two an autopilot flies.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.mavlink.build.fixed_wing import build_wing
+from gcsplan.mavlink.build.order import Order, split_legs
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.path import Path
+from gcsplan.world.world import World
+
+COPTER_ACCEPTANCE_M = 2.0  # ArduCopter WPNAV_RADIUS, default
+
+
+def acceptance_radius_m(vehicle: Vehicle) -> float:
+    """How near counts as reached: ArduCopter's own parameter; elsewhere the track error, sent with each item."""
+    if vehicle.autopilot is Autopilot.ARDUCOPTER:
+        return COPTER_ACCEPTANCE_M
+    return min(max(1.0, math.floor(vehicle.limits.track_error_m)), 255.0)
+
+
+def corner_m(vehicle: Vehicle) -> float:
+    """What a planner keeps beside its track for corners that are cut by more than ``track_error_m`` holds; mostly 0."""
+    if vehicle.turn_radius_m > 0.0 or math.isinf(vehicle.corner_accel_m_s2):
+        return 0.0
+    radius_m = acceptance_radius_m(vehicle)
+    return radius_m if radius_m > vehicle.limits.track_error_m else 0.0
+
+
+def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float, float], order: Order) -> Mission:
+    """The mission that flies ``path``: take-off at home, its points, and ``order.end``.
+
+    The path begins above home at take-off altitude and ends above the goal. The result is not yet judged.
+    """
+    if order.wing is not None:
+        return build_wing(path, world, vehicle, home_deg, order)
+    datum = world.ground_amsl(*(m.degrees_e7(x) / 1e7 for x in home_deg))
+    home = Home.at(*home_deg, round(datum, 2))
+    points = _spaced(path.points, 2.0 * acceptance_radius_m(vehicle) if order.spaced else 0.0)
+    terrain = order.altitude_frame == "terrain"
+    if terrain:  # cut legs keep their height above ground between the ends, as they are flown
+        ground = world.airspace.surface.ground_at(points[:, 0], points[:, 1])
+        points = np.column_stack([points[:, :2], points[:, 2] - ground])
+    points = split_legs(points, world)
+    places = world.frame.to_degrees(points[:, 0], points[:, 1])
+    lat_e7 = np.rint(places[:, 0] * 1e7).astype(int)
+    lon_e7 = np.rint(places[:, 1] * 1e7).astype(int)
+    lat_e7[0], lon_e7[0] = home.lat_e7, home.lon_e7
+    if terrain:
+        frame, cm = m.TERRAIN, np.rint(points[:, 2] * 100).astype(int)
+    else:
+        base = datum if order.altitude_frame == "relative" else 0.0
+        frame = m.RELATIVE if order.altitude_frame == "relative" else m.GLOBAL
+        cm = _round_heights(points, base, vehicle)
+    top_cm = round((path.points[0, 2] - datum) * 100)
+    bearings = _bearings(points)
+    px4, plane = vehicle.autopilot is Autopilot.PX4, vehicle.autopilot is Autopilot.ARDUPLANE
+
+    def item(command: int, i: int, frame: int, cm: int, *, radius_m: float = 0.0) -> MissionItem:
+        yaw = round(float(bearings[max(i - 1, 0)]), 1) if px4 else 0.0
+        z = 0.0 if command in (m.LAND, m.VTOL_LAND) else altitude_of_cm(cm, vehicle.autopilot)
+        return MissionItem(command, frame, (0.0, radius_m, 0.0, yaw), int(lat_e7[i]), int(lon_e7[i]), z)
+
+    radius = 0.0 if vehicle.autopilot is Autopilot.ARDUCOPTER else acceptance_radius_m(vehicle)
+    speed_kind = 0.0 if plane else 1.0
+    speed = vehicle.speed_max_m_s if order.speed_m_s is None else order.speed_m_s
+    items = [
+        item(m.VTOL_TAKEOFF if plane else m.TAKEOFF, 0, m.RELATIVE, top_cm),
+        MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (speed_kind, speed, -1.0, 0.0)),
+    ]
+    if order.hold_s > 0 or order.gate_utc is not None:  # before the speed, which is exact from a standstill
+        items.insert(1, _gate(order, vehicle))
+    last = len(points) - 1
+    items += [item(m.WAYPOINT, i, frame, int(cm[i]), radius_m=radius) for i in range(1, last)]
+    if order.end == "loiter":
+        items.append(item(m.LOITER_UNLIM, last, frame, int(cm[last])))
+    else:
+        items.append(item(m.WAYPOINT, last, frame, int(cm[last]), radius_m=radius))
+    if order.end == "land":
+        items.append(item(m.VTOL_LAND if plane else m.LAND, last, m.RELATIVE, 0))
+    elif order.end == "rtl":
+        items.append(MissionItem(m.RTL, m.NO_POSITION))
+    return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)
+
+
+def _gate(order: Order, vehicle: Vehicle) -> MissionItem:
+    if not vehicle.can_hold or (order.gate_utc is not None and vehicle.autopilot is not Autopilot.ARDUCOPTER):
+        raise ValueError(f"{vehicle.name} cannot wait so in the air: {vehicle.autopilot} goes on at once")
+    if order.gate_utc is None:
+        return MissionItem(m.DELAY, m.NO_POSITION, (float(order.hold_s), -1.0, -1.0, -1.0))
+    hour, minute, second = order.gate_utc
+    return MissionItem(m.DELAY, m.NO_POSITION, (-1.0, float(hour), float(minute), float(second)))
+
+
+def _spaced(points: NDArray[np.float64], apart_m: float) -> NDArray[np.float64]:
+    """Drop inner points nearer than ``apart_m`` to the one kept before them or to the last; the ends stay."""
+    kept = [points[0]]
+    for p in points[1:-1]:
+        if np.linalg.norm(p - kept[-1]) >= apart_m and np.linalg.norm(p - points[-1]) >= apart_m:
+            kept.append(p)
+    return np.array([*kept, points[-1]])
+
+
+def _round_heights(points: NDArray[np.float64], base_m: float, vehicle: Vehicle) -> NDArray[np.int_]:
+    """Heights over ``base_m`` in whole centimetres, without a leg growing steeper than its limit by the rounding."""
+    wanted = (points[:, 2] - base_m) * 100
+    run_cm = np.hypot(*np.diff(points[:, :2], axis=0).T) * 100 - 3.0
+    up, down = vehicle.limits.max_climb_slope, vehicle.limits.max_descent_slope
+    cm = np.rint(wanted).astype(int)
+    for i in range(1, len(cm) - 1):
+        high = cm[i - 1] + math.floor(up * run_cm[i - 1]) if math.isfinite(up) else cm[i]
+        low = cm[i - 1] - math.floor(down * run_cm[i - 1]) if math.isfinite(down) else cm[i]
+        if abs(np.clip(cm[i], low, high) - wanted[i]) <= 1.5:
+            cm[i] = np.clip(cm[i], low, high)
+    return cm
+
+
+def _bearings(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N - 1,) course of each leg, degrees clockwise from the plane's north, in [0, 360)."""
+    d = np.diff(points[:, :2], axis=0)
+    return np.asarray(np.degrees(np.arctan2(d[:, 0], d[:, 1])) % 360.0)

@@ -1,0 +1,1 @@
+"""Mission files: `.waypoints` and `.plan`, read and written."""

@@ -1,0 +1,216 @@
+"""What `.waypoints` and `.plan` have in common: one item's numbers as text, and back, without losing a bit.
+
+Degrees are written so that they name their wire integer exactly, params and altitudes with the fewest digits that
+give the same float32 again. What a reader of strangers' files takes for an item is decided here, once for both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import ROUND_HALF_EVEN, Decimal
+
+from gcsplan.errors import InputError, Problem
+from gcsplan.mavlink.mission.mission import (
+    DO_JUMP,
+    FRAME_SYNONYMS,
+    GLOBAL,
+    NO_POSITION,
+    RELATIVE,
+    TERRAIN,
+    Mission,
+    MissionItem,
+    float32,
+)
+
+MAX_BYTES = 20_000_000
+"""A mission file beyond this is not read."""
+
+MAX_ITEMS = 10_000
+"""A mission beyond this is not read; autopilots take 650 to a few thousand."""
+
+FRAMES = (GLOBAL, NO_POSITION, RELATIVE, TERRAIN)
+
+PLAIN_XY = frozenset({196, 202, 203, 1000, 31010, 31011, 31012, 31013, 31014, 42702, 42703})
+"""Commands whose param5 and param6 are numbers, whatever their frame (common.xml, ArduPilot's AP_Mission): region of
+interest offset, camera, gimbal flags, user commands, scripts, attitude."""
+
+
+HAS_PLACE = frozenset({16, 17, 18, 19, 21, 22, 31, 36, 80, 82, 84, 85, 94, 179, 188, 189, 192, 195, 201})
+"""Mission commands that common.xml gives a location, so that an unset one means something."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionFileRead:
+    """A mission from a file, and what its reader should know of it (``notes``, sentences for people).
+
+    ``fence`` and ``rally`` are the wire items of the file's other two lists, where it has them.
+    """
+
+    mission: Mission
+    notes: tuple[str, ...] = ()
+    fence: tuple[MissionItem, ...] = ()
+    rally: tuple[MissionItem, ...] = ()
+
+
+def in_degrees(command: int, frame: int) -> bool:
+    """True where x and y are degrees times 1e7, and not plain numbers."""
+    return FRAME_SYNONYMS.get(frame, frame) != NO_POSITION and command not in PLAIN_XY
+
+
+def float32_text(value: float) -> str:
+    """The shortest decimal text that reads back as the float32 ``value``, a whole number without a point.
+
+    Raises ValueError for NaN and infinity: the text formats have no word for them.
+    """
+    if not math.isfinite(value):
+        raise ValueError(f"{value} cannot be written as a number")
+    for digits in range(1, 10):
+        text = f"{value:.{digits}g}"
+        if float32(float(text)) == float32(value):
+            break
+    if "e" in text and 1e-9 <= abs(value) < 1e15:
+        text = f"{Decimal(text):f}"
+    return text
+
+
+def degrees_text(e7: int) -> str:
+    """Degrees with eight decimals of the wire integer ``e7``, exact."""
+    whole, part = divmod(abs(e7), 10**7)
+    return f"{'-' if e7 < 0 else ''}{whole}.{part:07d}0"
+
+
+def degrees_e7_of(degrees: float) -> int:
+    """The wire integer of degrees as they stand in a file: rounded in decimals, so that no half is lost in binary.
+
+    ``degrees`` is finite and below 1e6.
+    """
+    return int(Decimal(repr(degrees)).scaleb(7).to_integral_value(ROUND_HALF_EVEN))
+
+
+@dataclass(frozen=True, slots=True)
+class RawItem:
+    """An item as a file gives it: numbers in the file's own units, not yet judged. NaN is "not given"."""
+
+    command: float
+    frame: float
+    params: tuple[float, float, float, float]
+    x: float
+    y: float
+    z: float
+    autocontinue: bool
+
+
+def whole(value: float, low: int, high: int) -> int | None:
+    """``value`` as an integer within [low, high], or None."""
+    return int(value) if math.isfinite(value) and value == math.floor(value) and low <= value <= high else None
+
+
+def read_item(raw: RawItem, problems: list[Problem], where: str) -> MissionItem | None:
+    """The wire item of ``raw``, frames made plain; or None, with what is wrong added to ``problems``."""
+    before = len(problems)
+
+    def bad(message: str) -> None:
+        problems.append(Problem(where, message))
+
+    command = whole(raw.command, 0, 65535)
+    if command is None:
+        bad(f"the command must be a whole number from 0 to 65535, given {raw.command:g}")
+    frame = whole(raw.frame, 0, 255)
+    frame = FRAME_SYNONYMS.get(frame, frame) if frame is not None else None
+    if frame not in FRAMES:
+        bad(f"the frame must be 0 (AMSL), 2 (no place), 3 (relative to home) or 10 (terrain), given {raw.frame:g}")
+    for number, value in enumerate(raw.params, start=1):
+        if math.isinf(float32(value)):
+            bad(f"param{number} must be a number that a float32 holds, given {value:g}")
+    if command is None or frame is None:
+        return None
+    if math.isinf(float32(raw.z)) or (math.isnan(raw.z) and in_degrees(command, frame)):
+        bad(f"the altitude (param7) must be a number that a float32 holds, given {raw.z:g}")
+    if len(problems) > before:
+        return None
+    x, y = _xy(command, frame, raw, bad)
+    if x is None or y is None:
+        return None
+    return MissionItem(command, frame, raw.params, x, y, raw.z, raw.autocontinue)
+
+
+def _xy(command: int, frame: int, raw: RawItem, bad: Callable[[str], None]) -> tuple[int | None, int | None]:
+    if in_degrees(command, frame):
+        if not abs(raw.x) <= 90.0:
+            bad(f"the latitude must lie within ±90°, given {raw.x:g}")
+        elif not abs(raw.y) <= 180.0:
+            bad(f"the longitude must lie within ±180°, given {raw.y:g}")
+        else:
+            return degrees_e7_of(raw.x), degrees_e7_of(raw.y)
+        return None, None
+    x, y = whole(raw.x, -(2**31), 2**31 - 1), whole(raw.y, -(2**31), 2**31 - 1)
+    for number, given, value in ((5, x, raw.x), (6, y, raw.y)):
+        if given is None:
+            bad(f"param{number} of command {command} in frame {frame} must be a whole 32-bit number, given {value:g}")
+    return x, y
+
+
+def check_writable(mission: Mission, *, nan: bool) -> None:
+    """Raise InputError for items that a file cannot carry so that they read back the same.
+
+    ``nan``: the format has a word for "not given" (.plan has, .waypoints has not), except for an altitude.
+    """
+    problems: list[Problem] = []
+
+    def bad(message: str) -> None:
+        problems.append(Problem(mission.name, message))
+
+    for seq, item in enumerate(mission.items, start=mission.first_seq):
+        placed = in_degrees(item.command, item.frame)
+        for number, value in zip((1, 2, 3, 4, 7), (*item.params, item.z), strict=True):
+            if math.isinf(value) or (math.isnan(value) and (not nan or (number == 7 and placed))):
+                bad(f"param{number} of item {seq} is {value:g}, which this file format cannot carry; give it a number")
+        if FRAME_SYNONYMS.get(item.frame, item.frame) not in FRAMES:
+            bad(f"item {seq} is in frame {item.frame}; files are written in frames 0, 2, 3 and 10")
+        if placed and (abs(item.x) > 90 * 10**7 or abs(item.y) > 180 * 10**7):
+            bad(f"item {seq} lies at {item.lat_deg:.7f}, {item.lon_deg:.7f}: not a place on Earth")
+    home = mission.home
+    if not math.isfinite(home.amsl_m):
+        bad(f"the altitude of home is {home.amsl_m:g}; it must be metres AMSL")
+    if abs(home.lat_e7) > 90 * 10**7 or abs(home.lon_e7) > 180 * 10**7:
+        bad(f"home lies at {home.lat_e7 / 1e7:.7f}, {home.lon_e7 / 1e7:.7f}: not a place on Earth")
+    if problems:
+        raise InputError.of(problems)
+
+
+def jumps_to_file(mission: Mission) -> tuple[MissionItem, ...]:
+    """The items with DO_JUMP targets as files count them: home is 0, the first item 1, for every autopilot.
+
+    On the wire ArduPilot counts so too; PX4 has no home item and counts from 0. InputError for a jump to nowhere.
+    """
+    first = mission.first_seq
+    renumbered = {first + index: index + 1 for index in range(len(mission.items))}
+    return _jumps(mission.items, renumbered, first, mission.name)
+
+
+def jumps_from_file(
+    items: Sequence[MissionItem], index_of: Mapping[int, int], first_seq: int, where: str
+) -> tuple[MissionItem, ...]:
+    """The items with DO_JUMP targets as wire seq; ``index_of``: the file's number of an item to its index."""
+    return _jumps(items, {number: index + first_seq for number, index in index_of.items()}, first_seq, where)
+
+
+def _jumps(
+    items: Sequence[MissionItem], renumbered: Mapping[int, int], first_seq: int, where: str
+) -> tuple[MissionItem, ...]:
+    out: list[MissionItem] = []
+    problems: list[Problem] = []
+    for seq, item in enumerate(items, start=first_seq):
+        if item.command != DO_JUMP:
+            out.append(item)
+            continue
+        target = whole(item.params[0], 0, 2**24)
+        if target is None or target not in renumbered:
+            problems.append(Problem(where, f"item {seq} jumps to item {item.params[0]:g}, which the mission has not"))
+            continue
+        out.append(replace(item, params=(float(renumbered[target]), *item.params[1:])))
+    if problems:
+        raise InputError.of(problems)
+    return tuple(out)

@@ -1,0 +1,79 @@
+"""Mission files of either format: what is on the disk becomes a `Mission`, whatever its name says."""
+
+from __future__ import annotations
+
+import os
+import stat
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+from gcsplan.errors import InputError
+from gcsplan.mavlink.files.file_items import MAX_BYTES, MissionFileRead
+from gcsplan.mavlink.files.plan_file import parse_plan, read_plan, write_plan
+from gcsplan.mavlink.files.waypoints_file import parse_waypoints, read_waypoints, write_waypoints
+from gcsplan.mavlink.mission.mission import Home
+from gcsplan.vehicle import Autopilot
+
+__all__ = [
+    "MissionFileRead",
+    "read_mission_file",
+    "read_plan",
+    "read_waypoints",
+    "write_plan",
+    "write_waypoints",
+]
+
+
+def read_mission_file(
+    path: str | PathLike[str],
+    *,
+    autopilot: Autopilot | None,
+    home_hint: Home | None = None,
+    otherwise: Autopilot | None = None,
+) -> MissionFileRead:
+    """Read a `.waypoints` or `.plan` file; its content decides which it is. The mission is named after the file.
+
+    ``autopilot`` None takes a `.plan`'s own; a `.waypoints` file names none, so there it must be given, or
+    ``otherwise`` be there for it, and the notes say so. ``home_hint`` is the home of a file that has none. Raises
+    InputError for everything that is wrong, with line or key.
+    """
+    file = Path(path)
+    where = str(path)
+    text = _text(file, where)
+    start = text.lstrip("\ufeff \t\r\n")[:40]
+    if start.startswith("{"):
+        read = parse_plan(text, autopilot=autopilot, where=where, home_hint=home_hint)
+    elif start.startswith("QGC") or file.suffix.lower() in (".waypoints", ".txt"):
+        taken = autopilot or otherwise
+        if taken is None:
+            raise InputError("a .waypoints file does not name its autopilot; say which it is", where=where)
+        read = parse_waypoints(text, autopilot=taken, where=where, home_hint=home_hint)
+        if autopilot is None:
+            words = f"a .waypoints file does not name its autopilot: it is taken to be for {taken} (--autopilot)"
+            read = replace(read, notes=(*read.notes, words))
+    else:
+        raise InputError(
+            "neither a .waypoints file (first line 'QGC WPL 110') nor a .plan file (a JSON object)", where=where
+        )
+    return replace(read, mission=replace(read.mission, name=file.stem))
+
+
+def _text(file: Path, where: str) -> str:
+    try:
+        regular = stat.S_ISREG(file.stat().st_mode)
+        with open(file if regular else os.devnull, "rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", where=where) from None
+    except ValueError:
+        raise InputError("not a file name", where=repr(where)) from None
+    # A pipe or a device could keep its reader waiting for ever.
+    if not regular:
+        raise InputError("a mission file is wanted, and this is not a regular file", where=where)
+    if len(data) > MAX_BYTES:
+        raise InputError(f"a mission file of more than {MAX_BYTES // 10**6} MB is not read", where=where)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"not a text file in UTF-8 (byte {error.start})", where=where) from None

@@ -1,0 +1,149 @@
+"""The fence and the rally points of a `.plan` file: JSON to wire items, and back.
+
+A circle is one item (5003 in, 5004 out: radius), a polygon one for each corner (5001 in, 5002 out: their number), a
+rally point one (5100). ``inclusion: false`` is a zone to stay out of. Fence points are in frame 0: an autopilot takes
+2 for none of them, and keeps no altitude.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from gcsplan.errors import InputError, Problem
+from gcsplan.mavlink.files.file_items import MAX_ITEMS, degrees_e7_of, float32_text, whole
+from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, MissionItem
+
+POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT, RALLY_POINT = 5001, 5002, 5003, 5004, 5100
+MAX_PROBLEMS = 20
+
+
+def json_number(value: float) -> float | int | None:
+    """A float32 as JSON has it: null for NaN, whole numbers without a point."""
+    if math.isnan(value):
+        return None
+    text = float32_text(value)
+    return int(text) if text.lstrip("-").isdigit() and text != "-0" else float(text)
+
+
+def json_float(value: object) -> float | None:
+    """A JSON number as float, NaN for null, None for anything else."""
+    if value is None:
+        return math.nan
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def fence_json(fence: Sequence[MissionItem]) -> dict[str, Any]:
+    """``geoFence`` of wire items. Raises InputError for a polygon that is not whole and for other commands."""
+    circles, polygons = [], []
+    rest = list(fence)
+    while rest:
+        first = rest[0]
+        if first.command in (CIRCLE_IN, CIRCLE_OUT):
+            shape = {"center": [first.lat_deg, first.lon_deg], "radius": json_number(first.params[0])}
+            circles.append({"circle": shape, "inclusion": first.command == CIRCLE_IN, "version": 1})
+            rest = rest[1:]
+            continue
+        count = whole(first.params[0], 3, len(rest))
+        if first.command not in (POLYGON_IN, POLYGON_OUT) or count is None:
+            raise InputError(f"a fence is made of whole polygons and circles, given command {first.command}")
+        corners = [[v.lat_deg, v.lon_deg] for v in rest[:count]]
+        polygons.append({"inclusion": first.command == POLYGON_IN, "polygon": corners, "version": 1})
+        rest = rest[count:]
+    return {"circles": circles, "polygons": polygons, "version": 2}
+
+
+def rally_json(rally: Sequence[MissionItem]) -> dict[str, Any]:
+    """``rallyPoints`` of wire items."""
+    return {"points": [[r.lat_deg, r.lon_deg, json_number(r.z)] for r in rally], "version": 2}
+
+
+def fence_items(fence: object, where: str, notes: list[str]) -> tuple[MissionItem, ...]:
+    """The wire items of a ``geoFence``; none where there is none. Raises InputError with every mistake found."""
+    if not isinstance(fence, dict):
+        return ()
+    problems: list[Problem] = []
+    items: list[MissionItem] = []
+    for kind in ("circles", "polygons"):
+        for index, entry in enumerate(_list(fence.get(kind), f"{where}.{kind}", problems)):
+            at = f"{where}.{kind}[{index}]"
+            inside = entry.get("inclusion") if isinstance(entry, dict) else None
+            if not isinstance(entry, dict) or not isinstance(inside, bool):
+                problems.append(Problem(at, "must be an object with inclusion true or false"))
+            elif kind == "circles":
+                items += _circle(entry.get("circle"), inside, at, problems)
+            else:
+                items += _polygon(entry.get("polygon"), inside, at, problems)
+            if len(problems) >= MAX_PROBLEMS:
+                raise InputError.of(problems)
+    if problems:
+        raise InputError.of(problems)
+    if fence.get("breachReturn") is not None:
+        notes.append("the file's fence has a breach return point, which was not read")
+    return tuple(items)
+
+
+def rally_items(rally: object, where: str) -> tuple[MissionItem, ...]:
+    """The wire items of ``rallyPoints``, [latitude, longitude, metres above home] each. Raises InputError."""
+    problems: list[Problem] = []
+    items: list[MissionItem] = []
+    points = _list(rally.get("points"), f"{where}.points", problems) if isinstance(rally, dict) else []
+    for index, point in enumerate(points):
+        at = f"{where}.points[{index}]"
+        place = _place(point[:2] if isinstance(point, list) and len(point) == 3 else None, at, problems)
+        height = json_float(point[2]) if isinstance(point, list) and len(point) == 3 else None
+        if place is not None and (height is None or not math.isfinite(height)):
+            problems.append(Problem(at, "a rally point is [latitude, longitude, altitude above home]"))
+        elif place is not None and height is not None:
+            items.append(MissionItem(RALLY_POINT, RELATIVE, (0.0, 0.0, 0.0, 0.0), *place, height))
+        if len(problems) >= MAX_PROBLEMS:
+            break
+    if problems:
+        raise InputError.of(problems)
+    return tuple(items)
+
+
+def _list(value: object, where: str, problems: list[Problem]) -> list[Any]:
+    if value is None:
+        return []
+    if not isinstance(value, list) or len(value) > MAX_ITEMS:
+        problems.append(Problem(where, f"must be a list of {MAX_ITEMS} entries at most"))
+        return []
+    return value
+
+
+def _place(value: object, where: str, problems: list[Problem]) -> tuple[int, int] | None:
+    numbers = [json_float(v) for v in value] if isinstance(value, list) and len(value) == 2 else []
+    good = [n for n in numbers if n is not None and math.isfinite(n)]
+    if len(good) != 2 or abs(good[0]) > 90.0 or abs(good[1]) > 180.0:
+        problems.append(Problem(where, f"must be [latitude, longitude] within ±90°, ±180°, given {str(value)[:60]}"))
+        return None
+    return degrees_e7_of(good[0]), degrees_e7_of(good[1])
+
+
+def _circle(value: object, inside: bool, where: str, problems: list[Problem]) -> list[MissionItem]:
+    circle = value if isinstance(value, dict) else {}
+    place = _place(circle.get("center"), f"{where}.circle.center", problems)
+    radius_m = json_float(circle.get("radius"))
+    if radius_m is None or not 0.0 < radius_m <= 1e7:
+        given = str(circle.get("radius"))[:40]
+        problems.append(Problem(f"{where}.circle.radius", f"must be metres above 0, given {given}"))
+        return []
+    command = CIRCLE_IN if inside else CIRCLE_OUT
+    return [MissionItem(command, GLOBAL, (radius_m, 0.0, 0.0, 0.0), *place)] if place is not None else []
+
+
+def _polygon(value: object, inside: bool, where: str, problems: list[Problem]) -> list[MissionItem]:
+    corners = _list(value, f"{where}.polygon", problems)
+    if len(corners) < 3:
+        problems.append(Problem(f"{where}.polygon", f"must have at least 3 corners, given {len(corners)}"))
+        return []
+    places = [_place(c, f"{where}.polygon[{i}]", problems) for i, c in enumerate(corners)]
+    command, count = POLYGON_IN if inside else POLYGON_OUT, float(len(corners))
+    return [MissionItem(command, GLOBAL, (count, 0.0, 0.0, 0.0), *p) for p in places if p is not None]

@@ -1,0 +1,335 @@
+"""`.plan` files (QGroundControl's JSON), written so that QGroundControl, MAVSDK and Mission Planner take them.
+
+For PX4 this is the file to load: it keeps home apart from the items and has a word (null) for NaN. Survey and corridor
+items are read as the simple items that QGroundControl stored inside them, landing patterns as those that it makes of
+them; other complex items are refused. ``doJumpId`` counts from 1 for every autopilot; a DO_JUMP names one.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from gcsplan.errors import InputError, Problem
+from gcsplan.mavlink.files.file_items import (
+    HAS_PLACE,
+    MAX_BYTES,
+    MAX_ITEMS,
+    MissionFileRead,
+    RawItem,
+    check_writable,
+    degrees_e7_of,
+    in_degrees,
+    jumps_from_file,
+    jumps_to_file,
+    read_item,
+    whole,
+)
+from gcsplan.mavlink.files.plan_fence import fence_items, fence_json, json_float, json_number, rally_items, rally_json
+from gcsplan.mavlink.files.plan_landing import LANDINGS, landing_entries
+from gcsplan.mavlink.mission.mission import (
+    DO_CHANGE_SPEED,
+    DO_JUMP,
+    FRAME_SYNONYMS,
+    GLOBAL,
+    RELATIVE,
+    TERRAIN,
+    Home,
+    Mission,
+    MissionItem,
+)
+from gcsplan.vehicle import Autopilot, Vehicle
+
+ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT
+FIXED_WING, QUADROTOR = 1, 2  # MAV_TYPE
+ROTARY_WINGS = frozenset({2, 3, 4, 13, 14, 15, 29, 35})  # MAV_TYPE: quad-, hexa-, octorotor, helicopter, …
+WINGED = frozenset({1, 19, 20, 21, 22, 23, 24, 25})  # fixed wing, and VTOLs, which ArduPlane flies
+ALTITUDE_MODE = {RELATIVE: 1, GLOBAL: 2, TERRAIN: 4}  # QGroundControl's AltMode; 0 is "mixed"
+MAX_PROBLEMS = 20
+
+
+def write_plan(
+    mission: Mission,
+    *,
+    vehicle: Vehicle | None = None,
+    fence: Sequence[MissionItem] = (),
+    rally: Sequence[MissionItem] = (),
+) -> str:
+    """The text of a `.plan` file; `read_plan` gives the same mission again.
+
+    ``vehicle`` gives the speeds that QGroundControl reckons with where the mission sets none. ``fence`` and ``rally``
+    are the wire items of the other two lists (5001 … 5004, 5100). Raises InputError for what the format cannot carry.
+    """
+    check_writable(mission, nan=True)
+    items = jumps_to_file(mission)
+    modes = {ALTITUDE_MODE[_frame(i)] for i in items if i.command in HAS_PLACE and _frame(i) in ALTITUDE_MODE}
+    speed_m_s = _speed_m_s(mission, vehicle)
+    winged = mission.autopilot is Autopilot.ARDUPLANE or (vehicle is not None and vehicle.turn_radius_m > 0)
+    home = mission.home
+    plan = {
+        "fileType": "Plan",
+        "geoFence": fence_json(fence),
+        "groundStation": "gcsplan",
+        "mission": {
+            "cruiseSpeed": json_number(speed_m_s) if speed_m_s else 15,
+            "firmwareType": ARDUPILOT if mission.autopilot.is_ardupilot else PX4,
+            "globalPlanAltitudeMode": modes.pop() if len(modes) == 1 else 0,
+            "hoverSpeed": json_number(speed_m_s) if speed_m_s else 5,
+            "items": [_item(item, number) for number, item in enumerate(items, start=1)],
+            "plannedHomePosition": [home.lat_e7 / 1e7, home.lon_e7 / 1e7, float(home.amsl_m)],
+            "vehicleType": FIXED_WING if winged else QUADROTOR,
+            "version": 2,
+        },
+        "rallyPoints": rally_json(rally),
+        "version": 1,
+    }
+    return json.dumps(plan, indent=2, allow_nan=False) + "\n"
+
+
+def _frame(item: MissionItem) -> int:
+    return FRAME_SYNONYMS.get(item.frame, item.frame)
+
+
+def _speed_m_s(mission: Mission, vehicle: Vehicle | None) -> float | None:
+    for item in mission.items:
+        if item.command == DO_CHANGE_SPEED and item.params[0] in (0.0, 1.0) and item.params[1] > 0:
+            return item.params[1]
+    return vehicle.speed_max_m_s if vehicle is not None else None
+
+
+def _item(item: MissionItem, number: int) -> dict[str, Any]:
+    placed = in_degrees(item.command, item.frame)
+    x, y = (item.lat_deg, item.lon_deg) if placed else (int(item.x), int(item.y))
+    out: dict[str, Any] = {}
+    if item.command in HAS_PLACE and placed:
+        out["AMSLAltAboveTerrain"] = None
+        out["Altitude"] = json_number(item.z)
+        out["AltitudeMode"] = ALTITUDE_MODE[_frame(item)]
+    out["autoContinue"] = bool(item.autocontinue)
+    out["command"] = item.command
+    out["doJumpId"] = number
+    out["frame"] = _frame(item)
+    out["params"] = [*map(json_number, item.params), x, y, json_number(item.z)]
+    out["type"] = "SimpleItem"
+    return out
+
+
+def read_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint: Home | None = None) -> Mission:
+    """The mission in ``text``; see `parse_plan`."""
+    return parse_plan(text, autopilot=autopilot, where=where, home_hint=home_hint).mission
+
+
+def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint: Home | None = None) -> MissionFileRead:
+    """The mission in ``text`` and what is to be said of it.
+
+    ``autopilot`` None takes the file's own; one that differs from the file's is an InputError. ``home_hint`` is the
+    home of a file without one. Raises InputError with every mistake found (the first twenty), each with its key.
+    """
+    if len(text) > MAX_BYTES:
+        raise InputError(f"a mission file of more than {MAX_BYTES // 10**6} MB is not read", where=where)
+    plan = _json(text.removeprefix("\ufeff"), where)
+    if not isinstance(plan, dict) or plan.get("fileType", "Plan") not in ("Plan", None):
+        raise InputError("a .plan file is a JSON object with fileType 'Plan', and this is none", where=where)
+    # Mission Planner writes its .mission files in this form with mission version 0 and no item types.
+    theirs = plan.get("groundStation") == "MissionPlanner"
+    mission = plan.get("mission")
+    if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
+        raise InputError("there must be a mission with a list of items", where=f"{where}: mission.items")
+    for key, given, want in (("version", plan.get("version"), 1), ("mission.version", mission.get("version"), 2)):
+        if given != want and not (theirs and given in (0, None)):
+            raise InputError(
+                f"must be {want}, given {str(given)[:40]}; open the file in QGroundControl and save it again",
+                where=f"{where}: {key}",
+            )
+    notes: list[str] = []
+    pilot = _autopilot(mission, autopilot, where, notes)
+    home = _home(mission.get("plannedHomePosition"), home_hint, f"{where}: mission.plannedHomePosition", notes)
+    found = _Items(pilot, where, notes, typeless=theirs)
+    for index, entry in enumerate(mission["items"]):
+        found.add(entry, f"mission.items[{index}]")
+    items = found.finish()
+    fence = fence_items(plan.get("geoFence"), f"{where}: geoFence", notes)
+    rally = rally_items(plan.get("rallyPoints"), f"{where}: rallyPoints")
+    for key, own in (("geoFence", fence), ("rallyPoints", rally)):
+        if own:
+            notes.append(f"the file's {key} ({len(own)} items) is no part of the mission and is not sent with it")
+    return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally)
+
+
+def _json(text: str, where: str) -> Any:
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        made = dict(pairs)
+        if len(made) != len(pairs):
+            raise InputError("a key stands twice in one object, so it is not clear which one counts", where=where)
+        return made
+
+    def refuse(word: str) -> NoReturn:
+        raise InputError(f"{word} is no JSON; a value that is not given is null", where=where)
+
+    try:
+        return json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
+    except json.JSONDecodeError as error:
+        raise InputError(f"not JSON: {error.msg} (column {error.colno})", where=f"{where}:{error.lineno}") from None
+    except RecursionError:
+        raise InputError("nested too deep to be a mission", where=where) from None
+    except InputError:
+        raise
+    except ValueError:  # an integer of thousands of digits
+        raise InputError("not JSON that a mission can have: a number is too long", where=where) from None
+
+
+def _autopilot(mission: dict[str, Any], given: Autopilot | None, where: str, notes: list[str]) -> Autopilot:
+    firmware, kind = mission.get("firmwareType"), mission.get("vehicleType")
+    if firmware == PX4:
+        stated: Autopilot | None = Autopilot.PX4
+    elif firmware == ARDUPILOT and isinstance(kind, int) and kind in WINGED:
+        stated = Autopilot.ARDUPLANE
+    elif firmware == ARDUPILOT and (kind in (None, 0) or (isinstance(kind, int) and kind in ROTARY_WINGS)):
+        stated = Autopilot.ARDUCOPTER
+        if kind in (None, 0) and given is Autopilot.ARDUPLANE:
+            stated = given
+    elif firmware in (None, 0):
+        stated = None
+    else:
+        raise InputError(
+            f"firmwareType {str(firmware)[:40]} with vehicleType {str(kind)[:40]} is not one that gcsplan knows "
+            f"(3 ArduPilot with a copter or plane, 12 PX4)",
+            where=f"{where}: mission.firmwareType",
+        )
+    if stated is None and given is None:
+        raise InputError("the file does not say for which autopilot it is", where=f"{where}: mission.firmwareType")
+    if stated is None:
+        notes.append(f"the file does not say for which autopilot it is: it was read for {given}")
+    elif given is not None and given is not stated:
+        raise InputError(
+            f"the file is for {stated}, and {given} was wanted; use the file made for it, or change the vehicle",
+            where=f"{where}: mission.firmwareType",
+        )
+    return given or stated  # type: ignore[return-value]  # one of them is there
+
+
+def _home(value: object, hint: Home | None, place: str, notes: list[str]) -> Home:
+    numbers = [json_float(v) for v in value] if isinstance(value, list) and len(value) == 3 else None
+    good = numbers is not None and all(n is not None and math.isfinite(n) for n in numbers)
+    if value is None or (numbers is not None and any(n is not None and math.isnan(n) for n in numbers)):
+        if hint is None:
+            raise InputError("home must be given as [latitude, longitude, AMSL]", where=place)
+        notes.append("the file has no home: the mission's own home was taken")
+        return hint
+    if not good or numbers is None:
+        raise InputError(f"home must be [latitude, longitude, AMSL], given {str(value)[:60]}", where=place)
+    lat, lon, amsl = (float(n) for n in numbers if n is not None)
+    if abs(lat) > 90.0 or abs(lon) > 180.0:
+        raise InputError(f"home must lie within ±90°, ±180°, given {lat:g}, {lon:g}", where=place)
+    if lat == lon == 0.0 and hint is not None:
+        notes.append("the file's home holds no place (0, 0): the mission's own home was taken")
+        return hint
+    return Home(degrees_e7_of(lat), degrees_e7_of(lon), amsl)
+
+
+class _Items:
+    """Collects the simple items of a plan, and what is wrong with them."""
+
+    def __init__(self, autopilot: Autopilot, where: str, notes: list[str], *, typeless: bool) -> None:
+        self.autopilot, self.where, self.notes, self.typeless = autopilot, where, notes, typeless
+        self.items: list[MissionItem] = []
+        self.index_of: dict[int, int] = {}
+        self.twice: set[int] = set()
+        self.problems: list[Problem] = []
+        self.count = 0
+
+    def finish(self) -> tuple[MissionItem, ...]:
+        if self.twice and any(item.command == DO_JUMP for item in self.items):
+            bad = f"doJumpId {min(self.twice)} stands twice, so it is not clear where a DO_JUMP leads"
+            self.problems.append(Problem(f"{self.where}: mission.items", bad))
+        self._raise()
+        first_seq = 1 if self.autopilot.is_ardupilot else 0
+        return jumps_from_file(self.items, self.index_of, first_seq, self.where)
+
+    def _raise(self) -> None:
+        if self.problems:
+            many = len(self.problems) > 1
+            raise InputError.of(self.problems, headline=f"{self.where} is damaged" if many else "")
+
+    def _bad(self, key: str, message: str) -> None:
+        self.problems.append(Problem(f"{self.where}: {key}", message))
+        if len(self.problems) >= MAX_PROBLEMS:
+            self._raise()
+
+    def add(self, entry: object, key: str) -> None:
+        kind = entry.get("type") if isinstance(entry, dict) else None
+        if not isinstance(entry, dict):
+            self._bad(key, "a mission item must be an object")
+        elif kind == "SimpleItem" or (kind is None and self.typeless):
+            self._simple(entry, key)
+        elif kind == "ComplexItem":
+            self._complex(entry, key)
+        else:
+            self._bad(f"{key}.type", f"must be SimpleItem or ComplexItem, given {str(kind)[:40]!r}")
+
+    def _complex(self, entry: dict[str, Any], key: str) -> None:
+        style = entry.get("TransectStyleComplexItem")
+        inner = style.get("Items") if isinstance(style, dict) else None
+        name = str(entry.get("complexItemType"))[:40]
+        where = f"{key}.TransectStyleComplexItem.Items"
+        if name in LANDINGS:
+            inner, where = landing_entries(entry), key
+        if not isinstance(inner, list) or not inner:
+            self._bad(key, f"a complex item ({name}) without its single items cannot be read; make it of way points")
+            return
+        how = "stands for" if where == key else "holds"
+        self.notes.append(f"{key} is a {name}: it was read as the {len(inner)} items that it {how}")
+        for index, part in enumerate(inner):
+            place = f"{where}[{index}]"
+            if not isinstance(part, dict) or part.get("type") != "SimpleItem":
+                self._bad(place, "must be a SimpleItem")
+            else:
+                self._simple(part, place)
+
+    def _simple(self, entry: dict[str, Any], key: str) -> None:
+        self.count += 1
+        if self.count > MAX_ITEMS:
+            self._bad(key, f"a mission of more than {MAX_ITEMS} items is not read")
+            self._raise()
+        given = entry.get("params")
+        params = [json_float(p) for p in given] if isinstance(given, list) and len(given) == 7 else []
+        command, frame = json_float(entry.get("command")), json_float(entry.get("frame"))
+        goes_on = entry.get("autoContinue")
+        if len(params) != 7 or None in params:
+            self._bad(f"{key}.params", "must be seven numbers (null where none is given)")
+        elif command is None or frame is None:
+            self._bad(key, "command and frame must be numbers")
+        elif not isinstance(goes_on, bool):
+            self._bad(f"{key}.autoContinue", f"must be true or false, given {str(goes_on)[:40]}")
+        else:
+            p1, p2, p3, p4, x, y, z = (math.nan if p is None else p for p in params)
+            x, y = self._unset(command, frame, x, y, key)
+            item = read_item(
+                RawItem(command, frame, (p1, p2, p3, p4), x, y, z, goes_on), self.problems, f"{self.where}: {key}"
+            )
+            if item is not None:
+                self._number(entry.get("doJumpId"))
+                self.items.append(item)
+        if len(self.problems) >= MAX_PROBLEMS:
+            self._raise()
+
+    def _number(self, jump_id: object) -> None:
+        number = whole(json_float(jump_id) or math.nan, 1, 2**31) if jump_id is not None else None
+        if number is None:
+            return
+        if number in self.index_of:
+            self.twice.add(number)
+        self.index_of.setdefault(number, len(self.items))
+
+    def _unset(self, command: float, frame: float, x: float, y: float, key: str) -> tuple[float, float]:
+        if not (math.isnan(x) or math.isnan(y)):
+            return x, y
+        placed = command in HAS_PLACE and in_degrees(int(command), whole(frame, 0, 255) or GLOBAL)
+        if placed and (self.autopilot is Autopilot.PX4 or not (math.isnan(x) and math.isnan(y))):
+            self._bad(f"{key}.params", f"command {command:g} needs a latitude and a longitude, and they are null")
+            return 0.0, 0.0
+        if placed:
+            self.notes.append(f"{key} has no place: it was read as 0, 0, which ArduPilot takes for 'here'")
+        return (0.0 if math.isnan(x) else x), (0.0 if math.isnan(y) else y)

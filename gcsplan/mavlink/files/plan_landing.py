@@ -1,0 +1,58 @@
+"""QGroundControl's landing patterns: a complex item of a `.plan` as the simple items that are sent for it.
+
+As QGroundControl makes them (LandingComplexItem.cc, `appendMissionItems`): DO_LAND_START, a speed and the end of photos
+and video where they are asked for, the final approach (LOITER_TO_ALT, or a way point), and the landing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gcsplan.mavlink.mission.mission import (
+    DO_CHANGE_SPEED,
+    GLOBAL,
+    LAND,
+    NO_POSITION,
+    RELATIVE,
+    VTOL_LAND,
+    WAYPOINT,
+)
+
+LANDINGS = {"fwLandingPattern": LAND, "vtolLandingPattern": VTOL_LAND}
+DO_LAND_START, LOITER_TO_ALT, CAMERA_TRIGGER, STOP_PHOTOS, STOP_VIDEO = 189, 31, 206, 2001, 2501
+
+
+def landing_entries(entry: dict[str, Any]) -> list[dict[str, Any]] | None:
+    """The simple items, as a plan has them, of a landing pattern; None where its places are missing."""
+    land = entry.get("landCoordinate")
+    approach = entry.get("landingApproachCoordinate", entry.get("loiterCoordinate"))
+    if not (isinstance(land, list) and isinstance(approach, list) and len(land) == len(approach) == 3):
+        return None
+    both = entry.get("altitudesAreRelative")
+    frames = [
+        RELATIVE if (both if isinstance(both, bool) else entry.get(key, True)) else GLOBAL
+        for key in ("loiterAltitudeRelative", "landingAltitudeRelative")
+    ]
+    radius = entry.get("loiterRadius", 0)
+    turn = radius if entry.get("loiterClockwise", True) or not isinstance(radius, int | float) else -radius
+    items = [_entry(DO_LAND_START, NO_POSITION)]
+    if entry.get("useDoChangeSpeed"):
+        items.append(_entry(DO_CHANGE_SPEED, NO_POSITION, 1, entry.get("finalApproachSpeed", 0), -1))
+    if entry.get("stopTakingPhotos"):
+        items += [_entry(CAMERA_TRIGGER, NO_POSITION), _entry(STOP_PHOTOS, NO_POSITION)]
+    if entry.get("stopVideoPhotos"):
+        items.append(_entry(STOP_VIDEO, NO_POSITION))
+    if entry.get("useLoiterToAlt", True):
+        items.append(_entry(LOITER_TO_ALT, frames[0], 1, turn, 0, 1, at=approach))
+    else:
+        items.append(_entry(WAYPOINT, frames[0], at=approach))
+    items.append(_entry(LANDINGS[str(entry.get("complexItemType"))], frames[1], at=land))
+    return items
+
+
+def _entry(command: int, frame: int, *params: Any, at: list[Any] | None = None) -> dict[str, Any]:
+    numbers = [*params, 0, 0, 0, 0][:4]
+    return {
+        "type": "SimpleItem", "autoContinue": True, "command": command, "frame": frame,
+        "params": [*numbers, *(at or (0, 0, 0))],
+    }  # fmt: skip

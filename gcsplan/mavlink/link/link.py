@@ -1,0 +1,328 @@
+"""A link: one socket or serial port, the vehicles behind it, and the clock. The only place where time is read.
+
+Frames are routed by (system id, component id); every system is answered at the address where it was heard, and where a
+channel has pinned its vehicle's address, there alone. `pump` runs any number of tasks on any number of links in one
+thread: a fleet takes as long as its slowest vehicle. A task is a generator that yields the time until which it may
+sleep, and is woken before that by what its vehicle sends. What goes wrong in one task, of whatever kind, ends it alone.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.errors import GcsplanError
+from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey
+from gcsplan.mavlink.link.prompt import Prepared, PromptAnswers
+from gcsplan.mavlink.link.transport import Clock, Peer, Transport, Udp, open_transport, wait_readable
+from gcsplan.mavlink.link.url import Endpoint, parse_url
+from gcsplan.mavlink.protocol import wire
+from gcsplan.mavlink.protocol.messages import Address, Packet
+
+_log = logging.getLogger(__name__)
+T = TypeVar("T")
+Steps = Generator[float, None, T]
+
+GCS = Address(255, 190)
+"""System and component id that ground stations use (MAV_COMP_ID_MISSIONPLANNER)."""
+
+_MOST_PEERS = 260  # a system id each, and some strangers
+_MOST_WAITING = 4096
+_FORGET_S = 10.0
+_IDLE_S = 0.1  # a machine hears of prompt answers, and progress is shown, at least so often
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """One message: who sent it (ids and address), and the pymavlink message itself.
+
+    ``late``: rightly signed, but not newer than what was heard before. It counts for nothing, and may count against
+    who speaks.
+    """
+
+    source: Address
+    peer: Peer
+    message: Any
+    late: bool = False
+
+
+class Channel:
+    """What one system says on a link: an inbox, bounded, and a way to answer.
+
+    Not in the inbox are requests that were answered on the spot: their seqs are in ``prepared.asked``.
+    """
+
+    def __init__(self, link: Link, sysid: int) -> None:
+        self.link = link
+        self.sysid = sysid
+        self.inbox: deque[Heard] = deque(maxlen=_MOST_WAITING)
+        self.prepared: Prepared | None = None
+        self.peer: Peer | None = None
+
+    def pin(self, peer: Peer | None) -> None:
+        """Answer at ``peer`` from now on, whoever else speaks under the same system id."""
+        self.peer = peer
+
+    @property
+    def waits(self) -> bool:
+        """Whether there is something to take, or to take note of."""
+        return bool(self.inbox or (self.prepared and self.prepared.asked))
+
+    def take(self) -> Iterable[Heard]:
+        """Everything that has come since the last time."""
+        while self.inbox:
+            yield self.inbox.popleft()
+
+    def send(self, message: Any, to: Address) -> bool:
+        """Send a pymavlink message."""
+        return self.link.send(message, to) if self.peer is None else self.link.send(message, to, self.peer)
+
+    def send_packets(self, packets: Iterable[Packet]) -> None:
+        """Send mission messages."""
+        for packet in packets:
+            self.send(wire.encode(packet.message, packet.target), packet.target)
+
+
+class Link:
+    """An open link. Use it as a context manager, or `close` it.
+
+    ``us`` are our own ids; with ``key`` every frame is signed and unsigned ones are dropped; ``heartbeat_s`` is the
+    interval of our ground-station heartbeat, None for none. ``clock``, ``transport`` and ``wait`` can be had from
+    elsewhere, for simulated time, and so can ``signing``. Raises InputError for a bad URL, LinkError if it does
+    not open.
+    """
+
+    def __init__(
+        self,
+        endpoint: Endpoint | str,
+        *,
+        us: Address = GCS,
+        key: SigningKey | None = None,
+        heartbeat_s: float | None = 1.0,
+        clock: Clock = time.monotonic,
+        transport: Transport | None = None,
+        wait: Callable[[Sequence[Transport], float], None] = wait_readable,
+        signing: Signing | None = None,
+    ) -> None:
+        self.endpoint = parse_url(endpoint) if isinstance(endpoint, str) else endpoint
+        self.us = us
+        self.clock = clock
+        self._signing = signing or Signing(key)
+        self._writer = FrameWriter(us, self._signing)
+        self._parsers: dict[Peer, FrameParser] = {}
+        self._heard_at: dict[Peer, float] = {}
+        self._routes: dict[Address | int, Peer] = {}
+        self._channels: dict[int, list[Channel]] = {}
+        self._heartbeat_s = heartbeat_s
+        self._next_heartbeat = clock()
+        self._bad = self._unsigned = 0
+        self.heard_systems: dict[int, float] = {}
+        self.transport: Transport = transport or open_transport(self.endpoint)
+        self.wait = wait
+        self.prompt = PromptAnswers(self._writer, possible=isinstance(self.transport, Udp))
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the socket or port."""
+        self.transport.close()
+
+    @property
+    def url(self) -> str:
+        """The link's URL in pymavlink's way."""
+        return self.endpoint.url
+
+    @property
+    def place(self) -> str:
+        """The address really used; tells the port if a free one was asked for."""
+        return self.transport.place
+
+    @property
+    def garbage(self) -> int:
+        """Frames that did not check."""
+        return self._bad + sum(parser.bad for parser in self._parsers.values())
+
+    @property
+    def unsigned(self) -> int:
+        """Frames that were dropped because their signature is missing or wrong."""
+        return self._unsigned + sum(parser.unsigned for parser in self._parsers.values())
+
+    def channel(self, sysid: int) -> Channel:
+        """A new inbox for one system id; `drop` it when done."""
+        channel = Channel(self, sysid)
+        self._channels.setdefault(sysid, []).append(channel)
+        return channel
+
+    def drop(self, channel: Channel) -> None:
+        """Forget ``channel``."""
+        mine = self._channels.get(channel.sysid, [])
+        if channel in mine:
+            mine.remove(channel)
+
+    def knows(self, to: Address) -> bool:
+        """Whether there is an address to send to."""
+        return self._peer(to) is not None
+
+    def send(self, message: Any, to: Address, peer: Peer | None = None) -> bool:
+        """Send a pymavlink message to ``peer``, by default where ``to`` was heard; False where nobody knows the way.
+
+        sysid 0 is everybody.
+        """
+        if to.sysid == 0:
+            peers = [p for p in dict.fromkeys((*self._heard_at, self.transport.default)) if p is not None]
+            frame = self._writer.pack(message)
+            for each in peers:
+                self.transport.write(frame, each)
+            return bool(peers)
+        peer = self._peer(to) if peer is None else peer
+        if peer is None:
+            return False
+        self.transport.write(self._writer.pack(message), peer)
+        return True
+
+    def poll(self) -> None:
+        """Read what is there into the inboxes, and send our heartbeat if it is due."""
+        now = self.clock()
+        for peer, data in self.transport.read():
+            self._take_in(peer, data, now)
+        self._beat(now)
+
+    def answer(self, until: float) -> bool:
+        """Instead of `poll`: give prompt answers until ``until``, or a short silence, or something else comes.
+
+        Whether anything came. A link that has no answers ready says no at once.
+        """
+        if not self.prompt or not isinstance(self.transport, Udp):
+            return False
+        rest = self.transport.exchange(self.prompt, until, self.clock)
+        now, answered = self.clock(), self.prompt.answered()
+        self._heard_at.update((peer, now) for peer in answered & self._heard_at.keys())
+        for peer, data in rest:
+            self._take_in(peer, data, now)
+        self._beat(now)
+        return bool(rest or answered)
+
+    def _take_in(self, peer: Peer, data: bytes, now: float) -> None:
+        for message in self._parser(peer, now).feed(data, datagram=self.transport.datagrams):
+            self._route(peer, message, now)
+
+    @property
+    def next_heartbeat(self) -> float:
+        """When our next heartbeat is due; infinity without one."""
+        return self._next_heartbeat if self._heartbeat_s else float("inf")
+
+    def _peer(self, to: Address) -> Peer | None:
+        return self._routes.get(to) or self._routes.get(to.sysid) or self.transport.default
+
+    def _parser(self, peer: Peer, now: float) -> FrameParser:
+        parser = self._parsers.get(peer)
+        if parser is None:
+            if len(self._parsers) >= _MOST_PEERS:
+                self._forget(min(self._heard_at, key=lambda p: self._heard_at[p]))
+            parser = self._parsers[peer] = FrameParser(self._signing)
+        self._heard_at[peer] = now
+        return parser
+
+    def _forget(self, peer: Peer) -> None:
+        parser = self._parsers.pop(peer)
+        self._bad, self._unsigned = self._bad + parser.bad, self._unsigned + parser.unsigned
+        self._heard_at.pop(peer, None)
+        self._routes = {to: where for to, where in self._routes.items() if where != peer}
+
+    def _route(self, peer: Peer, message: Any, now: float) -> None:
+        source = Address(message.get_srcSystem(), message.get_srcComponent())
+        if source == self.us:
+            return  # our own voice, from a hub
+        if not message.late:
+            self._routes[source] = peer
+            self._routes[source.sysid] = peer
+            self.heard_systems[source.sysid] = now
+        for channel in self._channels.get(source.sysid, ()):
+            channel.inbox.append(Heard(source, peer, message, message.late))
+
+    def _beat(self, now: float) -> None:
+        if not self._heartbeat_s or now < self._next_heartbeat:
+            return
+        self._next_heartbeat = now + self._heartbeat_s
+        for peer in [p for p, at in self._heard_at.items() if now - at > _FORGET_S]:
+            self._forget(peer)
+        gcs = dialect.MAV_TYPE_GCS
+        self.send(
+            dialect.MAVLink_heartbeat_message(gcs, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3),
+            Address(0, 0),
+        )
+
+
+class Job(Generic[T]):
+    """One task of `pump` with its result or error."""
+
+    def __init__(self, channel: Channel, steps: Steps[T]) -> None:
+        self.channel = channel
+        self.result: T | None = None
+        self.error: GcsplanError | None = None
+        self.ended = False
+        self.wake_at = float("-inf")
+        self._steps = steps
+
+    def advance(self) -> None:
+        """Run to the next pause."""
+        try:
+            self.wake_at = next(self._steps)
+        except StopIteration as stop:
+            self.result, self.ended = stop.value, True
+        except GcsplanError as error:
+            self.error, self.ended = error, True
+        except Exception as error:  # a bug: the other vehicles' tasks have nothing to do with it
+            _log.exception("a task for system %d failed", self.channel.sysid)
+            words = f"internal error, a bug in gcsplan: {type(error).__name__}: {error}; what is on board is not known"
+            self.error, self.ended = GcsplanError(words, where=f"vehicle {self.channel.sysid}"), True
+
+    def close(self) -> None:
+        """End it early; its machine says goodbye to the vehicle."""
+        self._steps.close()
+
+
+def pump(jobs: Sequence[Job[T]]) -> None:
+    """Run all ``jobs`` to their ends, together. Errors stay with their job."""
+    if not jobs:
+        return
+    links = list({id(job.channel.link): job.channel.link for job in jobs}.values())
+    clock = links[0].clock
+    try:
+        while True:
+            now = clock()
+            for job in jobs:
+                if not job.ended and (job.channel.waits or now >= job.wake_at):
+                    job.advance()
+            waiting = [job.wake_at for job in jobs if not job.ended]
+            if not waiting:
+                return
+            due = min(*waiting, *(link.next_heartbeat for link in links), clock() + _IDLE_S)
+            if len(links) == 1 and links[0].answer(due):
+                continue
+            links[0].wait([link.transport for link in links], due - clock())
+            for link in links:
+                link.poll()
+    finally:
+        for job in jobs:
+            job.close()
+
+
+def run(channel: Channel, steps: Steps[T]) -> T:
+    """Run one task to its end and return its result; raises what it raises."""
+    job = Job(channel, steps)
+    pump([job])
+    if job.error is not None:
+        raise job.error
+    result: T = job.result  # type: ignore[assignment]
+    return result

@@ -1,0 +1,178 @@
+"""Failsafe, return, fence and corner parameters: which are read, and what they mean for a mission. Never written."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.mavlink.link.numbers import finite, whole
+from gcsplan.mavlink.link.preflight import distance_m
+from gcsplan.mavlink.mission.autopilots import PX4, manner
+from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
+from gcsplan.vehicle import Autopilot
+
+Values = Mapping[str, float]
+
+_COPTER = (
+    ("RTL_ALT", "RTL_ALT_M"),  # cm; renamed and in metres since 4.7
+    ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",),
+    ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",),
+    ("WPNAV_RADIUS", "WP_RADIUS_M"),  # cm; renamed and in metres since 4.7
+)  # fmt: skip
+_PLANE = (
+    ("RTL_ALTITUDE", "ALT_HOLD_RTL"),  # metres since 4.5; before that ALT_HOLD_RTL in cm
+    ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",),
+    ("THR_FAILSAFE",), ("FS_LONG_ACTN",), ("FS_GCS_ENABL",), ("BATT_FS_LOW_ACT",),
+    ("WP_RADIUS",), ("NAVL1_PERIOD",), ("NAVL1_DAMPING",),
+)  # fmt: skip
+_PX4 = (
+    ("RTL_RETURN_ALT",), ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
+    ("NAV_RCL_ACT",), ("NAV_DLL_ACT",), ("COM_LOW_BAT_ACT",), ("NAV_ACC_RAD",), ("NAV_MC_ALT_RAD",),
+)  # fmt: skip
+GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
+    Autopilot.ARDUCOPTER: _COPTER, Autopilot.ARDUPLANE: _PLANE, Autopilot.PX4: _PX4,
+}  # fmt: skip
+"""What is read of each autopilot. Names in one group are one parameter in different versions."""
+
+FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
+    Autopilot.ARDUCOPTER: (("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ACTION",)),
+    Autopilot.ARDUPLANE: (("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ACTION",)),
+    Autopilot.PX4: (("GF_ACTION",),),
+}
+"""What is read when a fence is sent."""
+
+_RETURN_ALTITUDE = {"RTL_ALT": 0.01, "RTL_ALT_M": 1.0, "ALT_HOLD_RTL": 0.01, "RTL_ALTITUDE": 1.0, "RTL_RETURN_ALT": 1.0}
+_FAILSAFES = {
+    "FS_THR_ENABLE": "loss of radio control", "THR_FAILSAFE": "loss of radio control",
+    "NAV_RCL_ACT": "loss of radio control", "FS_GCS_ENABLE": "loss of the ground station",
+    "FS_GCS_ENABL": "loss of the ground station", "NAV_DLL_ACT": "loss of the ground station",
+    "BATT_FS_LOW_ACT": "a low battery", "COM_LOW_BAT_ACT": "a low battery",
+}  # fmt: skip
+_ALTITUDE_FENCE, _CIRCLE_FENCE, _POLYGON_FENCE = 1, 2, 4  # bits of FENCE_TYPE; the circle is that around home
+_SAME_M = 0.5
+
+
+def decode_value(message: Any, mav_autopilot: int) -> float:
+    """The number in a PARAM_VALUE: ArduPilot casts to float, PX4 puts an integer's bytes in the float's place.
+
+    NaN where it holds none: NaN itself, infinity, a float that no float32 holds.
+    """
+    integer = message.param_type <= dialect.MAV_PARAM_TYPE_INT32
+    try:
+        if mav_autopilot == PX4 and integer:
+            return float(struct.unpack("<i", struct.pack("<f", message.param_value))[0])
+    except (struct.error, OverflowError):
+        return math.nan
+    value = finite(message.param_value)
+    return math.nan if value is None else value
+
+
+def parameter_name(message: Any) -> str:
+    """The name in a PARAM_VALUE."""
+    name = message.param_id
+    return name if isinstance(name, str) else bytes(name).split(b"\0")[0].decode(errors="replace")
+
+
+@dataclass(frozen=True, slots=True)
+class _Extent:
+    top_rel_home_m: float
+    reach_m: float
+
+
+def judge_parameters(
+    values: Values, mission: Mission, *, rtl_rel_home_m: float | None = None, expected: Values | None = None
+) -> list[str]:
+    """What of ``values`` does not fit ``mission``, in words; nothing is changed on board.
+
+    ``rtl_rel_home_m``: the return altitude that the mission was checked with. ``expected``: what the user wants
+    parameters to be, by name.
+    """
+    label = manner(mission.autopilot).label
+    if not values:
+        return [f"no parameters could be read: failsafe, return and fence settings of {label} were not compared"]
+    values, odd = _numbers(values)
+    found = odd + [
+        f"{name} is {values[name]:g} on board, {want:g} is expected"
+        for name, want in (expected or {}).items()
+        if name in values and not math.isclose(values[name], want, rel_tol=1e-6, abs_tol=1e-6)
+    ]
+    found += [f"{name} could not be read, {want:g} is expected" for name, want in (expected or {}).items()
+              if name not in values]  # fmt: skip
+    found += _return_altitude(values, rtl_rel_home_m)
+    found += _fences(values, _extent(mission))
+    off = [f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0]
+    if off:
+        found.append("no failsafe action on board for " + ", ".join(off))
+    return found
+
+
+def judge_fence_parameters(values: Values) -> list[str]:
+    """Whether a fence that is sent will be enforced, in words; nothing is changed on board."""
+    if not values:
+        return ["no parameters could be read: whether the fence is enforced is not known"]
+    values, found = _numbers(values)
+    if values.get("FENCE_ENABLE") == 0:
+        found.append("FENCE_ENABLE is 0 on board: the fence is kept and not enforced until it is enabled")
+    kinds = values.get("FENCE_TYPE")
+    if kinds is not None and not _bits(kinds) & _POLYGON_FENCE:
+        found.append(f"FENCE_TYPE is {kinds:g} on board: polygons and circles (4) are not among the fences in force")
+    if values.get("FENCE_ACTION") == 0 or values.get("GF_ACTION") == 0:
+        found.append("the fence's action on board is none: a breach is only reported")
+    return found
+
+
+def _numbers(values: Values) -> tuple[Values, list[str]]:
+    """Those of ``values`` that are numbers, and a line for each that is none."""
+    good = {name: value for name, value in values.items() if math.isfinite(value)}
+    return good, [f"{name} on board is no number: it was not compared" for name in values if name not in good]
+
+
+def _bits(value: float) -> int:
+    """A set of bits that came as a float; what is none has no bit set."""
+    return whole(value, 0, 2**31 - 1) or 0
+
+
+def _return_altitude(values: Values, wanted_m: float | None) -> list[str]:
+    name = next((n for n in _RETURN_ALTITUDE if n in values), None)
+    if name is None:
+        return [] if wanted_m is None else ["the return altitude on board could not be read"]
+    height_m = values[name] * _RETURN_ALTITUDE[name]
+    if wanted_m is None:
+        return [f"after a failsafe it returns at {height_m:g} m above home ({name}); that way was not checked"]
+    if abs(height_m - wanted_m) > _SAME_M:
+        return [f"it returns at {height_m:g} m above home ({name}); the return was checked at {wanted_m:g} m"]
+    return []
+
+
+def _fences(values: Values, extent: _Extent) -> list[str]:
+    kinds = _bits(values.get("FENCE_TYPE", 0.0)) if values.get("FENCE_ENABLE", 0) else 0
+    px4 = bool(values.get("GF_ACTION", 0))
+    limits = [
+        ("FENCE_ALT_MAX", bool(kinds & _ALTITUDE_FENCE), "high", extent.top_rel_home_m),
+        ("FENCE_RADIUS", bool(kinds & _CIRCLE_FENCE), "far", extent.reach_m),
+        ("GF_MAX_VER_DIST", px4 and values.get("GF_MAX_VER_DIST", 0) > 0, "high", extent.top_rel_home_m),
+        ("GF_MAX_HOR_DIST", px4 and values.get("GF_MAX_HOR_DIST", 0) > 0, "far", extent.reach_m),
+    ]
+    return [
+        f"the mission goes {reach:.0f} m {way} and the fence on board ends at {values[name]:g} m ({name})"
+        for name, on, way, reach in limits
+        if on and name in values and reach > values[name]
+    ]
+
+
+def _extent(mission: Mission) -> _Extent:
+    home = mission.home
+    top = reach = 0.0
+    for item in mission.items:
+        if item.x or item.y:
+            reach = max(reach, distance_m(home.lat_e7 / 1e7, home.lon_e7 / 1e7, item.lat_deg, item.lon_deg))
+            if item.frame in (RELATIVE, 6):
+                top = max(top, item.z)
+            elif item.frame in (GLOBAL, 5):
+                top = max(top, item.z - home.amsl_m)
+    return _Extent(top, reach)

@@ -1,0 +1,199 @@
+"""May this mission go to this vehicle, as it stands there now? All reasons against it at once, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from gcsplan.errors import VehicleRefused
+from gcsplan.mavlink.link.watch import (
+    CAN_FENCE,
+    CAN_MISSION_INT,
+    CAN_RALLY,
+    CAN_TERRAIN,
+    CRITICAL,
+    EMERGENCY,
+    POWEROFF,
+    STANDBY,
+    STATE_WORDS,
+    UNINIT,
+    VehicleState,
+)
+from gcsplan.mavlink.mission.autopilots import is_generic, manner, max_items, type_name
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, TERRAIN, Home, MissionItem
+from gcsplan.vehicle import Autopilot
+
+NEAR_START_M = 30.0
+NEAR_GROUND_M = 15.0
+_EARTH_RADIUS_M = 6_371_008.8
+
+Reasons = list[tuple[str, str]]
+
+
+def preflight(
+    state: VehicleState,
+    items: Sequence[MissionItem],
+    autopilot: Autopilot,
+    *,
+    mission_type: int = MISSION,
+    start: Home | None = None,
+    ground_amsl_m: float | None = None,
+    allow_armed: bool = False,
+    ignore_position: bool = False,
+) -> list[str]:
+    """Warnings about sending ``items`` (wire order) to a vehicle in ``state``.
+
+    ``start`` is where the mission begins; ``ground_amsl_m`` the ground there, by default the altitude of ``start``.
+    Raises VehicleRefused with every reason against it; ``reason`` is the first one's word.
+    """
+    against, warnings = objections(
+        state, items, autopilot, mission_type=mission_type, start=start, ground_amsl_m=ground_amsl_m,
+        allow_armed=allow_armed, ignore_position=ignore_position,
+    )  # fmt: skip
+    if against:
+        words = "; ".join(text for _, text in against)
+        raise VehicleRefused(f"not sent: {words}", where=f"vehicle {state.address.sysid}", reason=against[0][0])
+    return warnings
+
+
+def objections(
+    state: VehicleState,
+    items: Sequence[MissionItem],
+    autopilot: Autopilot,
+    *,
+    mission_type: int = MISSION,
+    start: Home | None = None,
+    ground_amsl_m: float | None = None,
+    allow_armed: bool = False,
+    ignore_position: bool = False,
+) -> tuple[Reasons, list[str]]:
+    """What `preflight` has against it, a word and a text each, and its warnings."""
+    against: list[tuple[str, str]] = []
+    warnings: list[str] = []
+    _identity(state, autopilot, against, warnings)
+    _readiness(state, allow_armed, against, warnings)
+    _abilities(state, items, autopilot, mission_type, against, warnings)
+    if start is not None and not ignore_position:
+        ground = start.amsl_m if ground_amsl_m is None else ground_amsl_m
+        _position(state, start, ground, against, warnings)
+    return against, warnings
+
+
+def _identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnings: list[str]) -> None:
+    if state.sources > 1:
+        against.append(("ambiguous", rivals_words(state)))
+    row = manner(autopilot)
+    if is_generic(state.mav_autopilot):
+        warnings.append(
+            f"the vehicle calls itself {state.what}; the mission is written for {row.label}, which could not be checked"
+        )
+        return
+    if state.mav_autopilot != row.mav_autopilot:
+        against.append(
+            (
+                "wrong_autopilot",
+                f"the mission is written for {row.label}, and the vehicle is {state.what}: plan it for that autopilot",
+            )
+        )
+    elif state.mav_type not in row.mav_types:
+        if state.mav_type == 0:
+            warnings.append(f"the vehicle does not say whether it is what {row.label} flies")
+        else:
+            against.append(
+                (
+                    "wrong_autopilot",
+                    f"the mission is written for {row.label}, and the vehicle is a {type_name(state.mav_type)}",
+                )
+            )
+
+
+def rivals_words(state: VehicleState) -> str:
+    """That several vehicles have the number, and what to do about it."""
+    return (
+        f"{state.sources} autopilots speak as system {state.address.sysid}: give each vehicle its own number, or leave "
+        f"one of them off the link"
+    )
+
+
+def _readiness(state: VehicleState, allow_armed: bool, against: Reasons, warnings: list[str]) -> None:
+    status = state.system_status
+    words = STATE_WORDS.get(status, f"in state {status}")
+    if status == UNINIT and is_generic(state.mav_autopilot):
+        warnings.append("the vehicle does not report its state: whether it is ready could not be checked")
+    elif status < STANDBY:
+        against.append(("not_ready", f"the vehicle is {words}: wait until it reports standby"))
+    elif status in (CRITICAL, EMERGENCY):
+        warnings.append(f"the vehicle reports that it is {words}")
+    elif status >= POWEROFF:
+        against.append(("not_ready", f"the vehicle is {words}"))
+    if state.armed:
+        if allow_armed:
+            warnings.append("the vehicle is armed, which was allowed")
+        else:
+            against.append(("armed", "the vehicle is armed: disarm it, or allow it with --allow-armed"))
+
+
+def _abilities(
+    state: VehicleState,
+    items: Sequence[MissionItem],
+    autopilot: Autopilot,
+    mission_type: int,
+    against: Reasons,
+    warnings: list[str],
+) -> None:
+    most = max_items(autopilot, mission_type)
+    if len(items) > most:
+        against.append(("too_many_items", f"it takes at most {most} items and the list has {len(items)}"))
+    needed = {FENCE: (CAN_FENCE, "fence"), RALLY: (CAN_RALLY, "rally points")}.get(mission_type)
+    if needed and state.can(needed[0]) is False:
+        against.append(("unsupported", f"the vehicle says that it keeps no {needed[1]}"))
+    if state.capabilities is None:
+        warnings.append("the vehicle does not report its capabilities")
+    elif not state.can(CAN_MISSION_INT) and not is_generic(state.mav_autopilot):
+        warnings.append("the vehicle does not say that it takes MISSION_ITEM_INT")
+    if any(item.frame in (TERRAIN, 11) for item in items) and state.can(CAN_TERRAIN) is False:
+        warnings.append("the mission has altitudes above terrain, and the vehicle does not say that it knows terrain")
+
+
+def _position(state: VehicleState, start: Home, ground_m: float, against: Reasons, warnings: list[str]) -> None:
+    if state.lat_deg is None or state.lon_deg is None or state.amsl_m is None:
+        warnings.append("the vehicle reports no position: whether it stands at the start could not be checked")
+        return
+    away_m = distance_m(state.lat_deg, state.lon_deg, start.lat_e7 / 1e7, start.lon_e7 / 1e7)
+    if state.just_at is not None and away_m <= NEAR_START_M:
+        lat, lon, _ = state.just_at
+        words = f"the vehicle reports two places by turns, the other at {lat:.6f}, {lon:.6f}: are there two of it?"
+        against.append(("wrong_place", words))
+    if away_m > NEAR_START_M:
+        against.append(
+            (
+                "wrong_place",
+                f"the vehicle stands {away_m:.0f} m from the mission's start (at {state.lat_deg:.6f}, "
+                f"{state.lon_deg:.6f}; {NEAR_START_M:.0f} m is allowed): move it, plan from there, or "
+                "--ignore-position",
+            )
+        )
+    off_m = state.amsl_m - ground_m
+    if abs(off_m) > NEAR_GROUND_M:
+        against.append(
+            (
+                "wrong_height",
+                f"the vehicle reports {state.amsl_m:.1f} m AMSL where the ground is at {ground_m:.1f} m "
+                f"({off_m:+.1f} m; {NEAR_GROUND_M:.0f} m is allowed): wait for a better fix, check the DEM's datum, or "
+                "--ignore-position",
+            )
+        )
+
+
+def apart_m(a: VehicleState, b: VehicleState) -> float | None:
+    """Metres between the two places; None where one of them is not known."""
+    if a.lat_deg is None or a.lon_deg is None or b.lat_deg is None or b.lon_deg is None:
+        return None
+    return distance_m(a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg)
+
+
+def distance_m(lat_a: float, lon_a: float, lat_b: float, lon_b: float) -> float:
+    """Great-circle distance in metres between two places in degrees (haversine on the mean sphere)."""
+    a, b = math.radians(lat_a), math.radians(lat_b)
+    h = math.sin((b - a) / 2) ** 2 + math.cos(a) * math.cos(b) * math.sin(math.radians(lon_b - lon_a) / 2) ** 2
+    return 2 * _EARTH_RADIUS_M * math.asin(min(1.0, math.sqrt(h)))

@@ -1,0 +1,107 @@
+"""Prompt answers: the items of an upload, ready as bytes before anybody asks for them.
+
+An upload goes in lock-step, so the time from a request to its item counts once for every item. The machine's rule is
+that any request in range is answered, in any order, again and again. So only the first request of an upload goes the
+whole way, through parser, routing and machine. One that differs from it in nothing but its seq is answered on the
+spot, and the machine hears of it a moment later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from struct import Struct
+from typing import Any
+
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.mavlink.link.frames import FrameWriter, checksum
+from gcsplan.mavlink.link.transport import Peer
+from gcsplan.mavlink.protocol.messages import Address, Item
+
+# MAVLink 2, unsigned: marker, length of the payload, two bytes of flags, number | system, component, kind (3 bytes),
+# payload | checksum, over everything but the marker and over a byte that depends on the kind.
+_HEAD = Struct("<BBBBB")
+_BEFORE_PAYLOAD = Struct("<BBHB")
+_CHECKSUM = Struct("<H")
+_MARKER, _NO_FLAGS = 0xFD, 0
+_AROUND = _HEAD.size + _BEFORE_PAYLOAD.size + _CHECKSUM.size
+_SEQ_AND_TARGET = 3  # bytes of a request's payload, at least: with fewer, zeros at its end may belong to the seq
+
+_ITEM = dialect.MAVLink_mission_item_int_message
+_PAYLOAD = _ITEM.unpacker
+_KIND = (_ITEM.id & 0xFFFF, _ITEM.id >> 16)
+_EXTRA = bytes([_ITEM.crc_extra])
+
+
+class Prepared:
+    """The items of one upload. ``asked``: the seqs that were answered since the machine was told of them last."""
+
+    def __init__(self, frames: Sequence[bytes]) -> None:
+        self.frames = frames
+        self.asked: list[int] = []
+        self.peer: Peer | None = None
+        self.extra = b""
+
+
+class PromptAnswers:
+    """What one link can answer on the spot: `prepare` items, `learn` which requests they answer, `drop` them.
+
+    Where that is not ``possible``, and with signing, it answers nothing.
+    """
+
+    def __init__(self, writer: FrameWriter, *, possible: bool = True) -> None:
+        self._writer = writer
+        self._possible = possible and not writer.signs
+        self._by_shape: dict[bytes, Prepared] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._by_shape)
+
+    def prepare(self, items: Sequence[Item], target: Address) -> Prepared:
+        """Make ``items``, in the order of their seqs from 0, ready to go to ``target``."""
+        us = self._writer.us
+        return Prepared([_tail(item, target, us) for item in items] if self._possible else [])
+
+    def learn(self, prepared: Prepared, peer: Peer, message: Any) -> None:
+        """From now on answer what looks like ``message``: a request (pymavlink's) that the machine has answered."""
+        frame = bytes(message.get_msgbuf())
+        plain = frame[0] == _MARKER and frame[2] == _NO_FLAGS and len(frame) == frame[1] + _AROUND
+        if prepared.frames and plain and frame[1] >= _SEQ_AND_TARGET:
+            prepared.peer, prepared.extra = peer, bytes([message.crc_extra])
+            self._by_shape[_shape(frame)] = prepared
+
+    def drop(self, prepared: Prepared) -> None:
+        """Answer with ``prepared`` no more."""
+        self._by_shape = {shape: one for shape, one in self._by_shape.items() if one is not prepared}
+
+    def answered(self) -> set[Peer | None]:
+        """Whom it has answered, as far as the machines have not been told yet."""
+        return {one.peer for one in self._by_shape.values() if one.asked}
+
+    def __call__(self, peer: Peer, data: bytes) -> bytes | None:
+        """The frame that answers the datagram ``data`` from ``peer``; None where that is for others to find out."""
+        prepared = self._by_shape.get(_shape(data))
+        if prepared is None or prepared.peer != peer:
+            return None
+        seq = data[10] | data[11] << 8
+        if seq >= len(prepared.frames) or checksum(data[1:-2] + prepared.extra) != data[-2] | data[-1] << 8:
+            return None
+        prepared.asked.append(seq)
+        tail = prepared.frames[seq]
+        head = _HEAD.pack(_MARKER, len(tail) - _BEFORE_PAYLOAD.size - 1, _NO_FLAGS, 0, self._writer.number())
+        return head + tail[:-1] + _CHECKSUM.pack(checksum(head[1:] + tail))
+
+
+def _shape(request: bytes) -> bytes:
+    """A request's bytes but those that change from one to the next: number (4), seq (10 and 11), checksum."""
+    return request[:4] + request[5:10] + request[12:-2]
+
+
+def _tail(message: Item, target: Address, us: Address) -> bytes:
+    """A MISSION_ITEM_INT frame from behind its number on; in the checksum's place the byte that goes into it unsent."""
+    item = message.item
+    payload = _PAYLOAD.pack(
+        *item.params, item.x, item.y, item.z, message.seq, item.command, *target, item.frame, message.current,
+        item.autocontinue, message.mission_type,
+    )  # fmt: skip
+    return _BEFORE_PAYLOAD.pack(*us, *_KIND) + (payload.rstrip(b"\0") or b"\0") + _EXTRA

@@ -1,0 +1,215 @@
+"""Is the vehicle that we write to still the one that was checked, and still as it was?
+
+Preflight looks once, and a transfer takes minutes on a bad link: meanwhile the vehicle may be armed, carried off or
+switched off, and another one with its number may speak up. So its address on the link is pinned, what others say
+under its number does not count, and preflight is repeated
+
+- before everything that begins to write: each announcement of a list, each request to clear one (`gate`);
+- on all that comes in: a vehicle elsewhere, of another kind, or two that take turns at its address end the transfer;
+- after a silence, before another item is answered: who speaks again may be somebody else;
+- after the read-back (`last_look`).
+
+A look counts only if heartbeat and position have come since it was wanted; they are asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.mavlink.link.link import Channel, Heard, Steps
+from gcsplan.mavlink.link.preflight import NEAR_START_M, Reasons, apart_m
+from gcsplan.mavlink.link.watch import FRESH_S, VehicleState, Watch
+from gcsplan.mavlink.protocol.machine import Wait
+from gcsplan.mavlink.protocol.messages import MissionMessage, Request
+from gcsplan.mavlink.protocol.outcome import Changed, Outcome, Unknown
+
+Judge = Callable[[VehicleState], tuple[Reasons, list[str]]]
+
+LOOK_S = 10.0
+"""So long a look waits for a vehicle that has fallen silent."""
+_TELLING = frozenset({"HEARTBEAT", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "ATTITUDE", "SYSTEM_TIME"})
+_RECENT_S = 1.5
+_ASK_AGAIN_S = 0.5
+_AGAIN_S = 0.1
+_REQUEST_MESSAGE, _HEARTBEAT, _GLOBAL_POSITION_INT = 512, 0, 33
+_MOVED = frozenset({"wrong_place", "wrong_height"})
+_AT_ONCE = frozenset({"wrong_place", "wrong_autopilot"})
+"""What ends a transfer in the middle: it may be another vehicle. One that was armed gets its list whole."""
+
+
+class Recheck:
+    """Holds on to the vehicle in ``state``, which was found on ``channel`` and has passed ``judge``.
+
+    ``may_move``: where it is does not matter. ``standby_s``: how long one that reboots is waited for.
+    """
+
+    def __init__(
+        self,
+        channel: Channel,
+        watch: Watch,
+        state: VehicleState,
+        judge: Judge,
+        *,
+        may_move: bool = False,
+        standby_s: float = 0.0,
+    ) -> None:
+        now = channel.link.clock()
+        watch.pin(state, now)
+        channel.pin(state.peer)
+        self._channel, self._watch, self._judge = channel, watch, judge
+        self._address = state.address
+        self._located = state.located
+        self._first = None if may_move else state
+        self._longest_s = max(LOOK_S, standby_s)
+        self._contact = now
+        self._shut = False
+        self._silent_until = -math.inf
+        self._news = False
+        self._stop: Outcome | None = None
+        self._began: float | None = None  # of the look that is under way
+        self._since = 0.0
+        self._ask_at = -math.inf
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """What the vehicle has said to people."""
+        return tuple(self._watch.texts)
+
+    # what drives a machine asks
+
+    @property
+    def shut(self) -> bool:
+        """Whether the vehicle was silent for so long that nothing is answered before the next look."""
+        return self._shut
+
+    @property
+    def deadline(self) -> float:
+        """When `stops` wants to be called."""
+        if self._began is not None:
+            return min(self._ask_at, self._channel.link.clock() + _AGAIN_S)
+        return math.inf if self._shut else self._contact + FRESH_S
+
+    def note(self, heard: Heard, now: float) -> None:
+        """Take in everything that comes under the vehicle's system id."""
+        if heard.peer == self._channel.peer and heard.source == self._address and not heard.late:
+            self.contact(now)
+        self._watch.note(heard, now)
+        self._news = self._news or heard.message.get_type() in _TELLING
+
+    def contact(self, now: float) -> None:
+        """The vehicle was heard at its address."""
+        self._shut_after_silence(now)
+        self._contact = now
+
+    def admits(self, heard: Heard, message: MissionMessage) -> bool:
+        """Whether a mission message counts: from its address, and, if it asks for an item, not after a silence."""
+        return heard.peer == self._channel.peer and not (self._shut and isinstance(message, Request))
+
+    def stops(self, now: float) -> Outcome | None:
+        """Why the transfer is to end here and now; None where it may go on. Sends what a look has to ask."""
+        self._shut_after_silence(now)
+        if self._news:
+            self._news = False
+            self._stop = self._stop or self._another(now)
+        if self._stop is None and self._shut and self._contact > self._silent_until:
+            seen = self._look(now)
+            self._stop = None if isinstance(seen, Wait) else seen
+        self._ask(now)
+        return self._stop
+
+    def gate(self, now: float) -> Wait | Outcome | None:
+        """Before something is written: `machine.Gate`."""
+        return self._stop or self._look(now)
+
+    # looks
+
+    def last_look(self) -> Steps[Outcome | None]:
+        """After the read-back: a `Changed` outcome, None where all is as it was; Unknown after silence."""
+        clock = self._channel.link.clock
+        self._longest_s, self._began = LOOK_S, None
+        self._begin(clock(), clock())
+        while isinstance(seen := self._look(clock(), boots=True), Wait):
+            self._ask(clock())
+            yield seen.until
+            for heard in self._channel.take():
+                self.note(heard, clock())
+        return self._stop or seen
+
+    def _begin(self, now: float, since: float) -> None:
+        if self._began is None:
+            self._began, self._since, self._ask_at = now, since, now
+
+    def _look(self, now: float, *, boots: bool = False) -> Wait | Outcome | None:
+        state = self._watch.state(now)
+        since = now - _RECENT_S if self._began is None else self._since
+        since = max(since, self._watch.newcomer_at())  # ours must be heard beside it, and then they are two
+        if state is None or state.beat_at < since or (self._located and state.placed_at < since):
+            self._begin(now, since)
+            return self._waits(now) or Unknown(self._unseen(state, since, now))
+        against = self._objections(state)
+        if not boots and against and all(word == "not_ready" for word, _ in against):
+            self._begin(now, since)
+            self._since = now - _RECENT_S
+            if waits := self._waits(now):
+                return waits
+        self._began, self._shut = None, False
+        return _changed(against)
+
+    def _waits(self, now: float) -> Wait | None:
+        assert self._began is not None
+        return Wait(now + _AGAIN_S) if now < self._began + self._longest_s else None
+
+    def _unseen(self, state: VehicleState | None, since: float, now: float) -> str:
+        silent = state is None or state.beat_at < since
+        what = "the vehicle fell silent" if silent else "the vehicle no longer reports its position"
+        if silent and self._watch.newcomer_at() > -math.inf:
+            what += f", and another one is heard as system {self._address.sysid} now"
+        return f"{what}: it could not be checked again, and nothing further was sent"
+
+    def _objections(self, state: VehicleState) -> Reasons:
+        against, _ = self._judge(state)
+        first = self._first
+        if first and not first.armed and not any(word in _MOVED for word, _ in against):
+            away_m = apart_m(first, state)
+            if away_m is not None and away_m > NEAR_START_M:
+                against.append(("wrong_place", f"the vehicle is {away_m:.0f} m from where it was checked"))
+        return against
+
+    def _another(self, now: float) -> Outcome | None:
+        """Whether what speaks from the vehicle's address cannot be the vehicle that was checked."""
+        state = self._watch.state(now)
+        if state is None:
+            return None
+        found = [(word, text) for word, text in self._objections(state) if word in _AT_ONCE]
+        if not self._watch.alike():
+            words = f"two vehicles speak as system {self._address.sysid} from the same address"
+            found.append(("ambiguous", words))
+        return _changed(found)
+
+    def _shut_after_silence(self, now: float) -> None:
+        if not self._shut and now >= self._contact + FRESH_S:
+            self._shut, self._silent_until = True, self._contact
+            self._began = None
+
+    def _ask(self, now: float) -> None:
+        if self._began is None or now < self._ask_at:
+            return
+        self._ask_at = now + _ASK_AGAIN_S
+        for kind in (_HEARTBEAT, _GLOBAL_POSITION_INT) if self._located else (_HEARTBEAT,):
+            self._channel.send(request_message(self._address, kind), self._address)
+
+
+def request_message(to: Any, kind: int) -> Any:
+    """MAV_CMD_REQUEST_MESSAGE for one message of ``kind``."""
+    return dialect.MAVLink_command_long_message(*to, _REQUEST_MESSAGE, 0, kind, 0, 0, 0, 0, 0, 0)
+
+
+def _changed(against: Reasons) -> Changed | None:
+    if not against:
+        return None
+    word = "moved" if against[0][0] in _MOVED else against[0][0]
+    return Changed(word, "; ".join(text for _, text in against))

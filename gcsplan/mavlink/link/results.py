@@ -1,0 +1,117 @@
+"""What a session hands back: how an upload, a comparison or a clearing ended, as data and as an error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from gcsplan.errors import CheckFailed, GcsplanError, LinkError, ReadBackDiffers, VehicleRefused
+from gcsplan.mavlink.link.watch import VehicleState
+from gcsplan.mavlink.mission.compare import Difference, faults
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Mission, MissionItem
+from gcsplan.mavlink.protocol.outcome import Accepted, Changed, Outcome, Refused
+
+OutcomeWord = Literal["accepted", "refused", "unknown"]
+_SHOWN = 8
+_LISTS = {MISSION: "mission", FENCE: "fence", RALLY: "list of rally points"}
+
+
+def outcome_word(outcome: Outcome) -> OutcomeWord:
+    """The outcome for summaries."""
+    if isinstance(outcome, Accepted):
+        return "accepted"
+    return "refused" if isinstance(outcome, (Refused, Changed)) else "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class UploadResult:
+    """One list and one vehicle.
+
+    ``verified`` is True only if the list was read back whole, equals what was sent as the autopilot keeps it, and
+    passed the caller's check again. ``reason``: the outcome in words. ``on_board``: what the vehicle holds, where
+    that is not what was sent. ``read_back`` is in wire order; ``mission`` the same as a Mission (missions only).
+    ``failed_check``: why the read-back does not pass the check. ``simulated`` is the caller's word for the vehicle.
+    ``changed``: a word for what became of the vehicle since it was checked (armed, moved, ambiguous, …), ``change``
+    the same in a sentence; nothing was sent since that was seen. ``state``: the vehicle as it was found.
+    """
+
+    vehicle: str
+    sysid: int
+    url: str
+    outcome: OutcomeWord
+    verified: bool
+    items: int
+    seconds: float
+    retries: int = 0
+    attempts: int = 1
+    simulated: bool = False
+    mission_type: int = MISSION
+    reason: str = ""
+    on_board: str = ""
+    failed_check: str | None = None
+    differences: tuple[Difference, ...] = ()
+    warnings: tuple[str, ...] = ()
+    texts: tuple[str, ...] = ()
+    read_back: tuple[MissionItem, ...] | None = None
+    mission: Mission | None = None
+    changed: str = ""
+    change: str = ""
+    state: VehicleState | None = None
+
+    @property
+    def faults(self) -> tuple[Difference, ...]:
+        """The differences that count."""
+        return faults(self.differences)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: the fixed keys, and those that have something to say."""
+        fixed: dict[str, Any] = {
+            "url": self.url,
+            "outcome": self.outcome,
+            "verified": self.verified,
+            "simulated": self.simulated,
+            "items": self.items,
+            "seconds": round(self.seconds, 3),
+            "retries": self.retries,
+        }
+        more: dict[str, Any] = {
+            "attempts": self.attempts if self.attempts > 1 else None,
+            "reason": self.reason if not self.verified else None,
+            "changed": self.changed,
+            "on_board": self.on_board,
+            "failed_check": self.failed_check,
+            "differences": [str(d) for d in self.differences],
+            "warnings": list(self.warnings),
+            "texts": list(self.texts) if not self.verified else None,
+        }
+        return fixed | {key: value for key, value in more.items() if value}
+
+    def error(self) -> GcsplanError | None:
+        """The error that this result amounts to; None if it is verified, and the vehicle still as it was."""
+        where = f"{self.vehicle or 'vehicle'} (system {self.sysid})"
+        if self.verified and self.changed:
+            words = f"the new {_LISTS[self.mission_type]} IS on board, read back and equal to what was sent, but "
+            return VehicleRefused(f"{words}{self.change}. Nothing further was sent", where=where, reason=self.changed)
+        if self.verified:
+            return None
+        tail = f"; {self.on_board}" if self.on_board else ""
+        if self.texts:
+            tail += f"; the vehicle says: {' / '.join(self.texts[-3:])}"
+        if self.changed and not self.faults and self.failed_check is None:
+            return VehicleRefused(f"the upload was stopped: {self.change}{tail}", where=where, reason=self.changed)
+        if self.outcome == "refused":
+            return VehicleRefused(f"the vehicle {self.reason}{tail}", where=where)
+        if self.faults:
+            shown = "; ".join(str(d) for d in self.faults[:_SHOWN])
+            rest = len(self.faults) - _SHOWN
+            more = f"; and {rest} more" if rest > 0 else ""
+            return ReadBackDiffers(f"what is on board is not what was sent: {shown}{more}{tail}", where=where)
+        if self.failed_check is not None:
+            return CheckFailed(f"the mission as read back fails the check: {self.failed_check}{tail}", where=where)
+        return LinkError(f"the outcome is {self.reason}{tail}", where=where)
+
+    def raise_for_outcome(self) -> None:
+        """Raise `error`, if there is one."""
+        error = self.error()
+        if error is not None:
+            raise error

@@ -1,0 +1,143 @@
+"""Conversations beside the mission protocol, as tasks for `link.pump`: find a vehicle, read its parameters."""
+
+from __future__ import annotations
+
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.errors import LinkError
+from gcsplan.mavlink.link.link import Channel, Link, Steps
+from gcsplan.mavlink.link.parameters import decode_value, parameter_name
+from gcsplan.mavlink.link.recheck import Recheck, request_message
+from gcsplan.mavlink.link.watch import STANDBY, UNINIT, VehicleState, Watch
+from gcsplan.mavlink.mission.autopilots import is_generic
+from gcsplan.mavlink.protocol.messages import Address
+
+_AUTOPILOT_VERSION, _GLOBAL_POSITION_INT, _HOME_POSITION = 148, 33, 242
+_DOES_NOT_EXIST = 1  # MAV_PARAM_ERROR
+_ASK_AGAIN_S = 0.5
+_ASKED_TIMES, _GENERIC_ASKED_TIMES = 4, 2  # one that calls itself generic is taken without a position as well
+_PARAMETER_S = 2.0
+_NO_PARAMETERS_S = 1.0
+
+
+def discover_steps(
+    channel: Channel, watch: Watch, *, timeout_s: float, listen_s: float, standby_s: float = 0.0
+) -> Steps[VehicleState]:
+    """Wait for an autopilot's heartbeat, ask it what it can and where it is, and listen for rivals.
+
+    ``listen_s``: how long to listen after the first heartbeat (heartbeats come once a second). ``standby_s``: how
+    long to wait for one that is still booting. Raises LinkError after ``timeout_s`` without a heartbeat.
+    """
+    clock = channel.link.clock
+    started = clock()
+    while (state := watch.state(clock())) is None:
+        if clock() >= started + timeout_s:
+            raise dead_link(channel.link, channel.sysid, timeout_s)
+        yield started + timeout_s
+        _note(channel, watch)
+    found, asked, ask_at = clock(), 0, clock()
+    while True:
+        now = clock()
+        state = watch.state(now) or state
+        times = _GENERIC_ASKED_TIMES if is_generic(state.mav_autopilot) else _ASKED_TIMES
+        complete = state.capabilities is not None and state.located
+        if _is_booting(state) and now < found + standby_s:
+            yield now + _ASK_AGAIN_S
+        elif not complete and now >= ask_at and asked < times:
+            _ask(channel, state)
+            asked, ask_at = asked + 1, now + _ASK_AGAIN_S
+        elif not complete and now < ask_at:
+            yield ask_at
+        elif now < found + listen_s:
+            yield found + listen_s
+        else:
+            return state
+        _note(channel, watch)
+
+
+def parameter_steps(
+    channel: Channel,
+    state: VehicleState,
+    groups: tuple[tuple[str, ...], ...],
+    watch: Watch,
+    recheck: Recheck | None = None,
+) -> Steps[dict[str, float]]:
+    """The values of those parameters that the vehicle has; at most two seconds, one if it gives none.
+
+    A value that is no number is NaN.
+    """
+    clock = channel.link.clock
+    values: dict[str, float] = {}
+    unknown: set[str] = set()  # the vehicle said that it has none of that name
+    started, ask_at = clock(), clock()
+
+    def missing() -> list[str]:
+        left = [name for group in groups if not any(n in values for n in group) for name in group]
+        return [name for name in left if name not in unknown]
+
+    while missing():
+        now = clock()
+        if now >= started + (_PARAMETER_S if values else _NO_PARAMETERS_S):
+            break
+        if now >= ask_at:
+            for name in missing():
+                _ask_parameter(channel, state.address, name)
+            ask_at = now + _ASK_AGAIN_S
+        yield ask_at
+        for heard in channel.take():
+            (recheck or watch).note(heard, clock())
+            ours = not heard.late and heard.source == state.address and channel.peer in (None, heard.peer)
+            kind = heard.message.get_type() if ours else ""
+            if kind == "PARAM_VALUE":
+                name = parameter_name(heard.message)
+                if any(name in group for group in groups):
+                    values[name] = decode_value(heard.message, state.mav_autopilot)
+            elif kind == "PARAM_ERROR" and heard.message.error == _DOES_NOT_EXIST:
+                unknown.add(parameter_name(heard.message))
+    return values
+
+
+def dead_link(link: Link, sysid: int, timeout_s: float) -> LinkError:
+    """Why nobody answers, as far as it can be told from here, and what to try."""
+    others = sorted(s for s in link.heard_systems if s != sysid)
+    hints = []
+    if others:
+        hints.append(f"systems heard there: {', '.join(map(str, others))}")
+    if link.unsigned:
+        hints.append(f"{link.unsigned} frames were dropped for their signature: is the signing key the right one?")
+    elif link.garbage:
+        hints.append(f"{link.garbage} frames did not check: is it MAVLink, is the baud rate right?")
+    if not others:
+        hints.append(f"is the vehicle on, and is {link.endpoint.other_direction()} meant?")
+    return LinkError(
+        f"no heartbeat of system {sysid} within {timeout_s:g} s ({link.endpoint.understood()}); {'; '.join(hints)}",
+        where=link.url,
+        reason="no_heartbeat",
+    )
+
+
+def _note(channel: Channel, watch: Watch) -> None:
+    now = channel.link.clock()
+    for heard in channel.take():
+        watch.note(heard, now)
+
+
+def _is_booting(state: VehicleState) -> bool:
+    if state.system_status == UNINIT and is_generic(state.mav_autopilot):
+        return False  # it does not say
+    return state.system_status < STANDBY
+
+
+def _ask(channel: Channel, state: VehicleState) -> None:
+    to = state.address
+    wanted = {
+        _AUTOPILOT_VERSION: state.capabilities is None,
+        _GLOBAL_POSITION_INT: not state.located,
+        _HOME_POSITION: state.home is None,
+    }
+    for kind in (kind for kind, lacking in wanted.items() if lacking):
+        channel.send(request_message(to, kind), to)
+
+
+def _ask_parameter(channel: Channel, to: Address, name: str) -> None:
+    channel.send(dialect.MAVLink_param_request_read_message(*to, name.encode(), -1), to)

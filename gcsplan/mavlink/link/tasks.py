@@ -1,0 +1,367 @@
+"""The tasks behind `session`: each a generator for `link.pump`, about one vehicle, from finding it to the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from types import MappingProxyType
+from typing import Any
+
+from gcsplan.errors import LinkError, VehicleRefused
+from gcsplan.mavlink.link.drive import drive
+from gcsplan.mavlink.link.link import Channel, Steps
+from gcsplan.mavlink.link.parameters import FENCE_GROUPS, GROUPS, judge_fence_parameters, judge_parameters
+from gcsplan.mavlink.link.preflight import (
+    NEAR_GROUND_M,
+    NEAR_START_M,
+    Reasons,
+    apart_m,
+    distance_m,
+    objections,
+    preflight,
+    rivals_words,
+)
+from gcsplan.mavlink.link.recheck import Judge as JudgeState
+from gcsplan.mavlink.link.recheck import Recheck
+from gcsplan.mavlink.link.results import UploadResult, outcome_word
+from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
+from gcsplan.mavlink.link.watch import VehicleState, Watch
+from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, max_items
+from gcsplan.mavlink.mission.autopilots import PX4 as MAV_PX4
+from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RELATIVE, Home, Mission, MissionItem
+from gcsplan.mavlink.protocol.patience import TIMEOUT_S, Patience, checked_timeout_s
+from gcsplan.mavlink.protocol.transfer import (
+    Accepted,
+    Changed,
+    Clear,
+    Download,
+    Progress,
+    Refused,
+    Settled,
+    Timers,
+    VerifiedUpload,
+)
+from gcsplan.vehicle import Autopilot
+
+ProgressCall = Callable[[str, Progress], None]
+Judge = Callable[[Mission, Mapping[str, float]], str | None]
+"""The check again, with the parameters that were read: None if it passes, else why not."""
+
+# The most that is read of a list. ArduPilot: 64 KB of missions on an SD card (BRD_SD_MISSION) at 15 bytes an item.
+_MOST_HELD = {ARDUPILOTMEGA: 4369, MAV_PX4: 2000}
+_MOST_HELD_BY_ANY = 4369
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How to go about it. ``unchecked`` sends without a verdict; ``simulated`` is only passed on to the result.
+
+    ``discover_s``: wait for a first heartbeat; ``listen_s``: listen for rivals after it; ``standby_s``: wait for a
+    vehicle that is booting. ``ground_amsl_m``: DEM height at the start, by default the altitude of the mission's home.
+    ``timeout_s``: the longest time without progress of a transfer, of `Patience`; it bounds ``discover_s`` and
+    ``standby_s`` too.
+    ``rtl_rel_home_m`` and ``expected_parameters`` are what the parameters on board are compared with.
+    """
+
+    unchecked: bool = False
+    allow_armed: bool = False
+    ignore_position: bool = False
+    ground_amsl_m: float | None = None
+    rtl_rel_home_m: float | None = None
+    expected_parameters: Mapping[str, float] = field(default_factory=dict)
+    read_parameters: bool = True
+    discover_s: float = 10.0
+    listen_s: float = 1.5
+    standby_s: float = 30.0
+    timeout_s: float = TIMEOUT_S
+    attempts: int = 4
+    timers: Timers = field(default_factory=Timers)
+    simulated: bool = False
+
+    def __post_init__(self) -> None:
+        checked_timeout_s(self.timeout_s)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One list in wire order for one vehicle; ``mission`` where it is one, else a fence or rally points."""
+
+    name: str
+    sysid: int
+    autopilot: Autopilot
+    items: tuple[MissionItem, ...]
+    mission_type: int
+    options: Options
+    mission: Mission | None = None
+    judge: Judge | None = None
+    progress: ProgressCall | None = None
+
+    @classmethod
+    def of(cls, mission: Mission, options: Options, judge: Judge | None, progress: ProgressCall | None = None) -> Task:
+        """The task of sending ``mission``."""
+        return cls(
+            mission.name, mission.sysid, mission.autopilot, mission.wire_items(), MISSION, options, mission, judge,
+            progress,
+        )  # fmt: skip
+
+
+def finding(channel: Channel, watch: Watch, options: Options) -> Steps[VehicleState]:
+    """Find the vehicle, and wait for it while it boots."""
+    return discover_steps(
+        channel, watch, timeout_s=min(options.discover_s, options.timeout_s), listen_s=options.listen_s,
+        standby_s=min(options.standby_s, options.timeout_s),
+    )  # fmt: skip
+
+
+def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
+    """Find, preflight, read parameters, upload and prove. Raises VehicleRefused, LinkError."""
+    clock, options = channel.link.clock, task.options
+    watch = Watch(task.sysid)
+    state = yield from finding(channel, watch, options)
+    warnings = preflight(state, task.items, task.autopilot, **_terms(task))
+    recheck = _holding(channel, watch, state, options, lambda now: objections(
+        now, task.items, task.autopilot, **_terms(task)
+    ))  # fmt: skip
+    against, values = yield from _parameters(channel, task, state, watch, recheck)
+    warnings += against
+    failed = task.judge(task.mission, values) if task.mission and task.judge and values else None
+    if failed is not None:
+        raise VehicleRefused(
+            f"with this vehicle's parameters the mission is not safe, and nothing was sent; plan it with more "
+            f"track_error_m, or set the parameters:\n{failed}",
+            where=f"vehicle {task.sysid}",
+            reason="parameters",
+        )
+    said_before = watch.said
+    machine = VerifiedUpload(
+        task.items,
+        task.autopilot,
+        us=channel.link.us,
+        vehicle=state.address,
+        mission_type=task.mission_type,
+        timers=options.timers,
+        attempts=options.attempts,
+        gate=recheck.gate,
+        most=max_items(task.autopilot, task.mission_type),
+    )
+    started = clock()
+    yield from drive(
+        machine,
+        channel,
+        recheck=recheck,
+        patience=Patience(options.timeout_s, len(task.items), started),
+        progress=lambda: task.progress(task.name, machine.progress) if task.progress else None,
+    )
+    settled = machine.result
+    assert settled is not None
+    changed = settled.outcome if isinstance(settled.outcome, Changed) else None
+    if settled.read_back is not None and changed is None:
+        seen = yield from recheck.last_look()
+        changed = seen if isinstance(seen, Changed) else None
+        if seen is not None and changed is None:
+            warnings.append(f"after the read-back: {seen}")
+    after = watch.state(clock())
+    if after and after.armed and not state.armed:
+        warnings.append("the vehicle was armed by somebody during the upload")
+    result = result_of(task, channel, settled, clock() - started, warnings, watch.texts_since(said_before), values)
+    result = replace(result, state=state)
+    return replace(result, changed=changed.reason, change=changed.why) if changed else result
+
+
+def _terms(task: Task) -> dict[str, Any]:
+    """What preflight holds a vehicle to, the first time and every time."""
+    options = task.options
+    return {
+        "mission_type": task.mission_type, "start": task.mission.home if task.mission else None,
+        "ground_amsl_m": options.ground_amsl_m, "allow_armed": options.allow_armed,
+        "ignore_position": options.ignore_position,
+    }  # fmt: skip
+
+
+def _holding(channel: Channel, watch: Watch, state: VehicleState, options: Options, judge: JudgeState) -> Recheck:
+    return Recheck(channel, watch, state, judge, may_move=options.ignore_position, standby_s=options.standby_s)
+
+
+def _parameters(
+    channel: Channel, task: Task, state: VehicleState, watch: Watch, recheck: Recheck
+) -> Steps[tuple[list[str], dict[str, float]]]:
+    """What the parameters on board have against the list, in words; and their values, as far as they are read."""
+    options, mission = task.options, task.mission
+    warnings: list[str] = []
+    values: dict[str, float] = {}
+    if mission and options.read_parameters:
+        values = yield from parameter_steps(channel, state, GROUPS[task.autopilot], watch, recheck)
+        warnings += judge_parameters(
+            values, mission, rtl_rel_home_m=options.rtl_rel_home_m, expected=options.expected_parameters
+        )
+    if task.mission_type == FENCE and options.read_parameters:
+        values = yield from parameter_steps(channel, state, FENCE_GROUPS[task.autopilot], watch, recheck)
+        warnings += judge_fence_parameters(values)
+    return warnings, values
+
+
+def reading(
+    channel: Channel, state: VehicleState, mission_type: int, options: Options, recheck: Recheck | None = None
+) -> Steps[Download]:
+    """Read one list whole, from the address that ``state`` was heard at. Raises VehicleRefused, LinkError."""
+    channel.pin(state.peer)
+    machine = Download(
+        us=channel.link.us, vehicle=state.address, mission_type=mission_type, timers=options.timers,
+        most=_MOST_HELD.get(state.mav_autopilot, _MOST_HELD_BY_ANY),
+    )  # fmt: skip
+    yield from drive(
+        machine, channel, recheck=recheck, patience=Patience(options.timeout_s, None, channel.link.clock())
+    )
+    where = f"vehicle {state.address.sysid}"
+    if isinstance(machine.outcome, Changed):
+        words = f"reading was stopped: {machine.outcome.why}"
+        raise VehicleRefused(words, where=where, reason=machine.outcome.reason)
+    if isinstance(machine.outcome, Refused):
+        raise VehicleRefused(f"the list cannot be read: {machine.outcome}", where=where)
+    if not isinstance(machine.outcome, Accepted):
+        raise LinkError(f"the list could not be read: {machine.outcome}", where=where)
+    return machine
+
+
+def looking_at(channel: Channel, options: Options) -> Steps[tuple[VehicleState, Recheck]]:
+    """Find a vehicle that is to be read from, and hold on to it. Raises VehicleRefused where two have its number."""
+    watch = Watch(channel.sysid)
+    state = yield from finding(channel, watch, options)
+    _require_one(state)
+    return state, _holding(channel, watch, state, replace(options, ignore_position=True), _ambiguous)
+
+
+def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
+    """Read the list and compare; nothing is written."""
+    state, recheck = yield from looking_at(channel, task.options)
+    started = channel.link.clock()
+    read = yield from reading(channel, state, task.mission_type, task.options, recheck)
+    differences = tuple(compare(task.items, read.items, task.autopilot, task.mission_type))
+    settled = Settled(Accepted(read.opaque_id), not faults(differences), differences, read.items, "", 1, read.retries)
+    return result_of(task, channel, settled, channel.link.clock() - started, [], recheck.texts)
+
+
+def clearing(
+    channel: Channel, name: str, kinds: tuple[int, ...], options: Options, same: VehicleState | None = None
+) -> Steps[UploadResult]:
+    """Clear each of ``kinds`` and read back that nothing is left. Raises VehicleRefused, LinkError.
+
+    ``same``: the vehicle that is meant, as it was seen before: another one is left alone.
+    """
+    clock = channel.link.clock
+    watch = Watch(channel.sysid)
+    state = yield from finding(channel, watch, options)
+    judge = partial(_against_clearing, options, same)
+    against, _ = judge(state)
+    if against:
+        words = f"not cleared: {'; '.join(text for _, text in against)}"
+        raise VehicleRefused(words, where=f"vehicle {channel.sysid}", reason=against[0][0])
+    recheck = _holding(channel, watch, state, options, judge)
+    started, retries, left = clock(), 0, 0
+    for kind in kinds:
+        machine = Clear(
+            us=channel.link.us, vehicle=state.address, mission_type=kind, timers=options.timers, gate=recheck.gate
+        )
+        yield from drive(machine, channel, recheck=recheck, patience=Patience(options.timeout_s, 1, clock()))
+        retries += machine.retries
+        assert machine.outcome is not None
+        if isinstance(machine.outcome, (Refused, Changed)):
+            reason = machine.outcome.reason if isinstance(machine.outcome, Changed) else ""
+            raise VehicleRefused(f"not cleared: {machine.outcome}", where=f"vehicle {channel.sysid}", reason=reason)
+        read = yield from reading(channel, state, kind, options, recheck)  # settles a lost answer as well
+        retries += read.retries
+        left += 0 if kind == MISSION and len(read.items) == 1 else len(read.items)  # ArduPilot's home may stay
+    return UploadResult(
+        name,
+        channel.sysid,
+        channel.link.url,
+        "unknown" if left else "accepted",
+        not left,
+        0,
+        clock() - started,
+        retries,
+        simulated=options.simulated,
+        mission_type=kinds[0],
+        reason=f"unknown: {left} items are still there" if left else "accepted",
+        on_board=f"the vehicle still holds {left} items" if left else "",
+        texts=tuple(watch.texts),
+    )
+
+
+def _against_clearing(options: Options, same: VehicleState | None, state: VehicleState) -> tuple[Reasons, list[str]]:
+    against, warnings = _ambiguous(state)
+    if state.armed and not options.allow_armed:
+        against.append(("armed", "the vehicle is armed: disarm it, or allow it with --allow-armed"))
+    if same is not None and (same.address, same.peer) != (state.address, state.peer):
+        against.append(("another", "it speaks from another address than the vehicle that was uploaded to"))
+    away_m = apart_m(same, state) if same is not None else None
+    if away_m is not None and away_m > NEAR_START_M and not options.ignore_position:
+        against.append(("wrong_place", f"it is {away_m:.0f} m from where the vehicle was that was uploaded to"))
+    return against, warnings
+
+
+def _ambiguous(state: VehicleState) -> tuple[Reasons, list[str]]:
+    return ([("ambiguous", rivals_words(state))] if state.sources > 1 else []), []
+
+
+def _require_one(state: VehicleState) -> None:
+    against, _ = _ambiguous(state)
+    if against:
+        raise VehicleRefused(against[0][1], where=f"vehicle {state.address.sysid}", reason="ambiguous")
+
+
+def result_of(
+    task: Task,
+    channel: Channel,
+    settled: Settled,
+    seconds: float,
+    warnings: list[str],
+    texts: tuple[str, ...],
+    values: Mapping[str, float] = MappingProxyType({}),
+) -> UploadResult:
+    """What became of ``task``, with the caller's check of what was read back under the parameters that were read."""
+    mission: Mission | None = None
+    failed: str | None = None
+    if task.mission and settled.read_back:
+        mission = Mission.from_wire(
+            task.autopilot, settled.read_back, home=task.mission.home, name=task.name, sysid=task.sysid
+        )
+        failed = task.judge(mission, values) if task.judge else None
+        warnings = warnings + _other_home(task.mission, settled.read_back)
+    return UploadResult(
+        task.name,
+        task.sysid,
+        channel.link.url,
+        outcome_word(settled.outcome),
+        settled.verified and failed is None,
+        len(task.items),
+        seconds,
+        settled.retries,
+        settled.attempts,
+        task.options.simulated,
+        task.mission_type,
+        str(settled.outcome),
+        settled.on_board,
+        failed,
+        settled.differences,
+        tuple(warnings),
+        texts,
+        settled.read_back,
+        mission,
+    )
+
+
+def _other_home(mission: Mission, read: tuple[MissionItem, ...]) -> list[str]:
+    """ArduPilot's item 0 is where it will count relative altitudes from, unless it is armed elsewhere."""
+    if not mission.autopilot.is_ardupilot or (read[0].x, read[0].y) == (0, 0):
+        return []
+    theirs, ours = Home(read[0].x, read[0].y, read[0].z), mission.home
+    away_m = distance_m(ours.lat_e7 / 1e7, ours.lon_e7 / 1e7, theirs.lat_e7 / 1e7, theirs.lon_e7 / 1e7)
+    higher_m = theirs.amsl_m - ours.amsl_m
+    if away_m <= NEAR_START_M and abs(higher_m) <= NEAR_GROUND_M:
+        return []
+    relative = any(item.frame in (RELATIVE, 6) for item in mission.items)
+    counts = "; its relative altitudes count from there if it is not armed at the start" if relative else ""
+    return [f"the vehicle's home is {away_m:.0f} m from the mission's start and {higher_m:+.1f} m in height{counts}"]

@@ -1,0 +1,361 @@
+"""Sockets and serial ports behind one small face: bytes in with the peer they came from, bytes out to a peer.
+
+Nothing here blocks longer than the opening of a connection. An opened transport is read when one of its ``handles``
+is readable; one without handles (serial ports on Windows) is polled.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import socket
+import struct
+import time
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any, Protocol, cast
+
+from gcsplan.errors import LinkError
+from gcsplan.mavlink.link.url import Endpoint
+
+Peer = Hashable
+Heard = tuple[Peer, bytes]
+Clock = Callable[[], float]
+
+_DATAGRAM = 65535
+_BURST = 256  # datagrams or reads at one go, so that a flood cannot starve the timers
+_SILENCE_S = 0.02
+_CONNECT_S = 5.0
+_RECONNECT_S = 1.0
+_MOST_UNSENT = 1 << 18
+_MOST_CLIENTS = 32
+
+
+class Transport(Protocol):
+    """``datagrams``: what one read gives is whole. ``default``: the peer of whoever has not been heard yet."""
+
+    datagrams: bool
+    default: Peer | None
+
+    @property
+    def handles(self) -> Sequence[int]:
+        """File descriptors to wait for; none: poll."""
+        ...
+
+    @property
+    def place(self) -> str:
+        """The address that is really used."""
+        ...
+
+    def read(self) -> list[Heard]:
+        """What has come, without waiting."""
+        ...
+
+    def write(self, data: bytes, peer: Peer) -> None:
+        """Send to ``peer``, without waiting; what cannot be sent is lost, as it is in the air."""
+        ...
+
+    def close(self) -> None:
+        """Close it for good."""
+        ...
+
+
+def open_transport(endpoint: Endpoint) -> Transport:
+    """Open ``endpoint``. Raises LinkError that says what failed and names the other direction."""
+    try:
+        if endpoint.kind == "udp":
+            return Udp(endpoint)
+        if endpoint.kind == "tcp":
+            return TcpServer(endpoint) if endpoint.listens else TcpClient(endpoint)
+        return Serial(endpoint)
+    except OSError as error:  # serial.SerialException is one
+        why = error.strerror or str(error)
+        raise LinkError(
+            f"cannot open the link ({endpoint.understood()}): {why}; is {endpoint.other_direction()} meant?",
+            where=endpoint.url,
+            reason="link",
+        ) from None
+
+
+def wait_readable(transports: Sequence[Transport], timeout_s: float) -> None:
+    """Sleep until one of ``transports`` can be read or ``timeout_s`` is over."""
+    timeout_s = max(0.0, timeout_s)
+    handles = [handle for transport in transports for handle in transport.handles]
+    if any(not transport.handles for transport in transports):
+        timeout_s = min(timeout_s, 0.005)  # one that can only be polled
+    if not handles:
+        time.sleep(timeout_s)
+        return
+    with contextlib.suppress(OSError, ValueError):  # closed meanwhile: the read will tell
+        select.select(handles, [], [], timeout_s)
+
+
+def _resolve(endpoint: Endpoint, kind: socket.SocketKind) -> tuple[socket.AddressFamily, Any]:
+    flags = socket.AI_PASSIVE if endpoint.listens else 0
+    family, *_, address = socket.getaddrinfo(endpoint.host, endpoint.port, type=kind, flags=flags)[0]
+    return family, address
+
+
+def _patience_s(sock: socket.socket) -> float | None:
+    """The timeout that makes ``sock`` wait for a short silence; None where the kernel was told and keeps the time."""
+    try:
+        silence = struct.pack("@ll", 0, round(_SILENCE_S * 1e6))  # struct timeval
+        for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+            sock.setsockopt(socket.SOL_SOCKET, option, silence)
+        told = any(sock.getsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, len(silence)))
+    except (OSError, AttributeError):
+        told = False
+    return None if told and os.name == "posix" else _SILENCE_S
+
+
+class Udp:
+    """One UDP socket. What the network says about unreachable peers is passed over: the timers know better."""
+
+    datagrams = True
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        family, address = _resolve(endpoint, socket.SOCK_DGRAM)
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self.default: Peer | None = None
+        self._patience_s = _patience_s(self._socket)
+        try:
+            self._socket.setblocking(False)
+            with contextlib.suppress(OSError):
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+            if endpoint.listens:
+                self._socket.bind(address)
+            else:
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+                self.default = address
+        except OSError:
+            self._socket.close()
+            raise
+
+    @property
+    def handles(self) -> Sequence[int]:
+        return (self._socket.fileno(),)
+
+    @property
+    def place(self) -> str:
+        """Our own address."""
+        host, port = self._socket.getsockname()[:2]
+        return f"{host}:{port}"
+
+    def read(self) -> list[Heard]:
+        heard: list[Heard] = []
+        for _ in range(_BURST):
+            try:
+                data, peer = self._socket.recvfrom(_DATAGRAM)
+            except (BlockingIOError, InterruptedError):
+                break
+            except OSError:  # ICMP: a port is closed
+                continue
+            heard.append((peer, data))
+        return heard
+
+    def exchange(self, answer: Callable[[Peer, bytes], bytes | None], until: float, clock: Clock) -> list[Heard]:
+        """Answer datagram after datagram: until one has no answer, which is returned, or a short silence, or ``until``.
+
+        A socket that waits by itself: every datagram costs two system calls less than `wait_readable` and `read`.
+        """
+        receive, send = self._socket.recvfrom, self._socket.sendto
+        try:
+            self._socket.settimeout(self._patience_s)
+            while clock() < until:
+                data, peer = receive(_DATAGRAM)
+                reply = answer(peer, data)
+                if reply is None:
+                    return [(peer, data)]
+                send(reply, peer)
+        except OSError:  # silence, ICMP, or closed meanwhile
+            return []
+        finally:
+            with contextlib.suppress(OSError):
+                self._socket.setblocking(False)
+        return []
+
+    def write(self, data: bytes, peer: Peer) -> None:
+        with contextlib.suppress(OSError):
+            self._socket.sendto(data, cast(tuple[Any, ...], peer))
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class _Stream:
+    """One TCP connection with what could not be sent at once."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.socket = sock
+        self.open = True
+        self._unsent = bytearray()
+
+    def read(self) -> bytes:
+        self.flush()
+        if not self.open:
+            return b""
+        try:
+            data = self.socket.recv(_DATAGRAM)
+        except (BlockingIOError, InterruptedError):
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self.close()
+        return data
+
+    def write(self, data: bytes) -> None:
+        if len(self._unsent) + len(data) <= _MOST_UNSENT:  # beyond that the other end is not reading: lost, as by radio
+            self._unsent += data
+        self.flush()
+
+    def flush(self) -> None:
+        if not self.open or not self._unsent:
+            return
+        try:
+            sent = self.socket.send(self._unsent)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError:
+            self.close()
+            return
+        del self._unsent[:sent]
+
+    def close(self) -> None:
+        self.open = False
+        self.socket.close()
+
+
+class TcpClient:
+    """A connection that we make, and make again when it breaks (a vehicle that reboots)."""
+
+    datagrams = False
+    default: Peer | None = "tcp"
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self._family, self._address = _resolve(endpoint, socket.SOCK_STREAM)
+        self._stream = _Stream(self._connect(_CONNECT_S))
+        self._again_at = 0.0
+
+    def _connect(self, timeout_s: float) -> socket.socket:
+        sock = socket.socket(self._family, socket.SOCK_STREAM)
+        try:
+            sock.settimeout(timeout_s)
+            sock.connect(self._address)
+        except OSError:
+            sock.close()
+            raise
+        return sock
+
+    @property
+    def handles(self) -> Sequence[int]:
+        return (self._stream.socket.fileno(),) if self._stream.open else ()
+
+    @property
+    def place(self) -> str:
+        """The other end's address."""
+        host, port = self._address[:2]
+        return f"{host}:{port}"
+
+    def read(self) -> list[Heard]:
+        if not self._stream.open and time.monotonic() >= self._again_at:
+            try:
+                self._stream = _Stream(self._connect(0.2))
+            except OSError:
+                self._again_at = time.monotonic() + _RECONNECT_S
+        data = self._stream.read() if self._stream.open else b""
+        return [("tcp", data)] if data else []
+
+    def write(self, data: bytes, peer: Peer) -> None:
+        self._stream.write(data)
+
+    def close(self) -> None:
+        self._stream.close()
+
+
+class TcpServer:
+    """Connections that others make to us."""
+
+    datagrams = False
+    default: Peer | None = None
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        family, address = _resolve(endpoint, socket.SOCK_STREAM)
+        self._socket = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            self._socket.bind(address)
+            self._socket.listen(8)
+            self._socket.setblocking(False)
+        except OSError:
+            self._socket.close()
+            raise
+        self._clients: dict[Peer, _Stream] = {}
+
+    @property
+    def handles(self) -> Sequence[int]:
+        return (self._socket.fileno(), *(s.socket.fileno() for s in self._clients.values() if s.open))
+
+    @property
+    def place(self) -> str:
+        """Our own address."""
+        host, port = self._socket.getsockname()[:2]
+        return f"{host}:{port}"
+
+    def read(self) -> list[Heard]:
+        while len(self._clients) < _MOST_CLIENTS:
+            try:
+                sock, peer = self._socket.accept()
+            except OSError:
+                break
+            self._clients[peer] = _Stream(sock)
+        heard = [(peer, stream.read()) for peer, stream in self._clients.items()]
+        self._clients = {peer: stream for peer, stream in self._clients.items() if stream.open}
+        return [(peer, data) for peer, data in heard if data]
+
+    def write(self, data: bytes, peer: Peer) -> None:
+        stream = self._clients.get(peer)
+        if stream:
+            stream.write(data)
+
+    def close(self) -> None:
+        for stream in self._clients.values():
+            stream.close()
+        self._socket.close()
+
+
+class Serial:
+    """A serial port, through pyserial."""
+
+    datagrams = False
+    default: Peer | None = "serial"
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        import serial  # not needed by any other link
+
+        self._port = serial.Serial(endpoint.device, endpoint.baud, timeout=0, write_timeout=1.0)
+        self.place = endpoint.place
+
+    @property
+    def handles(self) -> Sequence[int]:
+        try:
+            return (self._port.fileno(),)
+        except (AttributeError, OSError):  # Windows, or unplugged
+            return ()
+
+    def read(self) -> list[Heard]:
+        try:
+            data = self._port.read(4096)
+        except OSError:
+            time.sleep(0.05)  # unplugged: readable for ever
+            return []
+        return [("serial", bytes(data))] if data else []
+
+    def write(self, data: bytes, peer: Peer) -> None:
+        with contextlib.suppress(OSError):
+            self._port.write(data)
+
+    def close(self) -> None:
+        self._port.close()

@@ -1,0 +1,362 @@
+"""What a vehicle says of itself: heartbeats, position, capabilities and texts, folded into a `VehicleState`.
+
+What one address says is kept apart from what another says: two vehicles with one number must not be taken for one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.mavlink.link.link import Heard
+from gcsplan.mavlink.link.numbers import Place, place
+from gcsplan.mavlink.link.transport import Peer
+from gcsplan.mavlink.mission.autopilots import GENERIC, INVALID, autopilot_name, type_name
+from gcsplan.mavlink.mission.mission import Home
+from gcsplan.mavlink.protocol.messages import Address
+
+# MAV_STATE
+UNINIT, BOOT, CALIBRATING, STANDBY, ACTIVE, CRITICAL, EMERGENCY, POWEROFF, TERMINATION = range(9)
+STATE_WORDS = {
+    UNINIT: "not initialised", BOOT: "booting", CALIBRATING: "calibrating", STANDBY: "standby", ACTIVE: "active",
+    CRITICAL: "critical", EMERGENCY: "in an emergency", POWEROFF: "powering off", TERMINATION: "terminating",
+}  # fmt: skip
+
+# MAV_PROTOCOL_CAPABILITY
+CAN_MISSION_INT, CAN_TERRAIN, CAN_FENCE, CAN_RALLY = 4, 512, 16384, 32768
+
+_AUTOPILOT_COMPID = 1
+_NO_AUTOPILOT_TYPES = frozenset({5, 6, 18, 26, 27, 30, 31, 32, 33, 34, 36, 37, 38, 39, 40, 41, 42, 44})
+"""Ground stations, trackers, companion computers, gimbals, cameras and the like."""
+
+FRESH_S = 3.0
+"""Heartbeats come once a second: one that is older than this was missed."""
+_MOST_SOURCES = 64
+_MOST_TEXTS = 20
+_ODD_S = 5.0  # messages are held up on their way, but not for longer
+_FASTEST = 2.0  # a vehicle's clock against ours
+_LEAP_M = 300.0
+_METRES_A_DEGREE = 111_195.0
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleState:
+    """One vehicle as it reports itself; None where it did not.
+
+    ``address`` is its autopilot's, ``peer`` where on the link it speaks from. ``system_status`` is a MAV_STATE,
+    ``amsl_m`` metres above mean sea level, ``capabilities`` MAV_PROTOCOL_CAPABILITY bits. ``sources`` counts those
+    who speak as an autopilot under this system id: more than one are two vehicles with one number. ``texts`` are its
+    last messages to people. ``beat_at`` and ``placed_at`` are when the last heartbeat and position came (the clock of
+    the link, -inf: never).
+    ``just_at``: another place, too far for it to have come from there, where it was a moment ago.
+    """
+
+    address: Address
+    mav_autopilot: int
+    mav_type: int
+    armed: bool
+    system_status: int
+    lat_deg: float | None = None
+    lon_deg: float | None = None
+    amsl_m: float | None = None
+    capabilities: int | None = None
+    sources: int = 1
+    home: Home | None = None
+    texts: tuple[str, ...] = ()
+    peer: Peer | None = None
+    beat_at: float = -math.inf
+    placed_at: float = -math.inf
+    just_at: Place | None = None
+
+    @property
+    def what(self) -> str:
+        """Kind of autopilot and vehicle in words."""
+        return f"{autopilot_name(self.mav_autopilot)} ({type_name(self.mav_type)})"
+
+    @property
+    def located(self) -> bool:
+        """Whether it reports a position."""
+        return self.lat_deg is not None and self.lon_deg is not None
+
+    def can(self, capability: int) -> bool | None:
+        """Whether it says it can; None where it says nothing."""
+        return None if self.capabilities is None else bool(self.capabilities & capability)
+
+
+@dataclass(slots=True)
+class _Source:
+    """Heartbeats of one kind from one component at one address."""
+
+    autopilot: int
+    kind: int
+    armed: bool
+    status: int
+    first: float
+    at: float
+    armed_at: float = -math.inf
+
+    def overlaps(self, other: _Source) -> bool:
+        """Whether both were there at the same time."""
+        return self.first <= other.at and other.first <= self.at
+
+
+@dataclass(slots=True)
+class _Clock:
+    """The boot clock in one kind of an address's messages.
+
+    A vehicle that reboots falls back, and one that was not heard for long is further on. Only where two take turns
+    does the clock both fall back and leap ahead of the time that has passed.
+    """
+
+    latest_s: float = -math.inf
+    latest_at: float = -math.inf
+    fell: bool = False
+    leapt: bool = False
+
+    def note(self, boot_s: float, now: float) -> None:
+        ahead_s = boot_s - self.latest_s - _FASTEST * (now - self.latest_at)
+        self.leapt = self.leapt or (self.latest_s > -math.inf and ahead_s > _ODD_S)
+        self.fell = self.fell or boot_s < self.latest_s - _ODD_S
+        if boot_s >= self.latest_s or boot_s < self.latest_s - _ODD_S:  # a message that was overtaken is none of these
+            self.latest_s, self.latest_at = boot_s, now
+
+    @property
+    def of_two(self) -> bool:
+        """Whether it cannot be the clock of one vehicle."""
+        return self.fell and self.leapt
+
+
+@dataclass(slots=True)
+class _Told:
+    """What one component at one address says besides its heartbeats."""
+
+    clocks: dict[str, _Clock] = field(default_factory=dict)
+    place: Place | None = None
+    from_fix: bool = False
+    placed_at: float = -math.inf
+    leaps: int = 0  # from one place to another, faster than anything moves
+    leapt_from: Place | None = None
+    leapt_at: float = -math.inf
+    capabilities: int | None = None
+    home: Home | None = None
+    first: float = 0.0
+    at: float = 0.0
+
+
+_Voice = tuple[int, Peer]  # component id and address
+_Key = tuple[int, Peer, int, int]  # and the kinds of autopilot and vehicle
+
+
+class Watch:
+    """Collects what one system id says; `note` takes every message, `state` is what it amounts to.
+
+    ``texts`` are the last things said to people, ``said`` counts all of them. Once a vehicle is `pin`ned, the state is
+    that of the one that speaks from there, whoever else says it has the same number.
+    """
+
+    def __init__(self, sysid: int) -> None:
+        self.sysid = sysid
+        self.texts: deque[str] = deque(maxlen=_MOST_TEXTS)
+        self.said = 0
+        self._sources: dict[_Key, _Source] = {}
+        self._told: dict[_Voice, _Told] = {}
+        self._pinned: _Voice | None = None
+        self._pinned_at = 0.0
+
+    def pin(self, state: VehicleState, now: float) -> None:
+        """From now on the vehicle is the one in ``state``, and whoever else has its number is a rival for good."""
+        self._pinned, self._pinned_at = (state.address.compid, state.peer), now
+
+    def note(self, heard: Heard, now: float) -> None:
+        """Take one message in."""
+        kind = heard.message.get_type()
+        if heard.late:
+            self._note_against(heard, kind, now)
+            return
+        told = self._voice((heard.source.compid, heard.peer), now)
+        if kind in _CLOCKS and heard.message.time_boot_ms:
+            told.clocks.setdefault(kind, _Clock()).note(heard.message.time_boot_ms / 1e3, now)
+        if kind == "HEARTBEAT":
+            self._heartbeat(heard, now)
+        elif kind == "STATUSTEXT":
+            self._text(heard.message)
+        elif kind in _TELLS:
+            _TELLS[kind](told, heard.message, now)
+
+    def _note_against(self, heard: Heard, kind: str, now: float) -> None:
+        """What proves nothing may still show that there are two: another clock, another place, armed."""
+        m, told = heard.message, self._told.get((heard.source.compid, heard.peer))
+        if told is None:
+            return
+        if kind in _CLOCKS and m.time_boot_ms:
+            told.clocks.setdefault(kind, _Clock()).note(m.time_boot_ms / 1e3, now)
+        if kind == "GLOBAL_POSITION_INT" and told.place and now - told.placed_at <= FRESH_S:
+            found = place(m.lat, m.lon, m.alt)
+            if found is not None and _leap(told.place, found):
+                told.leaps, told.leapt_from, told.leapt_at = told.leaps + 2, found, now
+        if kind == "HEARTBEAT" and m.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:
+            for key, source in self._sources.items():
+                if key[:2] == (heard.source.compid, heard.peer):
+                    source.armed_at = now
+
+    def texts_since(self, said: int) -> tuple[str, ...]:
+        """The texts, as far as they are kept, after the first ``said`` of them."""
+        new = min(self.said - said, len(self.texts))
+        return tuple(self.texts)[len(self.texts) - new :]
+
+    def newcomer_at(self) -> float:
+        """When another autopilot was first heard under the number since the vehicle was pinned; -inf: none was."""
+        if self._pinned is None:
+            return -math.inf
+        compid = self._pinned[0]
+        pilots = [
+            s.first
+            for key, s in self._sources.items()
+            if key[:2] != self._pinned and _is_autopilot(key[0], s)
+            and (key[0] == compid or s.autopilot not in (GENERIC, INVALID))
+        ]  # fmt: skip
+        voices = [told.first for v, told in self._told.items() if v != self._pinned and v[0] == compid]
+        return max((at for at in (*pilots, *voices) if at >= self._pinned_at), default=-math.inf)
+
+    def state(self, now: float) -> VehicleState | None:
+        """The state now; None before an autopilot's heartbeat."""
+        pilots = {key: s for key, s in self._sources.items() if _is_autopilot(key[0], s)}
+        fresh = {key: s for key, s in pilots.items() if now - s.at <= FRESH_S} or pilots
+        if self._pinned:
+            fresh = {key: s for key, s in pilots.items() if key[:2] == self._pinned}
+        if not fresh:
+            return None
+        best = min(
+            fresh,
+            key=lambda key: (
+                key[0] != _AUTOPILOT_COMPID, fresh[key].autopilot in (GENERIC, INVALID),
+                -fresh[key].at if self._pinned else 0,
+            ),
+        )  # fmt: skip
+        source, told = fresh[best], self._told.get(best[:2]) or _Told()
+        lat, lon, amsl = told.place or (None, None, None)
+        armed = source.armed or now - source.armed_at <= FRESH_S  # two that take turns: one of them is
+        return VehicleState(
+            Address(self.sysid, best[0]), source.autopilot, source.kind, armed, source.status,
+            lat, lon, amsl, told.capabilities, self._rivals(best, pilots), told.home, tuple(self.texts),
+            best[1], source.at, told.placed_at,
+            told.leapt_from if now - told.leapt_at <= FRESH_S else None,
+        )  # fmt: skip
+
+    def alike(self) -> bool:
+        """Whether all that comes from the pinned address can be of one autopilot: one kind, boot clock and place."""
+        pilots = {
+            k: s
+            for k, s in self._sources.items()
+            if self._pinned and k[1] == self._pinned[1] and _is_autopilot(k[0], s)
+        }
+        mine = [key for key in pilots if key[:2] == self._pinned]
+        return not mine or self._rivals(max(mine, key=lambda k: pilots[k].at), pilots, here=True) == 1
+
+    def _voices_at(self, voice: _Voice) -> int:
+        kinds = [s for key, s in self._sources.items() if key[:2] == voice]
+        overlapping = any(a is not b and a.overlaps(b) for a in kinds for b in kinds)
+        told = self._told.get(voice)
+        taking_turns = told is not None and any(clock.of_two for clock in told.clocks.values())
+        return 2 if overlapping or taking_turns or (told is not None and told.leaps > 1) else 1
+
+    def _rivals(self, best: _Key, pilots: dict[_Key, _Source], *, here: bool = False) -> int:
+        """How many autopilots there are by all that was heard, at the same time as the one that is meant."""
+        mine, told = pilots[best], self._told.get(best[:2])
+        until = max(mine.at, told.at) if told else mine.at  # anything that it says shows that it is there
+        others = {
+            key[:2]
+            for key, s in pilots.items()
+            if key[:2] != best[:2] and s.first <= until and mine.first <= s.at
+            and (key[0] == best[0] or s.autopilot not in (GENERIC, INVALID))
+        }  # fmt: skip
+        # One that sends no heartbeat, or whose heartbeats get lost, is there all the same.
+        others |= {
+            voice
+            for voice, told in self._told.items()
+            if voice[0] == best[0] and voice[1] != best[1] and not here
+            and told.first <= until and mine.first <= told.at
+        }  # fmt: skip
+        return len(others) + self._voices_at(best[:2])
+
+    def _voice(self, voice: _Voice, now: float) -> _Told:
+        told = self._told.get(voice)
+        if told is None:
+            if len(self._told) >= _MOST_SOURCES:
+                del self._told[min((v for v in self._told if v != self._pinned), key=lambda v: self._told[v].at)]
+            told = self._told[voice] = _Told(first=now)
+        told.at = now
+        return told
+
+    def _heartbeat(self, heard: Heard, now: float) -> None:
+        m = heard.message
+        key = (heard.source.compid, heard.peer, int(m.autopilot), int(m.type))
+        armed = bool(m.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+        source = self._sources.get(key)
+        if source is not None:
+            source.armed, source.status, source.at = armed, m.system_status, now
+            source.armed_at = now if armed else source.armed_at
+            return
+        if len(self._sources) >= _MOST_SOURCES:
+            del self._sources[
+                min((k for k in self._sources if k[:2] != self._pinned), key=lambda k: self._sources[k].at)
+            ]
+        self._sources[key] = _Source(key[2], key[3], armed, m.system_status, now, now, now if armed else -math.inf)
+
+    def _text(self, m: Any) -> None:
+        text = m.text if isinstance(m.text, str) else bytes(m.text).decode(errors="replace")
+        self.said += 1
+        self.texts.append("".join(c for c in text if c.isprintable()).strip())
+
+
+def _is_autopilot(compid: int, source: _Source) -> bool:
+    return compid == _AUTOPILOT_COMPID or source.kind not in _NO_AUTOPILOT_TYPES
+
+
+def _position(told: _Told, m: Any, now: float) -> None:
+    found = place(m.lat, m.lon, m.alt)
+    if found is not None:
+        _put(told, found, now, from_fix=False)
+
+
+def _put(told: _Told, found: Place, now: float, *, from_fix: bool) -> None:
+    if told.place is not None and now - told.placed_at <= FRESH_S and _leap(told.place, found):
+        told.leaps, told.leapt_from, told.leapt_at = told.leaps + 1, told.place, now
+    told.place, told.from_fix, told.placed_at = found, from_fix, now
+
+
+def _leap(a: Place, b: Place) -> bool:
+    """Whether two places of the last seconds are farther from each other than any vehicle flies meanwhile."""
+    north_m = (a.lat_deg - b.lat_deg) * _METRES_A_DEGREE
+    turn_deg = (a.lon_deg - b.lon_deg + 180.0) % 360.0 - 180.0
+    east_m = turn_deg * _METRES_A_DEGREE * math.cos(math.radians(a.lat_deg))
+    return math.hypot(north_m, east_m) > _LEAP_M
+
+
+def _fix(told: _Told, m: Any, now: float) -> None:
+    found = place(m.lat, m.lon, m.alt)
+    if found is not None and m.fix_type >= dialect.GPS_FIX_TYPE_3D_FIX and (told.place is None or told.from_fix):
+        _put(told, found, now, from_fix=True)
+
+
+def _version(told: _Told, m: Any, now: float) -> None:
+    told.capabilities = int(m.capabilities)
+
+
+def _home_position(told: _Told, m: Any, now: float) -> None:
+    found = place(m.latitude, m.longitude, m.altitude)
+    if found is not None:
+        told.home = Home(m.latitude, m.longitude, found.amsl_m)
+
+
+_CLOCKS = frozenset({"SYSTEM_TIME", "ATTITUDE", "GLOBAL_POSITION_INT"})
+_TELLS = {
+    "GLOBAL_POSITION_INT": _position,
+    "GPS_RAW_INT": _fix,
+    "AUTOPILOT_VERSION": _version,
+    "HOME_POSITION": _home_position,
+}

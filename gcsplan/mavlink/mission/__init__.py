@@ -1,0 +1,1 @@
+"""A mission as it is stored: its items, how each autopilot stores them, and how two are compared."""

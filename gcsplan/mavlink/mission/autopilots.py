@@ -1,0 +1,161 @@
+"""Each autopilot's manners in one table: what it calls itself, what it takes, and what it keeps of what it takes.
+
+Facts and their sources stand beside the numbers; `stored_ardupilot` and `stored_px4` hold the rules for items.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from gcsplan.errors import InputError
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, float32
+from gcsplan.mavlink.mission.mission import MissionItem as Item
+from gcsplan.mavlink.mission.stored_ardupilot import (
+    refused_by_copter,
+    refused_by_plane,
+    stored_by_copter,
+    stored_by_plane,
+)
+from gcsplan.mavlink.mission.stored_px4 import refused_by_px4, stored_by_px4
+from gcsplan.vehicle import Autopilot
+
+# MAV_AUTOPILOT
+GENERIC, ARDUPILOTMEGA, INVALID, PX4 = 0, 3, 8, 12
+_AUTOPILOT_NAMES = {GENERIC: "a generic autopilot", ARDUPILOTMEGA: "ArduPilot", INVALID: "no autopilot", PX4: "PX4"}
+
+# MAV_TYPE
+_COPTERS = frozenset({2, 3, 4, 13, 14, 15, 29, 35, 43})  # quad-, coaxial, heli-, hexa-, octo-, tri-, dodeca-, decarotor
+_PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25, 28})  # fixed wing, the VTOLs, parafoil
+_TYPE_NAMES = {
+    0: "generic", 1: "fixed wing", 2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 6: "ground station",
+    10: "rover", 11: "boat", 12: "submarine", 13: "hexarotor", 14: "octorotor", 15: "tricopter", 19: "VTOL tailsitter",
+    20: "VTOL tailsitter", 21: "VTOL tiltrotor", 22: "VTOL with fixed rotors", 29: "dodecarotor", 35: "decarotor",
+}  # fmt: skip
+
+ALTITUDE_LIMIT_M = 83_000.0
+"""ArduPilot keeps centimetres in 24 bits and refuses more (``LOCATION_ALT_MAX_M``)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """One autopilot's manners.
+
+    ``max_items`` counts wire items, home included where it is one. ``stored(item)`` is what reads back;
+    ``refuses(item)`` says why it is not taken, empty where it is. ``atomic``: a mission is swapped in whole at the end
+    of an upload, so that a broken upload leaves the old one. ``holds_s``: how long a broken upload keeps the vehicle
+    busy.
+    """
+
+    autopilot: Autopilot
+    label: str
+    mav_autopilot: int
+    mav_types: frozenset[int]
+    max_items: int
+    atomic: bool
+    holds_s: float
+    stored: Callable[[Item], Item]
+    refuses: Callable[[Item], str]
+
+
+_TABLE: dict[Autopilot, Manner] = {
+    Autopilot.ARDUCOPTER: Manner(
+        Autopilot.ARDUCOPTER,
+        "ArduCopter",
+        ARDUPILOTMEGA,
+        _COPTERS,
+        max_items=650,  # measured; 15 bytes each in the storage of a 16 KB board (StorageManager.cpp)
+        atomic=False,  # MissionItemProtocol_Waypoints.cpp: COUNT truncates, items replace one by one
+        holds_s=8.0,  # MissionItemProtocol.h: upload_timeout_ms
+        stored=stored_by_copter,
+        refuses=refused_by_copter,
+    ),
+    Autopilot.ARDUPLANE: Manner(
+        Autopilot.ARDUPLANE,
+        "ArduPlane",
+        ARDUPILOTMEGA,
+        _PLANES,
+        max_items=650,  # ArduPlane's own layout has room for 655; one figure for both keeps the smaller
+        atomic=False,
+        holds_s=8.0,
+        stored=stored_by_plane,
+        refuses=refused_by_plane,
+    ),
+    Autopilot.PX4: Manner(
+        Autopilot.PX4,
+        "PX4",
+        PX4,
+        _COPTERS | _PLANES,
+        # navigation.h: NUM_MISSIONS_SUPPORTED 2000 on boards with an SD card, 65534 in simulation, 500 with missions
+        # in RAM and 50 on the smallest boards; those answer NO_SPACE.
+        max_items=2000,
+        atomic=True,  # mavlink_mission.cpp: written to the inactive bank, swapped after the last item
+        holds_s=5.0,  # mavlink_mission.h: MAVLINK_MISSION_PROTOCOL_TIMEOUT_DEFAULT
+        stored=stored_by_px4,
+        refuses=refused_by_px4,
+    ),
+}
+
+
+def manner(autopilot: Autopilot) -> Manner:
+    """The table's row for ``autopilot``."""
+    return _TABLE[autopilot]
+
+
+def stored(item: Item, autopilot: Autopilot) -> Item:
+    """``item`` as ``autopilot`` reads it back."""
+    return _TABLE[autopilot].stored(item)
+
+
+def max_items(autopilot: Autopilot, mission_type: int = MISSION) -> int:
+    """The longest list of that kind: of fence points 70 (84 on ArduPlane, 64 on PX4), of rally points 32."""
+    if mission_type == MISSION:
+        return _TABLE[autopilot].max_items
+    if mission_type == FENCE:  # polygon vertices; circles take more room on ArduPilot: 42 of them
+        return {Autopilot.ARDUCOPTER: 70, Autopilot.ARDUPLANE: 84, Autopilot.PX4: 64}[autopilot]
+    return 32
+
+
+def altitude_of_cm(cm: int, autopilot: Autopilot) -> float:
+    """Metres as float32 to send so that exactly ``cm`` centimetres are stored.
+
+    ArduPilot cuts towards zero after a float32 product, so half a centimetre is sent on top, away from zero.
+    Raises InputError beyond what the autopilot can keep.
+    """
+    if abs(cm) >= ALTITUDE_LIMIT_M * 100:
+        raise InputError(f"an altitude must lie within ±{ALTITUDE_LIMIT_M:.0f} m, given {cm / 100} m")
+    if _TABLE[autopilot].mav_autopilot == ARDUPILOTMEGA:
+        return float32((cm + math.copysign(0.5, cm)) / 100.0)
+    return float32(cm / 100.0)
+
+
+def encode_altitude(altitude_m: float, autopilot: Autopilot, toward: Literal["up", "down"]) -> float:
+    """``altitude_m`` in whole centimetres as float32 to send: a bound from below rounds up, one from above down.
+
+    What lies within a hundred-thousandth of a millimetre of a whole centimetre is that centimetre. Raises InputError
+    for NaN, infinity, and what the autopilot cannot keep.
+    """
+    if not math.isfinite(altitude_m):
+        raise InputError(f"an altitude must be a number of metres, given {altitude_m}")
+    cm = altitude_m * 100.0
+    nearest = round(cm)
+    if abs(cm - nearest) > 1e-6:
+        nearest = math.ceil(cm) if toward == "up" else math.floor(cm)
+    return altitude_of_cm(nearest, autopilot)
+
+
+def autopilot_name(mav_autopilot: int) -> str:
+    """A MAV_AUTOPILOT in words."""
+    return _AUTOPILOT_NAMES.get(mav_autopilot, f"autopilot kind {mav_autopilot}")
+
+
+def type_name(mav_type: int) -> str:
+    """A MAV_TYPE in words."""
+    return _TYPE_NAMES.get(mav_type, f"vehicle type {mav_type}")
+
+
+def is_generic(mav_autopilot: int) -> bool:
+    """True for a peer that does not say which autopilot it is."""
+    return mav_autopilot in (GENERIC, INVALID)

@@ -1,0 +1,136 @@
+"""Is what was read back what was sent? Item by item, by wire integers and float32, with the autopilot's own rounding.
+
+A number is right if it equals what the autopilot is known to keep (`autopilots.stored`) or what was sent (peers that
+keep everything). All else is a `Difference`, a command that we do not know included. ArduPilot's item 0 is the
+vehicle's own home: it is reported, but excused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, MISSION, MissionItem
+from gcsplan.mavlink.mission.stored_ardupilot import read_back_altitudes, stored_cm
+from gcsplan.mavlink.mission.stored_px4 import YAW_COMMANDS
+from gcsplan.vehicle import Autopilot
+
+YAW_TOLERANCE_DEG = 1e-3
+
+_NAMES = {
+    16: "waypoint", 17: "loiter", 18: "loiter turns", 19: "loiter time", 20: "return to launch", 21: "land",
+    22: "take-off", 31: "loiter to altitude", 82: "spline waypoint", 84: "VTOL take-off", 85: "VTOL land",
+    92: "guided enable", 93: "delay", 112: "condition delay", 113: "condition altitude", 114: "condition distance",
+    115: "condition yaw", 177: "jump", 178: "change speed", 179: "set home", 181: "relay", 183: "servo",
+    189: "land start", 195: "region of interest", 197: "no region of interest", 201: "region of interest",
+    206: "camera trigger", 211: "gripper", 5000: "fence return point", 5001: "fence vertex, inclusion",
+    5002: "fence vertex, exclusion", 5003: "fence circle, inclusion", 5004: "fence circle, exclusion",
+    5100: "rally point",
+}  # fmt: skip
+
+
+def command_name(command: int) -> str:
+    """A MAV_CMD in words."""
+    return _NAMES.get(command, f"command {command}")
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One number that is not as expected; ``seq`` is -1 for the list as a whole.
+
+    ``excused``: known and harmless for the comparison (the vehicle's own home), reported all the same.
+    """
+
+    seq: int
+    field: str
+    sent: str
+    expected: str
+    read: str
+    what: str = ""
+    excused: bool = False
+
+    def __str__(self) -> str:
+        place = f"item {self.seq} ({self.what})" if self.seq >= 0 else "the list"
+        if self.excused:
+            return f"{place}: {self.field} is the vehicle's own, {self.read}; planned {self.sent}"
+        kept = "" if self.expected == self.sent else f" (kept as {self.expected})"
+        return f"{place}: {self.field}: sent {self.sent}{kept}, read back {self.read}"
+
+
+def compare(
+    sent: Sequence[MissionItem], read: Sequence[MissionItem], autopilot: Autopilot, mission_type: int = MISSION
+) -> list[Difference]:
+    """Every difference between a list in wire order and what was read back of it; see `faults` for those that count."""
+    found: list[Difference] = []
+    if len(sent) != len(read):
+        count = str(len(sent))
+        found.append(Difference(-1, "number of items", count, count, str(len(read))))
+    for seq, (ours, theirs) in enumerate(zip(sent, read, strict=False)):
+        if seq == 0 and autopilot.is_ardupilot and mission_type == MISSION:
+            found += _home(ours, theirs)
+        else:
+            found += _item(seq, ours, theirs, autopilot, mission_type)
+    return found
+
+
+def faults(differences: Iterable[Difference]) -> tuple[Difference, ...]:
+    """The differences that are not excused: none means that the list on board is the one that was sent."""
+    return tuple(d for d in differences if not d.excused)
+
+
+def _home(ours: MissionItem, theirs: MissionItem) -> list[Difference]:
+    if (ours.x, ours.y) == (theirs.x, theirs.y) and theirs.z in (ours.z, *read_back_altitudes(stored_cm(ours.z))):
+        return []
+    planned, own = (f"{i.lat_deg:.7f}, {i.lon_deg:.7f}, {i.z:.2f} m" for i in (ours, theirs))
+    return [Difference(0, "home", planned, planned, own, "home", excused=True)]
+
+
+def _item(
+    seq: int, ours: MissionItem, theirs: MissionItem, autopilot: Autopilot, mission_type: int
+) -> list[Difference]:
+    if ours.command != theirs.command:
+        names = [f"{item.command} ({command_name(item.command)})" for item in (ours, theirs)]
+        return [Difference(seq, "command", names[0], names[0], names[1], command_name(ours.command))]
+    kept = manner(autopilot).stored(ours)
+    found: list[Difference] = []
+
+    def differ(field: str, sent: str, expected: str, got: str) -> None:
+        found.append(Difference(seq, field, sent, expected, got, command_name(ours.command)))
+
+    frames = [FRAME_SYNONYMS.get(item.frame, item.frame) for item in (ours, kept, theirs)]
+    if frames[2] not in frames[:2]:
+        differ("frame", *map(str, frames))
+    for i in range(4):
+        values = (ours.params[i], kept.params[i], theirs.params[i])
+        turning = i == 3 and autopilot is Autopilot.PX4 and ours.command in YAW_COMMANDS
+        if not (_same(values[2], values[0]) or _same(values[2], values[1]) or (turning and _same_yaw(*values[1:]))):
+            differ(f"param{i + 1}", *map(_number, values))
+    for field, *whole in (("latitude", ours.x, kept.x, theirs.x), ("longitude", ours.y, kept.y, theirs.y)):
+        if whole[2] not in whole[:2]:
+            differ(field, *(f"{value / 1e7:.7f}" for value in whole))
+    if not any(_same(theirs.z, z) for z in (ours.z, *_altitudes(ours, kept, autopilot))):
+        differ("altitude", _number(ours.z), _number(kept.z), _number(theirs.z))
+    if mission_type == MISSION and theirs.autocontinue not in (ours.autocontinue, kept.autocontinue):
+        differ("autocontinue", str(ours.autocontinue), str(kept.autocontinue), str(theirs.autocontinue))
+    return found
+
+
+def _altitudes(ours: MissionItem, kept: MissionItem, autopilot: Autopilot) -> tuple[float, ...]:
+    """The float32s that may come back: ArduPilot's versions turn the same centimetres into two of them."""
+    if autopilot.is_ardupilot and kept.z == read_back_altitudes(stored_cm(ours.z))[0]:
+        return read_back_altitudes(stored_cm(ours.z))
+    return (kept.z,)
+
+
+def _same(a: float, b: float) -> bool:
+    return a == b or (math.isnan(a) and math.isnan(b))
+
+
+def _same_yaw(a: float, b: float) -> bool:
+    return abs((a - b + 180.0) % 360.0 - 180.0) <= YAW_TOLERANCE_DEG  # NaN compares False
+
+
+def _number(value: float) -> str:
+    return f"{value:.9g}"

@@ -1,0 +1,136 @@
+"""What PX4 makes of a mission item: floats as they are, but only the params that a command uses; yaw in radians.
+
+Source: PX4 1.15, ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavlink_mission_item`),
+``navigation.h``, ``Limits.hpp`` (`radians`, `degrees`) and ``helper_functions.hpp`` (`wrap_2pi`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, RELATIVE, TERRAIN, MissionItem, float32
+
+Keep = Callable[[float], float]
+_RADIANS_PER_DEGREE = float32(float32(math.pi) / 180.0)
+_DEGREES_PER_RADIAN = float32(180.0 / float32(math.pi))
+_FULL_TURN = float32(2.0 * math.pi)
+_TURNS_PER_RADIAN = float32(1.0 / _FULL_TURN)
+
+
+def _f32(value: float) -> float:
+    return value
+
+
+def _lost(value: float) -> float:
+    return 0.0
+
+
+def _flag(value: float) -> float:
+    return 1.0 if value > 0 else 0.0
+
+
+def _u16(value: float) -> float:
+    return float(int(value) & 0xFFFF) if abs(value) < 2**31 else 0.0
+
+
+def _i16(value: float) -> float:
+    return (_u16(value) + 32768.0) % 65536.0 - 32768.0
+
+
+def _vertices(value: float) -> float:
+    return _u16(float32(value + 0.5))
+
+
+def yaw(degrees: float) -> float:
+    """Degrees through float32 radians wrapped to 0 … 2π and back: -90 reads back as 270, NaN stays NaN."""
+    radians = float32(degrees * _RADIANS_PER_DEGREE)
+    if not math.isfinite(radians):
+        return math.nan
+    if not 0.0 <= radians < _FULL_TURN:
+        turns = math.floor(float32(radians * _TURNS_PER_RADIAN))
+        radians = float32(radians - float32(_FULL_TURN * turns))
+    return float32(radians * _DEGREES_PER_RADIAN)
+
+
+_Rule = tuple[Keep, Keep, Keep, Keep]
+_NOTHING: _Rule = (_lost, _lost, _lost, _lost)
+_YAW: _Rule = (_lost, _lost, _lost, yaw)
+
+LOCATED: dict[int, _Rule] = {
+    16: (_f32, _f32, _lost, yaw),  # NAV_WAYPOINT: hold, acceptance radius
+    17: (_lost, _lost, _f32, yaw),  # NAV_LOITER_UNLIM: radius
+    19: (_f32, _flag, _f32, _flag),  # NAV_LOITER_TIME
+    21: (_lost, _u16, _lost, yaw),  # NAV_LAND: precision
+    22: _YAW,  # NAV_TAKEOFF
+    31: (_flag, _f32, _lost, _flag),  # NAV_LOITER_TO_ALT
+    80: _NOTHING,  # NAV_ROI
+    84: _YAW,  # NAV_VTOL_TAKEOFF
+    85: _YAW,  # NAV_VTOL_LAND
+    195: _NOTHING,  # DO_SET_ROI_LOCATION
+    201: _NOTHING,  # DO_SET_ROI at a place
+    212: _NOTHING,  # DO_AUTOTUNE_ENABLE
+    400: _NOTHING,  # COMPONENT_ARM_DISARM
+    4501: _NOTHING,  # CONDITION_GATE
+    5000: _NOTHING,  # fence: return point
+    5001: (_vertices, _lost, _lost, _lost),  # fence: polygon vertex, inclusion
+    5002: (_vertices, _lost, _lost, _lost),  # fence: polygon vertex, exclusion
+    5003: (_f32, _lost, _lost, _lost),  # fence: circle, inclusion
+    5004: (_f32, _lost, _lost, _lost),  # fence: circle, exclusion
+    5100: _NOTHING,  # rally point
+}
+"""What is kept of param1 … param4 of commands with a place (frames 0, 3 and their twins)."""
+
+PLACELESS = frozenset(
+    {
+        20, 80, 93, 112, 114, 177, 178, 179, 183, 187, 189, 197, 200, 201, 203, 204, 205, 206, 211, 212, 214, 260, 400,
+        530, 531, 532, 534, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 42600,
+    }
+)  # fmt: skip
+"""Commands that are taken in MAV_FRAME_MISSION (2) alone."""
+
+FENCE_AND_RALLY = frozenset({5001, 5002, 5003, 5004, 5100})
+_FENCE = range(5000, 5005)
+_DO_JUMP = 177
+
+YAW_COMMANDS = frozenset(command for command, rule in LOCATED.items() if rule[3] is yaw)
+"""Commands whose param4 goes through radians: a compiler may contract that product, so it is compared as an angle."""
+
+
+def refused_by_px4(item: MissionItem) -> str:
+    """Why PX4 refuses ``item`` on upload; empty where it takes it."""
+    frame = FRAME_SYNONYMS.get(item.frame, item.frame)
+    if frame not in (GLOBAL, RELATIVE, NO_POSITION):
+        return f"PX4 takes no item in frame {item.frame}" + (" (above terrain)" if frame == TERRAIN else "")
+    if item.command in FENCE_AND_RALLY:
+        return f"PX4 takes command {item.command} in a fence or among rally points alone"
+    known = PLACELESS if frame == NO_POSITION else LOCATED
+    if item.command in known:
+        modes = (0.0, 1.0, 2.0) if frame == NO_POSITION else (0.0, 3.0)
+        refused = item.command in (80, 201) and (
+            not math.isfinite(item.params[0]) or math.trunc(item.params[0]) not in modes
+        )
+        return (
+            f"PX4 takes no region of interest of the kind {item.params[0]:g} in frame {item.frame}" if refused else ""
+        )
+    other = LOCATED if frame == NO_POSITION else PLACELESS
+    if item.command in other:
+        wanted = "frame 2 (without a place)" if frame != NO_POSITION else "a frame with a place (0 or 3)"
+        return f"PX4 takes command {item.command} in {wanted} alone, and it is in frame {item.frame}"
+    return f"PX4 does not take command {item.command} in a mission"
+
+
+def stored_by_px4(item: MissionItem) -> MissionItem:
+    """``item`` as PX4 reads it back in ITEM_INT, with frames 5 and 6 written as 0 and 3."""
+    frame = FRAME_SYNONYMS.get(item.frame, item.frame)
+    if frame == NO_POSITION:
+        params = item.params
+        if item.command == _DO_JUMP:
+            params = (_i16(params[0]), _u16(params[1]), params[2], params[3])
+        x, y = (max(-(2**31), min(2**31 - 1, round(float32(v)))) for v in (item.x, item.y))
+        return MissionItem(item.command, frame, params, x, y, item.z, item.autocontinue)
+    rule = LOCATED.get(item.command, (_f32, _f32, _f32, _f32))
+    p1, p2, p3, p4 = (keep(value) for keep, value in zip(rule, item.params, strict=True))
+    if item.command in _FENCE:  # neither "relative" nor autocontinue is stored with a fence point
+        return MissionItem(item.command, GLOBAL, (p1, p2, p3, p4), item.x, item.y, item.z, False)
+    return MissionItem(item.command, frame, (p1, p2, p3, p4), item.x, item.y, item.z, item.autocontinue)

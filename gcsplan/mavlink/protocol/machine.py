@@ -1,0 +1,184 @@
+"""What `Upload`, `Clear` and `Download` share: timers, one table of transitions each, and whose packets count.
+
+Time is an argument and packets are values: ``start(now)``, ``receive(packet, now)`` and ``on_timer(now)`` return what
+is to be sent, ``deadline`` is when `on_timer` wants to be called next. Nothing here opens a socket or reads a clock.
+
+Two rules, after h11's state machine. (1) A state changes only through the machine's ``TABLE``, (state, event) → state.
+(2) What the vehicle sends is never an error: what does not count now is another event, or none. An event that we
+bring about ourselves and that is not in the table (a second ``start``) is a bug, `ImpossibleTransition`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, ClassVar
+
+from gcsplan.errors import GcsplanError, InputError
+from gcsplan.mavlink.protocol.messages import Address, Item, MissionMessage, Packet
+from gcsplan.mavlink.protocol.outcome import Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Timers:
+    """Seconds; the first three are those that the protocol guide recommends.
+
+    ``response_s``: wait for an answer before asking again, ``retries`` times. ``item_s``: the same for an item of a
+    download, for as long as the vehicle is heard of. ``silence_s``: how long an upload waits for a vehicle that has
+    asked for items (ArduPilot itself gives up after 8 s). ``stall_s``: how long it may ask for nothing new.
+    """
+
+    response_s: float = 1.5
+    item_s: float = 0.25
+    retries: int = 5
+    silence_s: float = 10.0
+    stall_s: float = 30.0
+
+    def __post_init__(self) -> None:
+        for name in ("response_s", "item_s", "silence_s", "stall_s"):
+            value = getattr(self, name)
+            if not 0 < value < 3600:
+                raise InputError(f"{name} must lie within 0 … 3600 s, given {value}")
+        if self.retries < 0:
+            raise InputError(f"retries must not be negative, given {self.retries}")
+
+    @property
+    def patience_s(self) -> float:
+        """How long all tries of one question take together."""
+        return self.response_s * (self.retries + 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """``done`` of ``total`` items; ``phase`` is a word: upload, read back, clear."""
+
+    phase: str
+    done: int
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Not yet: ask again at ``until``."""
+
+    until: float
+
+
+Gate = Callable[[float], "Wait | Outcome | None"]
+"""Asked before anything is written to a vehicle: None lets it pass, an outcome ends the transfer with it."""
+
+
+def always(now: float) -> None:
+    """The gate that is never shut."""
+
+
+CANCELLED_BY_US = "cancelled by us"
+
+
+class Label(Enum):
+    """A state or an event: one of its kind, so that identity will do for a hash, and it is a quick one."""
+
+    __hash__ = object.__hash__
+
+
+class ImpossibleTransition(GcsplanError, RuntimeError):
+    """A machine was used in a way that its table does not know: a bug in the caller."""
+
+
+class Machine:
+    """One transfer of one list with one vehicle. ``vehicle.compid`` 0 accepts every component of that system."""
+
+    ROLE: ClassVar[str]
+    TABLE: ClassVar[Mapping[tuple[Any, Any], Any]]
+
+    def __init__(
+        self, *, us: Address, vehicle: Address, mission_type: int, timers: Timers, state: Label, gate: Gate = always
+    ) -> None:
+        self.us = us
+        self.vehicle = vehicle
+        self.mission_type = mission_type
+        self.timers = timers
+        self.retries = 0
+        self.outcome: Outcome | None = None
+        self._state = state
+        self._deadline: float | None = None
+        self._gate = gate
+
+    @property
+    def deadline(self) -> float | None:
+        """When `on_timer` wants to be called; None before the start and after the end."""
+        return self._deadline
+
+    def receive(self, packet: Packet, now: float) -> list[Packet]:
+        """Take ``packet`` in, whoever sent it, and return the answers."""
+        if not self.concerns(packet):
+            return []
+        return self._react(packet.message, now)
+
+    def on_timer(self, now: float) -> list[Packet]:
+        """What is due at ``now``; nothing before the deadline."""
+        if self._deadline is None or now < self._deadline:
+            return []
+        return self._expire(now)
+
+    def concerns(self, packet: Packet) -> bool:
+        """From our vehicle, to us or to everybody, about our kind of list."""
+        source, target = packet.source, packet.target
+        return (
+            source.sysid == self.vehicle.sysid
+            and self.vehicle.compid in (0, source.compid)
+            and target.sysid in (0, self.us.sysid)
+            and target.compid in (0, self.us.compid)
+            and packet.message.mission_type == self.mission_type
+        )
+
+    @property
+    def answers(self) -> Sequence[Item]:
+        """What a request gets, by seq, at any time between `start` and `cancel`; most machines answer none."""
+        return ()
+
+    def answered(self, seqs: Iterable[int], now: float) -> None:
+        """Take note of requests that got their answer already."""
+
+    @property
+    def mark(self) -> tuple[int, ...]:
+        """How far it has come; grows with every item that is asked for or read for the first time."""
+        return (self.progress.done,)
+
+    @property
+    def progress(self) -> Progress:
+        """Items done so far."""
+        raise NotImplementedError
+
+    def stop(self, outcome: Outcome) -> None:
+        """End with ``outcome`` and without a word to the vehicle: it may be another one by now."""
+        raise NotImplementedError
+
+    def _step(self, event: Label) -> None:
+        try:
+            self._state = self.TABLE[self._state, event]
+        except KeyError:
+            raise ImpossibleTransition(
+                f"{self.ROLE}: {event.name} is impossible in state {self._state.name}", where=f"vehicle {self.vehicle}"
+            ) from None
+
+    def _end(self, event: Label, outcome: Outcome) -> None:
+        self._step(event)
+        self.outcome, self._deadline = outcome, None
+
+    def _to_vehicle(self, message: MissionMessage) -> Packet:
+        return Packet(self.us, self.vehicle, message)
+
+    def _react(self, message: MissionMessage, now: float) -> list[Packet]:
+        raise NotImplementedError
+
+    def _expire(self, now: float) -> list[Packet]:
+        raise NotImplementedError
+
+
+def checked_type(mission_type: int, allowed: range = range(3)) -> int:
+    """``mission_type`` if it is a kind of list: 0 mission, 1 fence, 2 rally (255 all, where allowed)."""
+    if mission_type not in allowed:
+        raise InputError(f"mission type must be 0 (mission), 1 (fence) or 2 (rally), given {mission_type}")
+    return mission_type

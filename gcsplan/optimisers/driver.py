@@ -1,0 +1,189 @@
+"""One driver for every optimiser: seed, bounds, exact budget, best so far, history, stopping."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gcsplan.errors import GcsplanError, InputError
+from gcsplan.optimisers.box import WORST, Floats, Run
+from gcsplan.optimisers.registry import Entry, get
+
+Cost = Callable[[Floats], NDArray[np.floating]]
+"""A batch objective: (n, dim) in [0, 1] to costs (n,). It must not change its argument."""
+
+StoppedBy = Literal["iterations", "evaluations", "target", "told"]
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A run after one batch: what `minimise` tells while it goes on. ``x`` (dim,) is the best point so far."""
+
+    iteration: int
+    evaluations: int
+    elapsed: float
+    cost: float
+    x: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """After each batch, in order (m,): cost evaluations so far, the iteration it was of (0 the first), best cost."""
+
+    evaluations: NDArray[np.int64]
+    iterations: NDArray[np.int64]
+    cost: Floats
+
+    def by_iteration(self) -> Floats:
+        """Best cost at the end of each iteration, the first population's at [0]; (iterations begun + 1,)."""
+        last = np.searchsorted(self.iterations, np.arange(self.iterations[-1] + 1), side="right") - 1
+        return self.cost[last]
+
+    def at_evaluations(self, counts: ArrayLike) -> Floats:
+        """Best cost known after as many evaluations as each of ``counts`` says; inf before the first batch's end."""
+        place = np.searchsorted(self.evaluations, np.asarray(counts), side="right") - 1
+        return np.where(place < 0, np.inf, self.cost[np.maximum(place, 0)])
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """The best point (dim,) that was evaluated, its cost (inf where no cost was finite), and what it took."""
+
+    x: Floats
+    cost: float
+    evaluations: int
+    iterations: int
+    history: History
+    stopped_by: StoppedBy
+    optimiser: str
+
+
+def minimise(
+    optimiser: str | Entry,
+    cost: Cost,
+    dim: int,
+    *,
+    population: int | None = None,
+    iterations: int | None = None,
+    evaluations: int | None = None,
+    seed: int | np.random.Generator = 1,
+    parameters: Mapping[str, object] | None = None,
+    target: float | None = None,
+    start: ArrayLike | None = None,
+    tell: Callable[[State], bool | None] | None = None,
+) -> Result:
+    """Minimise ``cost`` over the unit box [0, 1]^dim; the same arguments give the same bytes.
+
+    Args:
+        optimiser: a name of `gcsplan.optimisers.registry`, or a row of your own.
+        cost: batch objective, (n, dim) to (n,). A value that is not finite counts as the worst.
+        dim: number of variables, 1 or more.
+        population: size of the swarm; the row's own unless given.
+        iterations: rounds of the update rule after the first population; the row's own where ``evaluations`` is
+            missing too.
+        evaluations: most cost evaluations (rows handed to ``cost``), used exactly: a last batch is cut. With both
+            given, the first to be reached ends the run.
+        seed: a whole number, or a generator to draw from.
+        parameters: the rule's own, on top of the row's defaults.
+        target: stop after the batch that finds this cost or less.
+        start: (m, dim) points that take the first places of the first population.
+        tell: called after each batch; return True to stop.
+
+    Raises:
+        InputError: an unknown name or parameter, or a size or budget that cannot be used.
+        GcsplanError: a rule left the box, or ``cost`` did not return one number for each row: a bug in either.
+    """
+    entry = get(optimiser) if isinstance(optimiser, str) else optimiser
+    if iterations is None and evaluations is None:
+        iterations = entry.iterations
+    size = entry.population if population is None else population
+    for what, given, least in (
+        ("dim", dim, 1),
+        ("population", size, entry.least_population),
+        ("iterations", iterations, 1),
+        ("evaluations", evaluations, 1),
+    ):
+        if given is not None and given < least:
+            raise InputError(f"{entry.name}: {what} must be {least} or more, given {given}")
+    rng = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
+    run = Run(rng, dim, size, iterations, evaluations, _start(start, dim))
+    book = _Book(run, cost, target, tell)
+    steps = entry.rule()(run, **entry.with_defaults(parameters))
+    stopped_by: StoppedBy | None = None
+    try:
+        batch = next(steps)
+        while True:
+            costs, stopped_by = book.evaluate(batch)
+            if stopped_by is not None:
+                break
+            batch = steps.send(costs)
+    except StopIteration:
+        pass
+    finally:
+        steps.close()
+    return book.result(entry.name, stopped_by or "iterations")
+
+
+def _start(start: ArrayLike | None, dim: int) -> Floats:
+    if start is None:
+        return np.empty((0, dim))
+    points = np.array(start, dtype=np.float64, ndmin=2)
+    if points.ndim != 2 or points.shape[1] != dim or not ((points >= 0.0) & (points <= 1.0)).all():
+        raise InputError(f"start must be (m, {dim}) points in [0, 1], given shape {points.shape}")
+    return points
+
+
+class _Book:
+    """Evaluates batches and keeps the account of a run."""
+
+    def __init__(self, run: Run, cost: Cost, target: float | None, tell: Callable[[State], bool | None] | None) -> None:
+        self.run = run
+        self.cost = cost
+        self.target = -np.inf if target is None else target
+        self.tell = tell
+        self.best_x: Floats | None = None
+        self.best = np.inf
+        self.trace: list[tuple[int, int, float]] = []
+
+    def evaluate(self, batch: Floats) -> tuple[Floats, StoppedBy | None]:
+        """Costs of ``batch`` (cut to what the budget still holds), and why to stop, or None."""
+        run = self.run
+        limit = run.evaluations_limit
+        if limit is not None:
+            batch = batch[: limit - run.evaluations]
+        if not (batch.min() >= 0.0 and batch.max() <= 1.0):  # also false for NaN
+            raise GcsplanError(f"an update rule left the unit box in iteration {run.iteration + 1}")
+        raw = np.asarray(self.cost(batch), dtype=np.float64)
+        if raw.shape != (len(batch),):
+            raise GcsplanError(f"the cost must have shape ({len(batch)},), one number a row; given {raw.shape}")
+        run.evaluations += len(batch)
+        costs = np.where(np.isfinite(raw), np.clip(raw, -WORST, WORST), WORST)
+        lead = int(costs.argmin())
+        if self.best_x is None or costs[lead] < min(self.best, WORST):
+            self.best_x = batch[lead].copy()
+            self.best = float(raw[lead]) if np.isfinite(raw[lead]) else np.inf
+        at = run.iteration + 1 if run.in_cycles else 0
+        self.trace.append((run.evaluations, at, self.best))
+        return costs, self._stop(at)
+
+    def _stop(self, at: int) -> StoppedBy | None:
+        run = self.run
+        assert self.best_x is not None
+        told = self.tell is not None and self.tell(
+            State(at, run.evaluations, run.elapsed, self.best, self.best_x.copy())
+        )
+        if self.best <= self.target:
+            return "target"
+        if told:
+            return "told"
+        return "evaluations" if run.evaluations == run.evaluations_limit else None
+
+    def result(self, name: str, stopped_by: StoppedBy) -> Result:
+        assert self.best_x is not None
+        evaluations, iterations, cost = (np.array(column) for column in zip(*self.trace, strict=True))
+        history = History(evaluations, iterations, cost)
+        return Result(self.best_x, self.best, self.run.evaluations, int(iterations[-1]), history, stopped_by, name)
