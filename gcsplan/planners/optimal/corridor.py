@@ -35,12 +35,10 @@ class End:
 @dataclass(frozen=True, eq=False, slots=True)
 class Corridor:
     """(rows - 1, cols - 1) the cells of a leg's lattice that tracks of some length may enter, and how far the goal is
-    from there at least. ``parts``: a side that the finer lattice's cells there are cut into; 0: as many as the leg's
-    are."""
+    from there at least."""
 
     cells: Bools
     guide: Guide
-    parts: int = 0
 
     def within(self, cells: Bools) -> Corridor:
         """That part of it which lies in some of the guide's mesh's cells."""

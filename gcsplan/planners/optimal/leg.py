@@ -9,15 +9,15 @@ be short enough.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, Reached, Stop, Storeys
-from gcsplan.planners.optimal.cells import MOST_FINE, choose, has_room
+from gcsplan.planners.optimal.cells import choose, has_room
 from gcsplan.planners.optimal.corridor import Corridor, End, Nearby, Spare
-from gcsplan.planners.optimal.navmesh.clearance import Cone, Relief, mesh_of, sampled
+from gcsplan.planners.optimal.navmesh.clearance import Cone, Relief, mesh_of
 from gcsplan.planners.optimal.navmesh.free_altitudes import rooms, storeys
 from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, extent, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
@@ -40,22 +40,14 @@ MOST_ALONE = 50_000
 """Cells of the finer lattice that may be looked at each alone in four parts."""
 LEARNT = 10
 """Times that a track is looked for where nodes alone are as high as the exact check has them."""
-ALONG, MOST_OFTEN = 3, 2_000_000
-"""How many cells beside a way slits are looked for, and in how many of the finest lattice's cells, at most."""
 BESIDE = 8
 """How many cells more the finer lattice is over than those that are asked for: later tracks may lie beside them."""
 RAISED, WORTHWHILE = 4, 0.05
 """Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Exactly:
-    """Tracks are looked for where nodes are legal, though what is between them may not be by a little; ``closely``:
-    along the track of the last flood or bound, in cells as small as can be. ``shut``: where tracks lacked so many
-    metres all the same."""
-
-    closely: bool
-    shut: list[tuple[Floats, float]]
+Lacking = tuple[Floats, float]
+"""A place (2,) at which a track lacked so many metres of height."""
 
 
 class Leg:
@@ -153,7 +145,7 @@ class Leg:
             cells = guide.reach(self.start.place, limit_m)
         else:
             plane, guide, cells = within.guide.mesh.plane, within.guide, within.cells
-            fineness = within.parts or self.closer
+            fineness = self.closer
             if plane is self.plane and self.cells_of.stride == 1:
                 fineness *= self.cells_of.cut
             elif (
@@ -172,25 +164,25 @@ class Leg:
         under: Bools | None,
         spare_m: Spare = (0.0, 0.0),
         over: Bools | None = None,
-        exactly: Exactly | None = None,
+        shut: Sequence[Lacking] | None = None,
     ) -> GroundTrack | None:
         """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``, if it is shorter than
         ``limit_m``, and than `reach_m`.
 
         ``within``: on the finer lattice there; else on that of the first look. ``spare_m``: metres that may be added
         near start and goal to climb. ``under``, ``over`` (zones,): which zones may be passed so; None for all.
+        ``shut``: nodes are as high as the exact check has them, though what is between them may be shut by a little,
+        and higher where tracks lacked height before.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
-        if within is not None and exactly is not None and exactly.closely:
-            within = self._along(within)
         try:
-            relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, exactly is not None)
-            for place, by in exactly.shut if exactly is not None else ():
+            relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, shut is not None)
+            for place, by in shut or ():
                 relief.lift(place[None], np.array([by]))
-            for _ in range(LEARNT if exactly is not None else 1):
+            for _ in range(1 if shut is None else LEARNT):
                 way = relief.mesh().track(self.start.place, self.goal.place, limit, guide)
-                if way is None or exactly is None or not relief.learn(way.points):
+                if way is None or shut is None or not relief.learn(way.points):
                     return way
         except Exhausted:
             pass
@@ -255,17 +247,6 @@ class Leg:
             return False
         self._close, self.reach_m, self.closer = found, limit, parts // cut
         return True
-
-    def _along(self, within: Corridor) -> Corridor:
-        """What of a corridor lies along the way of the last flood or bound, in cells as small as can be."""
-        plane = within.guide.mesh.plane
-        near = np.zeros(within.cells.shape, np.bool_)
-        cell_m = math.dist((plane.x[0, 0], plane.y[0, 0]), (plane.x[0, 1], plane.y[0, 1]))
-        for i, j in np.unique(plane.all_at(sampled(self.last_way, cell_m)).astype(np.intp), axis=0).tolist():
-            near[max(j - ALONG, 0) : j + ALONG + 1, max(i - ALONG, 0) : i + ALONG + 1] = True
-        near &= within.cells
-        parts = math.isqrt(MOST_OFTEN // max(int(near.sum()) * self.cells_of.ratio**2, 1))
-        return Corridor(near, within.guide, max(1, min(MOST_FINE, parts)))
 
     def corridor(self, limit_m: float) -> Corridor:
         """What tracks shorter than ``limit_m``, and than `reach_m`, may meet."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.corridor import End, Stops, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.leg import Exactly, Leg
+from gcsplan.planners.optimal.leg import Lacking, Leg
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import Problem, terminals
 from gcsplan.planners.profile.track import Flown, fly, make_track
@@ -61,14 +61,14 @@ class PlaneSearch:
         self.choice = self._open
         """With what shut the last tracks were found that had to go past something."""
 
-    def stops(self, choice: Choice, cap_m: float, fine: bool, exactly: Exactly | None = None) -> Stops | None:
+    def stops(self, choice: Choice, cap_m: float, fine: bool, shut: Sequence[Lacking] | None = None) -> Stops | None:
         """The shortest track of a choice below a cap, from terminal to terminal; see `Leg.track`."""
         ways = []
         for leg in self.legs:
             limit = self.limit(leg)
             wanted = leg.corridor(limit) if fine and leg.cells_of.has_fine else None
             spare_m = choice.most_m
-            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, spare_m, choice.over, exactly)
+            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, spare_m, choice.over, shut)
             if way is None:
                 return None
             ways.append(way.points)
@@ -117,11 +117,11 @@ class PlaneSearch:
                 leg.flood((limit / leg.length_m - 1.0) * (1.0 + 1e-9), limit)
         return incumbent.gap > PROVED
 
-    def try_below(self, cap_m: float, *, fine: bool, exactly: Exactly | None = None) -> bool:
+    def try_below(self, cap_m: float, *, fine: bool, shut: Sequence[Lacking] | None = None) -> bool:
         """Look for a path below a cap; True if it is the best so far."""
         incumbent = self.incumbent
         incumbent.unsettled = None
-        stops = self.stops(self.choice, cap_m, fine, exactly)
+        stops = self.stops(self.choice, cap_m, fine, shut)
         if stops is None:
             return False
         track = make_track(incumbent.problem, *stops)
@@ -133,18 +133,17 @@ class PlaneSearch:
         past = flown.kind == "zone" or incumbent.best is None
         return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
 
-    def squeeze(self, *, closely: bool) -> bool:
+    def squeeze(self) -> bool:
         """Look for a path through what is open for the exact check alone: a lattice keeps as much beside its tracks as
-        the ground may rise there. ``closely``: along the track of the bound, in cells as small as can be. True if it is
-        the best so far."""
-        exactly = Exactly(closely, [])
+        the ground may rise there. True if it is the best so far."""
+        shut: list[Lacking] = []
         for more_m in DARED_M:
-            if self.try_below(self.top_m, fine=True, exactly=exactly):
+            if self.try_below(self.top_m, fine=True, shut=shut):
                 return True
             lacks = self.incumbent.unsettled
             if lacks is None or lacks.kind != "pinched" or not lacks.by < PINCHED_M or not self.incumbent.goes_on():
                 break
-            exactly.shut.append((lacks.place, lacks.by + more_m))
+            shut.append((lacks.place, lacks.by + more_m))
         return False
 
     def past(

@@ -24,10 +24,10 @@ from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
 Floats = NDArray[np.float64]
 
-FAR, MUCH, WIDE, SLANTED, NEAR = 5e-3, 5e-2, 2e-2, 1e-2, 5e-2
+FAR, MUCH, SLANTED, NEAR = 5e-3, 5e-2, 1e-2, 5e-2
 """Gaps, as parts: beyond which other ways to find a path are asked for a better one; beyond which small worlds are
-searched before time is spent on a bound; beyond which slits are looked for in cells as small as can be; beyond which
-slopes of large terrain models are climbed aslant; and up to which cells are cut once more."""
+searched before time is spent on a bound; beyond which slopes of large terrain models are climbed aslant; and up to
+which cells are cut once more."""
 TWICE = 2.0
 """From so many times the wanted gap on bounds that cost more are asked for."""
 PAST_FINE, ROUNDS = 9, 2
@@ -39,10 +39,9 @@ MOST_CELLS = 50_000
 
 
 NAMES = (
-    "straight", "outlines", "track_bound", "cap_search", "narrow_first", "lattice_first", "roadmap_first",
-    "roadmap_3d", "roadmap_near", "fine_tracks", "detours", "detours_fine", "bound_corridor", "narrow_passage",
-    "narrow_closely", "contour_climb", "lattice", "local_roadmap", "cap_pairs", "length_bound", "space_bound",
-    "altitude_intervals", "refinement",
+    "straight", "outlines", "track_bound", "cap_search", "corridor_first", "lattice_first", "roadmap_first",
+    "roadmap_3d", "roadmap_near", "fine_tracks", "detours", "detours_fine", "bound_corridor", "contour_climb",
+    "lattice", "local_roadmap", "cap_pairs", "length_bound", "space_bound", "altitude_intervals", "refinement",
 )  # fmt: skip
 """Of all searches; which a mission has depends on its objective and limits."""
 
@@ -111,7 +110,7 @@ class Searches:
             ]
         rows += [
             Search("cap_search", 1.0, missing, nodes(1.0), self._look_first),
-            Search("narrow_first", 0.5, missing, nodes(4.0), self._over(self._squeeze_first)),
+            Search("corridor_first", 0.5, missing, nodes(4.0), on(follow)),
             Search("lattice_first", 0.5, missing, of(1.0, 0.0), self._search_lattice),
             Search("roadmap_first", 0.1, self._small_lacks, of(1.0, 0.0), self._search_small),
             Search("roadmap_3d", 0.9, self._is_high, of(0.5, 0.0), self._search_space),
@@ -119,8 +118,6 @@ class Searches:
             Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
             Search("detours", 0.8, far, nodes(2.0), on(lambda plane: plane.past(PAST, fine=False))),
             Search("bound_corridor", 0.2, twice, nodes(3.0), on(follow)),
-            Search("narrow_passage", 0.15, far, nodes(5.0), on(lambda plane: plane.squeeze(closely=False))),
-            Search("narrow_closely", 0.15, gap(WIDE), nodes(6.0), on(lambda plane: plane.squeeze(closely=True))),
             Search("contour_climb", 0.1, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
             Search("lattice", 0.02, self._wants_lattice, of(0.5, 0.0), self._search_lattice_again),
             Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
@@ -194,15 +191,6 @@ class Searches:
         for _ in self.plane.first_looks():
             if not self.incumbent.budget.goes_on():
                 break
-
-    def _squeeze_first(self) -> None:
-        for closely in (False, True):
-            if self._may_squeeze() and self.plane.squeeze(closely=closely):
-                break
-
-    def _may_squeeze(self) -> bool:
-        limits = self.problem.limits
-        return max(limits.track_error_m, limits.horizontal_clearance_m) > 0.0
 
     def _search_lattice(self, *, known: bool = False) -> None:
         incumbent = self.incumbent

@@ -47,10 +47,11 @@ AT_ONCE = 512
 
 
 def follow(plane: PlaneSearch) -> bool:
-    """Where the ways of the last bounds leave the best path, look for a path along them; True if one is the best so
-    far."""
+    """Where the ways of the last bounds leave the best path, or all along them where none is known, look for a path;
+    True if one is the best so far."""
     incumbent = plane.incumbent
-    assert incumbent.best is not None
+    if incumbent.best is None:
+        return _first(plane)
     stops = [0, len(incumbent.best) - 1] if incumbent.pinned is None else np.flatnonzero(incumbent.pinned).tolist()
     if len(stops) != len(plane.legs) + 1:
         return False
@@ -63,13 +64,44 @@ def follow(plane: PlaneSearch) -> bool:
     return not incumbent.judge.violations(points) and incumbent.take_simpler(points, pinned, fine=True, longer=False)
 
 
+def _first(plane: PlaneSearch) -> bool:
+    """Look for a first path along the ways of all legs."""
+    incumbent, parts = plane.incumbent, []
+    before: Floats | None = None
+    for leg in plane.legs:
+        leg.bound(plane.top_m, leg.corridor(leg.reach_m), leg.reach_m)  # whose way is nearer to what is open
+        at, s, places = _sampled(leg.last_way)
+        start, goal = (_end(plane, leg, end, at[-1]) for end in (0.0, at[-1]))
+        part = _along(plane, leg, [start if before is None else before, goal], places, s, at[-1])
+        if part is None:
+            return False
+        parts.append(part)
+        before = part[-1]
+    points, pinned, _ = joined(parts, [None] * (len(parts) - 1))
+    return not incumbent.judge.violations(points) and incumbent.take_simpler(points, pinned, fine=True, longer=False)
+
+
+def _end(plane: PlaneSearch, leg: Leg, along_m: float, whole_m: float) -> Floats:
+    """(3,) an end of a leg; where its height is free, as high as `_height` says."""
+    end = leg.start if along_m <= 0.0 else leg.goal
+    if end.amsl_m is not None:
+        return np.array([*end.place, end.amsl_m])
+    over_m = float(plane.problem.floors(*np.array([end.place]).T)[0]) - plane.top_m
+    return np.array([*end.place, _height(plane, leg, along_m, whole_m - along_m, over_m)])
+
+
+def _sampled(way: Floats) -> tuple[Floats, Floats, Floats]:
+    """Metres along a way of its vertices, and of places `STEP_M` apart, and those places (N, 2)."""
+    at = distances(way)
+    s = np.linspace(0.0, at[-1], math.ceil(at[-1] / STEP_M) + 1)
+    return at, s, np.stack([np.interp(s, at, way[:, k]) for k in range(2)], axis=-1)
+
+
 def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
     """(N, 3) a cheaper path of a leg than a known one, which it leaves where the way of the last bound does; None where
     none was found."""
-    way = leg.last_way
-    at, on_path = distances(way), distances(path[:, :2])
-    s = np.linspace(0.0, at[-1], math.ceil(at[-1] / STEP_M) + 1)
-    places = np.stack([np.interp(s, at, way[:, k]) for k in range(2)], axis=-1)
+    on_path = distances(path[:, :2])
+    at, s, places = _sampled(leg.last_way)
     away, nearest = _nearest(places, path[:, :2])
     better: list[tuple[float, float, Floats]] = []
     for first, last in _runs(away > BESIDE_M):
@@ -120,7 +152,7 @@ def _along(
             for _ in found.first_looks(SLACKS):
                 pass
         if sub.best is None and not sub.proved_shut and found.legs:
-            found.squeeze(closely=False)
+            found.squeeze()
         if sub.best is None or not plane.incumbent.budget.goes_on():
             return None
         out.append(sub.best if not out else sub.best[1:])
