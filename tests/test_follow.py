@@ -72,7 +72,7 @@ def test_stops_are_passed_as_before() -> None:
 
 def test_the_planner_asks_for_it() -> None:
     plane = through(0.1)
-    improve(plane, ("narrow_passage", "narrow_closely"))
+    improve(plane, ())
     assert plane.incumbent.cost < STRAIGHT_M
     assert plane.incumbent.gap < 0.003
 

@@ -11,7 +11,7 @@ CROSSING = Path(__file__).parent / "data" / "crossing.yaml"
 PLAN = """
 import gc, sys
 sys.argv = ["gcsplan", "plan", sys.argv[1], "-o", sys.argv[2]]
-from gcsplan import cli
+from gcsplan.cli import main as cli
 from gcsplan.cli import memory
 try:
     cli.main()

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file import zone_geojson
+from gcsplan.mission_file import zone_file, zone_reader
 from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, circle, looks_swapped, place_zones, polygon, zones_sha256
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_reader import read_zones
@@ -221,12 +221,12 @@ def test_missing_and_oversized_files_are_refused(tmp_path: Path, monkeypatch: py
         with pytest.raises(InputError) as caught:
             read_zones(path, where="m: no_fly[0].file")
         assert caught.value.where == "m: no_fly[0].file"
-    monkeypatch.setattr(zone_geojson, "MAX_BYTES", 50)
+    monkeypatch.setattr(zone_reader, "MAX_BYTES", 50)
     assert "more than 50" in messages(tmp_path, collection(square()))
 
 
 def test_too_many_zones_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(zone_geojson, "MAX_ZONES", 2)
+    monkeypatch.setattr(zone_file, "MAX_ZONES", 2)
     assert "more than 2 zones" in messages(tmp_path, collection(*[square()] * 3))
 
 
