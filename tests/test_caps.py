@@ -226,7 +226,7 @@ def test_floors_are_never_above_the_ground_that_a_short_track_sees(seed: int) ->
     assert binding >= 1
 
 
-def storeys(problem: Problem, seed: int, count: int) -> list[Zone]:
+def intervals(problem: Problem, seed: int, count: int) -> list[Zone]:
     """Zones one after the other on the straight way, each to be passed over alone, under alone, or both."""
     rng = np.random.default_rng([seed, 7])
     a, b = np.array(problem.start[:2]), np.array(problem.goal[:2])
@@ -236,14 +236,14 @@ def storeys(problem: Problem, seed: int, count: int) -> list[Zone]:
         ground_m = float(problem.airspace.surface.ground_at(*place[:, None])[0])
         low, high = Level(rng.uniform(40.0, 90.0), "agl"), Level(ground_m + rng.uniform(100.0, 160.0), "amsl")
         sides = [(None, high), (low, None), (low, high)][k % 3]
-        out.append(Zone(f"storey {k}", Circle(*place.tolist(), 0.4 * math.dist(a, b) / (count + 1)), *sides))
+        out.append(Zone(f"interval {k}", Circle(*place.tolist(), 0.4 * math.dist(a, b) / (count + 1)), *sides))
     return out
 
 
 @pytest.mark.parametrize(("seed", "zones"), [(0, 0), (1, 0), (2, 0), (0, 2), (1, 2), (2, 2), (0, 5), (1, 5)])
 def test_no_path_over_a_short_track_is_shorter_than_the_bound_of_what_it_climbs(seed: int, zones: int) -> None:
     problem = hills(seed, BARE)
-    problem = replace(problem, airspace=Airspace(problem.airspace.surface, storeys(problem, seed, zones)))
+    problem = replace(problem, airspace=Airspace(problem.airspace.surface, intervals(problem, seed, zones)))
     leg = Leg(problem, End(*problem.start), End(*problem.goal), 700.0)
     leg.flood(0.15)
     rng = np.random.default_rng(seed)

@@ -50,7 +50,7 @@ def test_a_path_leads_through_what_is_open_by_centimetres(
     assert found.lower_bound is not None
     assert problem.cost(found.path) < 1.003 * found.lower_bound
     assert faults(problem, found.path) == []
-    monkeypatch.setattr(PlaneSearch, "squeeze", lambda self: False)
+    monkeypatch.setattr(PlaneSearch, "narrow_passage", lambda self: False)
     assert problem.cost(optimal.plan(problem).path) > ROUND_M, "the notch is too wide to show anything"
 
 

@@ -1,4 +1,4 @@
-"""Storeys over cells, held to brute force: what zones leave, what is carried on, and which tracks there are."""
+"""Altitude intervals over cells, held to brute force: what zones leave, what is carried on, which tracks there are."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, Reached, Stop, Storeys
+from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, AltitudeIntervals, Reached, Terminal
 from gcsplan.planners.optimal.corridor import End
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.navmesh.clearance import mesh_of
-from gcsplan.planners.optimal.navmesh.free_altitudes import rooms, storeys
+from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import make_plane
 from gcsplan.planners.optimal.navmesh.interval_kernels import spread
 from gcsplan.planners.problem import Problem
@@ -30,11 +30,11 @@ CELL_M = 10.0
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
 
-# --- what is carried from one storey to the next ------------------------------------------------------------------
+# --- what is carried from one interval to the next ------------------------------------------------------------------
 
 
-def random_storeys(rng: np.random.Generator, rows: int, cols: int) -> Storeys:
-    """One or two storeys over most cells, start and goal in opposite corners, at altitudes of the ten."""
+def random_storeys(rng: np.random.Generator, rows: int, cols: int) -> AltitudeIntervals:
+    """One or two intervals over most cells, start and goal in opposite corners, at altitudes of the ten."""
     cell, low, high = [], [], []
     goal = rows * cols - 1
     for k in range(rows * cols):
@@ -42,11 +42,11 @@ def random_storeys(rng: np.random.Generator, rows: int, cols: int) -> Storeys:
         if not ends and rng.random() < 0.15:
             continue
         floor = float(rng.choice([0.0, 0.0, 0.0, 20.0, 40.0]))
-        storeys = [(floor, 60.0)]
+        intervals = [(floor, 60.0)]
         if rng.random() < 0.5:
             bottom = float(rng.choice([10.0, 20.0, 30.0]))
-            storeys = [(a, b) for a, b in [(floor, bottom), (max(bottom + 20.0, floor), 60.0)] if a <= b]
-        for a, b in [(0.0, 60.0)] if ends else storeys:
+            intervals = [(a, b) for a, b in [(floor, bottom), (max(bottom + 20.0, floor), 60.0)] if a <= b]
+        for a, b in [(0.0, 60.0)] if ends else intervals:
             cell.append(k)
             low.append(a)
             high.append(b)
@@ -55,9 +55,9 @@ def random_storeys(rng: np.random.Generator, rows: int, cols: int) -> Storeys:
     away = CELL_M * np.hypot(row, col)
     left = CELL_M * np.hypot(rows - 1 - row, cols - 1 - col)
     half = CELL_M * math.sqrt(0.5)
-    stops = [Stop(np.array([k]), float(rng.choice([0.0, 20.0, 50.0]))) for k in (0, goal)]
+    stops = [Terminal(np.array([k]), float(rng.choice([0.0, 20.0, 50.0]))) for k in (0, goal)]
     near: list[Floats] = [np.maximum(x - half, 0.0) for x in (away, left)]
-    return Storeys(
+    return AltitudeIntervals(
         (rows, cols), at, np.array(low), np.array(high), near[0], near[1], away, left, half, stops[0], stops[1]
     )
 
@@ -89,9 +89,11 @@ def test_what_is_carried_on_is_the_least_of_all_ways(seed: int) -> None:
 # --- no track that there is is called too short -------------------------------------------------------------------
 
 
-def shortest(s: Storeys, up: float, down: float, step_m: float = 2.0) -> tuple[float, list[tuple[int, float]]]:
-    """The shortest track over middles of cells at altitudes of a lattice, searched through; and its storeys and
-    altitudes. From a storey to the next one passes the border at the mean of both altitudes."""
+def shortest(
+    s: AltitudeIntervals, up: float, down: float, step_m: float = 2.0
+) -> tuple[float, list[tuple[int, float]]]:
+    """The shortest track over middles of cells at altitudes of a lattice, searched through; and its intervals and
+    altitudes. From an interval to the next one passes the border at the mean of both altitudes."""
     levels = np.arange(0.0, 60.0 + step_m, step_m)
     cols = s.shape[1]
     of: dict[int, list[int]] = {}
@@ -164,10 +166,10 @@ def test_climbing_out_from_under_a_storey_takes_its_length(free: str, limited: s
     low[40], high[40] = 0.0, 60.0  # here it can be climbed
     away: Floats = CELL_M * at.astype(np.float64)
     left: Floats = away[::-1].copy()
-    stops = Stop(at[:1], None if free == "start" else 5.0), Stop(at[-1:], None if free == "goal" else 55.0)
+    stops = Terminal(at[:1], None if free == "start" else 5.0), Terminal(at[-1:], None if free == "goal" else 55.0)
     half = 0.5 * CELL_M
     near: list[Floats] = [np.maximum(x - half, 0.0) for x in (away, left)]
-    s = Storeys((1, cols), at, low, high, near[0], near[1], away, left, half, stops[0], stops[1])
+    s = AltitudeIntervals((1, cols), at, low, high, near[0], near[1], away, left, half, stops[0], stops[1])
     limits = Limits(
         0.0, max_climb_deg=math.degrees(math.atan(0.1)), max_descent_deg=90.0 if limited == "climb" else 30.0
     )
@@ -206,7 +208,7 @@ def test_every_altitude_that_is_legal_in_a_cell_lies_in_one_of_its_storeys(seed:
     problem = leg.problem
     plane = make_plane(problem, EVERYWHERE)
     mesh = mesh_of(plane, 250.0, True, single=True)
-    count, low, high = storeys(mesh, *rooms(mesh, 250.0), MOST, 1e-3)
+    count, low, high = intervals(mesh, *ranges(mesh, 250.0), MOST, 1e-3)
     x, y = mesh.places()
     many = 0
     for j, i in product(range(12), range(12)):
@@ -264,8 +266,8 @@ def test_a_ridge_right_behind_a_low_storey_is_farther_than_the_plane_tells() -> 
     track_m = float(run.sum())
     assert track_m < leg.reach_m
     plane = leg.bound(leg.top_m, leg.corridor(track_m), track_m, True)
-    proved = [m for m in np.arange(2950.0, track_m, 50.0).tolist() if not len(leg.storeys(m).cell)]
+    proved = [m for m in np.arange(2950.0, track_m, 50.0).tolist() if not len(leg.intervals(m).cell)]
     assert max(proved) > plane + 500.0
-    assert len(leg.storeys(track_m).cell)
+    assert len(leg.intervals(track_m).cell)
     # The straight way, and what more the climb takes: from under the zone's edge at 60 m to the ridge's top at 310 m.
     assert max(proved) <= 2950.0 + 2500.0

@@ -70,7 +70,7 @@ def test_the_track_over_the_lattice_has_way_enough_to_climb(objective: str) -> N
 def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> None:
     # More room over the zone than under it; a path that dives under it all the same.
     gentle = Limits(10.0, max_amsl_m=400.0, max_climb_deg=45.0, max_descent_deg=45.0)
-    zone = Zone("storey", Circle(1000.0, 1000.0, 250.0), Level(40.0, "amsl"), Level(100.0, "amsl"))
+    zone = Zone("interval", Circle(1000.0, 1000.0, 250.0), Level(40.0, "amsl"), Level(100.0, "amsl"))
     p = Problem(Airspace(ground(0.0), [zone]), gentle, (200.0, 1000.0, 80.0), (1800.0, 1000.0, 80.0))
     under = np.array([[200.0, 1000.0, 80.0], [600.0, 1100.0, 30.0], [1400.0, 1100.0, 30.0], [1800.0, 1000.0, 80.0]])
     over = under.copy()

@@ -58,9 +58,7 @@ def upload(
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
     from gcsplan.sim.loopback import loopback_fleet
 
-    options = Options(
-        allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s
-    )
+    options = Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s)
     return delivery.deliver(delivery.jobs_of(planned, targets), options, progress, simulator=loopback_fleet)
 
 

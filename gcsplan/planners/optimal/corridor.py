@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Spare = tuple[float, float]
 """Metres that a path may fly in laps near its start and near its goal."""
-Stops = tuple[Floats, Bools, Floats]
+PinnedTrack = tuple[Floats, Bools, Floats]
 """A track (N, 2), which of its points are terminals, and their altitudes (NaN free)."""
 
 
@@ -62,7 +62,7 @@ class Nearby:
     left_m: Floats
 
 
-def joined(ways: list[Floats], heights: list[float | None]) -> Stops:
+def joined(ways: list[Floats], heights: list[float | None]) -> PinnedTrack:
     """One track of those from stop to stop (N, 2), of which the ``heights`` of all but the ends are told."""
     points = np.vstack([ways[0], *(w[1:] for w in ways[1:])])
     pinned, pin_m = np.zeros(len(points), np.bool_), np.full(len(points), math.nan)

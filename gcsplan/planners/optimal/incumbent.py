@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.planner import straight_bound
-from gcsplan.planners.optimal.corridor import Stops
+from gcsplan.planners.optimal.corridor import PinnedTrack
 from gcsplan.planners.problem import Problem, Progress, Solution, Step
 from gcsplan.planners.profile.climb_laps import with_laps
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle, way_points
@@ -57,7 +57,7 @@ class Incumbent:
 
     # ------------------------------------------------------------------------------------------------- paths
 
-    def take_along(self, stops: Stops, *, fine: bool = True) -> bool:
+    def take_along(self, stops: PinnedTrack, *, fine: bool = True) -> bool:
         """Look for a path over a track; True if it is the best so far."""
         track = make_track(self.problem, *stops)
         flown = fly(self.problem, track)
@@ -66,7 +66,7 @@ class Incumbent:
         found = self.exact(track, flown)
         return found is not None and self.take_simpler(*found, fine=fine, longer=False)
 
-    def take_longer(self, stops: Stops, fine: bool) -> bool:
+    def take_longer(self, stops: PinnedTrack, fine: bool) -> bool:
         """Look for a path over a track, with laps where it is too steep; True if it is the best so far."""
         track = make_track(self.problem, *stops)
         flown = fly(self.problem, track)

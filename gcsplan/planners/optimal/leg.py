@@ -14,11 +14,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, Reached, Stop, Storeys
+from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, AltitudeIntervals, Reached, Terminal
 from gcsplan.planners.optimal.cells import choose, has_room
 from gcsplan.planners.optimal.corridor import Corridor, End, Nearby, Spare
-from gcsplan.planners.optimal.navmesh.clearance import Cone, Relief, mesh_of
-from gcsplan.planners.optimal.navmesh.free_altitudes import rooms, storeys
+from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh_of
+from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, extent, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack
@@ -75,7 +75,7 @@ class Leg:
         self._reached: tuple[Nearby, Reached] | None = None
         self.cells_of = choose(problem, start.place, self.straight_m, self._box(DETOURS[0]))
         self.closer = 1
-        """Into how many parts a side the finer lattice's cells are cut once more, see `look_closer`."""
+        """Into how many parts a side the finer lattice's cells are cut once more, see `refine`."""
 
     @property
     def lower_m(self) -> float:
@@ -127,7 +127,7 @@ class Leg:
                 self.length_m = self.reach_m = within_m  # no track is shorter
                 return
 
-    def _relief(
+    def _clearance(
         self,
         cap_m: float,
         low: bool,
@@ -137,7 +137,7 @@ class Leg:
         under: Bools | None = None,
         over: Bools | None = None,
         exact: bool = False,
-    ) -> tuple[Relief, Guide]:
+    ) -> tuple[ClearanceGrid, Guide]:
         """What to make a mesh of, finer ``within`` a corridor, or else the first look's for tracks shorter than
         ``limit_m``; and how far the goal is."""
         if within is None:
@@ -154,7 +154,7 @@ class Leg:
                 and has_room(self.problem, cells, BESIDE, self.cells_of.ratio)
             ):
                 plane, cells = self._over(cells)
-        return Relief(plane, cap_m, low, fineness, cells, ends, under, over, exact=exact), guide
+        return ClearanceGrid(plane, cap_m, low, fineness, cells, ends, under, over, exact=exact), guide
 
     def track(
         self,
@@ -177,12 +177,12 @@ class Leg:
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
         try:
-            relief, guide = self._relief(cap_m, False, within, limit, cones, under, over, shut is not None)
+            clearance, guide = self._clearance(cap_m, False, within, limit, cones, under, over, shut is not None)
             for place, by in shut or ():
-                relief.lift(place[None], np.array([by]))
+                clearance.lift(place[None], np.array([by]))
             for _ in range(1 if shut is None else LEARNT):
-                way = relief.mesh().track(self.start.place, self.goal.place, limit, guide)
-                if way is None or shut is None or not relief.learn(way.points):
+                way = clearance.mesh().track(self.start.place, self.goal.place, limit, guide)
+                if way is None or shut is None or not clearance.learn(way.points):
                     return way
         except Exhausted:
             pass
@@ -196,15 +196,15 @@ class Leg:
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         known = self.length_m
         try:
-            relief, guide = self._relief(cap_m, True, within, limit)
+            clearance, guide = self._clearance(cap_m, True, within, limit)
         except Exhausted:
             return known
         for _ in range(RAISED):
             spare = max(limit - known, 0.0)
             cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare) if climbs else []
-            relief.hold(cones)
+            clearance.hold(cones)
             try:
-                way = relief.mesh().track(self.start.place, self.goal.place, limit, guide)
+                way = clearance.mesh().track(self.start.place, self.goal.place, limit, guide)
             except Exhausted as given_up:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:
@@ -217,7 +217,7 @@ class Leg:
                 break
         return known
 
-    def look_closer(self, limit_m: float, parts: int, cut: int) -> bool:
+    def refine(self, limit_m: float, parts: int, cut: int) -> bool:
         """Look anew, at each cell of the finer lattice alone, at what tracks shorter than ``limit_m`` may meet; where
         they are few, at each of their ``cut`` parts a side.
 
@@ -266,16 +266,16 @@ class Leg:
             return of.low_m, of.high_m, of.away_m, of.left_m
         return close.low_m[near], close.high_m[near], close.away_m[near], close.left_m[near]
 
-    def storeys(self, limit_m: float) -> Storeys:
+    def intervals(self, limit_m: float) -> AltitudeIntervals:
         """Those that tracks shorter than ``limit_m``, and than `reach_m`, may enter by what they climb and descend."""
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
         if self._reached is None or self._reached[0] is not close:
             mesh, a, b = close.left.mesh, self.start, self.goal
             near = self._near(close, close.limit_m)
-            count, low, high = storeys(mesh, close.low_m, close.high_m, MOST, SPARE_M)
+            count, low, high = intervals(mesh, close.low_m, close.high_m, MOST, SPARE_M)
             cell, nth = np.nonzero((np.arange(MOST) < count[:, None]) & near[:, None])
-            every = Storeys(
+            every = AltitudeIntervals(
                 (mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1),
                 cell,
                 low[cell, nth],
@@ -285,8 +285,8 @@ class Leg:
                 mesh.middles_from(a.place)[cell],
                 mesh.middles_from(b.place)[cell],
                 mesh.half_m(),
-                Stop(mesh.cells_at(a.place), a.amsl_m),
-                Stop(mesh.cells_at(b.place), b.amsl_m),
+                Terminal(mesh.cells_at(a.place), a.amsl_m),
+                Terminal(mesh.cells_at(b.place), b.amsl_m),
             )
             self._reached = close, Reached(every, self.problem.limits, close.limit_m)
         return self._reached[1].within(limit, self._near(close, limit))
@@ -304,7 +304,7 @@ class Leg:
                 mesh = left.mesh
                 ends = (away, self.start), (left, self.goal)
                 ways = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
-                found = Nearby(limit_m, away, left, *rooms(mesh, self.top_m), *ways)
+                found = Nearby(limit_m, away, left, *ranges(mesh, self.top_m), *ways)
             self._close = found
         return self._close
 
@@ -318,7 +318,7 @@ class Leg:
             away = mesh.flood(a, b, limit_m, math.inf, left)[1]
         except Exhausted:
             return None
-        return Nearby(limit_m, away, left, *rooms(mesh, self.top_m), away.cells(), left.cells())
+        return Nearby(limit_m, away, left, *ranges(mesh, self.top_m), away.cells(), left.cells())
 
     def _over(self, cells: Bools) -> tuple[Plane, Bools]:
         """The finer lattice over some cells, and perhaps more, and which of its cells these are."""

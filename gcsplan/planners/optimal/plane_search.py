@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.planners.optimal.cap_search import above_all
-from gcsplan.planners.optimal.corridor import End, Stops, joined
+from gcsplan.planners.optimal.corridor import End, PinnedTrack, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Lacking, Leg
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
@@ -61,7 +61,9 @@ class PlaneSearch:
         self.choice = self._open
         """With what shut the last tracks were found that had to go past something."""
 
-    def stops(self, choice: Choice, cap_m: float, fine: bool, shut: Sequence[Lacking] | None = None) -> Stops | None:
+    def stops(
+        self, choice: Choice, cap_m: float, fine: bool, shut: Sequence[Lacking] | None = None
+    ) -> PinnedTrack | None:
         """The shortest track of a choice below a cap, from terminal to terminal; see `Leg.track`."""
         ways = []
         for leg in self.legs:
@@ -133,7 +135,7 @@ class PlaneSearch:
         past = flown.kind == "zone" or incumbent.best is None
         return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
 
-    def squeeze(self) -> bool:
+    def narrow_passage(self) -> bool:
         """Look for a path through what is open for the exact check alone: a lattice keeps as much beside its tracks as
         the ground may rise there. True if it is the best so far."""
         shut: list[Lacking] = []
@@ -147,7 +149,13 @@ class PlaneSearch:
         return False
 
     def past(
-        self, most: int, *, fine: bool, first: bool = False, cap_m: float | None = None, given: Stops | None = None
+        self,
+        most: int,
+        *,
+        fine: bool,
+        first: bool = False,
+        cap_m: float | None = None,
+        given: PinnedTrack | None = None,
     ) -> bool:
         """Look for tracks past what is in the way, at ``most`` of them; True if a path over one is the best so far.
 

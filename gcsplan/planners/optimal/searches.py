@@ -278,7 +278,7 @@ class Searches:
     def _refine(self) -> None:
         plane, incumbent = self.plane, self.incumbent
         cut = 2 if incumbent.gap > FAR else 1
-        if sum(leg.look_closer(plane.limit(leg), FINER, cut) for leg in plane.legs):
+        if sum(leg.refine(plane.limit(leg), FINER, cut) for leg in plane.legs):
             plane.try_below(plane.top_m, fine=True)
             halve(plane, far=True)
             if incumbent.gap > TWICE * incumbent.wanted and incumbent.budget.goes_on() and follow(plane):

@@ -1,11 +1,11 @@
-"""Which storeys a track that is short enough can get to, and on from, by what it can climb and descend.
+"""Which intervals a track that is short enough can get to, and on from, by what it can climb and descend.
 
 Flown for s metres of its track, a path that climbs no steeper than c and descends no steeper than d is at z, and
 z - c s only falls, z + d s only rises. So does s - r, r metres straight from the start, and s + t, t metres straight
-to the goal. In a storey a path is no higher than that is, and has flown no less than the shortest way there. So the
-most, or the least, that each of these can be in a storey is that of the way there whose worst storey is best, and is
-found as shortest ways are. Where by these no altitude of a storey can be had in time, nor from there the goal's, it is
-shut; and what is shut leaves others less. Where nothing is left, no track is so short.
+to the goal. In an interval a path is no higher than that is, and has flown no less than the shortest way there. So
+the most, or the least, that each of these can be in an interval is that of the way there whose worst interval is best,
+and is found as shortest ways are. Where by these no altitude of an interval can be had in time, nor from there the
+goal's, it is shut; and what is shut leaves others less. Where nothing is left, no track is so short.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
 MOST = 4
-"""Storeys over one cell, at most; zones that would make more are as if they were not."""
+"""Intervals over one cell, at most; zones that would make more are as if they were not."""
 SPARE_M = 1e-3
-"""By how much storeys are wider, and ends higher and lower, than they are: for rounding, and for what touches."""
+"""By how much intervals are wider, and ends higher and lower, than they are: for rounding, and for what touches."""
 KEPT = 4
-"""Lengths of which all storeys are kept, at most."""
+"""Lengths of which all intervals are kept, at most."""
 ROUNDS, WORTHWHILE = 4, 0.01
-"""Times that what is shut is taken account of, and what part of the storeys must have been shut to go on."""
+"""Times that what is shut is taken account of, and what part of the intervals must have been shut to go on."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Stop:
+class Terminal:
     """Where a track begins or ends: the cells that the place may lie in, and how high; None where that is free."""
 
     cells: Ints
@@ -42,12 +42,13 @@ class Stop:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Storeys:
-    """Storeys of a lattice's cells, and what is known of tracks shorter than some length that enter them.
+class AltitudeIntervals:
+    """Altitude intervals of a lattice's cells, and what is known of tracks shorter than some length that enter them.
 
-    ``shape`` rows and columns of cells; ``cell`` (N,) rising, whose storey each is. Of the storeys (N,): the lowest and
-    the highest altitude there; how long the ways there and on are at least; and how far the cells' middles are straight
-    from ``start`` and ``goal``, of which no other place of theirs is nearer or farther by more than ``half_m``.
+    ``shape`` rows and columns of cells; ``cell`` (N,) rising, whose interval each is. Of the intervals (N,): the lowest
+    and the highest altitude there; how long the ways there and on are at least; and how far the cells' middles are
+    straight from ``start`` and ``goal``, of which no other place of theirs is nearer or farther by more than
+    ``half_m``.
     """
 
     shape: tuple[int, int]
@@ -59,8 +60,8 @@ class Storeys:
     from_start_m: Floats
     to_goal_m: Floats
     half_m: float
-    start: Stop
-    goal: Stop
+    start: Terminal
+    goal: Terminal
 
     @property
     def cells(self) -> Bools:
@@ -69,7 +70,7 @@ class Storeys:
         out.ravel()[self.cell] = True
         return out
 
-    def only(self, which: Bools) -> Storeys:
+    def only(self, which: Bools) -> AltitudeIntervals:
         """Some of them."""
         return replace(
             self,
@@ -82,7 +83,7 @@ class Storeys:
             to_goal_m=self.to_goal_m[which],
         )
 
-    def reached(self, limits: Limits, limit_m: float) -> Storeys:
+    def reached(self, limits: Limits, limit_m: float) -> AltitudeIntervals:
         """Those that tracks shorter than ``limit_m`` may enter, and what of them; none where there is no such track."""
         # An angle that is exceeded by less than its float noise is kept.
         up, down = (k + 1e-8 * (1.0 + k * k) for k in (limits.max_climb_slope, limits.max_descent_slope))
@@ -94,7 +95,7 @@ class Storeys:
                 break
         return now
 
-    def _back(self) -> Storeys:
+    def _back(self) -> AltitudeIntervals:
         """The same for who comes from the goal."""
         return replace(
             self,
@@ -106,7 +107,7 @@ class Storeys:
             goal=self.start,
         )
 
-    def _there(self, up: float, down: float, limit_m: float) -> Storeys:
+    def _there(self, up: float, down: float, limit_m: float) -> AltitudeIntervals:
         """What is left of them, and how long the ways there are, by what climbs and descends from the start."""
         if not len(self.cell):
             return self
@@ -145,22 +146,22 @@ class Storeys:
 
 
 class Reached:
-    """Storeys that tracks shorter than some lengths may enter; what is known of longer ones helps.
+    """Altitude intervals that tracks shorter than some lengths may enter; what is known of longer ones helps.
 
     ``every``: what tracks shorter than ``limit_m`` may meet.
     """
 
-    def __init__(self, every: Storeys, limits: Limits, limit_m: float) -> None:
+    def __init__(self, every: AltitudeIntervals, limits: Limits, limit_m: float) -> None:
         self._limits, self._most_m = limits, limit_m
-        self._known: dict[float, Storeys] = {limit_m: every}
+        self._known: dict[float, AltitudeIntervals] = {limit_m: every}
         self._asked: set[float] = set()
 
-    def known(self, limit_m: float, near: Bools) -> Storeys:
+    def known(self, limit_m: float, near: Bools) -> AltitudeIntervals:
         """Those that tracks so long may enter, as far as is known by now, of cells that are ``near`` (cells,)."""
         found = self._known[min(m for m in self._known if m >= limit_m)]
         return found.only(near[found.cell])
 
-    def within(self, limit_m: float, near: Bools) -> Storeys:
+    def within(self, limit_m: float, near: Bools) -> AltitudeIntervals:
         """The same of one length, looked at."""
         if limit_m in self._asked and limit_m in self._known:
             return self._known[limit_m]

@@ -76,7 +76,7 @@ def _bound_shorter(plane: PlaneSearch, longest_m: float) -> float:
         limit = leg.length_m + spare
         wanted = leg.corridor(limit)
         if plane.by_intervals:
-            intervals = leg.storeys(limit)
+            intervals = leg.intervals(limit)
             if not len(intervals.cell):
                 tracks.append(min(limit, leg.reach_m))
                 continue

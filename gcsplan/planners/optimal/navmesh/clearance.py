@@ -1,7 +1,7 @@
 """What can be flown over a part of a plane below a cap, node by node, and the mesh of that.
 
-A relief may be held down: near the ends of a leg paths can be only so high, which a bound may use as a lower cap. Each
-time ways become longer by that there is less to spare for a climb, so it can be held down once more, from where it is.
+A clearance grid may be held down: near the ends of a leg paths can be only so high, which a bound may use as a lower
+cap. Each time tracks become longer by that there is less to spare for a climb, so it can be held down once more.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ MANY = 8
 """Names a portal from which on a mesh's are numbered one by one, for searches have room for every name."""
 
 
-class Relief:
+class ClearanceGrid:
     """The nodes of the ``wanted`` cells of a plane, or of all, cut ``fineness`` times finer: how much too high the
     lowest is that can be flown at (*excess*), and the walls of the zones.
 
     ``cap_m``, ``low`` as in `mesh_of`; ``ends``: where paths climb from, see `clearance_kernels.fill`; ``under``,
     ``over`` (zones,): which zones may be passed below their floors, above their ceilings; None for all. ``whole``: such
-    meshes are asked for places all over them, and kept; others last until the plane's next relief. ``exact``: nodes are
-    as high as the exact check has them, and not higher for what may be between them. Raises Exhausted
-    where the nodes take more memory than the budget leaves.
+    meshes are asked for places all over them, and kept; others last until the plane's next grid. ``exact``: nodes are
+    as high as the exact check has them, and not higher for what may be between them. Raises Exhausted where the nodes
+    take more memory than the budget leaves.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class Relief:
 
     def hold(self, cones: list[Cone]) -> None:
         """Hold nodes down to ``cones``, which no path of a length that matters is higher than near its ends: a bound's
-        relief. Cones that come later know of the ways that are longer because of those before."""
+        clearance. Cones that come later know of the ways that are longer because of those before."""
         if not cones:
             return
         cell_m = self.plane.stride * float(
@@ -238,9 +238,9 @@ def mesh_of(
 ) -> Mesh:
     """What of a plane can be crossed at or below ``cap_m``: by a bound's track (``low``: all of it) or by a path's.
 
-    ``wanted``: only these cells. ``single``: each free cell is a piece of its own. Raises Exhausted, see `Relief`.
+    ``wanted``: only these cells. ``single``: each free cell is a piece of its own. Raises Exhausted.
     """
-    return Relief(plane, cap_m, low, fineness, wanted, whole=single).mesh(single=single)
+    return ClearanceGrid(plane, cap_m, low, fineness, wanted, whole=single).mesh(single=single)
 
 
 def sampled(track: Floats, step_m: float) -> Floats:

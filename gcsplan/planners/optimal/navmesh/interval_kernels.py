@@ -1,6 +1,6 @@
-"""Storeys, what zones leave of the altitudes over a cell, one above the other; and what is carried from one to another.
+"""Altitude intervals: what zones leave of the altitudes over a cell; and what is carried from one to another.
 
-From a storey a path gets to those over the cells around that hold an altitude of its own; never to another over the
+From an interval a path gets to those over the cells around that hold an altitude of its own; never to another over the
 same cell, for a zone that covers all of it is between them.
 """
 
@@ -18,14 +18,14 @@ Ints = NDArray[np.int32]
 
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8 i4[] f8[,] f8[,]")
-def cut_storeys(
+def cut_intervals(
     ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, exact: bool, spare: float,
     count: Ints, low: Floats, high: Floats,
 ) -> None:  # fmt: skip
-    """Cut the storeys of each cell, ``count`` (cells,) of them from ``low`` to ``high`` (cells, most), by what is shut
-    for certain over all of it, but for ``spare`` at either side of a zone.
+    """Cut the intervals of each cell, ``count`` (cells,) of them from ``low`` to ``high`` (cells, most), by what is
+    shut for certain over all of it, but for ``spare`` at either side of a zone.
 
-    One that would be cut in two where there is room for no more is left as it is. ``exact``: as in `narrow_rooms`.
+    One that would be cut in two where there is room for no more is left as it is. ``exact``: as in `narrow_ranges`.
     """
     for z in range(len(zones)):
         if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):
@@ -42,7 +42,7 @@ def cut_storeys(
 
 @device
 def _cut(low: Floats, high: Floats, cell: int, count: int, bottom: float, top: float) -> int:
-    """Take what is between two altitudes out of a cell's storeys; returns how many are left."""
+    """Take what is between two altitudes out of a cell's intervals; returns how many are left."""
     most, n = low.shape[1], 0
     while n < count:
         if low[cell, n] > bottom and high[cell, n] < top:  # nothing is left of it: the last one takes its place
@@ -66,11 +66,11 @@ def spread(
     first: NDArray[np.int64], cell: NDArray[np.int64], cols: int, low: Floats, high: Floats, own: Floats, most: Floats,
     sources: NDArray[np.int64], begin: float, out: Floats, keys: Floats, ids: Ints, stack: NDArray[np.int64],
 ) -> None:  # fmt: skip
-    """The least that something can be in each storey which begins as ``begin``, and on its way only grows.
+    """The least that something can be in each interval which begins as ``begin``, and on its way only grows.
 
-    ``first`` (cells + 1,) of each cell's storeys, ``cell`` (N,) theirs, ``cols`` cells in a row. ``own`` (N,): it is
-    that at least in a storey; ``most`` (N,): no storey is entered with more. ``out`` (N,), infinite before, stays so
-    where nothing gets to. ``keys``, ``ids``, ``stack`` (N + 1,): room to work in.
+    ``first`` (cells + 1,) of each cell's intervals, ``cell`` (N,) theirs, ``cols`` cells in a row. ``own`` (N,): it is
+    that at least in an interval; ``most`` (N,): no interval is entered with more. ``out`` (N,), infinite before, stays
+    so where nothing gets to. ``keys``, ``ids``, ``stack`` (N + 1,): room to work in.
     """
     rows = (len(first) - 1) // cols
     size = waiting = 0
@@ -80,7 +80,7 @@ def spread(
         if out[s] == np.inf and value <= most[s]:
             out[s] = value
             size = push(keys, ids, size, value, s)
-    # Values leave in order, so the first that gets to a storey is the least.
+    # Values leave in order, so the first that gets to an interval is the least.
     while size > 0 or waiting > 0:
         if waiting > 0:
             waiting -= 1

@@ -259,7 +259,7 @@ def shut_over(
 
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8[,] f8[,]")
-def narrow_rooms(
+def narrow_ranges(
     ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, exact: bool, low: Floats,
     high: Floats,
 ) -> None:  # fmt: skip

@@ -152,7 +152,7 @@ def _along(
             for _ in found.first_looks(SLACKS):
                 pass
         if sub.best is None and not sub.proved_shut and found.legs:
-            found.squeeze()
+            found.narrow_passage()
         if sub.best is None or not plane.incumbent.budget.goes_on():
             return None
         out.append(sub.best if not out else sub.best[1:])

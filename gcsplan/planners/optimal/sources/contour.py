@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.lattice.planner import pulled
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
-from gcsplan.planners.optimal.corridor import Stops
+from gcsplan.planners.optimal.corridor import PinnedTrack
 from gcsplan.planners.problem import Problem, straight_way_m
 from gcsplan.planners.profile.climb_laps import pins_of
 
@@ -23,7 +23,7 @@ NODES = 60_000
 """Of the lattice, about."""
 
 
-def traverse(problem: Problem, longest_m: float) -> Stops | None:
+def traverse(problem: Problem, longest_m: float) -> PinnedTrack | None:
     """The best track on a lattice of reachable altitudes among those about as long as ``longest_m`` at most."""
     router = Router.at(problem, Level(max(longest_m / straight_way_m(problem), 1.0), NODES))
     way = router.way(weight=climbing_weight(problem) if problem.objective == "energy" else 0.0)

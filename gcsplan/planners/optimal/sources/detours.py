@@ -20,7 +20,7 @@ from heapq import heappop, heappush
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.optimal.corridor import Spare, Stops
+from gcsplan.planners.optimal.corridor import PinnedTrack, Spare
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import sampled_track
@@ -56,7 +56,7 @@ class Choice:
     tried: frozenset[int] = frozenset()
 
 
-_Open = tuple[float, int, float, Choice, Lacking | None, Stops | None]
+_Open = tuple[float, int, float, Choice, Lacking | None, PinnedTrack | None]
 """What a path of a choice may cost, a number, how long its track is at least, the choice; what the track lacks, if that
 is known; and that track, where a path over it is to be looked for."""
 
@@ -67,11 +67,11 @@ class DetourSearch:
     to terminal; ``fine``: whether that is of a fine lattice. What is found goes to the ``incumbent``."""
 
     incumbent: Incumbent
-    stops: Callable[[Choice], Stops | None]
+    stops: Callable[[Choice], PinnedTrack | None]
     fine: bool
 
     def run(
-        self, roots: list[Choice], most: int, *, first: bool, laps: bool, given: Stops | None = None
+        self, roots: list[Choice], most: int, *, first: bool, laps: bool, given: PinnedTrack | None = None
     ) -> Choice | None:
         """Look at ``most`` tracks; the choice that the best path was found with, if one was.
 
@@ -86,7 +86,9 @@ class DetourSearch:
         looked = taken = pushed = 0
         hoped = self.incumbent.cost
 
-        def push(length_m: float, choice: Choice, found: Lacking | None = None, over: Stops | None = None) -> None:
+        def push(
+            length_m: float, choice: Choice, found: Lacking | None = None, over: PinnedTrack | None = None
+        ) -> None:
             nonlocal pushed
             pushed += 1
             key = self.incumbent.least(length_m + 0.5 * (sum(choice.least_m) + sum(choice.most_m)))

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.planners.optimal.corridor import Stops, joined
+from gcsplan.planners.optimal.corridor import PinnedTrack, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.navmesh.outlines import Solids
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
@@ -44,7 +44,7 @@ class OutlineTracks:
         self._hints: list[Floats] = []
         """The tracks of the bound: paths may lead along them through slits that coarse outlines shut."""
 
-    def stops(self, choice: Choice) -> Stops | None:
+    def stops(self, choice: Choice) -> PinnedTrack | None:
         """The shortest track past the zones that a choice shuts; None where there is none, or too much to look at."""
         which = ~((choice.under & self.under) | (choice.over & self.over))
         try:

@@ -35,7 +35,7 @@ WINDING = 1.06
 WIDEST = 0.5
 """Widest margin of the box around two stops, as a part of their distance."""
 NEAR = 2.3
-"""Stops are linked to nodes within so many steps."""
+"""PinnedTrack are linked to nodes within so many steps."""
 WAYS, APART = 10, 3.0
 """Most ways between two stops, and how many steps from all ways before one must somewhere be."""
 DRAWN = 8
