@@ -245,7 +245,7 @@ def test_the_first_request_beside_a_twin_shows_that_they_are_two_and_is_not_answ
     first, second = craft(air, signing=signing()), craft(air, FAR, signing=signing(), compid=2)
     heard: list[tuple[object, str]] = []
     late: list[bytes] = []
-    air.heard = lambda by, message: heard.append((by, message.get_type()))
+    air.heard = lambda by, peer, message: heard.append((by, message.get_type()))
 
     def written(peer: Any, data: bytes) -> None:
         if (second, "HEARTBEAT") in heard and data[7] in (COUNT, ITEM, CLEAR):
