@@ -28,8 +28,9 @@ def test_the_campaign_finds_an_upload_that_does_not_look_again(monkeypatch: pyte
 
 
 def test_seeds_that_found_something_once_find_nothing() -> None:
-    """Twins of another component at one address (the first six), and what the campaign took for faults and was none."""
-    for seed in (100101, 100267, 106543, 107754, 107983, 109498, 102170, 103594, 104195):
+    """Twins of another component at one address (the first six), a twin that came between an upload and the clearing of
+    ``--atomic`` (301591), and what the campaign took for faults and was none."""
+    for seed in (100101, 100267, 106543, 107754, 107983, 109498, 301591, 102170, 103594, 104195):
         assert campaign(range(seed, seed + 1))[1] == []
 
 
