@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
@@ -161,8 +161,8 @@ class Voice:
 
     last: float = -math.inf
     back_at: float = -math.inf
-    beat_at: float = -math.inf
-    place_at: float = -math.inf
+    beats_at: list[float] = field(default_factory=list)
+    places_at: list[float] = field(default_factory=list)
 
     def heard(self, kind: str, now: float) -> None:
         """It said something."""
@@ -170,14 +170,19 @@ class Voice:
             self.back_at = now
         self.last = now
         if kind == "HEARTBEAT":
-            self.beat_at = now
+            self.beats_at.append(now)
         elif kind in ("GLOBAL_POSITION_INT", "GPS_RAW_INT"):
-            self.place_at = now
+            self.places_at.append(now)
 
     @property
     def looked_at(self) -> bool:
         """Whether a heartbeat, and a position if it ever told one, came since it spoke first or after a silence."""
-        return self.beat_at >= self.back_at and (self.place_at == -math.inf or self.place_at >= self.back_at)
+        return self.look_after(self.back_at) < math.inf
+
+    def look_after(self, since: float) -> float:
+        """When a look that began at ``since`` can have been over: a heartbeat, and a position if it ever told one."""
+        needed = [self.beats_at, *([self.places_at] if self.places_at else [])]
+        return max(min((at for at in heard if at >= since), default=math.inf) for heard in needed)
 
 
 class Forger:

@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import logging
+import math
 import random
 import sys
 import time
@@ -407,13 +408,14 @@ class Run:
     def _untold(self, seat: Seat, here: list[Craft]) -> Iterator[str]:
         """What the ground station has heard and should have said."""
         checked, until = seat.checked, seat.acked_at
-        voice = self.voices.get((seat.to, seat.pinned)) if seat.to else None
-        if voice is None or voice.beat_at < until:
+        voice = self.voices.get((seat.to, seat.pinned), Voice()) if seat.to else Voice()
+        looked_at = voice.look_after(until)
+        if looked_at == math.inf:
             yield "was not looked at after the read-back"
         for o in here:
-            if o.armed_told < until and not self.options.allow_armed:
+            if o.armed_told <= looked_at and not self.options.allow_armed:
                 yield "was heard to be armed"
-            if o.far_told < until and o.known_since < until and not self.options.ignore_position:
+            if o.far_told <= looked_at and o.known_since <= looked_at and not self.options.ignore_position:
                 yield "was heard to be 33 km away"
         if checked is None:
             return
