@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from gcsplan.mavlink.link.link import Heard, Steps
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.protocol.outcome import Changed
-from tests.campaigns.links import campaign, main
+from tests.campaigns.links import Run, campaign, main
 
 
 def test_nothing_is_found_among_adversaries() -> None:
@@ -24,6 +25,47 @@ def test_the_campaign_finds_an_upload_that_does_not_look_again(monkeypatch: pyte
     monkeypatch.setattr(Recheck, "gate", lambda self, now: None)
     _, found = campaign(range(14, 15))
     assert any("an announcement to one that was heard to be armed" in words for words in found)
+
+
+def test_seeds_that_found_something_once_find_nothing() -> None:
+    """Twins of another component at one address (the first six), a twin that came between an upload and the clearing of
+    ``--atomic`` (301591), and what the campaign took for faults and was none."""
+    for seed in (100101, 100267, 106543, 107754, 107983, 109498, 301591, 102170, 103594, 104195):
+        assert campaign(range(seed, seed + 1))[1] == []
+
+
+def test_the_campaign_finds_an_upload_that_answers_before_it_judges(monkeypatch: pytest.MonkeyPatch) -> None:
+    def admits(self: Recheck, heard: Heard, message: object, now: float) -> bool:
+        return heard.peer == self._channel.peer and not self.shut
+
+    monkeypatch.setattr(Recheck, "admits", admits)
+    _, found = campaign(range(106543, 106544))
+    assert any("an item to one that was heard to be 33 km away" in words for words in found)
+
+
+def silent_for_four_seconds() -> list[str]:
+    run = Run(1238)  # a good but slow radio, forty items, and nothing else that happens
+    craft = run.seats[1].craft
+    run.air.later(8.0, craft.go_silent)
+    run.air.later(12.0, craft.come_back)
+    deliveries, found = run.go()
+    assert [d.code for d in deliveries] == [0]
+    return found
+
+
+def test_the_campaign_finds_an_upload_that_does_not_look_after_a_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert silent_for_four_seconds() == []
+    monkeypatch.setattr("gcsplan.mavlink.link.recheck.FRESH_S", 1e9)
+    assert any("came after a silence and was not looked at" in words for words in silent_for_four_seconds())
+
+
+def test_the_campaign_finds_an_upload_that_does_not_look_after_the_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_look(self: Recheck) -> Steps[None]:
+        yield from ()
+
+    monkeypatch.setattr(Recheck, "last_look", no_look)
+    _, found = campaign(range(1, 2))
+    assert any("was not looked at after the read-back" in words for words in found)
 
 
 def test_the_campaign_finds_an_upload_that_never_ends_well(monkeypatch: pytest.MonkeyPatch) -> None:

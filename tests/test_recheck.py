@@ -5,17 +5,20 @@ Those in simulated time run on the air of the campaign (`tests.campaigns.links`)
 
 from __future__ import annotations
 
+import contextlib
 import random
 import threading
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
 from gcsplan.errors import GcsplanError, LinkError, VehicleRefused
-from gcsplan.mavlink.link.frames import FrameWriter
-from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.frames import FrameWriter, Signing, SigningKey
+from gcsplan.mavlink.link.link import GCS, Heard, Link
+from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.link.session import (
     Options,
     Order,
@@ -26,14 +29,20 @@ from gcsplan.mavlink.link.session import (
     upload_mission,
     verify_mission,
 )
+from gcsplan.mavlink.link.watch import Watch
 from gcsplan.mavlink.mission.mission import FENCE, Home, Mission, MissionItem
+from gcsplan.mavlink.protocol import wire
+from gcsplan.mavlink.protocol.machine import Wait
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Packet, Request, RequestList
+from gcsplan.mavlink.protocol.outcome import Changed
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.air import Air, Radio
 from tests.campaigns.crafts import Craft, OddParameters
+from tests.campaigns.links import CLEAR, COUNT, ITEM
+from tests.test_prompt import Asker, asker
 from tests.test_session import HOME, OPTIONS, mission, vehicle
 
 COPTER, PX4 = Autopilot.ARDUCOPTER, Autopilot.PX4
@@ -188,9 +197,9 @@ def on_air(*crafts: tuple[str, Craft], air: Air) -> Link:
     return air.link()
 
 
-def craft(air: Air, home: Home = HOME, **more: Any) -> Craft:
+def craft(air: Air, home: Home = HOME, signing: Signing | None = None, **more: Any) -> Craft:
     one = LoopbackVehicle(1, COPTER, lat_deg=home.lat_e7 / 1e7, lon_deg=home.lon_e7 / 1e7, amsl_m=371.0, **more)
-    return Craft(one, air)
+    return Craft(one, air, signing)
 
 
 SLOW = Options(unchecked=True, read_parameters=False)
@@ -225,6 +234,90 @@ def test_a_twin_that_comes_in_the_middle_behind_the_same_address_ends_the_transf
     assert air.now < 1000.0 + 15.0
 
 
+@pytest.mark.parametrize("signed", [False, True])
+@pytest.mark.parametrize("comes_s", [4.0, 4.2, 4.4, 4.6, 4.8])
+def test_the_first_request_beside_a_twin_shows_that_they_are_two_and_is_not_answered(
+    comes_s: float, signed: bool
+) -> None:
+    """The twin is another component of the same number behind the same address; ours asks on, and says nothing else."""
+    air = Air(1, Radio(delay_s=0.3, jitter_s=0.0), limit_s=600.0)
+    signing = (lambda: Signing(SigningKey(bytes(32)), clock=air.wall_clock)) if signed else lambda: None
+    first, second = craft(air, signing=signing()), craft(air, FAR, signing=signing(), compid=2)
+    heard: list[tuple[object, str]] = []
+    late: list[bytes] = []
+    air.heard = lambda by, peer, message: heard.append((by, message.get_type()))
+
+    def written(peer: Any, data: bytes) -> None:
+        if (second, "HEARTBEAT") in heard and data[7] in (COUNT, ITEM, CLEAR):
+            late.append(data)
+
+    air.written = written
+    air.later(comes_s, lambda: air.put("router", second))
+    air.put("router", first)
+    with air.link(signing()) as link:
+        result = upload_mission(link, mission(count=60), options=SLOW)
+    assert (second, "HEARTBEAT") in heard
+    assert result.changed == "ambiguous"
+    assert late == []
+
+
+def test_a_request_beside_a_twin_gets_no_prompt_answer() -> None:
+    """Over a real socket: ten requests are answered on the spot, and the first one behind a twin's heartbeat is not."""
+    answers: list[str] = []
+
+    def script(board: Asker) -> None:
+        board.hear("HEARTBEAT")
+        pilot = dialect.MAVLink_heartbeat_message(2, 3, 0, 0, dialect.MAV_STATE_STANDBY, 3)
+        board.say(pilot)
+        board.say(dialect.MAVLink_global_position_int_message(1, HOME.lat_e7, HOME.lon_e7, 371_000, 0, 0, 0, 0, 0))
+        board.say(dialect.MAVLink_autopilot_version_message(0, 0, 0, 0, 0, *[[0] * 8] * 3, 0, 0, 0))
+        board.hear("MISSION_COUNT")
+        for seq in range(10):
+            board.ask(seq)
+        board.socket.sendto(FrameWriter(Address(1, 2)).pack(pilot), board.station)
+        board.say(wire.encode(Request(10), GCS))
+        board.socket.settimeout(0.5)
+        with contextlib.suppress(TimeoutError):
+            while True:
+                data, _ = board.socket.recvfrom(4096)
+                answers.extend(m.get_type() for m in board.parser.feed(data, datagram=True))
+
+    with asker(script) as board, Link(board.url) as link:
+        result = upload_mission(link, mission(count=40), options=OPTIONS)
+    assert result.changed == "ambiguous"
+    assert "MISSION_ITEM_INT" not in answers
+
+
+def test_a_place_that_is_told_late_is_held_to_from_then_on() -> None:
+    """No position came while the vehicle was looked at: every look behind the first one asks for it all the same."""
+    air = Air(1, Radio(), limit_s=60.0)
+    beat = dialect.MAVLink_heartbeat_message(2, 3, 0, 0, dialect.MAV_STATE_STANDBY, 3)
+
+    def note(message: Any) -> None:
+        recheck.note(Heard(Address(1, 1), "a", message), air.now)
+
+    def place(home: Home) -> Any:
+        return dialect.MAVLink_global_position_int_message(0, home.lat_e7, home.lon_e7, 371_000, 0, 0, 0, 0, 0)
+
+    with air.link() as link:
+        watch = Watch(1)
+        watch.note(Heard(Address(1, 1), "a", beat), air.now)
+        state = watch.state(air.now)
+        assert state is not None
+        recheck = Recheck(link.channel(1), watch, state, lambda _: ([], []))
+        assert recheck.gate(air.now) is None  # it reports none
+        note(place(HOME))
+        assert recheck.gate(air.now) is None
+        for _ in range(4):
+            air.now += 1.0
+            note(beat)
+        assert isinstance(recheck.gate(air.now), Wait)
+        note(place(FAR))
+        stopped = recheck.gate(air.now)
+    assert isinstance(stopped, Changed)
+    assert stopped.reason == "moved"
+
+
 def test_who_speaks_after_a_silence_is_looked_at_before_it_is_answered() -> None:
     """Another vehicle at the same address, which asks for items at once."""
     air = Air(3, Radio(), limit_s=600.0)
@@ -236,8 +329,6 @@ def test_who_speaks_after_a_silence_is_looked_at_before_it_is_answered() -> None
         air.at("a").clear()
 
         def ask() -> None:
-            from gcsplan.mavlink.protocol import wire
-
             sent.clear()
             air.written = lambda peer, data: sent.append(data)
             air.say("a", asked.pack(wire.encode(Request(3), Address(255, 190))), second)

@@ -94,6 +94,38 @@ def test_one_without_heartbeats_is_a_rival_all_the_same() -> None:
     assert seen((0.2, at(5.0, peer="b")), (1.0, beat())).sources == 2
 
 
+def told(compid: int, peer: str = "a") -> Heard:
+    return Heard(Address(1, compid), peer, dialect.MAVLink_statustext_message(6, b"here"))
+
+
+def test_a_pilot_whose_heartbeats_get_lost_is_a_rival_while_it_says_anything() -> None:
+    """Of the other one the only heartbeat came before the first of ours; what it says later shows that it stayed."""
+    for later, sources in ((told(2), 2), (told(1), 1)):
+        watch = Watch(1)
+        watch.note(beat(compid=2), 0.0)
+        watch.note(beat(), 1.0)
+        watch.note(later, 2.0)
+        state = watch.state(2.0)
+        assert state is not None
+        assert (state.address.compid, state.sources) == (1, sources)
+
+
+def test_a_pinned_vehicle_that_says_anything_beside_a_newcomer_is_one_of_two() -> None:
+    watch = Watch(1)
+    watch.note(beat(), 0.0)
+    state = watch.state(0.0)
+    assert state is not None
+    watch.pin(state, 1.0)
+    assert not watch.contested
+    watch.note(told(190), 1.5)  # a camera that is no autopilot
+    assert not watch.contested
+    watch.note(beat(compid=2), 2.0)
+    assert watch.contested
+    assert watch.alike()  # ours may have gone
+    watch.note(told(1), 2.1)
+    assert not watch.alike()
+
+
 @pytest.mark.parametrize("odd", [*ODD, 10**400, "x", None, b"\0"])
 def test_numbers_that_are_none_are_told_from_those_that_are(odd: Any) -> None:
     number = finite(odd)

@@ -31,7 +31,7 @@ def withdrawn(
         return list(deliveries)
     results = {name: result for name, result in ended.items() if not isinstance(result, GcsplanError)}
     taken = [name for name, r in results.items() if r.outcome in ("accepted", "unknown") and not r.changed]
-    again = [replace(orders[name], options=replace(orders[name].options, listen_s=0.0)) for name in taken]
+    again = [orders[name] for name in taken]  # listening for rivals too: the upload may have ended minutes ago
     seen = {orders[name].mission.name: results[name].state for name in taken}
     cleared = dict(zip(taken, session.clear_fleet(again, seen), strict=True))
     why = f"not verified: {', '.join(failures)}"

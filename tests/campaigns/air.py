@@ -51,7 +51,8 @@ class Radio:
 class Air:
     """The ground station's transport.
 
-    ``written(address, data)`` is told every frame that leaves it, ``heard(by, message)`` every message that it takes.
+    ``written(address, data)`` is told every frame that leaves it, ``heard(by, address, message)`` every message that
+    it takes.
     """
 
     datagrams = True
@@ -63,7 +64,7 @@ class Air:
         self.radio = radio
         self.default: Peer | None = default
         self.written: Callable[[Peer, bytes], None] = lambda peer, data: None
-        self.heard: Callable[[object, Any], None] = lambda by, message: None
+        self.heard: Callable[[object, Peer, Any], None] = lambda by, peer, message: None
         self._rng = random.Random(seed)
         self._limit_s = self.now + limit_s
         self._places: dict[Peer, list[Place]] = {}
@@ -182,5 +183,5 @@ class _Link(Link):
 
     def _route(self, peer: Peer, message: Any, now: float) -> None:
         if not message.late:
-            self._air.heard(self._by, message)
+            self._air.heard(self._by, peer, message)
         super()._route(peer, message, now)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import dataclass, field
 from typing import Any
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
@@ -51,16 +52,18 @@ class Craft:
         self.address: Peer = ""
         self.there_since = air.now
         self.left_at = math.inf
-        self.beats = 0
-        self.known_since, self.last_heard = math.inf, -math.inf
-        self.places = 0
-        self.together = 0  # places heard while another stood at the same address
-        self._beats_at: list[float] = []
-        self.armed_told = self.far_told = math.inf
+        self.forget()
         self.start = vehicle.home
         self._last: list[MissionItem] | None = None
         self._equal_since = math.inf
         self.equal: list[tuple[float, float]] = []
+
+    def forget(self) -> None:
+        """Nothing was heard of it: another run of the ground station begins, which knows nothing of this one."""
+        self.known_since, self.last_heard = math.inf, -math.inf
+        self.together = 0  # places heard while another stood at the same address
+        self._beats_at: list[float] = []
+        self.armed_told = self.far_told = math.inf
 
     def take(self, client: str, data: bytes, now: float) -> list[tuple[Any, bytes]]:
         """Bytes of the ground station."""
@@ -99,12 +102,10 @@ class Craft:
         kind, now = message.get_type(), self.air.now
         self.last_heard = now
         if kind == "HEARTBEAT":
-            self.beats += 1
             self.known_since = min(self.known_since, now)
             self._beats_at.append(now)
             self.armed_told = min(self.armed_told, now) if message.base_mode & 128 else math.inf
         elif kind == "GLOBAL_POSITION_INT":
-            self.places += 1
             far = max(abs(message.lat - self.start.lat_e7), abs(message.lon - self.start.lon_e7)) > 5000
             self.far_told = min(self.far_told, now) if far else math.inf
 
@@ -149,6 +150,39 @@ class Craft:
     def come_back(self) -> None:
         """Within reach again."""
         self.silent = False
+
+
+SILENCE_S = 3.0
+
+
+@dataclass
+class Voice:
+    """What the ground station has heard of one component at one address, whoever it was that spoke."""
+
+    last: float = -math.inf
+    back_at: float = -math.inf
+    beats_at: list[float] = field(default_factory=list)
+    places_at: list[float] = field(default_factory=list)
+
+    def heard(self, kind: str, now: float) -> None:
+        """It said something."""
+        if now - self.last > SILENCE_S + 1e-6:
+            self.back_at = now
+        self.last = now
+        if kind == "HEARTBEAT":
+            self.beats_at.append(now)
+        elif kind in ("GLOBAL_POSITION_INT", "GPS_RAW_INT"):
+            self.places_at.append(now)
+
+    @property
+    def looked_at(self) -> bool:
+        """Whether a heartbeat, and a position if it ever told one, came since it spoke first or after a silence."""
+        return self.look_after(self.back_at) < math.inf
+
+    def look_after(self, since: float) -> float:
+        """When a look that began at ``since`` can have been over: a heartbeat, and a position if it ever told one."""
+        needed = [self.beats_at, *([self.places_at] if self.places_at else [])]
+        return max(min((at for at in heard if at >= since), default=math.inf) for heard in needed)
 
 
 class Forger:
@@ -218,4 +252,4 @@ class Recorder:
             self._air.later(after_s + at - began, lambda data=data: self._air.say(address, data, self))  # type: ignore[misc]
 
 
-__all__ = ["MISSION", "Craft", "Forger", "OddParameters", "Recorder"]
+__all__ = ["MISSION", "Craft", "Forger", "OddParameters", "Recorder", "Voice"]

@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import logging
+import math
 import random
 import sys
 import time
@@ -39,14 +40,15 @@ from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.air import Air, Hang, Radio
-from tests.campaigns.crafts import Craft, Forger, OddParameters, Recorder
+from tests.campaigns.crafts import SILENCE_S, Craft, Forger, OddParameters, Recorder, Voice
 
 URL = "udpout:127.0.0.1:14560"
 COUNT, ITEM, CLEAR, REQUEST_LIST, ACK = 44, 73, 45, 43, 47
 WRITES = (COUNT, ITEM, CLEAR)
 LAST_LOOK_S = 10.0
 FIND_S, STANDBY_S, PARAMETERS_S = 10.0, 30.0, 4.0
-SILENCE_S = 4.0
+LOOKED_S = 2.0
+"""Before anything is written the vehicle has been heard within 1.5 s, and what it said is judged every 0.1 s."""
 ALIKE_FRAMES = 4
 """So many positions of each of two vehicles at one address, and it is known that they are two."""
 
@@ -73,10 +75,9 @@ class Seat:
     asked_at: float = 0.0  # for the list, last
     acked_at: float = 0.0
     wrote: int = 0
-    armed_at: float = float("inf")
-    moved_at: float = float("inf")
     checked: Craft | None = None
     pinned: Peer | None = None
+    to: Address | None = None
 
 
 class Run:
@@ -99,6 +100,7 @@ class Run:
         self.key = SigningKey(bytes(range(32))) if rng.random() < 0.25 else None
         self.found: list[str] = []
         self.seats: dict[int, Seat] = {}
+        self.voices: dict[tuple[Address, Peer], Voice] = {}
         self._parser = FrameParser()
         self._recorder = Recorder(self.air)
         self.happened: list[str] = []
@@ -131,8 +133,6 @@ class Run:
             craft.hub._vehicles[0][1].parameters = OddParameters(autopilot, sysid, rng)
         address = f"address {sysid}" if rng.random() < 0.8 else "router"
         seat = self.seats[sysid] = Seat(craft, address, mission)
-        if trouble.armed:
-            seat.armed_at = air.now
         self._put(craft, address)
         for act in (self._change, self._change, self._twin, self._forge, self._swap, self._edit):
             if rng.random() < 0.25:
@@ -182,17 +182,11 @@ class Run:
 
         def armed() -> None:
             craft.arm()
-            seat.armed_at = min(seat.armed_at, air.now)
             if rng.random() < 0.2:
-                air.later(rng.uniform(0.5, 5.0), disarmed)
-
-        def disarmed() -> None:
-            craft.disarm()
-            seat.armed_at = float("inf")
+                air.later(rng.uniform(0.5, 5.0), craft.disarm)
 
         def far() -> None:
             craft.carry(far=True)
-            seat.moved_at = min(seat.moved_at, air.now)
 
         def silent() -> None:
             craft.go_silent()
@@ -285,34 +279,43 @@ class Run:
                 seat.acked_at = self.air.now
             else:
                 seat.wrote += 1
-                self._judge_write(seat, peer, kind)
+                self._judge_write(seat, peer, packet.target, kind)
 
-    def _judge_write(self, seat: Seat, peer: Peer, kind: int) -> None:
+    def _judge_write(self, seat: Seat, peer: Peer, to: Address, kind: int) -> None:
         now, what = self.air.now, {COUNT: "an announcement", ITEM: "an item", CLEAR: "a clearing"}[kind]
         there = [o for o in self.air.at(peer) if isinstance(o, Craft) and o.vehicle.sysid == seat.mission.sysid]
-        if seat.checked is None:
-            # Whoever was found there, and nowhere else, is the one that was checked.
-            seat.checked, seat.pinned = (seat.craft if seat.craft in there else there[0] if there else None), peer
+        if seat.pinned is None:
+            seat.checked, seat.pinned, seat.to = self._found(seat, there), peer, to
         said: list[str] = []
+        voice = self.voices.get((to, peer), Voice())
         if peer != seat.pinned:
             said.append("a twin at another address")
+        elif now - voice.last > LOOKED_S:
+            said.append("one that is silent")
+        elif not voice.looked_at:
+            said.append("one that came after a silence and was not looked at")
         for one in there:
             if one.armed_told < now and kind != ITEM and not self.options.allow_armed:
                 said.append("one that was heard to be armed")
             # A component that is no autopilot may say what it likes: it takes a heartbeat to be one.
             if one.far_told < now and one.known_since < now and not self.options.ignore_position:
                 said.append("one that was heard to be 33 km away")
-            if one is seat.checked:
-                continue
-            if seat.checked in there:
+            if one is not seat.checked and seat.checked in there:
                 least = min(one.together, seat.checked.together if seat.checked else 0)
                 if least > ALIKE_FRAMES and one.known_since < now:
                     said.append("two at one address")
-            elif not self._heard_lately(seat, one) and not (one.beats and one.places):
-                said.append("one that came after a silence and was not looked at")
         self.found += [f"misdelivered at {now - 1000.0:.2f} s: {what} to {words}" for words in said]
 
-    def _heard(self, by: object, message: Any) -> None:
+    def _found(self, seat: Seat, there: list[Craft]) -> Craft | None:
+        """Who was checked: of those at the address the one that was heard last; of two that still speak, ours."""
+        heard = [one for one in there if one.known_since < self.air.now]
+        if seat.craft in heard and self.air.now - seat.craft.last_heard <= SILENCE_S:
+            return seat.craft
+        return max(heard, key=lambda one: one.last_heard, default=None)
+
+    def _heard(self, by: object, peer: Peer, message: Any) -> None:
+        source = Address(message.get_srcSystem(), message.get_srcComponent())
+        self.voices.setdefault((source, peer), Voice()).heard(message.get_type(), self.air.now)
         if not isinstance(by, Craft):
             return
         by.heard(message)
@@ -321,11 +324,6 @@ class Run:
             self._recorder.note(bytes(message.get_msgbuf()))
         beside = [o for o in (seat.craft, *seat.others) if o is not by and self._same_address(o, by)]
         by.together = by.together + (message.get_type() == "GLOBAL_POSITION_INT") if beside else 0
-
-    def _heard_lately(self, seat: Seat, one: Craft) -> bool:
-        """Whether anybody but ``one`` was heard from its address in the last seconds: there was no silence."""
-        others = [o for o in (seat.craft, *seat.others) if o is not one and o.address == one.address]
-        return any(self.air.now - o.last_heard <= SILENCE_S for o in others)
 
     def _same_address(self, a: Craft, b: Craft) -> bool:
         there = self.air.at(b.address)
@@ -340,6 +338,9 @@ class Run:
         began = self.air.now
         for seat in self.seats.values():
             seat.began, seat.checked, seat.pinned = began, None, None
+            for one in (seat.craft, *seat.others):
+                one.forget()
+        self.voices.clear()
         jobs = [delivery.Job(s.mission.name, URL, s.mission) for s in self.seats.values()]
         try:
             with self._links():
@@ -394,30 +395,36 @@ class Run:
         seat.asked_at = seat.acked_at = air.now
 
     def _judge(self, d: delivery.Delivery, seat: Seat) -> None:
-        now, options, checked = self.air.now, self.options, seat.checked
+        now, checked = self.air.now, seat.checked
         if d.code == GcsplanError.exit_code:
             self.found.append(f"crash: {d.vehicle}: {d.message}")
-        there = [checked, *(o for o in (seat.craft, *seat.others) if seat.pinned and o in self.air.at(seat.pinned))]
-        if d.verified and not any(o is not None and o.was_equal(seat.asked_at, now) for o in there):
+        here = [o for o in (seat.craft, *seat.others) if seat.pinned and o in self.air.at(seat.pinned)]
+        there = [o for o in (checked, *here) if o is not None]
+        if d.verified and not any(o.was_equal(seat.asked_at, now) for o in there):
             self.found.append(f"false verified: {d.vehicle}: {d.as_dict()}")
-        if d.code != 0 or not d.verified or any("after the read-back" in w for w in d.warnings):
-            return
-        if checked is seat.craft and checked.left_at > seat.acked_at:
-            if seat.armed_at < seat.acked_at and checked.vehicle.armed and not options.allow_armed:
-                self.found.append(f"untold: {d.vehicle} is armed, and exit 0")
-            if seat.moved_at < seat.acked_at and not options.ignore_position:
-                self.found.append(f"untold: {d.vehicle} is 33 km away, and exit 0")
-        if self.key or checked is None:
+        if d.code == 0 and d.verified and not any("after the read-back" in w for w in d.warnings):
+            self.found += [f"untold: {d.vehicle} {words}, and exit 0" for words in self._untold(seat, here)]
+
+    def _untold(self, seat: Seat, here: list[Craft]) -> Iterator[str]:
+        """What the ground station has heard and should have said."""
+        checked, until = seat.checked, seat.acked_at
+        voice = self.voices.get((seat.to, seat.pinned), Voice()) if seat.to else Voice()
+        looked_at = voice.look_after(until)
+        if looked_at == math.inf:
+            yield "was not looked at after the read-back"
+        for o in here:
+            if o.armed_told <= looked_at and not self.options.allow_armed:
+                yield "was heard to be armed"
+            if o.far_told <= looked_at and o.known_since <= looked_at and not self.options.ignore_position:
+                yield "was heard to be 33 km away"
+        if checked is None:
             return
         for o in (seat.craft, *seat.others):
             # Heard while the one that was checked was there: a rival, wherever it stands.
-            same = o.vehicle.compid == checked.vehicle.compid and o.address != checked.address
-            if (
-                o is not checked
-                and same
-                and o.heard_between(max(seat.began, checked.there_since) + 0.1, min(seat.acked_at, checked.left_at))
-            ):
-                self.found.append(f"untold: {d.vehicle} has a twin that was heard, and exit 0")
+            apart = (o.vehicle.compid, o.address) != (checked.vehicle.compid, checked.address)
+            since = max(seat.began, checked.there_since) + 0.1
+            if o is not checked and apart and o.heard_between(since, min(until, checked.left_at)):
+                yield "has a twin that was heard"
 
 
 def one(seed: int) -> tuple[Counter[str], list[str]]:

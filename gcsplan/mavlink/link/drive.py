@@ -93,7 +93,7 @@ def drive(
                 _take(machine, channel, prepared, heard, recheck)
             if _ended_early(machine, channel, recheck, patience):
                 return
-            if recheck and recheck.shut:
+            if recheck and recheck.wary:
                 prompt.drop(prepared)
             channel.send_packets(machine.on_timer(clock()))
             if progress:
@@ -115,11 +115,11 @@ def _take(machine: Driven, channel: Channel, prepared: Prepared, heard: Heard, r
     if recheck:
         recheck.note(heard, now)
     packet = None if heard.late else wire.decode(heard.message)
-    if packet is None or (recheck and not recheck.admits(heard, packet.message)):
+    if packet is None or (recheck and not recheck.admits(heard, packet.message, now)):
         return
     answers = machine.receive(packet, now)
     channel.send_packets(answers)
-    if answers and isinstance(packet.message, Request):
+    if answers and isinstance(packet.message, Request) and not (recheck and recheck.wary):
         channel.link.prompt.learn(prepared, heard.peer, heard.message)
 
 

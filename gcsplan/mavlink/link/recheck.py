@@ -62,8 +62,8 @@ class Recheck:
         channel.pin(state.peer)
         self._channel, self._watch, self._judge = channel, watch, judge
         self._address = state.address
-        self._located = state.located
-        self._first = None if may_move else state
+        self._first = state
+        self._may_move = may_move
         self._longest_s = max(LOOK_S, standby_s)
         self._contact = now
         self._shut = False
@@ -87,6 +87,11 @@ class Recheck:
         return self._shut
 
     @property
+    def wary(self) -> bool:
+        """Whether a request has to be looked at before it is answered: it may show that there are two vehicles."""
+        return self._shut or self._stop is not None or self._watch.contested
+
+    @property
     def deadline(self) -> float:
         """When `stops` wants to be called."""
         if self._began is not None:
@@ -98,23 +103,28 @@ class Recheck:
         if heard.peer == self._channel.peer and heard.source == self._address and not heard.late:
             self.contact(now)
         self._watch.note(heard, now)
-        self._news = self._news or heard.message.get_type() in _TELLING
+        self._news = self._news or heard.message.get_type() in _TELLING or self._watch.contested
 
     def contact(self, now: float) -> None:
         """The vehicle was heard at its address."""
         self._shut_after_silence(now)
         self._contact = now
 
-    def admits(self, heard: Heard, message: MissionMessage) -> bool:
-        """Whether a mission message counts: from its address, and, if it asks for an item, not after a silence."""
-        return heard.peer == self._channel.peer and not (self._shut and isinstance(message, Request))
+    def admits(self, heard: Heard, message: MissionMessage, now: float) -> bool:
+        """Whether a mission message counts: it comes from the vehicle's address.
+
+        A request is answered only while nothing speaks against it, what it shows itself included, and not after a
+        silence.
+        """
+        if heard.peer != self._channel.peer or not isinstance(message, Request):
+            return heard.peer == self._channel.peer
+        self._judge_news(now)
+        return self._stop is None and not self._shut
 
     def stops(self, now: float) -> Outcome | None:
         """Why the transfer is to end here and now; None where it may go on. Sends what a look has to ask."""
         self._shut_after_silence(now)
-        if self._news:
-            self._news = False
-            self._stop = self._stop or self._another(now)
+        self._judge_news(now)
         if self._stop is None and self._shut and self._contact > self._silent_until:
             seen = self._look(now)
             self._stop = None if isinstance(seen, Wait) else seen
@@ -147,7 +157,7 @@ class Recheck:
         state = self._watch.state(now)
         since = now - _RECENT_S if self._began is None else self._since
         since = max(since, self._watch.newcomer_at())  # ours must be heard beside it, and then they are two
-        if state is None or state.beat_at < since or (self._located and state.placed_at < since):
+        if state is None or state.beat_at < since or (state.located and state.placed_at < since):
             self._begin(now, since)
             return self._waits(now) or Unknown(self._unseen(state, since, now))
         against = self._objections(state)
@@ -172,12 +182,19 @@ class Recheck:
 
     def _objections(self, state: VehicleState) -> Reasons:
         against, _ = self._judge(state)
+        if not self._first.located and state.located:
+            self._first = state  # its place was not heard in time: it is held to the first one that is
         first = self._first
-        if first and not first.armed and not any(word in _MOVED for word, _ in against):
+        if not self._may_move and not first.armed and not any(word in _MOVED for word, _ in against):
             away_m = apart_m(first, state)
             if away_m is not None and away_m > NEAR_START_M:
                 against.append(("wrong_place", f"the vehicle is {away_m:.0f} m from where it was checked"))
         return against
+
+    def _judge_news(self, now: float) -> None:
+        if self._news:
+            self._news = False
+            self._stop = self._stop or self._another(now)
 
     def _another(self, now: float) -> Outcome | None:
         """Whether what speaks from the vehicle's address cannot be the vehicle that was checked."""
@@ -199,7 +216,7 @@ class Recheck:
         if self._began is None or now < self._ask_at:
             return
         self._ask_at = now + _ASK_AGAIN_S
-        for kind in (_HEARTBEAT, _GLOBAL_POSITION_INT) if self._located else (_HEARTBEAT,):
+        for kind in (_HEARTBEAT, _GLOBAL_POSITION_INT):
             self._channel.send(request_message(self._address, kind), self._address)
 
 

@@ -208,19 +208,17 @@ class Watch:
         new = min(self.said - said, len(self.texts))
         return tuple(self.texts)[len(self.texts) - new :]
 
+    @property
+    def contested(self) -> bool:
+        """Whether another autopilot was heard under the number, now or before: ours may be there beside it."""
+        return self._pinned is not None and bool(self._others(self._pinned))
+
     def newcomer_at(self) -> float:
         """When another autopilot was first heard under the number since the vehicle was pinned; -inf: none was."""
         if self._pinned is None:
             return -math.inf
-        compid = self._pinned[0]
-        pilots = [
-            s.first
-            for key, s in self._sources.items()
-            if key[:2] != self._pinned and _is_autopilot(key[0], s)
-            and (key[0] == compid or s.autopilot not in (GENERIC, INVALID))
-        ]  # fmt: skip
-        voices = [told.first for v, told in self._told.items() if v != self._pinned and v[0] == compid]
-        return max((at for at in (*pilots, *voices) if at >= self._pinned_at), default=-math.inf)
+        firsts = (self._span(voice)[0] for voice in self._others(self._pinned))
+        return max((at for at in firsts if at >= self._pinned_at), default=-math.inf)
 
     def state(self, now: float) -> VehicleState | None:
         """The state now; None before an autopilot's heartbeat."""
@@ -242,20 +240,14 @@ class Watch:
         armed = source.armed or now - source.armed_at <= FRESH_S  # two that take turns: one of them is
         return VehicleState(
             Address(self.sysid, best[0]), source.autopilot, source.kind, armed, source.status,
-            lat, lon, amsl, told.capabilities, self._rivals(best, pilots), told.home, tuple(self.texts),
+            lat, lon, amsl, told.capabilities, self._rivals(best[:2]), told.home, tuple(self.texts),
             best[1], source.at, told.placed_at,
             told.leapt_from if now - told.leapt_at <= FRESH_S else None,
         )  # fmt: skip
 
     def alike(self) -> bool:
         """Whether all that comes from the pinned address can be of one autopilot: one kind, boot clock and place."""
-        pilots = {
-            k: s
-            for k, s in self._sources.items()
-            if self._pinned and k[1] == self._pinned[1] and _is_autopilot(k[0], s)
-        }
-        mine = [key for key in pilots if key[:2] == self._pinned]
-        return not mine or self._rivals(max(mine, key=lambda k: pilots[k].at), pilots, here=True) == 1
+        return self._pinned is None or self._rivals(self._pinned, here=True) == 1
 
     def _voices_at(self, voice: _Voice) -> int:
         kinds = [s for key, s in self._sources.items() if key[:2] == voice]
@@ -264,24 +256,29 @@ class Watch:
         taking_turns = told is not None and any(clock.of_two for clock in told.clocks.values())
         return 2 if overlapping or taking_turns or (told is not None and told.leaps > 1) else 1
 
-    def _rivals(self, best: _Key, pilots: dict[_Key, _Source], *, here: bool = False) -> int:
-        """How many autopilots there are by all that was heard, at the same time as the one that is meant."""
-        mine, told = pilots[best], self._told.get(best[:2])
-        until = max(mine.at, told.at) if told else mine.at  # anything that it says shows that it is there
-        others = {
+    def _rivals(self, mine: _Voice, *, here: bool = False) -> int:
+        """How many autopilots were heard at the same time as ``mine``, itself counted; ``here``: at its address."""
+        first, until = self._span(mine)
+        others = [voice for voice in self._others(mine) if not here or voice[1] == mine[1]]
+        spans = [self._span(voice) for voice in others]
+        return sum(begin <= until and first <= end for begin, end in spans) + self._voices_at(mine)
+
+    def _others(self, mine: _Voice) -> set[_Voice]:
+        """Who else speaks as an autopilot."""
+        pilots = {
             key[:2]
-            for key, s in pilots.items()
-            if key[:2] != best[:2] and s.first <= until and mine.first <= s.at
-            and (key[0] == best[0] or s.autopilot not in (GENERIC, INVALID))
-        }  # fmt: skip
+            for key, s in self._sources.items()
+            if _is_autopilot(key[0], s) and (key[0] == mine[0] or s.autopilot not in (GENERIC, INVALID))
+        }
         # One that sends no heartbeat, or whose heartbeats get lost, is there all the same.
-        others |= {
-            voice
-            for voice, told in self._told.items()
-            if voice[0] == best[0] and voice[1] != best[1] and not here
-            and told.first <= until and mine.first <= told.at
-        }  # fmt: skip
-        return len(others) + self._voices_at(best[:2])
+        return (pilots | {voice for voice in self._told if voice[0] == mine[0]}) - {mine}
+
+    def _span(self, voice: _Voice) -> tuple[float, float]:
+        """When a voice was heard first and last: anything that it says shows that it is there."""
+        heard = [(s.first, s.at) for key, s in self._sources.items() if key[:2] == voice]
+        if voice in self._told:
+            heard.append((self._told[voice].first, self._told[voice].at))
+        return min(first for first, _ in heard), max(at for _, at in heard)
 
     def _voice(self, voice: _Voice, now: float) -> _Told:
         told = self._told.get(voice)
