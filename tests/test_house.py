@@ -16,7 +16,7 @@ ROOT = Path(gcsplan.__file__).parent
 MODULES = sorted(ROOT.rglob("*.py"))
 
 # The packages from the bottom up. Each may import what stands in its set, and itself; a module in none is a mistake.
-WORLD = {"errors", "native", "world"}
+WORLD = {"arrays", "errors", "native", "world"}
 VEHICLE = WORLD | {"vehicle"}
 MISSION = VEHICLE | {"mavlink.mission"}
 MAVLINK = {"mavlink.mission", "mavlink.build", "mavlink.files", "mavlink.protocol", "mavlink.link"}
@@ -25,12 +25,13 @@ OUTWARD = ABOVE | {"export", "report", "sim"}
 APP = OUTWARD | {"mission_file", "app"}
 
 MAY_IMPORT: dict[str, set[str]] = {
+    "arrays": set(),
     "errors": set(),
     "native": set(),
-    "world": {"errors", "native"},
+    "world": {"arrays", "errors", "native"},
     "vehicle": WORLD,
-    "logs": {"errors"},
-    "optimisers": {"errors"},
+    "logs": {"arrays", "errors"},
+    "optimisers": {"arrays", "errors"},
     "planners": WORLD | {"optimisers"},
     "fleet": VEHICLE,
     "mavlink.mission": VEHICLE,

@@ -19,6 +19,7 @@ from gcsplan.app.gate import SLACK_S, GateTime, gated
 from gcsplan.app.model import Brief, FleetPlan, VehiclePlan
 from gcsplan.app.planning import rebuilt
 from gcsplan.app.slants import circling_m, slants_of
+from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.motion import TimedPath
@@ -27,7 +28,6 @@ from gcsplan.fleet.timing import Course, Route, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
 from gcsplan.world.world import World
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 TERRAIN_STEP_M = 25.0

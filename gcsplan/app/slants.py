@@ -6,16 +6,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.app.model import VehiclePlan
+from gcsplan.arrays import Floats
 from gcsplan.check.rtl.returning import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.verdict import LegFigures
 from gcsplan.world.world import World
 
 __all__ = ["circling_m", "slants_of"]
-
-Floats = NDArray[np.float64]
 
 
 def slants_of(v: VehiclePlan, world: World) -> tuple[Floats | None, Floats | None]:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.app.problems import lowest_amsl
+from gcsplan.arrays import Floats
 from gcsplan.check.climb_out import REACHED_M, above_slant, circle_missing_m, flared, slant_room
 from gcsplan.check.rtl.returning import circle_growth
 from gcsplan.errors import NoMission
@@ -27,7 +27,6 @@ from gcsplan.world.limits import Limits
 
 __all__ = ["FlightEnd", "circle_m", "goals", "starts"]
 
-Floats = NDArray[np.float64]
 
 SHARPEST = math.radians(60.0)
 """The largest turn at a joint that the straight pieces there are long enough for; what is more takes several."""

@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
 from gcsplan.app.wing_ends import FlightEnd, circle_m, goals, starts
+from gcsplan.arrays import Floats
 from gcsplan.check.arcs import UNFITTING
 from gcsplan.check.rtl.returning import circle_growth
 from gcsplan.check.verdict import Verdict
@@ -33,7 +33,6 @@ from gcsplan.world.world import World
 
 __all__ = ["plan_wing"]
 
-Floats = NDArray[np.float64]
 
 ATTEMPTS = 5
 

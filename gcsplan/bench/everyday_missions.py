@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Floats
+
 Document = dict[str, Any]
 
 KINDS = (

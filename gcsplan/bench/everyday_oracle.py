@@ -17,9 +17,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.zones import Circle, Zone
-
-Floats = NDArray[np.float64]
 
 SEGMENTS = 24
 """Chords of a quarter circle."""

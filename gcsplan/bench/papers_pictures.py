@@ -16,14 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle as CirclePatch
 from matplotlib.patches import Polygon as PolygonPatch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.bench.papers_runs import Record
 from gcsplan.bench.papers_scenarios import Set
 from gcsplan.bench.papers_statistics import legal
 from gcsplan.world.zones import Circle
-
-Floats = NDArray[np.float64]
 
 COLOURS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
 ZONE_COLOUR = "#ffbf00"

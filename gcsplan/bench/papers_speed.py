@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.bench.check import LIMITS, scene
 from gcsplan.bench.papers_scenarios import SCENARIOS, mission_text, prepare, settings_of
 from gcsplan.errors import InputError
@@ -22,8 +22,6 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.swarm.encodings import Code
 from gcsplan.planners.swarm.objectives import Cost, get_objective
 from gcsplan.planners.swarm.scene import Scene
-
-Floats = NDArray[np.float64]
 
 CASE = "ssgwo-table5"
 """Twelve cylinders, population 30, 500 iterations, 30 nodes."""

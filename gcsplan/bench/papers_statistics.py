@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.bench.papers_runs import OPTIMA, Record
 from gcsplan.bench.papers_scenarios import Claim, Scenario, claims_of
-
-Floats = NDArray[np.float64]
 
 LEAST_RUNS_TO_JUDGE = 30
 SIGNIFICANCE = 0.05

@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Legs
 
-Floats = NDArray[np.float64]
 Status = Literal["solved", "infeasible", "not found", "unsafe", "failed"]
 OURS = "gcsplan"
 OURS_LONG = "gcsplan 60 s"

@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.mission_file.world import make_box
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame, centre_of
@@ -22,8 +23,6 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
 from gcsplan.world.zones import Circle, Level, Zone
-
-Floats = NDArray[np.float64]
 
 MIDDLE_DEG = (36.5896, -84.2458)  # of the sample DEM
 HALF_M = (13_000.0, 14_000.0)  # east and north, from there: starts and goals lie within

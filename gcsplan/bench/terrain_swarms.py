@@ -14,15 +14,13 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.bench.terrain_measure import passes
 from gcsplan.bench.terrain_ompl import CURE, Found, box_of
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle, Level
-
-Floats = NDArray[np.float64]
 
 SWARMS = {"GWO": "OriginalGWO", "PSO": "OriginalPSO", "DE": "OriginalDE", "ABC": "OriginalABC", "FOA": "OriginalFOA"}
 POPULATION, EPOCHS = 30, 500

@@ -23,8 +23,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.rtl.returning import circle_growth
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m
@@ -36,7 +36,6 @@ from gcsplan.world.frame import Frame
 
 __all__ = ["SAG_M", "UNFITTING", "bend", "tangent_m"]
 
-Floats = NDArray[np.float64]
 
 SAG_M = 0.2
 """How far an arc may lie outside its chords, which are widened by that."""

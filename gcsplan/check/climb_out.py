@@ -22,8 +22,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.rtl.returning import circle_growth, flat_m
 from gcsplan.check.spline import towards
@@ -36,8 +36,6 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.world import World
-
-Floats = NDArray[np.float64]
 
 LEAST_PITCH_DEG = 4.0
 """ArduPlane's where the item gives none."""

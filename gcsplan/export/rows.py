@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Zone
-
-Floats = NDArray[np.float64]
 
 CIRCLE_CORNERS = 72
 OUTLINE_MARGIN_M = 0.02

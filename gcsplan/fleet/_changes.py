@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.fleet._taken import Spans, Taken
 from gcsplan.fleet.arrival import WITHIN_S, Craft, Crew, Hold, Mode, Slot
@@ -19,7 +18,6 @@ from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.timing import Route, speed_for
 from gcsplan.vehicle import Vehicle
 
-Floats = NDArray[np.float64]
 How = Literal["as scheduled", "departure", "speed", "hold", "path"]
 
 EARLIER_LATER_S = (1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0, 34.0, 55.0, 89.0, 144.0, 233.0)

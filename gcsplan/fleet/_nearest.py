@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Floats
 
 PARALLEL = 1e-13
 """Part of |v|²|u|² below which two velocities count as parallel: the least then lies on an edge as well."""

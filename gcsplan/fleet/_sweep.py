@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.fleet._nearest import Pieces, nearest
 from gcsplan.fleet.motion import TimedPath
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 FOREVER_S = 1e9

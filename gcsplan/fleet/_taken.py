@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.fleet._nearest import Pieces, shifts
 from gcsplan.fleet._sweep import pieces_of
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Rules
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 GROUP, LEVELS = 6, 3

@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
 from gcsplan.fleet._settle import LATER_S, Again, Ask, Stuck, maker, motion_of, settle, with_leaving
 from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import Crew, Hold, Schedule
 from gcsplan.fleet.separation import Rules
 from gcsplan.fleet.timing import Route
-
-Floats = NDArray[np.float64]
 
 MANY = 12
 """Vehicles up to which the smallest interval is looked for with the whole fleet."""

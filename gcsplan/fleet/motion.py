@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False, slots=True)

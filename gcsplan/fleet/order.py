@@ -13,7 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Floats
+
 Ints = NDArray[np.intp]
 Clock = Literal["first", "fleet"]
 Cost = Callable[[Floats], Floats]

@@ -14,12 +14,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.fleet._nearest import below, nearest
 from gcsplan.fleet._sweep import Fleet, Least
 from gcsplan.fleet.motion import TimedPath
 
-Floats = NDArray[np.float64]
 Place = tuple[float, float, float]
 Where = Callable[[Place], str]
 """Turns east_m, north_m, amsl_m into words for people; whoever knows degrees hands one in."""

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.vehicle import Vehicle
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 CUT_M = 2.0

@@ -17,13 +17,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column, legs
 from gcsplan.vehicle import Vehicle
 
 __all__ = ["POSITION_ERROR_M", "Course", "End", "Route", "fly", "motion_error_m", "speed_for", "time_to_goal_s"]
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 End = Literal["land", "loiter", "rtl", "none"]
 

@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.logs.flight_log import FlightLog
-
-Floats = NDArray[np.float64]
 
 STEP_S = 5.0
 """Long enough that noise of the height is small beside what is climbed in it, short enough to be of one kind."""

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 
-Floats = NDArray[np.float64]
 EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
 LEAST_POINTS = 20
 LONGEST_S, FARTHEST_DEG = 86_400.0, 3.0

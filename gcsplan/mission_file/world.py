@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.schema import FrameKeys, LocalPoint, TerrainKeys, ZoneKeys
@@ -20,7 +19,6 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Terrain, TerrainSpec
 from gcsplan.world.zones import Circle, Level, Zone
 
-Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
 MARGIN_M, MARGIN_PART, MARGIN_MOST_M = 3000.0, 1.0, 25_000.0

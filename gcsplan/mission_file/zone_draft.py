@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import Problem
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
@@ -20,7 +20,6 @@ from gcsplan.world.zones import Circle, Level, Polygon, Zone
 if TYPE_CHECKING:
     import shapely
 
-Floats = NDArray[np.float64]
 
 LARGEST_RADIUS_M = 100_000.0
 """A circle in the plane is one on the ground only where the plane's scale hardly changes over it."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Floats
+
 Indices = NDArray[np.intp]
 Steps = Generator[Floats, Floats, None]
 """An optimiser at work: yields populations (n, dim) in [0, 1]; is sent their costs (n,), finite, its own to change."""

@@ -11,15 +11,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem, terminals
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Zone
-
-Floats = NDArray[np.float64]
 
 PIECES = 8
 """Straight pieces of one side of a window, which the plane bends."""

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Ints = NDArray[np.intp]
 Marks = NDArray[np.int8]
 

@@ -7,13 +7,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 
-Floats = NDArray[np.float64]
 Plan = Callable[[Problem], Solution]
 
 TRIES = 32

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gcsplan.arrays import Floats
 from gcsplan.report.marks import Mark, marks_html
 from gcsplan.report.markup import esc, num
 from gcsplan.report.relief import nice_step
 
-Floats = NDArray[np.float64]
 UNITS = 10_000.0
 
 

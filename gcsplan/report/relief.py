@@ -10,15 +10,13 @@ from dataclasses import dataclass
 
 import contourpy
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from gcsplan.arrays import Floats
 from gcsplan.report.samples import Line
 from gcsplan.world.surface import Surface
 from gcsplan.world.world import World
 from gcsplan.world.zones import Zone
-
-Floats = NDArray[np.float64]
 
 UNITS = 10_000.0
 """Width of the map in its own units; heights of it follow."""

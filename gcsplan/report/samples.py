@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.mission import TERRAIN
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
 
-Floats = NDArray[np.float64]
 TERRAIN_FRAMES = (TERRAIN, 11)
 MOST_SAMPLES = 12_000
 """Of all vehicles together, a little more with many legs."""

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.report.relief import Relief
 from gcsplan.report.samples import Line, level_amsl
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Polygon, Zone
 
-Floats = NDArray[np.float64]
 CIRCLE_CORNERS = 48
 RINGS = (1.0, 0.66, 0.33)
 EDGE_PARTS = 160

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.sim.kinematics import AT_ONCE_M_S2
 from gcsplan.sim.trace import Trace
 from gcsplan.sim.track import PASSED, Track
 from gcsplan.sim.wind import Air, Weather
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 STEP_S = 0.1

@@ -16,12 +16,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Finding
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.world import World
-
-Floats = NDArray[np.float64]
 
 CHORD = 16
 """Samples that are looked at as one straight leg, where they lie on one."""

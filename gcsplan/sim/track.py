@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.arcs import bend
 from gcsplan.check.flight import follow
 from gcsplan.check.stretch import Flight, Stretch
@@ -21,8 +22,6 @@ from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.kinematics import Kinematics
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
-
-Floats = NDArray[np.float64]
 
 SAG_M = 0.02
 """How far the chords of a rounded corner may lie from its arc."""

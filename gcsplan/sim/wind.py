@@ -9,11 +9,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-
-Floats = NDArray[np.float64]
 
 GUST_MEMORY_S = 4.0
 """Near the ground a turbulence of some tens of metres is carried past at about 10 m/s."""

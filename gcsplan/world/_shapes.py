@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world._shared import (
     CEILING_AGL,
     EAST,
@@ -19,8 +19,6 @@ from gcsplan.world._shared import (
     WEST_E,
     Zones,
 )
-
-Floats = NDArray[np.float64]
 
 
 def spans(track: Floats, zones: Zones, within_m: float, over_ground_m: float) -> list[tuple[int, float, float]]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Floats
 
 TOUCH_M = 1e-6
 """Float noise: a limit that is broken by less is touched, and touching is legal."""

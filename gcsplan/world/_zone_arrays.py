@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world._field import Field
 from gcsplan.world._shared import (
     BAND_HIGH,
@@ -35,7 +36,6 @@ from gcsplan.world._shared import (
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Level, Zone
 
-Floats = NDArray[np.float64]
 BOX = [WEST_E, SOUTH_N, EAST_E, NORTH_N]
 MOST_SQUARES = 128  # of the lattice, along one side
 

@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.native.form import Held
 from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES, around, judge, room
 from gcsplan.world._field import Field
@@ -50,7 +51,6 @@ from gcsplan.world.zones import Circle, Polygon, Zone
 
 __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 
-Floats = NDArray[np.float64]
 NEAR_M, NEAR_PART = 0.01, 0.01
 """To which the kernel resolves the nearest place of a zone over ground (`_sweep_zones.nearest_conflict`)."""
 

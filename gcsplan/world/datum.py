@@ -13,14 +13,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 
 from gcsplan.errors import InputError
 from gcsplan.world.frame import Frame
-
-Floats = NDArray[np.float64]
 
 WORST_SHIFT_M = 30.0
 """A horizontal datum shift less accurate than this is refused: it would move hills by more than a DEM cell."""

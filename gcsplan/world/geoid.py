@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world.raster import gdal, missing, require_numbers
-
-Floats = NDArray[np.float64]
 
 WORST_GEOID_M = 120.0
 """No geoid is farther from its ellipsoid (EGM2008: -107 … +86 m)."""

@@ -9,10 +9,9 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from gcsplan.arrays import Bools, Floats
+
 AT_ONCE = 1_000_000
 MEETS = -1.0
 """Not 0, which is to touch: touching is legal, where nothing is demanded besides."""

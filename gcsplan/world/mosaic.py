@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world.datum import plane_to_raster, to_wgs84
 from gcsplan.world.frame import Frame
 from gcsplan.world.raster import MAX_CELLS, Raster
 from gcsplan.world.surface import NO_SIDES, GridMap, Sides
 
-Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
 FIT_ERROR_M = 0.01

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.mosaic import Window
 from gcsplan.world.surface import GridMap
-
-Floats = NDArray[np.float64]
 
 TALLEST_M = 250.0
 """A canopy cell beyond this (or below -1 m) is an undeclared nodata value: unknown. The tallest tree has 116 m."""

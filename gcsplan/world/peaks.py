@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world.surface import GridMap
 
-Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
 WANTED_ERROR_M = 0.01

@@ -18,12 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world.datum import RasterCRS, VerticalDatum, take_apart
 
-Floats = NDArray[np.float64]
 Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
 
 SAMPLE = "sample:jacksboro"

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Floats
+
 Sides = tuple[bool, bool, bool, bool]
 NO_SIDES: Sides = (False, False, False, False)
 DEGREE = 6

@@ -26,7 +26,6 @@ from gcsplan.world.peaks import Peak, flat_grid, peaks_grid
 from gcsplan.world.raster import SAMPLE, Raster, open_raster, require_file, sample_jacksboro, sha256_of
 from gcsplan.world.surface import Surface
 
-Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 HeightUnit = Literal["m", "ft", "us_ft"]
 

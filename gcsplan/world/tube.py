@@ -6,16 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.native.form import Held
 from gcsplan.world._compiled import pieces
 from gcsplan.world._field import Field
 from gcsplan.world._shapes import spans
 from gcsplan.world._shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
 from gcsplan.world.limits import Limits
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

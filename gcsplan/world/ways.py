@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world import hulls
 from gcsplan.world._compiled import pieces
 from gcsplan.world._shapes import grown_edges
@@ -38,7 +39,6 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.tube import MARGIN_M, ZONE_ROOM_M, Reaches
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 BOX_LOW, BOX_HIGH = [WEST_E, SOUTH_N], [EAST_E, NORTH_N]

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.rtl.rules import Returns, Target, returns
 from gcsplan.check.rtl.stretches import stretches_of
 from gcsplan.check.rtl.study import CLEAR, Study
@@ -26,7 +27,6 @@ from gcsplan.check.rtl.walls import Walls
 from gcsplan.mavlink.mission.mission import RELATIVE, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
-Floats = NDArray[np.float64]
 RALLY_POINT = 5100  # MAV_CMD_NAV_RALLY_POINT
 MOST_POINTS = 6
 LEVELS = 40

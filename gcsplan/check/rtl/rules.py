@@ -23,13 +23,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.rtl.returning import COPTER_CONE_SLOPE, PLANE_LOITER_RADIUS_M, PX4_CONE_SLOPE, circle_growth
 from gcsplan.check.rtl.trail import Cuts, Trail
 from gcsplan.check.rtl.walls import GROUND, MAX_AGL, MAX_AMSL, Walls
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world import ways
 
-Floats = NDArray[np.float64]
 AT_HOME_M = 5.0
 """Nearer to home than this, or than the track error, a return is a descent."""
 

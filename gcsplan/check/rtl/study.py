@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools
 from gcsplan.check.rtl.rules import Returns
 from gcsplan.check.rtl.trail import Cuts, Trail
 from gcsplan.check.rtl.walls import Walls
 
-Bools = NDArray[np.bool_]
 Judge = Callable[[Cuts, bool], Returns]
 """``judge(cuts, whole)``: see `rules.returns`."""
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.plane_legs import legs_in_plane
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 

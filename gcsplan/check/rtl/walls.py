@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Bools, Floats
+
 Ints = NDArray[np.intp]
-Bools = NDArray[np.bool_]
 
 TOUCH_M = 1e-6
 GROUND, MAX_AMSL, MAX_AGL = -1, -2, -3

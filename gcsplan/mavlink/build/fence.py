@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.mavlink.files.plan_fence import CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, POLYGON_OUT
 from gcsplan.mavlink.mission.autopilots import manner, max_items
@@ -26,7 +26,6 @@ from gcsplan.world.zones import Circle, Polygon, Zone
 if TYPE_CHECKING:
     from gcsplan.world.frame import Frame
 
-Floats = NDArray[np.float64]
 STRAIGHT_M = 0.1
 """A corner of the outline that lies this near to the line between its neighbours is left out."""
 

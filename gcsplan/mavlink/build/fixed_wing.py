@@ -14,6 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.mavlink.build.order import Order, split_legs
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
@@ -24,7 +25,6 @@ from gcsplan.world.world import World
 
 __all__ = ["build_wing", "flown_m", "parted", "pitch_deg", "tangents_m", "thinned"]
 
-Floats = NDArray[np.float64]
 
 FARTHEST_ACCEPTED_M = 255.0
 """What ArduPlane keeps of an acceptance radius at most."""

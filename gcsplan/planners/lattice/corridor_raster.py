@@ -14,13 +14,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.lattice import near_zone
 from gcsplan.planners.problem import Problem, terminals
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
-
-Floats = NDArray[np.float64]
 
 SHUT_M = 1e5
 """Floor where there is no room at all; kernels are spared infinities."""

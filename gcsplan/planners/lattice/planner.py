@@ -17,6 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
 from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m, terminals
@@ -26,7 +27,6 @@ from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, m
 from gcsplan.planners.simplify import fewer
 from gcsplan.world.path import Path
 
-Floats = NDArray[np.float64]
 Tell = Callable[[str, float | None], None]
 
 COARSE_STEPS = (0.03, 0.015, 0.007, 0.0035)

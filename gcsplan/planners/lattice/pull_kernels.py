@@ -13,11 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.compiled import device, kernel
-
-Floats = NDArray[np.float64]
 
 MOST_POINTS = 400
 MOST_DOORS = 6000

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.lattice import Lattice, Links, make_lattice, make_links
 from gcsplan.planners.lattice.search import Found, Label, search
 from gcsplan.planners.problem import Problem, terminals
 from gcsplan.planners.profile.track import Obstruction, Track, make_track
-
-Floats = NDArray[np.float64]
 
 SHUT_IN = 200
 """An end from which no more labels than this are to be had is shut in."""

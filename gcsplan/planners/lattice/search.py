@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.lattice import search_kernels
 from gcsplan.planners.lattice.lattice import LINK_DOORS, STEPS, Lattice, Links
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 LABELS_A_NODE = 8

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.mesh import Guide
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Spare = tuple[float, float]
 """Metres that a path may fly in laps near its start and near its goal."""
 PinnedTrack = tuple[Floats, Bools, Floats]

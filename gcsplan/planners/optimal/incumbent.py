@@ -7,8 +7,8 @@ import time
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.planner import straight_bound
 from gcsplan.planners.optimal.corridor import PinnedTrack
@@ -18,9 +18,6 @@ from gcsplan.planners.profile.exact import Judge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
 from gcsplan.planners.simplify import fewer, polished
 from gcsplan.world.path import Path
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 LITTLE, WORTH = 5e-6, 2e-5
 """What fewer way points may cost, as a part: on the way, and at last."""

@@ -12,8 +12,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, AltitudeIntervals, Reached, Terminal
 from gcsplan.planners.optimal.cells import choose, has_room
 from gcsplan.planners.optimal.corridor import Corridor, End, Nearby, Spare
@@ -24,9 +24,6 @@ from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
 from gcsplan.planners.problem import Problem
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 DETOURS, LEAST_DETOUR = (1.25, 2.5, math.inf), 1.02
 """How long tracks may be, in times the straight way, before the lattice must be widened; and how long they may be in

@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.corridor import End, PinnedTrack, joined
@@ -17,8 +16,6 @@ from gcsplan.planners.optimal.leg import Lacking, Leg
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import Problem, terminals
 from gcsplan.planners.profile.track import Flown, fly, make_track
-
-Floats = NDArray[np.float64]
 
 SLACKS = (0.008, 0.15, 0.6)
 """How much longer than the shortest the tracks are that are looked at, as a part of it, until a path is known."""

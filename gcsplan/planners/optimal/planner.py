@@ -29,6 +29,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.planner import plan_band
@@ -39,8 +40,6 @@ from gcsplan.planners.optimal.window import plan_over
 from gcsplan.planners.problem import Problem, Refusal, Solution, terminals
 from gcsplan.planners.refusal import check_ends, explain
 from gcsplan.world.path import Path
-
-Floats = NDArray[np.float64]
 
 TURNS_NOTE = "the lower bound is that of paths with sharp corners: it ignores turn_radius_m"
 BAND_NOTE = "the lower bound knows ground, zones and ceilings, but not the room between min and max AGL"

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.errors import InputError
 from gcsplan.planners.lattice.planner import plan_band
@@ -21,8 +20,6 @@ from gcsplan.planners.optimal.sources.bound_corridor import follow
 from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
 from gcsplan.planners.problem import Problem, Refusal, terminals
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
-
-Floats = NDArray[np.float64]
 
 FAR, MUCH, SLANTED, NEAR = 5e-3, 5e-2, 1e-2, 5e-2
 """Gaps, as parts: beyond which other ways to find a path are asked for a better one; beyond which small worlds are

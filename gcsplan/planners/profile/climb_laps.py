@@ -13,17 +13,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import ENDS_M, Problem
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.track import Flown, Lacking, Shut, Track, distances, fly, lacking
 from gcsplan.planners.simplify import fewer
 from gcsplan.world.path import Path
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 DIRECTIONS = 12
 SHORTEST_M = 20.0

@@ -9,12 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
 from gcsplan.world.airspace import Legs, Tube, Violation
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 SAMPLE_M = 12.0
 """Between places at which floor and ceiling over a track are read; its profile bends at these alone."""

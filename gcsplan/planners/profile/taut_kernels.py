@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.compiled import kernel
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 

@@ -16,9 +16,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.profile.taut_kernels import draw
-
-Floats = NDArray[np.float64]
 
 NO_LIMIT = 1e12
 """A slope that stands for infinite ones, which would make nothing of a step at one place."""

@@ -15,12 +15,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import ENDS_M, Problem
 from gcsplan.planners.profile.taut_kernels import edge
 from gcsplan.planners.profile.taut_string import NO_LIMIT, Blocked, Profile, taut_string
 from gcsplan.world.airspace import Tube
-
-Floats = NDArray[np.float64]
 
 KEEP_M = 1e-4
 """Kept from floors and ceilings where there is room, so that rounding never decides."""

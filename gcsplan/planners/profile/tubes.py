@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.airspace import Band, Tube
-
-Floats = NDArray[np.float64]
 
 
 def cut(tube: Tube, s0_m: float, s1_m: float) -> Tube | None:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import unknown_name
 from gcsplan.optimisers.driver import History, Result
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
@@ -25,8 +26,6 @@ from gcsplan.planners.swarm.encodings import LATERAL, Code
 from gcsplan.planners.swarm.objectives import Cost, Earlier, get_objective
 from gcsplan.planners.swarm.planner import Found, Settings, finish, judged
 from gcsplan.planners.swarm.scene import Scene
-
-Floats = NDArray[np.float64]
 
 ACROSS = UPWARD = 21
 EDGE_PARTS = 16

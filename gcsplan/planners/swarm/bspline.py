@@ -12,9 +12,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.swarm.curve_kernels import samples_of
-
-Floats = NDArray[np.float64]
 
 DEGREE = 3
 

@@ -13,12 +13,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.swarm import scene_kernels as s
 from gcsplan.planners.swarm.compiled import device, kernel
 from gcsplan.planners.swarm.curve_kernels import CURVE, angle, chords, divide, draw, exponential, weigh
 from gcsplan.planners.swarm.scene_kernels import SCENE, gap_to, height_at, lookup, lookup_both, one_grid, place
 
-Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 

@@ -11,9 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.swarm.compiled import device, kernel
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 CURVE = "f8[,] i8[,]"

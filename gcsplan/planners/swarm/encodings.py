@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import unknown_name
 from gcsplan.planners.swarm.scene import Scene
-
-Floats = NDArray[np.float64]
 
 LATERAL = 0.5
 """Reach of a section to either side, as a part of the horizontal distance (IB-ABC, section 2.2)."""

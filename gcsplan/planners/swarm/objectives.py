@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import unknown_name
 from gcsplan.native.form import Held
 from gcsplan.planners.problem import Problem
@@ -24,8 +24,6 @@ from gcsplan.planners.swarm.curve_kernels import CURVE
 from gcsplan.planners.swarm.encodings import Code, shares
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.scene_kernels import SCENE, clocks_of, nearness
-
-Floats = NDArray[np.float64]
 
 PENALTY = 100.0
 """Cost of a metre that is not allowed, in metres: D, all; C and PC of MSFOA, P of ABO, μ_obs of SSGWO are 100 too."""

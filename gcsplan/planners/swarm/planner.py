@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import unknown_name
 from gcsplan.optimisers.driver import Result, State, minimise
 from gcsplan.optimisers.registry import get as get_optimiser
@@ -29,8 +30,6 @@ from gcsplan.planners.swarm.repair import repair, violations
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Violation
 from gcsplan.world.path import Path
-
-Floats = NDArray[np.float64]
 
 CORRIDORS = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 0.0)
 """Widths tried for few way points beside the curve, as parts of the straight way; 0 keeps every sample."""

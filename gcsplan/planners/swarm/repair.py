@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import way_points
 from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
@@ -21,8 +22,6 @@ from gcsplan.planners.simplify import fewer
 from gcsplan.planners.swarm import scene_kernels as k
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Legs, Violation
-
-Floats = NDArray[np.float64]
 
 STATIONS, SIDES, REACH = 160, 30, 4
 """Stations along the ribbon, side steps to either side, and by how many steps neighbours may differ."""

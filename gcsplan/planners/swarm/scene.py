@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import VOLUME_KEYS
@@ -17,8 +18,6 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Level, Zone
-
-Floats = NDArray[np.float64]
 
 GROWN = 0.1
 """Room around the stops on every side, as a part of the longer side; the shorter is first made as long: a mission due

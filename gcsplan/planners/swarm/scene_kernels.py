@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.swarm.compiled import device, kernel
 
-Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
 SCENE = "f4[,] f8[,] f4[,] f8[,] f8[] f8[,] f8[,]"

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.turns.kernels import CHORD_M, fill_outline, part_neighbours, tangents
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST_DEG = 100.0

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.turns.compiled import kernel
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 END_M, FORGIVEN_M = 60.0, 25.0

@@ -20,13 +20,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
 from gcsplan.planners.turns.arc_path import Belt, through, unlooped
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
 from gcsplan.world.path import Path
-
-Floats = NDArray[np.float64]
 
 Replan = Callable[[float], tuple[Floats, NDArray[np.bool_]] | None]
 """A path and its pinned points, planned with so many metres of track error more (`roomier`); None: there is none."""

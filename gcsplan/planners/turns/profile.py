@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.taut_string import Profile
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly
@@ -20,7 +21,6 @@ from gcsplan.planners.turns.arc_path import Outline
 from gcsplan.planners.turns.kernels import CHORD_M, level, straighten
 from gcsplan.world.airspace import Band, Legs, Tube, Violation
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 CORRECTIONS, CORRECTED_M = 8, 0.01

@@ -12,15 +12,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import Obstruction, Track
 from gcsplan.planners.turns.arc_path import Belt, Outline, inserted, moved, outline, tight, without
 from gcsplan.planners.turns.kernels import pinched, shut
 from gcsplan.planners.turns.profile import Risen, rise, track_of
-
-Floats = NDArray[np.float64]
 
 STEPS_M = (1.0, 4.0, 15.0, 50.0, 150.0)
 """How far discs are moved."""

@@ -12,10 +12,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.profile.taut_string import Blocked, Profile, taut_string
-
-Floats = NDArray[np.float64]
 
 STEPS = 400
 """Places along a leg at which the floor is looked up."""

@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
 from gcsplan.planners.optimal.navmesh.mesh_kernels import stands
 from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 BESIDE = 5

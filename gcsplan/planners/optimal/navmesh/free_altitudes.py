@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.navmesh.interval_kernels import cut_intervals
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.zone_kernels import narrow_ranges
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 

@@ -17,13 +17,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent, nodes, places, slopes
 from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, TOP, TOP_2, UNDER, UNDER_2
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, Fit, Shapes, make_shapes
 from gcsplan.planners.problem import Problem
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Box = tuple[float, float, float, float]
 """West, south, east, north; infinite: everywhere."""

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
 from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, over_ground, shut_over
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import RATES
 from gcsplan.planners.optimal.navmesh.grid import Plane
 from gcsplan.planners.optimal.navmesh.mesh_kernels import in_reach, least_of_cells, least_of_portals, within
 from gcsplan.planners.optimal.navmesh.portals import GroundTrack, Place, Portals
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
 
 BENT_M = LOOSE.bent_m
 """Most that a raster's line may bow between the corners of a block."""

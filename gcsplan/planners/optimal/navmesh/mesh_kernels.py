@@ -15,9 +15,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.compiled import device, kernel
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 

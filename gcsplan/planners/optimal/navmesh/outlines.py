@@ -18,12 +18,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place, Portals
 from gcsplan.world.zones import Circle, Zone
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 COARSE = 4

@@ -16,6 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.compiled import kernel
 from gcsplan.planners.optimal.navmesh.polyanya_nodes import (
     AHEAD,
@@ -46,7 +47,6 @@ from gcsplan.planners.optimal.navmesh.polyanya_nodes import (
     push,
 )
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 Names = NDArray[np.int64]

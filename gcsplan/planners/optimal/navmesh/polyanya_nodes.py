@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.compiled import device
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Names = NDArray[np.int64]
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.navmesh.polyanya import search
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Place = tuple[float, float]
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.navmesh.clearance_kernels import lay, pool
 from gcsplan.world.surface import GridMap
 
-Floats = NDArray[np.float64]
 Extent = tuple[int, int, int, int]
 """First and last columns and rows (col0, row0, col1, row1) of a terrain model's nodes."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.navmesh.zone_kernels import (
     BESIDE,
     BOTTOM,
@@ -28,7 +29,6 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle, Zone
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 

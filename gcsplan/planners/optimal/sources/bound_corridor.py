@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.corridor import joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Leg
@@ -21,7 +22,6 @@ from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.profile.track import distances
 from gcsplan.world.path import Path
 
-Floats = NDArray[np.float64]
 Point = tuple[float, float, float]
 
 STEP_M = 8.0

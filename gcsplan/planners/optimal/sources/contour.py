@@ -7,17 +7,12 @@ of reachable altitudes (`routes`) is searched among all tracks that may still be
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.lattice.planner import pulled
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
 from gcsplan.planners.optimal.corridor import PinnedTrack
 from gcsplan.planners.problem import Problem, straight_way_m
 from gcsplan.planners.profile.climb_laps import pins_of
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 NODES = 60_000
 """Of the lattice, about."""

@@ -18,16 +18,13 @@ from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools
 from gcsplan.planners.optimal.corridor import PinnedTrack, Spare
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import sampled_track
 from gcsplan.planners.profile.track import Lacking, Shut, distances, lacking
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 LACKING_M, HAIR_M = 3.0, 0.2
 """So little room is missing because cells are more lenient than the check, about terrain that is kept clear of

@@ -15,13 +15,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.sources.roadmap_3d import Lattice, path_of, stops_of
 from gcsplan.planners.optimal.sources.section_dp import cost_of
 from gcsplan.planners.problem import Problem, terminals
 from gcsplan.world.zones import Circle
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Ints = NDArray[np.intp]
 
 NODES, PLACES, LEVELS = 8000, (200, 1000), (7, 30)

@@ -12,8 +12,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.corridor import PinnedTrack, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.navmesh.outlines import Solids
@@ -21,9 +21,6 @@ from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import terminals
 from gcsplan.world.zones import Zone
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 TRACKS = 24
 """Tracks that are looked at, at most."""

@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.sources.section_dp import FIXED, FREE, UPRIGHT, cheapest, cost_of, drawn
 from gcsplan.planners.problem import Problem
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Ints = NDArray[np.intp]
 
 RATIO = 0.15
