@@ -252,6 +252,21 @@ def test_wrong_usage_is_explained(run: Any, arguments: list[str], said: str) -> 
     assert said in err
 
 
+@pytest.mark.parametrize("far", [(36.6, 177.0), (0.0, 5.6), (-36.6, 95.6), (38.6, -84.3)])
+def test_a_spline_to_the_other_end_of_the_world_is_a_finding_and_asks_for_no_terrain(
+    run: Any, folder: Path, world: list[str], far: tuple[float, float]
+) -> None:
+    plan = json.loads(Path(file_of(folder, "spline")).read_text())
+    item = next(i for i in plan["mission"]["items"] if i["command"] == 82)
+    item["params"][4:6] = far
+    file = folder / "far.plan"
+    file.write_text(json.dumps(plan))
+    code, _, err = run(file, *world, "-q")
+    assert code == 4
+    assert "too far from the mission's terrain" in err
+    assert "Warning" not in err
+
+
 def test_a_mission_files_world_reaches_as_far_as_the_file_flies(run: Any, folder: Path, world: list[str]) -> None:
     # The mission itself stays in one corner; the file goes round the whole terrain.
     lat, lon = corpus.degrees(*corpus.HOME)
