@@ -648,6 +648,22 @@ def test_a_small_file_that_unpacks_into_a_large_block_is_refused(
         open_raster(path, where="m")
 
 
+def test_a_block_is_no_larger_than_what_a_check_may_hold_of_it(tmp_path: Path) -> None:
+    """A check holds 460 MB of its own when terrain is read again for a file that goes beyond it, of 600 MB promised."""
+    for rows, fits in ((4096, True), (8192, False)):
+        path = tmp_path / f"{rows}.tif"
+        with rasterio.open(
+            path, "w", driver="GTiff", width=4096, height=rows, count=1, dtype="float32", crs="EPSG:4326",
+            transform=from_origin(-84.6, 36.6, 1e-5, 1e-5), compress="deflate", blockysize=rows, sparse_ok=True,
+        ):  # fmt: skip
+            pass
+        if fits:
+            assert open_raster(path, where="m").rows == rows
+        else:
+            with pytest.raises(InputError, match="64 MB"):
+                open_raster(path, where="m")
+
+
 @pytest.mark.parametrize("tiled", [True, False])
 def test_blocks_that_were_never_written_are_unknown_and_no_sea(tmp_path: Path, tiled: bool) -> None:
     path, heights = tmp_path / "a.tif", np.full((96, 96), 400.0, "float32")

@@ -30,8 +30,8 @@ SAMPLE = "sample:jacksboro"
 MAX_CELLS = 200_000_000
 """Of one window: 1.6 GB as float64."""
 
-MAX_BLOCK_BYTES = 256_000_000
-"""Of one block of a file, which GDAL unpacks whole to read one cell of it."""
+MAX_BLOCK_BYTES = 64 * 2**20
+"""Of one block of a file, which GDAL unpacks whole to read one cell of it; no more than its cache holds."""
 
 FARTHEST_UNITS, LEAST_CELL = 1e9, 1e-11
 """Coordinates beyond the first are not on Earth in any unit; a cell below the second part of its grid's coordinates is
@@ -50,7 +50,7 @@ UNITS_M = {
 }  # fmt: skip
 """Metres in one unit of height, by the words that files use (lower case)."""
 
-CACHE_BYTES = 64_000_000
+CACHE_BYTES = MAX_BLOCK_BYTES
 """Of unpacked blocks that GDAL keeps; without a word it keeps a twentieth of the machine's memory."""
 
 _STRIP_CELLS = 4_000_000
@@ -196,8 +196,8 @@ def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
     bands = dataset.count if dataset.interleaving == Interleaving.pixel else 1
     if math.prod(dataset.block_shapes[0]) * np.dtype(dataset.dtypes[0]).itemsize * bands > MAX_BLOCK_BYTES:
         raise InputError(
-            f"{path} is stored in blocks of {dataset.block_shapes[0]} cells, too many to hold; rewrite it in tiles "
-            "(gdal_translate -co TILED=YES)",
+            f"{path} is stored in blocks of {dataset.block_shapes[0]} cells, above {MAX_BLOCK_BYTES >> 20} MB each; "
+            "rewrite it in tiles (gdal_translate -co TILED=YES)",
             where=where,
         )
 
