@@ -334,3 +334,20 @@ def test_a_plans_own_fence_is_held_against_it(run: Any, folder: Path, world: lis
     plan["geoFence"]["circles"][0]["circle"]["center"] = list(corpus.degrees(0, 1000))
     file.write_text(json.dumps(plan))
     assert run(file, *world, "-q")[0] == 0
+    # Corners where the plane has no place, a quarter of the globe away, and an outline that crosses itself.
+    plan["geoFence"]["circles"] = []
+    lat, lon = corpus.degrees(0, 0)
+    far, southwest, southeast, northwest, northeast = (
+        [0.0, lon + 90.0], *(list(corpus.degrees(e, n)) for n in (-9000, 9000) for e in (-9000, 9000)),
+    )  # fmt: skip
+    for corners, inclusion, said in (
+        ([southwest, southeast, far], False, ""), ([southwest, southeast, far], True, ": fence: "),
+        ([southwest, northwest, far], False, ": fence: "), ([southwest, northwest, [lat + 30.0, lon], far], True, ""),
+        ([southwest, northeast, southeast, northwest], True, "crosses"),
+    ):  # fmt: skip
+        plan["geoFence"]["polygons"] = [{"polygon": corners, "inclusion": inclusion, "version": 1}]
+        file.write_text(json.dumps(plan))
+        code, _, err = run(file, *world, "-q")
+        assert code == (4 if said else 0), err
+        assert said in err
+        assert "Warning" not in err
