@@ -313,6 +313,20 @@ def test_an_inclusion_area_holds_the_bow_of_a_long_leg() -> None:
         assert verdict.safe is safe, half_m
 
 
+def test_an_inclusion_area_holds_corners_as_they_are_cut() -> None:
+    """PX4 turns at a way point's own radius: 60 m before this one, and is beside both legs then."""
+    where, craft = world(), vehicle(Autopilot.PX4)
+    path = FlightPath(np.array([[0.0, 0, 420], [3000, 0, 420], [3000, 3000, 420]]))
+    mission = build_mission(path, where, craft, (36.6, -84.3), Order())
+    ring = ring_of(5001, (-200, -200), (3200, -200), (3200, 3200), (2980, 3200), (2980, 20), (-200, 20))
+    for radius_m, safe in ((1.0, True), (60.0, False)):
+        items = [replace(i, params=(0.0, radius_m, 0.0, math.nan)) if i.command == 16 else i for i in mission.items]
+        cut = replace(mission, items=tuple(items))
+        verdict = judge(cut, craft, where)
+        assert verdict.safe is True
+        assert fencing.own_fence(ring, verdict, craft, where)[0].safe is safe, radius_m
+
+
 def test_a_fence_that_crosses_itself_is_not_judged() -> None:
     verdict = own(ring_of(5001, (-500, -500), (6500, 1500), (6500, -500), (-500, 1500)))
     assert verdict.safe is None
