@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.optimisers.box import Floats, Run
+from gcsplan.arrays import Floats
+from gcsplan.optimisers.box import Run
 from gcsplan.optimisers.registry import get
 
 DRAWS = ("random", "uniform", "integers", "normal", "permutation")

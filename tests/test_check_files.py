@@ -252,6 +252,21 @@ def test_wrong_usage_is_explained(run: Any, arguments: list[str], said: str) -> 
     assert said in err
 
 
+@pytest.mark.parametrize("far", [(36.6, 177.0), (0.0, 5.6), (-36.6, 95.6), (38.6, -84.3)])
+def test_a_spline_to_the_other_end_of_the_world_is_a_finding_and_asks_for_no_terrain(
+    run: Any, folder: Path, world: list[str], far: tuple[float, float]
+) -> None:
+    plan = json.loads(Path(file_of(folder, "spline")).read_text())
+    item = next(i for i in plan["mission"]["items"] if i["command"] == 82)
+    item["params"][4:6] = far
+    file = folder / "far.plan"
+    file.write_text(json.dumps(plan))
+    code, _, err = run(file, *world, "-q")
+    assert code == 4
+    assert "too far from the mission's terrain" in err
+    assert "Warning" not in err
+
+
 def test_a_mission_files_world_reaches_as_far_as_the_file_flies(run: Any, folder: Path, world: list[str]) -> None:
     # The mission itself stays in one corner; the file goes round the whole terrain.
     lat, lon = corpus.degrees(*corpus.HOME)
@@ -319,3 +334,20 @@ def test_a_plans_own_fence_is_held_against_it(run: Any, folder: Path, world: lis
     plan["geoFence"]["circles"][0]["circle"]["center"] = list(corpus.degrees(0, 1000))
     file.write_text(json.dumps(plan))
     assert run(file, *world, "-q")[0] == 0
+    # Corners where the plane has no place, a quarter of the globe away, and an outline that crosses itself.
+    plan["geoFence"]["circles"] = []
+    lat, lon = corpus.degrees(0, 0)
+    far, southwest, southeast, northwest, northeast = (
+        [0.0, lon + 90.0], *(list(corpus.degrees(e, n)) for n in (-9000, 9000) for e in (-9000, 9000)),
+    )  # fmt: skip
+    for corners, inclusion, said in (
+        ([southwest, southeast, far], False, ""), ([southwest, southeast, far], True, ": fence: "),
+        ([southwest, northwest, far], False, ": fence: "), ([southwest, northwest, [lat + 30.0, lon], far], True, ""),
+        ([southwest, northeast, southeast, northwest], True, "crosses"),
+    ):  # fmt: skip
+        plan["geoFence"]["polygons"] = [{"polygon": corners, "inclusion": inclusion, "version": 1}]
+        file.write_text(json.dumps(plan))
+        code, _, err = run(file, *world, "-q")
+        assert code == (4 if said else 0), err
+        assert said in err
+        assert "Warning" not in err

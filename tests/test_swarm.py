@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gcsplan.optimisers.box import Floats
+from gcsplan.arrays import Floats
 from gcsplan.optimisers.driver import Result, minimise
 from gcsplan.optimisers.functions import FUNCTIONS
 from gcsplan.optimisers.registry import TABLE, get, names

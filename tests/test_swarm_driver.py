@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.optimisers.box import WORST, Floats, Run, Steps, clipped, partners
+from gcsplan.optimisers.box import WORST, Run, Steps, clipped, partners
 from gcsplan.optimisers.driver import State, minimise
 from gcsplan.optimisers.registry import Entry, get
 

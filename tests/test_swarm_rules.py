@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from gcsplan.arrays import Floats
 from gcsplan.optimisers.bees import roulette
-from gcsplan.optimisers.box import Floats
 from gcsplan.optimisers.budgerigars import LEVY_SPREAD
 from tests.swarm_play import Play, bowl, clip, crowd
 

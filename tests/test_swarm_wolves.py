@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 
-from gcsplan.optimisers.box import Floats
+from gcsplan.arrays import Floats
 from gcsplan.optimisers.wolves import FACTORS
 from tests.swarm_play import Play, bowl, clip, crowd
 

@@ -103,9 +103,9 @@ def inside(box: tuple[float, float, float, float], n: int = 2000) -> tuple[Float
 def test_the_sample_has_its_heights_at_cell_centres_with_row_0_in_the_north() -> None:
     from matplotlib.cbook import get_sample_data
 
-    file = get_sample_data("jacksboro_fault_dem.npz")
-    heights, dx, dy = file["elevation"], float(file["dx"]), float(file["dy"])
-    west, north = float(file["xmin"]), float(file["ymin"])
+    with get_sample_data("jacksboro_fault_dem.npz") as file:
+        heights, dx, dy = file["elevation"], float(file["dx"]), float(file["dy"])
+        west, north = float(file["xmin"]), float(file["ymin"])
     frame = Frame(36.59, -84.24)
     surface = load_terrain(SAMPLE, frame, (-20e3, -20e3, 20e3, 20e3), where="m")
     assert surface.ground_m.shape == heights.shape == (344, 403)
@@ -521,6 +521,25 @@ def test_rasters_that_are_not_north_up_are_refused_with_the_cure(tmp_path: Path)
         assert "gdalwarp" in str(refusal(tif(tmp_path / f"{i}.tif", hills(100, 100), transform)))
 
 
+@pytest.mark.parametrize("kind", ["tif", "asc", "canopy"])
+@pytest.mark.parametrize(
+    ("cell", "west"),
+    [(1e-310, -84.6), (5e-324, 0.0), (1e-16, -84.6), (1e-12, 7e5), (1e12, 7e5), (1e307, 7e5), (30, 1e300)],
+)
+def test_a_grid_that_is_none_on_earth_is_refused(tmp_path: Path, kind: str, cell: float, west: float) -> None:
+    """Where a cell's number drowns in rounding or overflows, so would every node's place."""
+    keys: dict[str, Any] = {"crs": "EPSG:32616" if abs(west) > 180.0 else "EPSG:4326"}
+    path = tmp_path / ("a.asc" if kind == "asc" else "a.tif")
+    if kind == "asc":
+        head = f"ncols 60\nnrows 60\nxllcorner {west!r}\nyllcorner 36.4\ncellsize {cell!r}\n"
+        path.write_text(head + "\n".join(" ".join("400" for _ in range(60)) for _ in range(60)))
+    else:
+        tif(path, hills(60, 60), from_origin(west, 36.6, cell, cell), **keys)
+    ground = degrees_tif(tmp_path / "d.tif")
+    error = refusal(ground, canopy=str(path)) if kind == "canopy" else refusal(path, **keys)
+    assert "broken georeference" in str(error)
+
+
 def test_a_raster_without_a_place_is_refused(tmp_path: Path) -> None:
     error = refusal(tif(tmp_path / "a.tif", hills(100, 100), Affine.identity(), None))
     assert "no georeference" in str(error)
@@ -627,6 +646,22 @@ def test_a_small_file_that_unpacks_into_a_large_block_is_refused(
     monkeypatch.setattr(raster, "MAX_BLOCK_BYTES", 64 * 64 * 4 * 3 - 1)
     with pytest.raises(InputError, match="TILED"):
         open_raster(path, where="m")
+
+
+def test_a_block_is_no_larger_than_what_a_check_may_hold_of_it(tmp_path: Path) -> None:
+    """A check holds 460 MB of its own when terrain is read again for a file that goes beyond it, of 600 MB promised."""
+    for rows, fits in ((4096, True), (8192, False)):
+        path = tmp_path / f"{rows}.tif"
+        with rasterio.open(
+            path, "w", driver="GTiff", width=4096, height=rows, count=1, dtype="float32", crs="EPSG:4326",
+            transform=from_origin(-84.6, 36.6, 1e-5, 1e-5), compress="deflate", blockysize=rows, sparse_ok=True,
+        ):  # fmt: skip
+            pass
+        if fits:
+            assert open_raster(path, where="m").rows == rows
+        else:
+            with pytest.raises(InputError, match="64 MB"):
+                open_raster(path, where="m")
 
 
 @pytest.mark.parametrize("tiled", [True, False])

@@ -31,6 +31,7 @@ from gcsplan.mavlink.mission.mission import (
 from gcsplan.mission_file import MissionFile, VehicleRequest, load_mission
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.frame import FARTHEST_M
 from gcsplan.world.world import World
 
 SAME_PLACE_M = 1.0
@@ -160,9 +161,19 @@ def beyond_m(mission: Mission) -> float:
     circles = [p for i in mission.items if i.command in CIRCLES for p in i.params[1:3]]
     widest = max((min(abs(p), 3000.0) for p in circles if math.isfinite(p)), default=0.0)
     if any(i.command == SPLINE_WAYPOINT for i in mission.items):
-        lat, lon = (max(x) - min(x) for x in zip(*places_of(mission), strict=True))
-        widest += SPLINE_BULGE * 111_195.0 * math.hypot(lat, lon)
+        extent_m = _extent_m(places_of(mission))
+        # What is wider than any plane is found to be too far, and wants no terrain.
+        widest += SPLINE_BULGE * extent_m if extent_m <= 2.0 * FARTHEST_M else 0.0
     return float(widest) + DEFAULT_CIRCLE_M
+
+
+def _extent_m(places: Sequence[tuple[float, float]]) -> float:
+    """The diagonal of the box around places, no less than it is; the antimeridian is no edge."""
+    lat, lon = zip(*places, strict=True)
+    turned = [(x - lon[0] + 180.0) % 360.0 - 180.0 for x in lon]
+    nearest = 0.0 if min(lat) < 0.0 < max(lat) else min(map(abs, lat))  # to the equator, where a degree is longest
+    wide = math.cos(math.radians(nearest)) * (max(turned) - min(turned))
+    return 111_700.0 * math.hypot(max(lat) - min(lat), wide)
 
 
 def _reaching(source: MissionFile, places: Sequence[tuple[float, float]]) -> MissionFile:

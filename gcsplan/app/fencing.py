@@ -7,23 +7,27 @@ area of it by the track error and the clearance.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gcsplan.arrays import Floats
+from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
+from gcsplan.check.plane_legs import legs_in_plane
 from gcsplan.check.verdict import Finding, Verdict
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
 from gcsplan.mavlink.build.fence import Area, Fence, areas_of, fence_of
 from gcsplan.mavlink.mission.autopilots import manner
 from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
 from gcsplan.vehicle import Vehicle
-from gcsplan.world.airspace import Airspace
+from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.world import World
-from gcsplan.world.zones import Circle
+from gcsplan.world.zones import Circle, Polygon, Zone
 
 if TYPE_CHECKING:
     from gcsplan.app.jobs import Job
@@ -47,9 +51,13 @@ def fence_for(
     fence = fence_of(world.airspace.zones, world.frame, mission.autopilot, infinite=infinite)
     try:
         areas = areas_of([manner(mission.autopilot).stored(item) for item in fence.items], world.frame)
-    except InputError as error:  # what we made ourselves, as it is stored
-        raise GcsplanError(f"the fence would not be stored as it was made: {error}") from error
-    named = [replace(a, zone=replace(a.zone, name=z.name)) for a, z in zip(areas, fence.zones, strict=True)]
+    except InputError as error:  # as it is stored, to centimetres
+        raise InputError(
+            f"the fence would not be stored as it was made ({error.message}): a zone is too thin for it; widen the "
+            "zone, or send no fence",
+            where=vehicle.name,
+        ) from None
+    named = [replace(a, name=z.name) for a, z in zip(areas, fence.zones, strict=True)]
     found = breaches(named, mission, vehicle, world, rtl_rel_home_m=rtl_rel_home_m)
     if found:
         lines = "\n".join(f"  {f.message}" for f in found)
@@ -72,7 +80,7 @@ def breaches(
     The flight is widened by its track error and keeps the horizontal clearance, as from zones. An aircraft must be
     inside each inclusion area.
     """
-    out = [a.zone for a in areas if not a.inclusion]
+    out = [Zone(a.name, shape) for a in areas if not a.inclusion for shape in a.shapes]
     found: list[Finding] = []
     if out:
         fenced = World(world.frame, Airspace(world.airspace.surface, out, scale=world.airspace.scale))
@@ -86,37 +94,62 @@ def breaches(
             if f.kind == "zone"
         ]
     inside = [a for a in areas if a.inclusion]
-    if inside:
-        stored = replace(mission, items=tuple(manner(mission.autopilot).stored(i) for i in mission.items))
-        flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
-        for area in inside:
-            for s in flight.stretches:
-                reach_m = (vehicle.limits.track_error_m + s.reach_m) * world.airspace.scale
-                ends = world.frame.to_plane(np.array([s.start[0], s.end[0]]), np.array([s.start[1], s.end[1]]))
-                short_m = _outside_m(area, ends, reach_m)
-                if short_m > 0.0:
-                    lat, lon, amsl = s.end
-                    words = f"item {s.seq} ({s.kind}): leaves the fence's area “{area.zone.name}” (by {short_m:.1f} m)"
-                    found.append(
-                        Finding(s.seq, "fence", words, lat, lon, amsl, -short_m, 0.0, short_m, "m", area.zone.name)
-                    )
-                    break
+    return found + (_outside(inside, mission, vehicle, world, rtl_rel_home_m) if inside else [])
+
+
+def _outside(
+    areas: Sequence[Area], mission: Mission, vehicle: Vehicle, world: World, rtl_rel_home_m: float | None
+) -> list[Finding]:
+    """For each of the inclusion areas where the flight, as `judge` follows it, first comes out of it."""
+    stored = replace(mission, items=tuple(manner(mission.autopilot).stored(i) for i in mission.items))
+    flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    round_corners(flight, stored, vehicle, world.frame)
+    flown = [*flight.stretches, *flight.instead]
+    if not flown:
+        return []
+    plane = legs_in_plane(flown, vehicle.limits, world, 0.0)
+    found = []
+    for area in areas:
+        beyond_m = _beyond_m(area, plane.legs, world.airspace.scale)
+        if beyond_m.max() > 0.0:
+            leg = int(np.argmax(beyond_m > 0.0))
+            s, short_m = flown[plane.owner[leg]], float(beyond_m[leg])
+            lat, lon, amsl = s.end
+            by = f" (by {short_m:.1f} m)" if math.isfinite(short_m) else ", which is far away"
+            words = f"item {s.seq} ({s.kind}): leaves the fence's area “{area.name}”{by}"
+            by_m = short_m if math.isfinite(short_m) else math.nan
+            found.append(Finding(s.seq, "fence", words, lat, lon, amsl, -by_m, 0.0, by_m, "m", area.name))
     return found
 
 
-def _outside_m(area: Area, ends: np.ndarray[tuple[int, ...], np.dtype[np.float64]], reach_m: float) -> float:
-    """How far a line, widened by ``reach_m``, goes beyond an area's border; 0 where it stays inside."""
-    shape = area.zone.shape
+def _beyond_m(area: Area, legs: Legs, scale: float) -> Floats:
+    """How far each leg, widened by its track error, goes beyond an area's border; 0 where it stays inside.
+
+    The parts of an area that is near in several lie apart: a leg inside the area is inside one of them.
+    """
+    beyond_m = np.full(len(legs.start), math.inf)
+    for shape in area.shapes:
+        np.minimum(beyond_m, _beyond_shape_m(shape, legs, scale), out=beyond_m)
+    return beyond_m
+
+
+def _beyond_shape_m(shape: Circle | Polygon, legs: Legs, scale: float) -> Floats:
+    reach_m = legs.track_error_m * scale
+    ends = np.stack([legs.start[:, :2], legs.end[:, :2]], axis=1)
     if isinstance(shape, Circle):  # a disc is convex: the ends decide
-        away = np.hypot(*(ends - [shape.east_m, shape.north_m]).T) + reach_m - shape.radius_m
-        return max(0.0, float(away.max()))
+        away = np.hypot(ends[..., 0] - shape.east_m, ends[..., 1] - shape.north_m).max(axis=1)
+        return np.asarray(np.maximum(0.0, away + reach_m - shape.radius_m))
     import shapely
 
-    polygon, line = shapely.Polygon(shape.vertices), shapely.LineString(ends)
-    beyond = line.difference(polygon)
-    if (not beyond.is_empty and beyond.length > 0.0) or not polygon.covers(line):
-        return reach_m + float(max(polygon.distance(shapely.Point(p)) for p in shapely.get_coordinates(beyond)))
-    return max(0.0, reach_m - float(polygon.exterior.distance(line)))
+    polygon, lines = shapely.Polygon(shape.vertices), shapely.linestrings(ends)
+    # A vertical leg is a line without length, of which no part is left to be outside: its ends are asked for too.
+    out = shapely.distance(polygon, shapely.points(ends)).max(axis=1)
+    rest = shapely.difference(lines, polygon)
+    points, owner = shapely.get_coordinates(rest, return_index=True)
+    np.maximum.at(out, owner, shapely.distance(polygon, shapely.points(points)))
+    crosses = (out > 0.0) | (shapely.length(rest) > 0.0)
+    inside_m = shapely.distance(polygon.exterior, lines)
+    return np.asarray(np.where(crosses, reach_m + out, np.maximum(0.0, reach_m - inside_m)))
 
 
 def own_fence(

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.check.climb_out import slant_findings
 from gcsplan.check.corners import round_corners
 from gcsplan.check.enough import enough
@@ -24,7 +25,7 @@ from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.mavlink.mission.autopilots import manner
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.vehicle import Vehicle
-from gcsplan.world.airspace import Floats, LegReport, Violation
+from gcsplan.world.airspace import LegReport, Violation
 from gcsplan.world.frame import EARTH_RADIUS_M, FARTHEST_M
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World

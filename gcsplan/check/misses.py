@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.stretch import Stretch
 from gcsplan.vehicle import Vehicle
-from gcsplan.world.airspace import Floats, LegReport, Legs, Violation
+from gcsplan.world.airspace import LegReport, Legs, Violation
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle
 

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.stretch import Stretch
-from gcsplan.world.airspace import Floats, Kind, LegReport, Legs, Violation
+from gcsplan.world.airspace import Kind, LegReport, Legs, Violation
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.world import World

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.export.rows import Floats, Track, outline_deg
+from gcsplan.arrays import Floats
+from gcsplan.export.rows import Track, outline_deg
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level, Zone
 

@@ -8,7 +8,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from gcsplan.export.rows import Floats, Track, extent_words, outline_deg
+from gcsplan.arrays import Floats
+from gcsplan.export.rows import Track, extent_words, outline_deg
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level, Zone
 

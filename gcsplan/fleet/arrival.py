@@ -19,9 +19,10 @@ from typing import Literal
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
 from gcsplan.fleet.craft import LONGEST_HOLD_S, Craft, Crew, Hold, Longer, Slot
-from gcsplan.fleet.order import WITHIN_S, Clock, Floats, best_order, earliest_first, interval_range
+from gcsplan.fleet.order import WITHIN_S, Clock, best_order, earliest_first, interval_range
 
 __all__ = [
     "WITHIN_S", "Clock", "Craft", "Crew", "Hold", "Longer", "Mode", "NoSchedule", "Schedule", "Slot",

@@ -4,33 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gcsplan.arrays import Floats
 from gcsplan.errors import Problem
-from gcsplan.world.frame import FARTHEST_M, Frame
+from gcsplan.world.degree_shapes import (
+    LARGEST_RADIUS_M,
+    counter_clockwise,
+    near_circle,
+    near_polygons,
+    outline_of,
+)
+from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
-
-if TYPE_CHECKING:
-    import shapely
-
-
-LARGEST_RADIUS_M = 100_000.0
-"""A circle in the plane is one on the ground only where the plane's scale hardly changes over it."""
 
 MAX_VERTICES = 100_000
 """Of one polygon."""
-
-EDGE_BOW_M = 0.05
-"""An edge is straight in degrees; it is cut until its pieces in the plane are this near to it."""
-
-_FAR_M = 1.6 * FARTHEST_M
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,17 +127,9 @@ def polygon(
     floor, ceiling = bounds.levels(where, problems)
     if len(problems) > before:
         return None
-    ring = [p for i, p in enumerate(points) if i == 0 or p != points[i - 1]]
-    if len(ring) > 1 and ring[0] == ring[-1]:
-        ring.pop()
-    if len(set(ring)) < 3:
-        problems.append(Problem(at, f"a polygon needs at least 3 different points, given {len(set(ring))}"))
-        return None
-    import shapely  # many missions have no polygons
-
-    shape = shapely.Polygon(np.asarray(ring) if local else _unwrapped(ring, ring[0][1]))
-    if not shape.is_valid or not shape.area > 0.0:
-        problems.append(Problem(at, _why_invalid(shape, local)))
+    ring, fault = outline_of(points, local=local)
+    if fault:
+        problems.append(Problem(at, fault))
         return None
     return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling)
 
@@ -170,7 +153,7 @@ def check_degrees(point: tuple[float, float], where: str, problems: list[Problem
 def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[ZoneDraft, Zone]], list[ZoneDraft]]:
     """Each draft's zones in the plane (a polygon cut at the edge of the world may give several, or none).
 
-    Also the drafts that lie too far away to matter. Polygons are cut to what is within `_FAR_M`: beyond that no
+    Also the drafts that lie too far away to matter. Polygons are cut to what is within `FAR_M`: beyond that no
     mission goes.
     """
     placed: list[tuple[ZoneDraft, Zone]] = []
@@ -206,77 +189,10 @@ def zones_sha256(drafts: Sequence[ZoneDraft]) -> str:
     return hashlib.sha256(json.dumps(plain).encode()).hexdigest()
 
 
-def _shapes(draft: ZoneDraft, frame: Frame) -> list[Circle | Polygon]:
-    points = np.asarray(draft.points, float)
+def _shapes(draft: ZoneDraft, frame: Frame) -> Sequence[Circle | Polygon]:
     if draft.radius_m is not None:
-        east, north = points[0] if draft.local else frame.to_plane(points[0, 0], points[0, 1])
-        distance = math.hypot(east, north)
-        near = math.isfinite(distance) and distance <= _FAR_M + draft.radius_m
-        return [Circle(float(east), float(north), draft.radius_m)] if near else []
+        circle = near_circle(draft.points[0], draft.radius_m, frame, local=draft.local)
+        return [circle] if circle is not None else []
     if draft.local:
-        return [_polygon(points)]
-    return [_polygon(frame.to_plane(ring[:, 1], ring[:, 0])) for ring in _near_rings(draft, frame)]
-
-
-def _polygon(vertices: Floats) -> Polygon:
-    x, y = vertices[:, 0], vertices[:, 1]
-    area = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-    return Polygon(np.ascontiguousarray(vertices if area > 0.0 else vertices[::-1]))
-
-
-def _near_rings(draft: ZoneDraft, frame: Frame) -> list[Floats]:
-    """Rings (N, 2) longitude, latitude of the parts near the frame, edges cut as `EDGE_BOW_M` asks."""
-    ring = _unwrapped(draft.points, frame.lon_deg)
-    tall = math.degrees(_FAR_M / 6_350_000.0)
-    wide = min(tall / math.cos(math.radians(min(abs(frame.lat_deg) + tall, 89.0))), 80.0)
-    south, north = frame.lat_deg - tall, frame.lat_deg + tall
-    rings = []
-    for turn in (0.0, -360.0, 360.0):
-        turned = ring + np.array([turn, 0.0])
-        low, high = turned.min(axis=0), turned.max(axis=0)
-        window = (frame.lon_deg - wide, south, frame.lon_deg + wide, north)
-        if low[0] >= window[2] or high[0] <= window[0] or low[1] >= north or high[1] <= south:
-            continue
-        parts: list[Floats] = [turned]
-        if low[0] < window[0] or high[0] > window[2] or low[1] < south or high[1] > north:
-            import shapely
-
-            cut = shapely.intersection(shapely.Polygon(turned), shapely.box(*window))
-            parts = [
-                np.asarray(p.exterior.coords)[:-1]
-                for p in getattr(cut, "geoms", [cut])
-                if p.geom_type == "Polygon" and not p.is_empty
-            ]
-        rings += [_cut_edges(part, frame) for part in parts]
-    return rings
-
-
-def _cut_edges(ring: Floats, frame: Frame) -> Floats:
-    """The ring with every edge cut into equal pieces, each within `EDGE_BOW_M` of its chord in the plane."""
-    following = np.roll(ring, -1, axis=0)
-    bow = frame.bow_m(ring[:, ::-1], following[:, ::-1])
-    pieces = np.maximum(1, np.ceil(np.sqrt(bow / EDGE_BOW_M))).astype(int)
-    return np.concatenate(
-        [a + (b - a) * (np.arange(n) / n)[:, None] for a, b, n in zip(ring, following, pieces, strict=True)]
-    )
-
-
-def _unwrapped(points: Sequence[tuple[float, float]], near_lon_deg: float) -> Floats:
-    """(N, 2) longitude, latitude; the first one near ``near_lon_deg``, each within half a turn of the one before."""
-    p = np.asarray(points, float)
-    steps = np.diff(p[:, 1], prepend=near_lon_deg)
-    lon = near_lon_deg + np.cumsum((steps + 180.0) % 360.0 - 180.0)
-    # Adding up steps loses bits: each longitude is given back exactly, but for whole turns.
-    return np.stack([p[:, 1] + 360.0 * np.round((lon - p[:, 1]) / 360.0), p[:, 0]], axis=-1)
-
-
-def _why_invalid(shape: shapely.Polygon, local: bool) -> str:
-    import shapely
-
-    reason = shapely.is_valid_reason(shape)
-    match = re.search(r"\[(\S+) (\S+)\]", reason)
-    if match is None:
-        return "the polygon has no area; give its corners in order around it"
-    x, y = float(match[1]), float(match[2])
-    at = f"{x:g} m east, {y:g} m north" if local else f"{y:.6f}, {(x + 180.0) % 360.0 - 180.0:.6f}"
-    return f"the polygon's outline crosses or touches itself at {at}; give its corners in order around it"
+        return [counter_clockwise(np.asarray(draft.points, float))]
+    return near_polygons(draft.points, frame)

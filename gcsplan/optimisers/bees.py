@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.optimisers.box import Floats, Indices, Run, Steps, clipped, keep_better, partners
+from gcsplan.optimisers.box import Indices, Run, Steps, clipped, keep_better, partners
 
 
 def abc(run: Run, *, limit: int, group: int) -> Steps:

@@ -10,8 +10,9 @@ import math
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.optimisers.box import Floats, Run, Steps, clipped
+from gcsplan.optimisers.box import Run, Steps, clipped
 
 LEVY_POWER = 1.5  # γ of eq. 10
 BEHAVIOURS = 4

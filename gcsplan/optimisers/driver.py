@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.optimisers.box import WORST, Floats, Run
+from gcsplan.optimisers.box import WORST, Run
 from gcsplan.optimisers.registry import Entry, get
 
 Cost = Callable[[Floats], NDArray[np.floating]]

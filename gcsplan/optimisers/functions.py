@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from gcsplan.optimisers.box import Floats
+from gcsplan.arrays import Floats
 
 SHIFT_SEED = 2024
 SHIFT_SHARE = 0.6  # an optimum moves by at most this share of the half range, in each dimension by its own

@@ -10,7 +10,8 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.optimisers.box import Floats, Run, Steps, clipped, rms_distances
+from gcsplan.arrays import Floats
+from gcsplan.optimisers.box import Run, Steps, clipped, rms_distances
 
 
 def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int) -> Steps:

@@ -13,8 +13,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.optimisers.box import WORST, Floats, Run, Steps, clipped, keep_better
+from gcsplan.optimisers.box import WORST, Run, Steps, clipped, keep_better
 
 PACK = 3  # α, β, δ
 ANNEALING_SHARE = 0.95  # η of eq. 25

@@ -12,9 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.routes import Level, Router
 from gcsplan.planners.problem import Problem, Refusal
-from gcsplan.planners.trials import DEGREES, LEAST_DEG, Floats, Least, Plan, Trials, metres_from, two_digits
+from gcsplan.planners.trials import DEGREES, LEAST_DEG, Least, Plan, Trials, metres_from, two_digits
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Zone

@@ -8,8 +8,9 @@ from itertools import combinations
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.report.chart import Axes, Floats, chart_html
+from gcsplan.report.chart import Axes, chart_html
 from gcsplan.report.markup import esc, least, num, table, tools
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.subject import Page

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.check.rtl.verdict import WayHome
-from gcsplan.report.chart import Axes, Floats, chart_html
+from gcsplan.report.chart import Axes, chart_html
 from gcsplan.report.markup import esc, num, place, table, tools
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.profile_view import unit_of

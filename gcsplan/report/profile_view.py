@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from gcsplan.report.chart import Axes, Floats, chart_html
+from gcsplan.arrays import Floats
+from gcsplan.report.chart import Axes, chart_html
 from gcsplan.report.marks import Mark
 from gcsplan.report.markup import least, num, place
 from gcsplan.report.plan_view import COLOURS, zone_heights

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gcsplan.world._shared import Floats, steps_of
+from gcsplan.arrays import Floats
+from gcsplan.world._shared import steps_of
 from gcsplan.world.surface import DEGREE, TERMS, GridMap
 
 

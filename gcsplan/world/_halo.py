@@ -12,10 +12,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.native.form import Held
 from gcsplan.world._compiled import HALO, surroundings
 from gcsplan.world._field import Field
-from gcsplan.world._shared import Floats, Halo
+from gcsplan.world._shared import Halo
 from gcsplan.world.surface import GridMap
 
 LARGE = 2_000_000

@@ -155,17 +155,17 @@ class Mosaic:
         tiles = layout.tiles
 
         def exact(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
-            x, y = there.transform(east_m, north_m)
-            return layout.grid_of(self._near(np.asarray(x, float), reference), np.asarray(y, float))
+            x, y = (np.asarray(a, float) for a in there.transform(east_m, north_m))
+            if not (np.isfinite(x).all() and np.isfinite(y).all()):
+                raise InputError(
+                    "the mission reaches beyond what the DEM's coordinate system can hold; gdalwarp the DEM to a "
+                    "system made for this place",
+                    where=self.where,
+                )
+            return layout.grid_of(self._near(x, reference), y)
 
         wide = (box[0] - spare_m, box[1] - spare_m, box[2] + spare_m, box[3] + spare_m)
         col, row = exact(*_lattice(wide))
-        if not (np.isfinite(col).all() and np.isfinite(row).all()):
-            raise InputError(
-                "the mission reaches beyond what the DEM's coordinate system can hold; gdalwarp the DEM to a system "
-                "made for this place",
-                where=self.where,
-            )
         first_col, last_col = min(p.col for p in tiles), max(p.col + p.raster.cols for p in tiles)
         first_row, last_row = min(p.row for p in tiles), max(p.row + p.raster.rows for p in tiles)
         c0, c1 = max(math.floor(col.min()) - _SPARE_CELLS, first_col), math.ceil(col.max()) + _SPARE_CELLS + 1

@@ -29,8 +29,12 @@ SAMPLE = "sample:jacksboro"
 MAX_CELLS = 200_000_000
 """Of one window: 1.6 GB as float64."""
 
-MAX_BLOCK_BYTES = 256_000_000
-"""Of one block of a file, which GDAL unpacks whole to read one cell of it."""
+MAX_BLOCK_BYTES = 64 * 2**20
+"""Of one block of a file, which GDAL unpacks whole to read one cell of it; no more than its cache holds."""
+
+FARTHEST_UNITS, LEAST_CELL = 1e9, 1e-11
+"""Coordinates beyond the first are not on Earth in any unit; a cell below the second part of its grid's coordinates is
+lost in their rounding."""
 
 LOWEST_M, HIGHEST_M = -500.0, 9000.0
 """Ground outside of this is a void that nobody declared (-9999, -32768, 3.4e38): unknown."""
@@ -45,7 +49,7 @@ UNITS_M = {
 }  # fmt: skip
 """Metres in one unit of height, by the words that files use (lower case)."""
 
-CACHE_BYTES = 64_000_000
+CACHE_BYTES = MAX_BLOCK_BYTES
 """Of unpacked blocks that GDAL keeps; without a word it keeps a twentieth of the machine's memory."""
 
 _STRIP_CELLS = 4_000_000
@@ -191,8 +195,8 @@ def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
     bands = dataset.count if dataset.interleaving == Interleaving.pixel else 1
     if math.prod(dataset.block_shapes[0]) * np.dtype(dataset.dtypes[0]).itemsize * bands > MAX_BLOCK_BYTES:
         raise InputError(
-            f"{path} is stored in blocks of {dataset.block_shapes[0]} cells, too many to hold; rewrite it in tiles "
-            "(gdal_translate -co TILED=YES)",
+            f"{path} is stored in blocks of {dataset.block_shapes[0]} cells, above {MAX_BLOCK_BYTES >> 20} MB each; "
+            "rewrite it in tiles (gdal_translate -co TILED=YES)",
             where=where,
         )
 
@@ -219,6 +223,7 @@ def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_uni
             "gdalwarp makes it so",
             where=where,
         )
+    _require_grid(t, dataset, path, where=where)
     text = crs if crs is not None else (dataset.crs.to_wkt() if dataset.crs else None)
     if text is None:
         raise InputError(
@@ -246,6 +251,17 @@ def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_uni
         path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical, read,
         path.stat().st_size, lambda: sha256_of(path), tuple(notes),
     )  # fmt: skip
+
+
+def _require_grid(t: Any, dataset: Any, path: Path, *, where: str) -> None:
+    corners = (t.c, t.f, t.c + t.a * dataset.width, t.f + t.e * dataset.height)
+    largest, cell = max(1.0, *map(abs, corners)), min(t.a, -t.e)
+    if not (largest <= FARTHEST_UNITS and cell >= LEAST_CELL * largest):
+        raise InputError(
+            f"{path} has a broken georeference: cells of {t.a:g} × {-t.e:g} from {t.c:g}, {t.f:g} to {corners[2]:g}, "
+            f"{corners[3]:g} are no grid on Earth; correct it (gdal_edit.py -a_ullr, or the header of an .asc)",
+            where=where,
+        )
 
 
 def _require_degrees(t: Any, dataset: Any, path: Path, *, where: str) -> None:

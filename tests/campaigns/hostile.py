@@ -89,6 +89,12 @@ ASC_WORDS = (
     b"1e400", b"cellsize 0", b"cellsize 1e-300", b"cellsize -1", b"dx 1", b"xllcenter 7", b"NODATA_value nan",
     b"\x00", b"\n", b" ", b"1e39", b"-32768", b"9" * 300,
 )  # fmt: skip
+SYSTEMS = (
+    "EPSG:4269", "EPSG:4979", "EPSG:32616", "EPSG:32656", "EPSG:3857", "EPSG:3413", "EPSG:3031", "EPSG:5070",
+    "EPSG:27700", "EPSG:2193", "EPSG:4326+5773", "+proj=gnom +lat_0=-36 +lon_0=95", "+proj=longlat +pm=paris",
+    "+proj=ortho +lat_0=36 +lon_0=-84", "+proj=tmerc +lat_0=0 +lon_0=5.62",
+)  # fmt: skip
+"""Coordinate systems that the grids are not in; some have no place for this world."""
 HEADER = b"ncols 60\nnrows 60\nxllcorner -84.41\nyllcorner 36.57\ncellsize 0.001\nNODATA_value -9999\n"
 
 
@@ -156,7 +162,7 @@ def written(name: str, data: bytes) -> None:
 
 PLAUSIBLE: tuple[Any, ...] = (
     0, 1, -1, 2, 3, 5, 10, 16, 17, 18, 19, 20, 21, 22, 30, 31, 82, 84, 85, 93, 112, 114, 177, 178, 189, 195, 206, 0.5,
-    40, 60, 90, 120, 180, 360, 500, 1000, 36.6, -84.38, 36.605, -84.37, 36.61, 1e-3, 1e-7, 1e4, 1e5,
+    40, 60, 90, 5.62, 95.62, 120, 180, 360, 500, 1000, 36.6, -84.38, 36.605, -84.37, 36.61, 1e-3, 1e-7, 1e4, 1e5,
 )  # fmt: skip
 """Numbers that pass for good ones in some place or other: commands, frames, heights, places, counts."""
 
@@ -245,12 +251,14 @@ def _plans() -> list[Any]:
         for firmware, survey in ((3, False), (12, False), (3, True)):
             if not survey or len(items) >= 8:
                 plans.append(json.loads(corpus.plan(items, firmware, survey=survey)))
-    for plan in plans[::2]:
+    around = [[36.5, -84.5], [36.5, -84.3], [36.61, -84.36], [36.7, -84.3], [36.7, -84.5]]
+    for number, plan in enumerate(plans[::2]):
         plan["geoFence"] = {
             "version": 2, "breachReturn": [36.6, -84.37, 50],
             "circles": [{"circle": {"center": [36.6, -84.37], "radius": 900}, "inclusion": True, "version": 1}],
             "polygons": [
                 {"polygon": [[36.59, -84.39], [36.62, -84.39], [36.62, -84.36]], "inclusion": False, "version": 1},
+                *([{"polygon": around, "inclusion": True, "version": 1}] if number % 2 else []),
             ],
         }  # fmt: skip
         plan["rallyPoints"] = {"version": 2, "points": [[36.6, -84.379, 50.0], [36.601, -84.371, 60.0]]}
@@ -320,7 +328,8 @@ def terrain(rng: random.Random) -> list[str]:
     written(name, data if kind >= 0.85 else bombed(bytes(data), rng))
     if rng.random() < 0.3:
         return ["clean/uav1.waypoints", "--dem", name, *OPTIONS[2:]]
-    dem = f"{{dem: {name}, vertical_datum: EGM96, crs: 'EPSG:4326'}}"
+    crs = rng.choice(SYSTEMS) if rng.random() < 0.1 else "EPSG:4326"
+    dem = f"{{dem: {name}, vertical_datum: EGM96, crs: '{crs}'}}"
     if rng.random() < 0.15:
         dem = f"{{dem: clean/west.asc, vertical_datum: EGM96, crs: 'EPSG:4326', canopy: {name}}}"
     elif rng.random() < 0.15:

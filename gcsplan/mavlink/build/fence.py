@@ -21,6 +21,7 @@ from gcsplan.mavlink.files.plan_fence import CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, 
 from gcsplan.mavlink.mission.autopilots import manner, max_items
 from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7
 from gcsplan.vehicle import Autopilot
+from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of
 from gcsplan.world.zones import Circle, Polygon, Zone
 
 if TYPE_CHECKING:
@@ -36,9 +37,13 @@ HEAD_BYTES, CIRCLE_BYTES, POLYGON_BYTES, CORNER_BYTES = 5, 13, 2, 8  # AC_PolyFe
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """One area of a fence: as a zone without floor and ceiling; ``inclusion``: to be stayed inside of."""
+    """One area of a fence in the plane; ``inclusion``: to be stayed inside of.
 
-    zone: Zone
+    ``shapes``: what of it is near the frame: none of an area far away, several where it comes near in several parts.
+    """
+
+    name: str
+    shapes: tuple[Circle | Polygon, ...]
     inclusion: bool
 
 
@@ -86,36 +91,60 @@ def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infin
 def areas_of(items: Sequence[MissionItem], frame: Frame) -> list[Area]:
     """The areas of a fence from its wire items; return points (5000) are passed over.
 
-    Raises InputError for a polygon that is not whole, a radius that is none, and other commands.
+    Raises InputError for a polygon that is not whole or not simple, a radius that is none or beyond
+    `LARGEST_RADIUS_M`, places that are none, and other commands.
     """
     areas: list[Area] = []
     index = 0
     while index < len(items):
         item = items[index]
-        number = len(areas) + 1
-        if item.command in (CIRCLE_IN, CIRCLE_OUT):
-            radius_m = item.params[0]
-            if not 0.0 < radius_m < math.inf:
-                raise InputError(f"item {index} of the fence is a circle with a radius of {radius_m:g} m")
-            east, north = (float(x) for x in frame.to_plane(item.lat_deg, item.lon_deg))
-            shape: Circle | Polygon = Circle(east, north, radius_m)
-            index += 1
-        elif item.command in (POLYGON_IN, POLYGON_OUT):
-            count = item.params[0]
-            corners = items[index : index + int(count)] if math.isfinite(count) and count >= 3 else []
-            whole = [c for c in corners if c.command == item.command and c.params[0] == count]
-            if len(whole) < 3 or len(whole) != count:
-                raise InputError(f"item {index} of the fence begins a polygon of {count:g} corners that is not whole")
-            ring = frame.to_plane([c.lat_deg for c in whole], [c.lon_deg for c in whole])
-            shape = Polygon(np.ascontiguousarray(ring if _area(ring) > 0.0 else ring[::-1]))
-            index += len(whole)
-        elif item.command == 5000:
+        shapes: tuple[Circle | Polygon, ...]
+        if item.command == 5000:
             index += 1
             continue
+        if item.command in (CIRCLE_IN, CIRCLE_OUT):
+            count, shapes = 1, _circle_of(item, index, frame)
+        elif item.command in (POLYGON_IN, POLYGON_OUT):
+            count, shapes = _polygon_of(items, index, frame)
         else:
             raise InputError(f"item {index} of the fence is command {item.command}, which no fence has")
-        areas.append(Area(Zone(f"fence {number}", shape), item.command in (CIRCLE_IN, POLYGON_IN)))
+        areas.append(Area(f"fence {len(areas) + 1}", shapes, item.command in (CIRCLE_IN, POLYGON_IN)))
+        index += count
     return areas
+
+
+def _circle_of(item: MissionItem, index: int, frame: Frame) -> tuple[Circle, ...]:
+    radius_m = item.params[0]
+    if not 0.0 < radius_m < math.inf:
+        raise InputError(f"item {index} of the fence is a circle with a radius of {radius_m:g} m")
+    if radius_m > LARGEST_RADIUS_M:
+        raise InputError(
+            f"item {index} of the fence is a circle with a radius of {radius_m:g} m, more than {LARGEST_RADIUS_M:g} m: "
+            "use a polygon"
+        )
+    circle = near_circle(_corner(item, index), radius_m, frame)
+    return () if circle is None else (circle,)
+
+
+def _polygon_of(items: Sequence[MissionItem], index: int, frame: Frame) -> tuple[int, tuple[Polygon, ...]]:
+    """How many items the polygon that begins there has, and what of it is near."""
+    first = items[index]
+    count = first.params[0]
+    corners = items[index : index + int(count)] if math.isfinite(count) and count >= 3 else []
+    whole = [c for c in corners if c.command == first.command and c.params[0] == count]
+    if len(whole) < 3 or len(whole) != count:
+        raise InputError(f"item {index} of the fence begins a polygon of {count:g} corners that is not whole")
+    ring, fault = outline_of([_corner(c, index + k) for k, c in enumerate(whole)])
+    if fault:
+        raise InputError(f"item {index} of the fence: {fault}")
+    return len(whole), tuple(near_polygons(ring, frame))
+
+
+def _corner(item: MissionItem, index: int) -> tuple[float, float]:
+    lat, lon = item.lat_deg, item.lon_deg
+    if abs(lat) > 90.0 or abs(lon) > 180.0:
+        raise InputError(f"item {index} of the fence lies at {lat:.7f}, {lon:.7f}: not a place on Earth")
+    return lat, lon
 
 
 def _circle(circle: Circle, frame: Frame) -> list[MissionItem]:
@@ -189,11 +218,6 @@ def _holds(outer: Zone, inner: Zone, first: bool) -> bool:
         return False
     slack = a.radius_m - b.radius_m - math.hypot(a.east_m - b.east_m, a.north_m - b.north_m)
     return slack >= 0.0 and (a.radius_m > b.radius_m or first)
-
-
-def _area(ring: Floats) -> float:
-    x, y = ring[:, 0], ring[:, 1]
-    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def _names(zones: Sequence[Zone]) -> str:
