@@ -21,6 +21,13 @@ def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
     assert sum(tally.judged.values()) >= 4
 
 
+def test_what_the_campaign_found_once_is_cured() -> None:
+    """A leg off a circle that is smaller than the track error was judged as begun in the circle's middle."""
+    tally = run(FOREVER_S, 500156, ("circle",), most=1)
+    assert tally.judged["circle"] == 4
+    assert tally.unsafe == []
+
+
 @pytest.mark.slow
 def test_no_family_is_unsafe_at_the_limit() -> None:
     tally = run(FOREVER_S, 40, most=4)

@@ -62,10 +62,14 @@ def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Fra
 
 @dataclass(frozen=True, slots=True)
 class _Off:
-    """How far from the beginning of a leg a vehicle may begin it: to the side, and in height."""
+    """How far from the beginning of a leg a vehicle may begin it: to the side, and in height.
+
+    ``meant``: it is where the mission has it, on a circle; what the vehicle may be off comes on top of that.
+    """
 
     aside_m: float = 0.0
     height_m: float = 0.0
+    meant: bool = False
 
 
 class _Cutter:
@@ -88,13 +92,13 @@ class _Cutter:
             if not s.column and s.start == s.end:
                 stops = stops or s.hold_s > 0.0
                 if s.reach_m > 0.0:  # a circle, which may be left anywhere
-                    off, last = _Off(s.reach_m, s.band_m), None
+                    off, last = _Off(s.reach_m, s.band_m, meant=True), None
                 continue
             begun = off if last is None else self._leave(last, s, off, stops)
             if s.column:
                 if last is None and s.kind == "land" and self._has_place(s.seq):
                     begun = _Off()  # off the circle it flies to its place first
-                found += self._parts(s, (0.0, 1.0), self._beyond(_Off(begun.aside_m)), fading=False)
+                found += self._parts(s, (0.0, 1.0), self._beyond(_Off(begun.aside_m, meant=begun.meant)), fading=False)
                 climbed = s.kind == "takeoff" and self.mission.autopilot is Autopilot.PX4
                 # A return goes on from where it climbed; else what was off ends on the ground.
                 off = begun if s.kind == "rtl" else _Off(0.0, self.tuning.px4_height_m if climbed else 0.0)
@@ -196,6 +200,8 @@ class _Cutter:
 
     def _beyond(self, off: _Off) -> tuple[float, float]:
         """What is off; 0 where the vehicle's own errors hold it."""
+        if off.meant:
+            return off.aside_m, off.height_m
         aside_m = off.aside_m if off.aside_m > self.limits.track_error_m else 0.0
         return aside_m, off.height_m if off.height_m > self.limits.altitude_error_m else 0.0
 
