@@ -87,7 +87,7 @@ def test_elsewhere_there_is_a_line_now_and_then(monkeypatch: pytest.MonkeyPatch)
     lines = after.splitlines()
     assert 2 <= len(lines) <= 4
     assert re.fullmatch(
-        r"planning uav2 \(2 of 3\), 0\.\d s, best 2\u2009040 kJ, bound 2\u2009000 kJ, gap 2\.00 %, improve", lines[-1]
+        r"planning uav2 \(2 of 3\), \d\.\d s, best 2\u2009040 kJ, bound 2\u2009000 kJ, gap 2\.00 %, improve", lines[-1]
     )
     time.sleep(0.3)
     assert shown.getvalue() == after
@@ -100,7 +100,7 @@ def test_a_dumb_terminal_gets_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "dumb")
     with planning_display(["uav1"]):
         time.sleep(0.25)
-    assert re.search(r"planning, .*0\.1.* s\n", shown.getvalue())
+    assert re.search(r"planning, .*\d\.\d.* s\n", shown.getvalue())
     assert "\x1b[2K" not in shown.getvalue()
 
 
