@@ -12,8 +12,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.mission_file.complaints import read_section
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
-from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys, read_section
+from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys
 from gcsplan.mission_file.vehicles import make_vehicle
 from gcsplan.mission_file.world import Box, make_spec, settle_zones
 from gcsplan.mission_file.zone_draft import ZoneDraft, one_line, place_zones, zones_sha256
