@@ -7,12 +7,13 @@ built loads nothing from elsewhere, which is looked at in the end. Functions wit
 from __future__ import annotations
 
 import ast
+import builtins
 import inspect
 import re
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, get_args
 
 import gcsplan
 from gcsplan import errors
@@ -96,7 +97,10 @@ def mission_file() -> str:
             lines.append(f"| `{key}` | {value} | {_default(key, field)} | {meaning} |")
         lines.append("")
         if issubclass(kind, schema.LimitKeys) and kind is not schema.LimitKeys:
-            lines += ["Every key of [`limits`](#limits) may stand here too, and then counts for this vehicle alone.", ""]
+            lines += [
+                "Every key of [`limits`](#limits) may stand here too, and then counts for this vehicle alone.",
+                "",
+            ]
     return "\n".join(lines)
 
 
@@ -143,16 +147,10 @@ def _bounds(told: Mapping[str, Any]) -> str:
     if high is not None and high >= 1e6:  # wide enough to stop slips alone
         high = None
         low = low if low is None or low > -1e6 else None
-    words = []
-    if low is not None:
-        words.append(f"≥ {low:g}")
-    if above is not None:
-        words.append(f"> {above:g}")
-    if high is not None:
-        words.append(f"≤ {high:g}")
-    if below is not None:
-        words.append(f"< {below:g}")
-    return ", ".join(words)
+    if low is not None and high is not None:
+        return f"{low:g} to {high:g}"
+    signs = {"≥": low, ">": above, "≤": high, "<": below}
+    return ", ".join(f"{sign} {value:g}" for sign, value in signs.items() if value is not None)
 
 
 # -- the command line -------------------------------------------------------------------------------------------------
@@ -184,8 +182,9 @@ def command_line() -> str:
         arguments = [p for p in shown if p.param_type_name == "argument"]
         options = [p for p in shown if p.param_type_name == "option"]
         inside = getattr(command, "commands", {})
-        what = " ".join(_metavar(a) if a.required else f"[{_metavar(a)}]" for a in arguments) or ("COMMAND" * bool(inside))
-        lines += ["```", " ".join(w for w in (name, "[OPTIONS]" if options else "", what) if w), "```", ""]
+        words = [_metavar(a) if a.required else f"[{_metavar(a)}]" for a in arguments]
+        usage = [name, *(["[OPTIONS]"] if options else []), *(["COMMAND"] if inside else words)]
+        lines += ["```", " ".join(usage), "```", ""]
         if arguments:
             lines += ["| argument | what it is |", "| --- | --- |"]
             lines += [f"| `{_metavar(a)}` | {_cell(a.help)} |" for a in arguments]
@@ -194,10 +193,10 @@ def command_line() -> str:
             lines += ["| option | default | what it does |", "| --- | --- | --- |"]
             lines += [f"| {_option(o)} | {_option_default(o)} | {_cell(o.help)} |" for o in options]
             lines.append("")
-        if inside:
-            lines += [f"- [`{name} {word}`](#{_anchor(f'{name} {word}')}): {_cell(c.get_short_help_str(200))}"
-                      for word, c in inside.items()]  # fmt: skip
-            lines.append("")
+        for word, one in inside.items():
+            anchor = f"{name} {word}".replace(" ", "-")
+            lines.append(f"- [`{name} {word}`](#{anchor}): {_cell(one.get_short_help_str(200))}")
+        lines.append("")
     return "\n".join(lines)
 
 
@@ -225,10 +224,6 @@ def _cell(text: str | None) -> str:
     return " ".join((text or "").split()).replace("|", "\\|").replace("<", "&lt;").replace("*.", "\\*.")
 
 
-def _anchor(title: str) -> str:
-    return title.lower().replace(" ", "-")
-
-
 # -- errors and messages ----------------------------------------------------------------------------------------------
 
 
@@ -254,19 +249,17 @@ def exit_codes() -> str:
 
 def reasons_of(kind: type[errors.GcsplanError]) -> list[str]:
     """Words that ``reason`` may be, as the code says them."""
-    words = {} if kind is errors.NoMission else {kind.default_reason: None}
     if kind is errors.NoMission:
-        words = dict.fromkeys(errors.NoMissionReason.__args__)  # type: ignore[attr-defined]
-    names = {kind.__name__, *(name for name, of in _RAISED.items() if of is kind)}
-    for call in (m.call for m in messages() if m.raised in names):
-        for keyword in call.keywords:
-            if keyword.arg == "reason":
-                words |= {
-                    node.value: None
-                    for node in ast.walk(keyword.value)
-                    if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isidentifier()
-                }
-    return list(words)
+        return list(get_args(errors.NoMissionReason))
+    said = [
+        keyword.value
+        for message in messages()
+        if _RAISED[message.raised] is kind
+        for keyword in message.call.keywords
+        if keyword.arg == "reason"
+    ]
+    words = [node.value for value in said for node in ast.walk(value) if isinstance(node, ast.Constant)]
+    return list(dict.fromkeys([kind.default_reason, *(word for word in words if str(word).isidentifier())]))
 
 
 _RAISED: Mapping[str, type[errors.GcsplanError]] = {
@@ -278,11 +271,13 @@ _RAISED: Mapping[str, type[errors.GcsplanError]] = {
 """Names that messages are handed to, and the kind of error that carries them."""
 
 
-class Message:
+class Message(NamedTuple):
     """One message as it stands in the code; ``‹…›`` is what is only known when it is said."""
 
-    def __init__(self, module: str, raised: str, text: str, call: ast.Call) -> None:
-        self.module, self.raised, self.text, self.call = module, raised, text, call
+    module: str
+    raised: str
+    text: str
+    call: ast.Call
 
 
 @cache
@@ -295,8 +290,9 @@ def messages() -> tuple[Message, ...]:
         scopes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)] or [tree]
         seen: set[ast.AST] = set()
         for scope in scopes:
-            named = {ast.unparse(node.targets[0]): node.value for node in ast.walk(scope) if isinstance(node, ast.Assign)}
-            for node in ast.walk(scope):
+            nodes = list(ast.walk(scope))
+            named = {ast.unparse(node.targets[0]): node.value for node in nodes if isinstance(node, ast.Assign)}
+            for node in nodes:
                 if not isinstance(node, ast.Call) or node in seen:
                     continue
                 seen.add(node)
@@ -318,10 +314,10 @@ def _text(node: ast.expr, named: Mapping[str, ast.expr], depth: int = 0) -> str:
         return "".join(_text(part, named, depth) for part in node.values)
     if isinstance(node, ast.FormattedValue):
         value = node.value
-        if isinstance(value, ast.Call) and ast.unparse(value.func).endswith(".join"):
-            value = value.args[0]
+        if isinstance(value, ast.Call):
+            value = value.args[0] if ast.unparse(value.func).endswith(".join") else value.func
         name = ast.unparse(value).split("[")[0].split(".")[-1].strip("_ ")
-        return f"‹{name if name.isidentifier() else '…'}›"
+        return f"‹{name if name.isidentifier() and not hasattr(builtins, name) else '…'}›"
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         return _text(node.left, named, depth) + _text(node.right, named, depth)
     if isinstance(node, ast.IfExp):
