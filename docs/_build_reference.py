@@ -215,8 +215,7 @@ def _option_default(option: Any) -> str:
         return "**wanted**"
     if option.is_flag and option.secondary_opts:
         return f"`{option.opts[0] if option.default else option.secondary_opts[0]}`"
-    value = None if option.is_flag or option.default in (None, [], (), "") else option.default
-    return "–" if value is None else f"`{value}`"
+    return "–" if option.is_flag or option.default in (None, [], (), "") else f"`{option.default}`"
 
 
 def _cell(text: str | None) -> str:
