@@ -1,7 +1,5 @@
 """Every error that gcsplan raises on purpose, and the exit code that it ends in.
 
-::
-
     GcsplanError                    70  our bug, if nothing below fits
     ├── InputError     (ValueError)       2  bad input; carries every problem found, each with its place
     │   └── UsageError                    2  wrong options on the command line

@@ -234,6 +234,19 @@ def test_a_file_that_cannot_be_read_is_exit_2_and_the_others_are_judged(
     assert json.loads(out)["error"]["problems"]
 
 
+def test_a_zone_with_latitude_and_longitude_swapped_is_refused_and_not_left_out(
+    run: Any, folder: Path, world: list[str]
+) -> None:
+    lat, lon = corpus.degrees(*corpus.HOME)
+    point = {"type": "Point", "coordinates": [lat, lon]}  # GeoJSON has the longitude first
+    feature = {"type": "Feature", "properties": {"name": "mast", "radius_m": 60}, "geometry": point}
+    zones = folder / "swapped.geojson"
+    zones.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    code, _, err = run(file_of(folder, "round"), *world, "--zones", zones, "-q")
+    assert code == 2
+    assert "latitude and longitude of the zone 'mast' look swapped" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

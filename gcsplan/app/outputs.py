@@ -38,7 +38,7 @@ def outputs_of(
     *,
     rally: bool = False,
 ) -> dict[str, str]:
-    """File name to text, of all that INTERFACE's ``plan -o DIR`` names but the report and the upload.
+    """File name to text, of all that docs/reference/contract.md names but the report and the upload.
 
     ``homes``: vehicle to its way home, where that was judged; it stands in the summary then. ``fences``: vehicle to
     the items of its fence, for the `.plan`; with ``rally`` the rally points that were proposed stand there too.
@@ -112,7 +112,7 @@ def upload_text(plan: Plan, deliveries: Sequence[Delivery], homes: Homes = Mappi
 
 
 def summary_of(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Homes = MappingProxyType({})) -> dict[str, Any]:
-    """The summary of INTERFACE.md as plain values, clock readings included."""
+    """The summary of docs/reference/contract.md as plain values, clock readings included."""
     uploads = {d.vehicle: d for d in deliveries}
     return {
         "name": plan.source.name,

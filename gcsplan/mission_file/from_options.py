@@ -12,11 +12,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.mission_file.complaints import read_section
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
-from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys, read_section
+from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys
 from gcsplan.mission_file.vehicles import make_vehicle
 from gcsplan.mission_file.world import Box, make_spec, settle_zones
-from gcsplan.mission_file.zone_draft import ZoneDraft, one_line, place_zones, zones_sha256
+from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zones_sha256
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
@@ -113,8 +114,13 @@ class OpenWorld:
                 f"the places lie more than {FARTHEST_M / 1000:.0f} km from their middle: too far for one plane",
                 where="--dem",
             )
-        problems: list[Problem] = []
         placed, far = place_zones(self._drafts, frame)
+        # One of these would be a zone of the mission; as it stands it would be left out, and flown through.
+        problems = [
+            Problem(draft.where, f"latitude and longitude of the zone {draft.name!r} look swapped")
+            for draft in far
+            if looks_swapped(draft, frame)
+        ]
         box = self._box(in_plane, reach_m)
         scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
         surface = self._terrain.load(frame, box)

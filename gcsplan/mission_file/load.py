@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.mission_file.complaints import read_section, unknown_keys
 from gcsplan.mission_file.ground import Ground, Site
 from gcsplan.mission_file.request import AltitudeFrame, ArrivalRequest, MissionFile, PlannerRequest, VehicleRequest
 from gcsplan.mission_file.schema import (
@@ -28,9 +29,7 @@ from gcsplan.mission_file.schema import (
     VehicleKeys,
     ZoneKeys,
     nearest,
-    read_section,
     shown,
-    unknown_keys,
 )  # fmt: skip
 from gcsplan.mission_file.stops import Stops
 from gcsplan.mission_file.strict_yaml import MAX_BYTES, read_yaml

@@ -8,9 +8,8 @@ error that names the nearest one that is.
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -20,11 +19,8 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
-    ValidationError,
     model_validator,
 )
-
-from gcsplan.errors import Problem
 
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
 _FAR = 1e6
@@ -51,7 +47,9 @@ Encoding = Literal["box", "sections", "polar", "bspline", "offsets"]
 SwarmCost = Literal["krill", "ssgwo", "msfoa", "abo", "ib-abc"]
 
 
-class _Section(BaseModel):
+class Keys(BaseModel):
+    """A section of the file. What stands below a key says in the reference what it is (docs/_build_reference.py)."""
+
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
     @property
@@ -60,13 +58,17 @@ class _Section(BaseModel):
         return {k: getattr(self, k) for k in self.model_fields_set}
 
 
-class LocalPoint(_Section):
+class LocalPoint(Keys):
     """A point of a local frame; on the ground unless ``up_m`` or ``agl_m`` says otherwise."""
 
     east_m: Metres
+    """East of the frame's origin."""
     north_m: Metres
+    """North of the frame's origin."""
     up_m: Metres | None = None
+    """Height above the frame's zero."""
     agl_m: Length | None = None
+    """Height above ground."""
 
     @model_validator(mode="after")
     def _one_height(self) -> LocalPoint:
@@ -85,29 +87,34 @@ LatLon = Annotated[list[float], Field(min_length=2, max_length=2)]
 LatLonAgl = Annotated[list[float], Field(min_length=2, max_length=3)]
 Point = Annotated[Annotated[LatLon, Tag("[lat, lon]")] | _Local, Discriminator(_form)]
 ViaPoint = Annotated[Annotated[LatLonAgl, Tag("[lat, lon]")] | _Local, Discriminator(_form)]
-_FORMS = ("[lat, lon]", "{east_m, north_m}", "one", "several")
+FORMS = ("[lat, lon]", "{east_m, north_m}", "one", "several")
 
 
-class FrameKeys(_Section):
+class FrameKeys(Keys):
     """``frame:`` of a mission in local metres."""
 
     origin: LatLon
+    """Latitude and longitude of the point 0, 0."""
     amsl_m: Metres = 0.0
+    """Altitude above sea level of `up_m: 0`."""
 
 
-class PeakKeys(_Section):
+class PeakKeys(Keys):
     """One peak, metres of the local frame."""
 
     center: Pair
+    """East and north of its top, metres."""
     height_m: Metres
+    """Height of its top above the flat ground."""
     decay_m: Annotated[list[Annotated[float, Field(ge=1e-3, le=_FAR)]], Field(min_length=2, max_length=2)]
+    """East and north: at this distance from the top it has fallen to 37 % (1/e) of its height."""
 
 
 def _count(value: Any) -> str:
     return "several" if isinstance(value, list) else "one"
 
 
-class TerrainKeys(_Section):
+class TerrainKeys(Keys):
     """``terrain:``."""
 
     dem: (
@@ -118,80 +125,135 @@ class TerrainKeys(_Section):
         ]
         | None
     ) = None
+    """A raster (.tif, .hgt, .asc), relative to this file, a list of tiles, or `sample:jacksboro`."""
     vertical_datum: Text | None = None
+    """What heights count from: `EGM96`, `NAVD88`, `WGS84` (ellipsoidal), …; wanted where the raster does not say."""
     geoid_grid: Text | None = None
+    """Geoid raster that converts ellipsoidal heights; without it they are refused."""
     crs: Text | None = None
+    """Coordinate system of a raster that does not say, such as `EPSG:32617`."""
     height_unit: Literal["m", "ft", "us_ft"] | None = None
+    """Of a raster that does not say."""
     flat_m: Metres | None = None
+    """No raster: flat ground at this altitude. In a mission with a frame it counts above its zero."""
     peaks: Annotated[list[PeakKeys], Field(min_length=1, max_length=1000)] | None = None
+    """No raster: hills on flat ground, in a mission with a frame."""
     obstacle_height_m: Length = 0.0
+    """Trees and buildings, everywhere: added to the ground for `min_agl_m`, not for `max_agl_m`."""
     canopy: Text | None = None
+    """A raster of heights above ground; where both are given the higher one counts."""
     canopy_nodata_m: Annotated[float, Field(ge=0.0, le=250.0)] | None = None
+    """Height of canopy cells without data; not given, the ground there is unknown."""
 
 
-class LimitKeys(_Section):
+class LimitKeys(Keys):
     """``limits:``; a vehicle may give any of them too."""
 
     min_agl_m: Length | None = None
+    """Lowest height above ground and what stands on it; wanted, here or in every vehicle."""
     max_agl_m: Positive | None = None
+    """Highest height above ground."""
     max_amsl_m: Metres | None = None
+    """Highest altitude above sea level."""
     horizontal_clearance_m: Length | None = None
+    """No zone is nearer than this, and no ground within it reaches flight level."""
     track_error_m: Length | None = None
+    """How far the aircraft may be from its track; every check is widened by it."""
     altitude_error_m: Length | None = None
+    """How far the aircraft may be from its altitude; every check is widened by it."""
     max_climb_deg: Angle | None = None
+    """Steepest climb; not given: any for a multicopter, 15 for an arduplane."""
     max_descent_deg: Angle | None = None
+    """Steepest descent; not given: `max_climb_deg`."""
 
 
-class ZoneKeys(_Section):
+class ZoneKeys(Keys):
     """One entry of ``no_fly:``: a circle, a polygon or a file."""
 
     name: Text | None = None
+    """Names it in messages and reports."""
     center: Point | None = None
+    """Middle of a circle; goes with `radius_m`."""
     radius_m: float | None = None
+    """Radius of a circle, 100 000 at most."""
     polygon: list[Point] | None = None
+    """Corners of a polygon, in order; it is closed by itself."""
     file: Text | None = None
+    """Zones of a .geojson or .kml file; the other keys then stand in the file."""
     floor_agl_m: Metres | None = None
+    """Lowest height above ground, point by point; not given or 0, nothing passes below."""
     ceiling_agl_m: Metres | None = None
+    """Highest height above ground, point by point; no ceiling: nothing passes above."""
     floor_amsl_m: Metres | None = None
+    """The same above sea level."""
     ceiling_amsl_m: Metres | None = None
+    """The same above sea level."""
 
 
-class EnergyKeys(_Section):
+class EnergyKeys(Keys):
     """``energy:`` of a vehicle."""
 
     vertical_j_per_m: Annotated[float, Field(ge=0.0, le=1e9)] = 120.0
+    """Energy of a metre up or down."""
     horizontal_j_per_m: Annotated[float, Field(ge=0.0, le=1e9)] = 100.0
+    """Energy of a metre along."""
     hover_w: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
+    """Power of standing still; a hold costs it."""
     battery_j: Annotated[float, Field(gt=0.0, le=1e15), AfterValidator(_no_trifle)] | None = None
+    """Energy of the full battery; not given, the battery is not judged."""
     reserve: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.2
+    """Part of the battery that is left at the end, 0 to 1."""
 
 
 class VehicleKeys(LimitKeys):
     """One entry of ``vehicles:``."""
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)]
+    """Letters, digits, _ and -; names its files."""
     sysid: Annotated[int, Field(ge=1, le=255)]
+    """MAVLink system id."""
     autopilot: Literal["arducopter", "arduplane", "px4"]
+    """Whose rules the mission is written for and judged by."""
     start: Point
+    """Where it stands on the ground."""
     goal: Point
+    """Where it flies to."""
     takeoff_agl_m: Positive | None = None
+    """Top of the vertical take-off; the path begins there. Not given: the lowest that is legal."""
     approach_agl_m: Positive | None = None
+    """End of the path above the goal. Not given: the lowest that is legal."""
     via: Annotated[list[ViaPoint], Field(max_length=500)] = []
+    """Points to pass, in order: a place, with or without its height above ground."""
     end: Literal["land", "loiter", "rtl", "none"] = "land"
+    """What follows the path: a landing, a hold or circle, the autopilot's return, or nothing."""
     rtl_rel_home_m: Positive | None = None
+    """Height above home of the autopilot's own return; goes with `end: rtl`."""
     takeoff_heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | None = None
+    """Launch heading of a fixed wing; not given, the planner looks for one."""
     speed_m_s: Annotated[list[Speed], Field(min_length=2, max_length=2)] = [3.0, 15.0]
+    """Slowest and fastest cruise."""
     climb_m_s: Speed = 2.5
+    """Fastest climb; slows steep legs."""
     descent_m_s: Speed = 1.5
+    """Fastest descent; slows steep legs."""
     land_m_s: Speed = 0.5
+    """Descent just above ground."""
     accel_m_s2: Accel = 1.5
+    """Speeding up and braking along the path."""
     corner_accel_m_s2: Accel = 2.5
+    """Bounds the speed in a corner."""
     vertical_accel_m_s2: Accel = 1.0
+    """Speeding up and braking of take-off and landing."""
     leg_jerk_m_s3: Accel = 1.0
+    """Of ArduPilot's S-curves, which bound the speed on a short leg."""
     turn_radius_m: Length = 0.0
+    """Above 0: a fixed wing, whose corners are planned and judged as arcs."""
     energy: EnergyKeys = EnergyKeys()
+    """What flying costs."""
     link: Text | None = None
+    """URL for `--upload link`."""
     limits: LimitKeys | None = None
+    """Limits of this vehicle alone; they may stand beside its other keys too."""
 
 
 def _order_form(value: Any) -> Any:
@@ -203,18 +265,27 @@ def _order_form(value: Any) -> Any:
 _Order = Annotated[Annotated[Literal["best"], Tag("one")] | Annotated[list[str], Tag("several")], Discriminator(_count)]
 
 
-class ArrivalKeys(_Section):
+class ArrivalKeys(Keys):
     """``arrival:``."""
 
     mode: Literal["sequence", "together", "none"]
+    """One after the other, all at once, or as each likes."""
     order: Annotated[_Order | None, BeforeValidator(_order_form)] = None
+    """Every vehicle's name once, or `best`; not given: the order of the file."""
     interval_s: Seconds | None = None
+    """Between one arrival and the next; a sequence needs it."""
     arrive_s: Annotated[float, Field(gt=0.0, le=86400.0)] | None = None
+    """When the first is to arrive, or all together."""
     clock: Literal["first", "fleet"] | None = None
+    """Who sets the time of a sequence: the first vehicle, or the whole fleet."""
     hold: Literal["ground", "gate", "none"] = "ground"
+    """Where a vehicle waits that would come too early."""
     window_s: Seconds = 0.0
+    """Each may arrive so much earlier or later."""
     pad_clear_s: Seconds | None = None
+    """So long after a landing the pad is free again; not given: never."""
     separation_m: Length | None = None
+    """Least distance of every pair, from take-off to landing."""
 
 
 def _plain_values(parameters: dict[str, Any]) -> dict[str, Any]:
@@ -224,59 +295,65 @@ def _plain_values(parameters: dict[str, Any]) -> dict[str, Any]:
     return parameters
 
 
-class PlannerKeys(_Section):
+class PlannerKeys(Keys):
     """``planner:``; the keys below ``budget_mb`` belong to planners that search with a swarm."""
 
     name: Text = "optimal"
+    """One of the [planners](planners.md)."""
     objective: Literal["length", "energy"] = "length"
+    """What is made least."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 1
+    """Of everything random."""
     gap_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
+    """Planning stops when path and bound are that near."""
     budget_s: Annotated[float, Field(gt=0.0, le=86400.0)] = 10.0
+    """Time for what comes after the first path; a first path may take three times as long."""
     budget_mb: Annotated[float, Field(ge=64.0, le=1e6)] = 1024.0
+    """Memory for the searches, above the terrain itself."""
     encoding: Encoding | None = None
+    """How a swarm's numbers become a path."""
     cost: SwarmCost | None = None
+    """Which paper's cost a swarm makes least."""
     points: Annotated[int, Field(ge=1, le=1000)] | None = None
+    """Way points of a swarm's path."""
     population: Annotated[int, Field(ge=2, le=100_000)] | None = None
+    """Members of a swarm."""
     iterations: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    """Rounds of a swarm."""
     evaluations: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
+    """Paths that a swarm may try."""
     parameters: Annotated[dict[str, Any], AfterValidator(_plain_values)] | None = None
+    """A swarm's own parameters, by their names."""
 
 
-TOP_KEYS = (
-    "version", "name", "terrain", "limits", "no_fly", "vehicles", "arrival", "planner", "altitude_frame", "frame",
-    "terrain_error_m",
-)  # fmt: skip
+class MissionKeys(Keys):
+    """The whole file. Each of its sections is read on its own."""
 
-Section = TypeVar("Section", bound=_Section)
-
-
-def read_section(kind: type[Section], value: Any, where: str, problems: list[Problem]) -> Section | None:
-    """``value`` as a section; None, and every mistake in ``problems``, where it is not one.
-
-    A section whose only mistakes are unknown keys is given without them.
-    ``where`` is the place so far (``FILE: vehicles[1]``).
-    """
-    if not isinstance(value, dict):
-        keys = ", ".join(list(kind.model_fields)[:6])
-        problems.append(Problem(where, f"must be a mapping of keys ({keys}, …), given {shown(value)}"))
-        return None
-    try:
-        return kind.model_validate(value)
-    except ValidationError as why:
-        errors = why.errors(include_url=False)
-        problems += [_problem(kind, e, where) for e in errors]
-        unknown = {e["loc"][0] for e in errors if e["type"] == "extra_forbidden" and len(e["loc"]) == 1}
-        if len(unknown) < len(errors):
-            return None
-    # Nothing but unknown keys: the rest is judged too, so that its mistakes are told in the same breath.
-    return kind.model_validate({k: v for k, v in value.items() if k not in unknown})
+    version: Literal[1]
+    """Version of this format."""
+    name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
+    """Of the mission; not given: the file's own name."""
+    terrain: TerrainKeys
+    """The ground, and what stands on it."""
+    limits: LimitKeys | None = None
+    """What every vehicle is held to; a vehicle may override any of them."""
+    no_fly: list[ZoneKeys] = []
+    """Zones that nobody enters."""
+    vehicles: Annotated[list[VehicleKeys], Field(min_length=1, max_length=255)]
+    """Who flies, from where to where."""
+    arrival: ArrivalKeys | None = None
+    """How several vehicles arrive; not given, their separation is not judged."""
+    planner: PlannerKeys = PlannerKeys()
+    """Who plans, for what, how long."""
+    altitude_frame: Literal["relative", "amsl", "terrain"] = "relative"
+    """What the mission's altitudes count from: home, the sea, or the ground (not for px4)."""
+    frame: FrameKeys | None = None
+    """Makes this a mission in local metres, as the papers' worlds are."""
+    terrain_error_m: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """With `altitude_frame: terrain`: how far the vehicle's own terrain may be off."""
 
 
-def unknown_keys(given: Iterable[str], known: Iterable[str], where: str) -> list[Problem]:
-    """A problem for each key that is not known, naming the nearest one that is."""
-    names = list(known)
-    prefix = where if where.endswith(": ") else where + "."
-    return [Problem(f"{prefix}{key[:80]}", _unknown(key, names)) for key in given if key not in names]
+TOP_KEYS = tuple(MissionKeys.model_fields)
 
 
 def shown(value: Any) -> str:
@@ -300,82 +377,3 @@ def nearest(word: str, known: Iterable[str]) -> str:
     """`` (did you mean …?)`` or nothing."""
     close = difflib.get_close_matches(word[:80], list(known), n=1, cutoff=0.6)
     return f"; did you mean {close[0]}?" if close else ""
-
-
-def key_path(where: str, loc: Iterable[int | str]) -> str:
-    """``FILE: vehicles[1]`` and ("speed_m_s", 0) to ``FILE: vehicles[1].speed_m_s[0]``."""
-    path = where
-    for part in loc:
-        if isinstance(part, int):
-            path += f"[{part}]"
-        elif part not in _FORMS:
-            path += part[:80] if path.endswith(": ") else f".{part[:80]}"
-    return path
-
-
-def _unknown(key: str, known: list[str]) -> str:
-    near = nearest(key, known)
-    return "unknown key" + (near or f"; known are {', '.join(known)}")
-
-
-def _problem(kind: type[_Section], error: Any, where: str) -> Problem:
-    loc, given = error["loc"], shown(error["input"])
-    path = key_path(where, loc)
-    context = error.get("ctx", {})
-    match error["type"]:
-        case "missing":
-            return Problem(path, "is missing")
-        case "extra_forbidden":
-            return Problem(path, _unknown(str(loc[-1]), list(_model_at(kind, loc[:-1]).model_fields)))
-        case "value_error":
-            return Problem(path, str(context["error"]))
-        case "literal_error":
-            choices = re.findall(r"'([^']*)'", context["expected"])
-            near = nearest(error["input"], choices) if isinstance(error["input"], str) else ""
-            return Problem(path, f"must be one of {', '.join(choices)}, given {given}{near}")
-        case "string_pattern_mismatch":
-            return Problem(path, f"must be made of letters, digits, _ and -, given {given}")
-        case "string_type":
-            return Problem(path, f"must be text (in quotes, if it looks like a number), given {given}")
-        case "float_type":
-            return Problem(path, f"must be a number, given {given}")
-        case "int_type" | "int_from_float" | "int_parsing_size":
-            return Problem(path, f"must be a whole number, given {given}")
-        case "finite_number":
-            return Problem(path, f"must be a finite number, given {given}")
-        case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
-            word = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
-            bound = next(k for k in ("gt", "ge", "lt", "le") if k in context)
-            return Problem(path, f"must be {word[bound]} {context[bound]:g}, given {given}")
-        case "too_short" | "too_long":
-            least, most = context.get("min_length"), context.get("max_length")
-            bound = f"at least {least}" if least is not None else f"at most {most}"
-            given = context.get("actual_length", given)
-            return Problem(path, f"must have {bound} values{_form_of(loc)}, given {given}")
-        case "list_type" if _form_of(loc):
-            return Problem(path, f"must be [lat, lon], or {{east_m, north_m}} in a mission with a frame, given {given}")
-        case "list_type":
-            return Problem(path, f"must be a list, given {given}")
-        case "model_type" | "dict_type" | "model_attributes_type":
-            return Problem(path, f"must be a mapping of keys, given {given}")
-    return Problem(path, f"{error['msg'][:1].lower()}{error['msg'][1:]}, given {given}")
-
-
-def _form_of(loc: tuple[int | str, ...]) -> str:
-    return " [lat, lon]" if "[lat, lon]" in loc else ""
-
-
-def _model_at(kind: type[_Section], loc: Iterable[int | str]) -> type[_Section]:
-    """The section that holds the key at ``loc``, for the names that it knows."""
-    for part in loc:
-        if part == "{east_m, north_m}":
-            kind = LocalPoint
-        elif isinstance(part, str) and part in kind.model_fields:
-            kind = _sections_in(kind.model_fields[part].annotation) or kind
-    return kind
-
-
-def _sections_in(annotation: Any) -> type[_Section] | None:
-    if isinstance(annotation, type) and issubclass(annotation, _Section):
-        return annotation
-    return next((s for a in get_args(annotation) if (s := _sections_in(a)) is not None and s is not LocalPoint), None)

@@ -73,8 +73,12 @@ class Flight:
     def ground(self, en: Floats) -> float:
         return float(self.oracle.height(self.case.surface.ground_m, en[:1], en[1:2])[0])
 
-    def target(self, item: MissionItem) -> Floats:
+    def target(self, item: MissionItem, here: Floats) -> Floats:
+        """Where an item leads from ``here``; to ArduCopter an altitude of 0 is none: it keeps its own."""
         en = self.place(item.x, item.y)
+        if self.autopilot is Autopilot.ARDUCOPTER and stored_m(item, self.autopilot) == 0.0:
+            kept = here[2] - self.ground(here) + self.ground(en) if item.frame == 10 else here[2]
+            return np.array([*en, kept])
         base = {0: 0.0, 3: self.datum}.get(item.frame, self.ground(en))
         return np.array([*en, base + stored_m(item, self.autopilot)])
 
@@ -116,10 +120,10 @@ class Flight:
                 yield Line(self.straight(over, np.array([*over[:2], self.ground(over[:2])])), track, high, column=True)
                 return
             elif item.command in (16, 17, 18, 82):
-                to = self.target(item)
+                to = self.target(item, here)
                 if item.command == 82:
                     leaves = np.zeros(3) if stops or before is None else here - before
-                    beyond = np.zeros(3) if item.params[0] > 0 or after is None else self.target(after) - to
+                    beyond = np.zeros(3) if item.params[0] > 0 or after is None else self.target(after, to) - to
                     yield Line(self.spline(here, to, leaves, beyond), track, high)
                 elif circle > 0.0:  # from anywhere on the circle
                     yield Line(self.straight(self.on_circle(here, circle), to), track, high, angles=False)
@@ -211,7 +215,7 @@ class Flight:
             return own if own > 0 else 10.0
         if after is None:
             return 0.0
-        one, two = (to - here)[:2], (self.target(after) - to)[:2]
+        one, two = (to - here)[:2], (self.target(after, to) - to)[:2]
         turn = abs((math.atan2(*two) - math.atan2(*one) + math.pi) % (2 * math.pi) - math.pi)
         return min(90.0, 0.75 * 17.0 / math.pi * self.case.vehicle.speed_max_m_s) * min(1.0, turn / (0.5 * math.pi))
 
@@ -234,7 +238,7 @@ class Flight:
         track, high = limits.track_error_m, limits.altitude_error_m
         if self.autopilot is Autopilot.ARDUCOPTER:
             if item.command == 16 and item.params[0] == 0 and after is not None and after.command in (16, 17):
-                one, two = to - here, self.target(after) - to
+                one, two = to - here, self.target(after, to) - to
                 long = [float(np.linalg.norm(v)) for v in (one, two)]
                 if min(long) > 1e-3 and after.frame != 10 and item.frame != 10:
                     u, v = one / long[0], two / long[1]
@@ -267,7 +271,7 @@ class Flight:
         yield Line(
             self.straight(np.array([*self.home, self.datum]), top), limits.track_error_m, limits.altitude_error_m, True
         )
-        points = np.array([top, *(self.target(i) for i in items[1:])])
+        points = np.array([top, *(self.target(i, top) for i in items[1:])])
         yield Line(arcs(points, WING_RADIUS_M), limits.track_error_m, limits.altitude_error_m)
         thin = (1.0 - 0.0065 * points[-1, 2] / 288.15) ** -4.2559
         yield Line(

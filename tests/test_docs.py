@@ -1,0 +1,194 @@
+"""The documents: what is made from the code names all of it, and what is written by hand keeps up with it."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any, get_args
+
+import pytest
+import yaml
+
+import gcsplan
+from gcsplan import errors
+from gcsplan.export.summary import ORDER
+from gcsplan.mission_file import schema
+from gcsplan.planners import registry
+from gcsplan.world.airspace import Kind
+
+TOP = Path(__file__).parents[1]
+DOCS = TOP / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+
+
+@pytest.fixture(scope="module")
+def made() -> ModuleType:
+    """The hook of the build; it needs no mkdocs to make its parts."""
+    spec = importlib.util.spec_from_file_location("_build_reference", DOCS / "_build_reference.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def kinds_of(kind: type[schema.Keys]) -> Iterator[type[schema.Keys]]:
+    """Every section, however deep; found by inheritance and not by the walk that makes the page."""
+    for one in kind.__subclasses__():
+        yield one
+        yield from kinds_of(one)
+
+
+def rows(table: str) -> list[list[str]]:
+    """Cells of every row of every table; a pipe in code or behind a backslash divides nothing."""
+    lines = [line for line in table.splitlines() if line.startswith("| ") and not line.startswith("| ---")]
+    return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
+
+
+# -- the reference -----------------------------------------------------------------------------------------------------
+
+
+def test_the_mission_file_s_reference_names_every_key_once_and_says_what_it_is(made: ModuleType) -> None:
+    keys = [cells for cells in rows(made.mission_file()) if cells[0] != "key"]
+    for kind in kinds_of(schema.Keys):
+        for key in kind.__annotations__:
+            [_, *_] = found = [cells for cells in keys if cells[0] == f"`{key}`"]
+            assert all(len(cells) == 4 and all(cells) for cells in found), (kind.__name__, key, found)
+    wanted = sum(len(kind.__annotations__) for kind in kinds_of(schema.Keys))
+    assert len(keys) == wanted
+
+
+def test_units_and_defaults_are_those_of_the_code(made: ModuleType) -> None:
+    told = {(cells[0], cells[3]): cells[1:3] for cells in rows(made.mission_file())}
+    by_key = {key: value for (key, _), value in told.items()}
+    assert by_key["`budget_s`"] == ["s, > 0, ≤ 86400", "`10`"]
+    assert by_key["`min_agl_m`"] == ["m, ≥ 0", "–"]
+    assert by_key["`horizontal_clearance_m`"] == ["m, ≥ 0", "`30`"]
+    assert by_key["`altitude_frame`"] == ["`relative`, `amsl`, `terrain`", "`relative`"]
+    assert by_key["`sysid`"] == ["whole number, 1 to 255", "**wanted**"]
+    assert by_key["`leg_jerk_m_s3`"][0].startswith("m/s³")
+    assert by_key["`via`"][0] == "list of [lat, lon] or [lat, lon, agl_m] or {east_m, north_m}"
+
+
+def test_the_command_line_s_reference_names_every_command_and_option(made: ModuleType) -> None:
+    import typer.main
+
+    from gcsplan.cli.main import app
+
+    text = made.command_line()
+    parts = {part.split("`")[1]: part for part in re.split(r"^## ", text, flags=re.MULTILINE)[1:]}
+
+    def look(name: str, command: Any) -> None:
+        part = parts.pop(name)
+        assert command.help
+        for param in command.params:
+            if param.param_type_name == "option" and param.name != "help":
+                assert param.help, f"{name} {param.opts}: says nothing"
+                for word in (*param.opts, *param.secondary_opts):
+                    assert re.search(rf"`{re.escape(word)}[ `]", part), f"{name} {word}"
+        for word, inner in getattr(command, "commands", {}).items():
+            look(f"{name} {word}", inner)
+
+    look("gcsplan", typer.main.get_command(app))
+    assert parts == {}
+    assert "| `--timeout S` | `60.0` |" in text
+
+
+def test_every_exit_code_and_reason_stands_in_the_table(made: ModuleType) -> None:
+    table = {cells[1]: cells for cells in rows(made.exit_codes())}
+    kinds = [k for k in vars(errors).values() if isinstance(k, type) and issubclass(k, errors.GcsplanError)]
+    for kind in kinds:
+        assert table[f"`{kind.__name__}`"][0] == str(kind.exit_code)
+    assert {cells[0] for cells in table.values()} >= {"0", "129", "130", "143"}
+    assert all(f"`{word}`" in table["`NoMission`"][4] for word in get_args(errors.NoMissionReason))
+    assert "`parameters`" in table["`VehicleRefused`"][4]
+
+
+def test_messages_are_read_out_of_the_code_with_what_is_only_known_later(made: ModuleType) -> None:
+    texts = {message.text for message in made.messages()}
+    assert "give either `dem` or `flat_m` and `peaks`" in texts  # a plain one
+    assert "no vehicle is named ‹name›‹nearest›" in texts  # of a Problem, whose second argument it is
+    assert "must be text, 300 characters at most, given ‹shown›" in texts  # put into a name before
+    assert len(texts) > 300
+    raised = {message.raised for message in made.messages()}
+    assert raised >= {"InputError", "UsageError", "Problem", "NoMission", "Refusal", "LinkError", "VehicleRefused"}
+
+
+def test_every_planner_stands_in_the_table(made: ModuleType) -> None:
+    assert [cells[0] for cells in rows(made.planners())][1:] == [f"`{name}`" for name in registry.names()]
+
+
+def test_the_python_reference_names_all_that_the_package_offers() -> None:
+    text = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
+    for name in set(gcsplan.__all__) - {"__version__"}:
+        assert f"\n::: gcsplan.{name}\n" in text, name
+
+
+# -- pages by hand -----------------------------------------------------------------------------------------------------
+
+
+def test_the_contract_names_every_key_of_the_summary_and_every_kind_of_violation() -> None:
+    text = (DOCS / "reference" / "contract.md").read_text(encoding="utf-8")
+    for key in {key for keys in ORDER.values() for key in keys}:
+        assert f'"{key}"' in text, key
+    for kind in (*get_args(Kind), "battery", "refused", "unreachable", "too_many_items"):
+        assert f"`{kind}`" in text, kind
+
+
+def test_every_page_has_its_place_and_every_mark_its_part(made: ModuleType) -> None:
+    text = (TOP / "mkdocs.yml").read_text(encoding="utf-8")
+    assert "font: false" in text
+    named = set(re.findall(r": ([a-z/-]+\.md)$", text, re.MULTILINE))
+    assert {page.relative_to(DOCS).as_posix() for page in PAGES} == named
+    marks = {mark for page in PAGES for mark in made.MARK.findall(page.read_text(encoding="utf-8"))}
+    assert marks == set(made.PARTS)
+
+
+@pytest.mark.parametrize("page", [TOP / "README.md", TOP / "CONTRIBUTING.md", *PAGES], ids=lambda p: p.name)
+def test_links_between_documents_lead_somewhere(page: Path) -> None:
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    for target in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", text):
+        if not target.startswith(("http:", "https:", "mailto:")):
+            picture = TOP / "missions" / Path(target).name if "pictures/" in target else page.parent / target
+            assert picture.exists(), f"{page.name}: {target}"
+
+
+def test_the_tutorial_s_mission_is_one(tmp_path: Path) -> None:
+    text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+    source, mission, datum = re.findall(r"^```(?:python|yaml)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[:3]
+    subprocess.run([sys.executable, "-c", source], cwd=tmp_path, check=True, timeout=120)
+    whole = yaml.safe_load(mission) | yaml.safe_load(datum)
+    read = gcsplan.load_mission(tmp_path / "ridge.yaml", text=yaml.safe_dump(whole))
+    assert [request.vehicle.name for request in read.vehicles] == ["uav1"]
+    with pytest.raises(errors.InputError, match="does not say what its heights are measured from"):
+        gcsplan.load_mission(tmp_path / "ridge.yaml", text=mission)
+
+
+def test_readme_is_short() -> None:
+    assert len((TOP / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
+# -- what is built -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "foreign"),
+    [
+        ('<script src="https://cdn.example/x.js"></script>', True),
+        ("<script async src=//cdn.example/x.js></script>", True),
+        ('<link rel="stylesheet" href="https://fonts.example/css">', True),
+        ('<img alt="" src="http://example/x.png">', True),
+        ("@import url(https://example/x.css)", True),
+        ('a { background: url("https://example/x.png") }', True),
+        ('<a href="https://example/">read on</a> <img src="../pictures/a.png">', False),
+        ('<script src="../assets/javascripts/bundle.js"></script><link rel="stylesheet" href="site.css">', False),
+        ('<link rel="canonical" href="https://example/">', False),
+    ],
+)
+def test_what_loads_from_elsewhere_is_seen(made: ModuleType, text: str, foreign: bool) -> None:
+    assert bool(made.FOREIGN.search(text)) is foreign
