@@ -21,10 +21,19 @@ def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
     assert sum(tally.judged.values()) >= 4
 
 
-def test_what_the_campaign_found_once_is_cured() -> None:
-    """A leg off a circle that is smaller than the track error was judged as begun in the circle's middle."""
-    tally = run(FOREVER_S, 500156, ("circle",), most=1)
-    assert tally.judged["circle"] == 4
+@pytest.mark.parametrize(
+    ("seed", "family"),
+    [
+        (
+            500156,
+            "circle",
+        ),  # a leg off a circle smaller than the track error was judged as begun in the circle's middle
+        (600036, "wing"),  # of two arcs that overlap, what lies back from one to the next counted as climbed on
+    ],
+)
+def test_what_the_campaign_found_once_is_cured(seed: int, family: str) -> None:
+    tally = run(FOREVER_S, seed, (family,), most=1)
+    assert tally.judged[family] == 4
     assert tally.unsafe == []
 
 

@@ -155,7 +155,8 @@ class _Run:
         half = np.array([0.5 * self.radius * abs(c.turn) for c in self.corners])
         tangent = np.array([c.tangent for c in self.corners])
         self.straight_m = self.long_m - tangent[:-1] - tangent[1:]
-        self.flown_m = half[:-1] + np.abs(self.straight_m) + half[1:]
+        # Arcs may overlap by `FIT_M`: what lies back from one to the next is not climbed on.
+        self.flown_m = half[:-1] + np.maximum(self.straight_m, 0.0) + half[1:]
         self.half_m = half
 
     def _corners(self, mission: Mission, flight: Flight) -> list[_Corner]:
@@ -234,7 +235,7 @@ class _Run:
         n = len(behind) - 1
         off = a.off_m + sag
         track = [(p, self.half_m[k] * (n - i) / max(n, 1), off) for i, p in reversed(list(enumerate(behind)))]
-        done = float(self.half_m[k]) + abs(float(self.straight_m[k]))
+        done = float(self.half_m[k]) + max(float(self.straight_m[k]), 0.0)
         track.append((reaches, done, self._widen_m(k)))
         ahead, sag = self._half_arc(reaches, heading, b.turn)
         n = len(ahead) - 1

@@ -403,7 +403,7 @@ def battery_needed_j(case: Case) -> float:
             spent += move(over)
             here, to = over, np.array([*over[:2], flight.ground(over[:2])])
         else:
-            to = flight.target(item)
+            to = flight.target(item, here)
         spent += move(to, item.params[0] if item.command == 16 else 0.0)
         here, index = to, index + 1
     return spent
