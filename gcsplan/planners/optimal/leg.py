@@ -208,7 +208,7 @@ class Leg:
                 return limit
             self.last_way = way.points
             # Ways are longer between the walls that the cones raised, so there is less to spare for a climb: again.
-            enough = not cones or way.length_m < known + WORTHWHILE * spare
+            enough = not cones or way.length_m < known + WORTHWHILE * spare or not self.problem.budget.goes_on()
             known = max(known, way.length_m)
             if enough:
                 break
