@@ -143,6 +143,7 @@ def _along(
             goal = np.array([*places[last], height])
         part = replace(plane.problem, start=_point(start), goal=_point(goal), via=(), progress=None, objective="length")
         sub = Incumbent(part)
+        sub.first_s = 0.0  # a path for a piece is not the mission's first, with which the budget begins
         found = PlaneSearch(sub)
         for piece in found.legs:
             piece.farthest = FARTHEST
