@@ -8,7 +8,7 @@ from contextlib import contextmanager
 _listeners: list[Callable[[str], None]] = []
 
 QUICK = "compiling the kernels for this machine (once, about a second)"
-SLOW = "compiling the kernels from source (once, about 15 s)"
+SLOW = "compiling the kernels from source (once, up to two minutes)"
 
 
 @contextmanager

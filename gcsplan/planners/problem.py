@@ -124,7 +124,7 @@ class Solution:
     """A path that `Airspace.examine` passes, and what is known about the best one.
 
     ``lower_bound`` holds for every feasible path of the stated model, in the objective's unit; None where the
-    planner has none. ``stopped_by``: gap, exhausted, evaluations, time. ``notes`` are said to the user.
+    planner has none. ``stopped_by``: gap, exhausted, budget, evaluations, time. ``notes`` are said to the user.
     ``flown``: the track that ``path``'s points are flown by on, where there is a turn radius; None where corners are
     flown as they are. Of planners that search by samples: ``raw_violations``, how many limits the exact check found
     broken in the result of the search itself, and whether it was ``repaired``; None of all others.
