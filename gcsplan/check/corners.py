@@ -98,16 +98,17 @@ class _Cutter:
             if s.column:
                 if last is None and s.kind == "land" and self._has_place(s.seq):
                     begun = _Off()  # off the circle it flies to its place first
-                found += self._parts(s, (0.0, 1.0), self._beyond(_Off(begun.aside_m, meant=begun.meant)), fading=False)
+                found += self._parts(s, (0.0, 1.0), self._beyond(replace(begun, height_m=0.0), s), fading=False)
                 climbed = s.kind == "takeoff" and self.mission.autopilot is Autopilot.PX4
-                # A return goes on from where it climbed; else what was off ends on the ground.
-                off = begun if s.kind == "rtl" else _Off(0.0, self.tuning.px4_height_m if climbed else 0.0)
+                off = _Off(0.0, self.tuning.px4_height_m if climbed else 0.0)
+                if s.kind == "rtl":  # it goes on from where it climbed, or as low as it came; else that ends here
+                    off = replace(begun, height_m=0.0) if s.end[2] > s.start[2] else begun
                 last, stops = None, False
                 continue
             if last is not None:
                 found += self._before(last, s, begun, stops)
             blends = self.copter and last is not None
-            found += self._parts(s, (0.0, 0.5) if blends else PARTS, self._beyond(begun), fading=not blends)
+            found += self._parts(s, (0.0, 0.5) if blends else PARTS, self._beyond(begun, s), fading=not blends)
             off, last, stops = begun, s, s.hold_s > 0.0
         return found
 
@@ -175,7 +176,7 @@ class _Cutter:
     def _before(self, s: Stretch, after: Stretch, begun: _Off, stops: bool) -> Iterator[Stretch]:
         """The end of ``s``, from where it turns on: what is flown from there may not yet lie beside ``after``."""
         radius_m, long_m = self._radius_m(s, after, turn := _turn(s, after), stops), flat_m(s.start, s.end)
-        aside_m, height_m = self._beyond(begun)
+        aside_m, height_m = self._beyond(begun, after)
         if self.copter or radius_m >= long_m:
             yield from self._parts(s, (0.5 if self.copter else 0.0, 1.0), (aside_m, height_m), fading=False)
             return
@@ -193,17 +194,21 @@ class _Cutter:
             # In the terrain frame height runs over the ground: such a leg is not cut.
             for a, b in [(0.0, 1.0)] if one.terrain else pairwise(cuts):
                 left = 1.0 - a if fading else 1.0
+                band_m = height_m if one.kind == "rtl" else left * height_m
                 yield replace(
                     one, start=_between(one, a), end=_between(one, b), reach_m=one.reach_m + left * aside_m,
-                    band_m=one.band_m + left * height_m, hold_s=0.0, on_path=False,
+                    band_m=one.band_m + band_m, hold_s=0.0, on_path=False,
                 )  # fmt: skip
 
-    def _beyond(self, off: _Off) -> tuple[float, float]:
-        """What is off; 0 where the vehicle's own errors hold it."""
+    def _beyond(self, off: _Off, s: Stretch) -> tuple[float, float]:
+        """What is off on ``s``; 0 where the vehicle's own errors hold it.
+
+        A return is flown at the altitude at which it began: the error of that altitude comes on top.
+        """
         if off.meant:
             return off.aside_m, off.height_m
         aside_m = off.aside_m if off.aside_m > self.limits.track_error_m else 0.0
-        return aside_m, off.height_m if off.height_m > self.limits.altitude_error_m else 0.0
+        return aside_m, off.height_m if s.kind == "rtl" or off.height_m > self.limits.altitude_error_m else 0.0
 
     # -- what the mission says -----------------------------------------------------------------------------------
 
