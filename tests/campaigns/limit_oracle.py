@@ -256,7 +256,7 @@ class Flight:
         part = float(self.rng.choice([1.0, 1.0, self.rng.uniform(0.05, 1.0)]))
         joins = here + part * (to - here)
         points = np.concatenate([self.straight(begun, joins), self.straight(joins, to)])
-        held, held_high = off <= track, abs(begun[2] - here[2]) <= high
+        held, held_high = off <= track + 1e-3, abs(begun[2] - here[2]) <= high + 1e-3  # an acceptance radius, rounded
         yield Line(points, 0.0 if held else track, 0.0 if held_high else high, angles=False)
 
     # -- a fixed wing ------------------------------------------------------------------------------------------------
