@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.app.pipeline import plan
 from gcsplan.app.model import Plan
+from gcsplan.app.pipeline import plan
 from gcsplan.app.rehearsing import rehearse, rehearse_in_sitl
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mission_file import load_mission
