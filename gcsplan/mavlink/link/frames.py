@@ -168,24 +168,28 @@ class FrameParser:
             if message is None:
                 position = start + 1
                 continue
-            messages.append(message)
-            position, rest = end, b""
+            if self._is_taken(message, buffer[start:end]):
+                messages.append(message)
+            position, rest = end, b""  # a bad signature is no frame's beginning: what follows must not wait for it
         self._rest = rest
         return messages
 
     def _decode(self, frame: bytes) -> Any:
-        """The message in a whole frame; None if it does not check."""
+        """The message in a whole frame; None if its checksum does not fit."""
         try:
-            message = self._mav.decode(bytearray(frame))
+            return self._mav.decode(bytearray(frame))
         except dialect.MAVError:
             self.bad += 1
             return None
+
+    def _is_taken(self, message: Any, frame: bytes) -> bool:
+        """Whether the signature lets a message count, which learns whether it came late."""
         verdict = self._signing.judge(frame)
         if verdict != GOOD:
             self.bad += 1
             self.unsigned += 1
         message.late = verdict == LATE
-        return None if verdict == BAD else message
+        return verdict != BAD
 
 
 def _is_unknown_kind(buffer: bytes, start: int) -> bool:
