@@ -20,7 +20,7 @@ from gcsplan.sim.trace import Trace
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 from sitl_tests import sitl
-from tests.worlds import world
+from tests.support.worlds import world
 
 TRACK_ERROR_M = 3.0
 

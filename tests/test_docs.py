@@ -20,8 +20,9 @@ from gcsplan.export.summary import ORDER
 from gcsplan.mission_file import schema
 from gcsplan.planners import registry
 from gcsplan.world.airspace import Kind
+from tests.support.paths import REPOSITORY
 
-TOP = Path(__file__).parents[1]
+TOP = REPOSITORY
 DOCS = TOP / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 

@@ -11,8 +11,8 @@ from gcsplan import load_mission, plan
 from gcsplan.app.outputs import homes_of, outputs_of
 from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.mavlink.mission.compare import compare, faults
+from tests.support.paths import MISSIONS
 
-MISSIONS = Path(__file__).parent.parent / "missions"
 SLOW = {"fleet-100", "fleet-4", "jacksboro-high"}
 
 

@@ -33,6 +33,7 @@ import typer
 from gcsplan.cli import main as cli
 from tests.campaigns.disk import workshop
 from tests.campaigns.hostile import KINDS, write_clean
+from tests.support.paths import REPOSITORY
 
 CODES = {0, 2, 3, 4}
 PATIENCE_S = 10.0
@@ -138,7 +139,7 @@ class Worker:
 
     def __init__(self, folder: Path, seed: int) -> None:
         command = [sys.executable, "-m", "tests.campaigns.files", "--work", "--seed", str(seed)]
-        paths = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+        paths = os.pathsep.join([str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
         environment = os.environ | {"PYTHONPATH": paths}
         self.process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, env=environment)
         self.seed = seed

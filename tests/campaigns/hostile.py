@@ -23,9 +23,9 @@ from rasterio.transform import Affine
 
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan
 from gcsplan.vehicle import Autopilot
-from tests import corpus
-from tests.spoil import ODD, places, spoilt_bytes, spoilt_tree
-from tests.test_hostile import MISSION, ROWS
+from tests.cli.test_hostile import MISSION, ROWS
+from tests.support import corpus
+from tests.support.spoil import ODD, places, spoilt_bytes, spoilt_tree
 
 RICH = """
 version: 1

@@ -21,7 +21,7 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
-from tests.random_worlds import Ground, random_zones
+from tests.support.random_worlds import Ground, random_zones
 
 Floats = NDArray[np.float64]
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.limit_cases import WING_RADIUS_M, Case
-from tests.oracle import Oracle
+from tests.oracles.legs import Oracle
 
 Floats = NDArray[np.float64]
 STEP_M = 0.25

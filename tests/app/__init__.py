@@ -1,0 +1,1 @@
+"""Tests of from a request to what is done."""

@@ -1,0 +1,156 @@
+"""From a mission file to a judged mission, for every kind of vehicle, frame and end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from gcsplan.app.model import Plan
+from gcsplan.app.outputs import outputs_of, summary_of
+from gcsplan.app.pipeline import plan, require_passing
+from gcsplan.errors import CheckFailed, InputError, NoMission
+from gcsplan.mavlink.files.formats import read_plan, read_waypoints
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mission_file import load_mission
+from gcsplan.vehicle import Autopilot
+from tests.support.paths import DATA
+
+CROSSING: dict[str, Any] = yaml.safe_load((DATA / "crossing.yaml").read_text())
+
+
+def planned(vehicle: dict[str, Any] | None = None, limits: dict[str, Any] | None = None, **more: Any) -> Plan:
+    """The crossing with changes to its vehicle, its limits, and the file."""
+    asked = CROSSING | more
+    asked["vehicles"] = [CROSSING["vehicles"][0] | (vehicle or {})]
+    asked["limits"] = CROSSING["limits"] | (limits or {})
+    return plan(load_mission(DATA / "crossing.yaml", text=yaml.safe_dump(asked)))
+
+
+def commands(of: Plan) -> list[int]:
+    return [item.command for item in of.vehicles[0].mission.items]
+
+
+@pytest.mark.slow
+def test_the_example_of_the_contract_plans_as_printed() -> None:
+    done = plan(load_mission(DATA / "interface_example.yaml"))
+    assert [v.name for v in done.vehicles] == ["uav1", "uav2"]
+    for v in done.vehicles:
+        assert v.verdict.safe is True
+        assert v.verdict.length_m > 17_000
+    summary = summary_of(done)
+    assert summary["fleet"]["order"] == ["uav1", "uav2"]
+    first, second = (v["arrive_s"] for v in summary["vehicles"])
+    assert second - first == pytest.approx(9.0, abs=1e-3)
+    assert summary["fleet"]["min_separation_m"] >= 30
+    assert summary["fleet"]["closest"]["vehicles"] == ["uav1", "uav2"]
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_every_autopilot_gets_a_safe_mission_whose_files_read_back_the_same(autopilot: Autopilot) -> None:
+    done = planned({"autopilot": str(autopilot)})
+    (v,) = done.vehicles
+    assert v.verdict.safe is True
+    files = outputs_of(done)
+    for read in (
+        read_plan(files["uav1.plan"], autopilot=None, where="uav1.plan"),
+        read_waypoints(files["uav1.waypoints"], autopilot=autopilot, where="uav1.waypoints"),
+    ):
+        assert [i.wire for i in read.items] == [i.wire for i in v.mission.items]
+        assert read.home == v.mission.home
+
+
+@pytest.mark.parametrize("frame", ["relative", "amsl", "terrain"])
+def test_every_altitude_frame_is_planned_with_its_own_errors(frame: str) -> None:
+    done = planned({"max_climb_deg": 35}, altitude_frame=frame)
+    (v,) = done.vehicles
+    assert v.verdict.safe is True
+    wanted = {"relative": m.RELATIVE, "amsl": m.GLOBAL, "terrain": m.TERRAIN}[frame]
+    assert {i.frame for i in v.mission.items if i.command == m.WAYPOINT} == {wanted}
+    assert v.verdict.lowest is not None
+    assert v.verdict.lowest.min_agl_m >= (95 if frame == "terrain" else 65)
+
+
+@pytest.mark.parametrize("end", ["land", "loiter", "none"])
+def test_every_end_is_planned(end: str) -> None:
+    done = planned({"end": end})
+    assert done.vehicles[0].verdict.safe is True
+    assert commands(done)[-1] == {"land": m.LAND, "loiter": m.LOITER_UNLIM, "none": m.WAYPOINT}[end]
+
+
+@pytest.mark.slow
+def test_a_return_that_meets_the_hills_is_no_mission_and_a_higher_one_is() -> None:
+    with pytest.raises(NoMission, match="rtl"):
+        planned({"end": "rtl", "rtl_rel_home_m": 70}, no_fly=[])
+    done = planned({"end": "rtl", "rtl_rel_home_m": 400}, no_fly=[])
+    assert done.vehicles[0].verdict.safe is True
+    assert done.vehicles[0].verdict.energy_j > 1.5 * done.vehicles[0].verdict.path_energy_j
+
+
+def test_via_points_are_passed() -> None:
+    done = planned({"via": [[36.602, -84.368], [36.600, -84.360, 150]]})
+    (v,) = done.vehicles
+    points = v.solution.path.points
+    world = done.world
+    for lat, lon in ((36.602, -84.368), (36.600, -84.360)):
+        east, north = world.frame.to_plane(lat, lon)
+        assert np.hypot(points[:, 0] - east, points[:, 1] - north).min() < 0.01
+    assert v.verdict.safe is True
+
+
+def test_a_battery_that_is_too_small_is_named() -> None:
+    with pytest.raises(NoMission, match="battery") as refused:
+        planned({"energy": {"battery_j": 200_000, "reserve": 0.2}})
+    assert refused.value.reason == "battery"
+
+
+def test_a_take_off_below_the_limits_is_bad_input_and_one_just_at_them_is_raised_with_a_note() -> None:
+    with pytest.raises(InputError, match="takeoff_agl_m"):
+        planned({"takeoff_agl_m": 50})
+    done = planned({"takeoff_agl_m": 65})
+    assert any("takeoff_agl_m 65 raised" in n for n in done.vehicles[0].notes)
+
+
+def test_the_energy_objective_spends_no_more_than_the_shortest_way() -> None:
+    sharp = yaml.safe_dump(CROSSING | {"planner": {"gap_percent": 0.1}})
+    length, energy = (
+        plan(load_mission(DATA / "crossing.yaml", text=sharp), objective=objective)
+        for objective in ("length", "energy")
+    )
+    assert energy.vehicles[0].verdict.path_energy_j <= length.vehicles[0].verdict.path_energy_j * 1.001
+    assert summary_of(energy)["vehicles"][0]["lower_bound_m"] is None
+
+
+def test_a_world_in_local_metres_is_planned_like_any_other() -> None:
+    text = """
+version: 1
+name: A cube with a mound
+frame: {origin: [36.6, -84.3], amsl_m: 0}
+terrain: {peaks: [{center: [50, 50], height_m: 70, decay_m: [20, 20]}]}
+limits: {min_agl_m: 3, horizontal_clearance_m: 0.2, track_error_m: 0, altitude_error_m: 0}
+vehicles:
+  - name: uav1
+    sysid: 1
+    autopilot: arducopter
+    start: {east_m: 0, north_m: 0, up_m: 0}
+    goal: {east_m: 100, north_m: 100, up_m: 60}
+    end: loiter
+planner: {gap_percent: 5}
+"""
+    done = plan(load_mission("mound.yaml", text=text))
+    (v,) = done.vehicles
+    assert v.verdict.safe is True
+    assert 152.48 < v.verdict.length_m < 175
+    assert v.solution.path.points[-1] == pytest.approx([100, 100, 60], abs=0.2)
+
+
+def test_a_verdict_that_is_not_safe_is_not_let_through() -> None:
+    done = planned()
+    bad = done.vehicles[0].verdict
+    unjudged = type(bad)(bad.mission, bad.legs, (), ("the wind",))
+    require_passing({"uav1": bad})
+    with pytest.raises(CheckFailed, match="the wind"):
+        require_passing({"uav1": unjudged})
+    require_passing({"uav1": unjudged}, allow_unjudged=True)

@@ -1,0 +1,472 @@
+"""The way home: known worlds with known answers, brute force on random ones, rally points where there is no way."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gcsplan.check.flight import follow
+from gcsplan.check.judge import judge
+from gcsplan.check.rtl.everywhere import WayHome, study_of, way_home
+from gcsplan.check.rtl.rally import rally_items
+from gcsplan.check.rtl.rules import Target, returns
+from gcsplan.check.rtl.stretches import rel_home
+from gcsplan.check.rtl.study import CLEAR, LEGAL
+from gcsplan.check.rtl.trail import trail_of
+from gcsplan.check.rtl.walls import Walls
+from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.mission import (
+    LAND,
+    RELATIVE,
+    RTL,
+    TAKEOFF,
+    VTOL_LAND,
+    VTOL_TAKEOFF,
+    WAYPOINT,
+    Home,
+    Mission,
+)
+from gcsplan.mavlink.mission.mission import MissionItem as Item
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.limits import Limits
+from gcsplan.world.world import World
+from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.oracles.returns import breach, random_case
+from tests.support.worlds import vehicle, world
+
+Floats = NDArray[np.float64]
+COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
+
+
+def mission(
+    w: World, places: Sequence[tuple[float, float, float]], autopilot: Autopilot = COPTER, *, land: bool = True
+) -> Mission:
+    """Up at the origin to the first height, along (east, north, above home), down at the last."""
+    plane = autopilot is PLANE
+    lat, lon = w.frame.to_degrees(0.0, 0.0)
+    home = Home.at(float(lat), float(lon), w.ground_amsl(float(lat), float(lon)))
+    items = [Item(VTOL_TAKEOFF if plane else TAKEOFF, RELATIVE, x=home.lat_e7, y=home.lon_e7, z=places[0][2])]
+    for east, north, up in places:
+        lat, lon = w.frame.to_degrees(east, north)
+        items.append(Item(WAYPOINT, RELATIVE, x=round(float(lat) * 1e7), y=round(float(lon) * 1e7), z=up + 0.001))
+    if land:
+        items.append(Item(VTOL_LAND if plane else LAND, RELATIVE, x=items[-1].x, y=items[-1].y))
+    return Mission(autopilot, home, tuple(items))
+
+
+def judged(w: World, m: Mission, v: Vehicle | None = None, rtl: float | None = None, *, rally: bool = True) -> WayHome:
+    v = v or vehicle(m.autopilot)
+    return way_home(judge(m, v, w, rtl_rel_home_m=rtl), v, w, rtl_rel_home_m=rtl, rally=rally)
+
+
+def ridge(east: Floats, north: Floats) -> Floats:
+    """100 m high, from 900 to 1100 m east flat on top, 100 m of slope on either side; ground at 300 m."""
+    return 300.0 + 100.0 * np.clip((300.0 - np.abs(east - 1000.0)) / 200.0, 0.0, 1.0) + 0.0 * north
+
+
+BARE = {"min_agl_m": 20.0, "track_error_m": 0.0, "altitude_error_m": 5.0}
+OVER: list[tuple[float, float, float]] = [(0, 0, 150), (2000, 0, 150), (2000, 0, 40), (3000, 0, 40)]
+"""Over the ridge at 150 m, down behind it, and on along the ground."""
+
+
+def test_over_flat_ground_any_altitude_is_safe() -> None:
+    home = judged(world(), mission(world(), [(0, 0, 80), (3000, 0, 80)]), rtl=15.0)
+    assert home.safe is True
+    assert home.unsafe == ()
+    assert home.lowest_rel_home_m == pytest.approx(5.0, abs=0.2)  # the altitude error; landing columns begin below it
+    assert home.highest_rel_home_m is None
+    assert home.rally == ()
+    # With min AGL 60 and 5 m of error, from the landing column at the goal the return must be at 65.
+    assert home.lowest_legal_rel_home_m == pytest.approx(65.0, abs=0.2)
+    assert [s.from_seq for s in home.irregular] == [4]
+    assert "clear, but not within all limits: 0.00 km, first on the way to item 4" in home.describe()
+
+
+def test_behind_a_ridge_the_return_must_clear_it() -> None:
+    w = world(ridge)
+    home = judged(w, mission(w, OVER), vehicle(**BARE), 50.0)
+    assert home.safe is False
+    assert home.lowest_rel_home_m == pytest.approx(105.0, abs=0.6)
+    assert home.lowest_legal_rel_home_m == pytest.approx(125.0, abs=0.6)
+    assert home.rally == ()  # an altitude cures it
+    assert home.advised_rel_home_m == home.lowest_rel_home_m
+    (stretch,) = home.unsafe
+    # Coming down at 2000 m it is below 105 m from two fifths of that column on; all of the rest is low.
+    assert stretch.from_m == pytest.approx(2000.0, abs=3.0)
+    assert stretch.start[2] == pytest.approx(405.0, abs=6.0)
+    assert stretch.to_m == pytest.approx(3000.0, abs=1.0)
+    assert stretch.lowest_rel_home_m == pytest.approx(105.0, abs=0.6)
+    assert stretch.obstacle is not None
+    east, north = w.frame.to_plane(*stretch.obstacle[:2])
+    assert 890.0 <= float(east) <= 1110.0
+    assert abs(float(north)) < 1.0
+    assert "meets ground" in stretch.describe()
+
+
+@pytest.mark.parametrize("autopilot", [COPTER, PX4])
+def test_at_the_lowest_altitude_it_is_safe_and_a_little_below_it_is_not(autopilot: Autopilot) -> None:
+    w = world(ridge)
+    m, v = mission(w, OVER, autopilot), vehicle(autopilot, **BARE)
+    lowest = judged(w, m, v).lowest_rel_home_m
+    assert lowest is not None
+    assert judged(w, m, v, lowest).safe is True
+    assert judged(w, m, v, lowest - 1.2).safe is False
+
+
+def test_without_an_altitude_the_autopilots_default_is_judged_and_said_so() -> None:
+    for autopilot, parameter, default in (
+        (COPTER, "RTL_ALT", 15.0), (PLANE, "RTL_ALTITUDE", 100.0), (PX4, "RTL_RETURN_ALT", 60.0),
+    ):  # fmt: skip
+        home = judged(world(), mission(world(), [(0, 0, 120), (2000, 0, 120)], autopilot))
+        assert (home.parameter, home.rtl_rel_home_m, home.assumed) == (parameter, default, True)
+        assert any("default" in n and parameter in n for n in home.notes)
+    home = judged(world(), mission(world(), [(0, 0, 120), (2000, 0, 120)]), rtl=40.0)
+    assert not home.assumed
+    assert home.notes == ()
+
+
+def test_a_zone_over_the_way_bounds_the_return_from_above() -> None:
+    shelf = Zone("shelf", Circle(1000.0, 0.0, 200.0), floor=Level(420.0, "amsl"))
+    w = world(300.0, [shelf])
+    m, v = mission(w, [(0, 0, 80), (2500, 0, 80)]), vehicle(**BARE)
+    home = judged(w, m, v, 60.0)
+    assert home.safe is True
+    assert home.highest_rel_home_m == pytest.approx(115.0, abs=0.01)
+    high = judged(w, m, v, 130.0)
+    assert [s.zone for s in high.unsafe] == ["shelf"]
+    # Under the zone, even the climb is shut in; before it, within reach of it, nothing is in the way.
+    assert high.unsafe[0].from_m == pytest.approx(800.0, abs=5.0)
+
+
+def test_a_column_must_not_climb_into_a_zone_and_home_may_lie_under_one() -> None:
+    lid = Zone("lid", Circle(0.0, 0.0, 50.0), floor=Level(400.0, "amsl"))
+    w = world(300.0, [lid])
+    m = mission(w, [(0, 0, 60), (2000, 0, 60)])
+    assert judged(w, m, vehicle(**BARE), 90.0).safe is True
+    assert judged(w, m, vehicle(**BARE), 99.0).unsafe[0].zone == "lid"
+    assert judged(w, m, vehicle(**BARE)).highest_rel_home_m == pytest.approx(95.0, abs=0.01)
+
+
+def test_a_wall_without_a_top_leaves_no_altitude_and_rally_points_mend_it() -> None:
+    tower = Zone("tower", Circle(1500.0, 0.0, 150.0))
+    w = world(300.0, [tower])
+    m = mission(w, [(0, 0, 80), (1500, 900, 80), (4000, 0, 80)])
+    v = vehicle(**BARE)
+    home = judged(w, m, v, 60.0)
+    assert home.lowest_rel_home_m is None
+    assert home.unsafe
+    assert all(s.lowest_rel_home_m is None for s in home.unsafe)
+    assert {s.zone for s in home.unsafe} == {"tower"}
+    assert "no top" in home.unsafe[0].why
+    assert home.rally
+    assert sum(s.to_m - s.from_m for s in home.left) < 0.3 * home.unsafe_m
+    assert any("RALLY_LIMIT_KM" in n for n in home.notes)
+    for item, point in zip(rally_items(home.rally), home.rally, strict=True):
+        assert (item.command, item.frame) == (5100, RELATIVE)
+        assert item.lat_deg == pytest.approx(point.lat_deg)
+        assert item.z == pytest.approx(point.rel_home_m)
+        east, north = w.frame.to_plane(item.lat_deg, item.lon_deg)
+        assert math.hypot(float(east) - 1500.0, float(north)) > 150.0
+    assert judged(w, m, v, 60.0, rally=False).rally == ()
+
+
+def test_a_mission_that_hugs_a_zone_is_not_called_shut_in() -> None:
+    # The shortest way around a tower touches its clearance; what lies behind it is in its shadow, what lies before not.
+    turn, reach = math.asin(230.03 / 1500.0), math.sqrt(1500.0**2 - 230.03**2)
+    touch = [(0.0, 0.0, 80.0), (reach * math.cos(turn), reach * math.sin(turn), 80.0), (1500.0, 1500.0, 80.0)]
+    corner = Zone("tower", Circle(1500.0, 0.0, 200.0))
+    w = world(300.0, [corner])
+    v = vehicle(min_agl_m=20.0, track_error_m=0.0, altitude_error_m=5.0, horizontal_clearance_m=30.0)
+    v = replace(v, corner_accel_m_s2=math.inf)  # turns on the spot
+    m = mission(w, touch)
+    assert judge(m, v, w).findings == ()
+    home = judged(w, m, v, 60.0)
+    assert home.unsafe == ()
+    assert home.lowest_rel_home_m is not None
+    block = np.array([[900.0, -300.0], [1500.0, -300.0], [1500.0, 200.0], [900.0, 200.0]])
+    w = world(300.0, [Zone("block", Polygon(block))])
+    along = [(0.0, 231.0, 80.0), (2500.0, 231.0, 80.0)]
+    m = mission(w, [(0.0, 0.0, 80.0), *along])
+    assert judge(m, v, w).findings == ()
+    (stretch,) = judged(w, m, v, 60.0, rally=False).unsafe
+    # Home is at the south-west corner: from 231 m north the way is shut as soon as it meets the block's western side.
+    assert stretch.from_m == pytest.approx(231.0 + 900.0 + 0.0, abs=60.0)
+
+
+def test_each_autopilot_gets_rally_points_at_the_altitude_that_it_understands() -> None:
+    def slope(east: Floats, north: Floats) -> Floats:
+        return 300.0 + 0.02 * east + 0.0 * north
+
+    w = world(slope, [Zone("tower", Circle(1500.0, 0.0, 150.0))])
+    for autopilot in (COPTER, PX4):
+        v = vehicle(autopilot, **BARE)
+        m = mission(w, [(0, 0, 80), (1500, 900, 120), (4000, 0, 170)], autopilot)
+        home = judged(w, m, v, 90.0)
+        assert home.rally
+        assert home.advised_rel_home_m is not None
+        for point in home.rally:
+            on_ground = point.ground_amsl_m - home.home[2]
+            if autopilot is PX4:  # it returns at RTL_RETURN_ALT above the point
+                assert point.rel_home_m == pytest.approx(on_ground, abs=0.01)
+            else:  # it returns at the point's own altitude, or at RTL_ALT if that is more
+                assert point.rel_home_m >= max(home.advised_rel_home_m, on_ground + 5.0) - 0.01
+
+
+def test_what_rally_points_leave_unsafe_is_what_brute_force_finds() -> None:
+    tower = Zone("tower", Circle(1500.0, 0.0, 150.0))
+    w = world(300.0, [tower])
+    home = judged(w, mission(w, [(0, 0, 80), (1500, 900, 80), (4000, 0, 80)]), vehicle(**BARE), 60.0)
+    spots = np.array([(0.0, 0.0), *(w.frame.to_plane(r.lat_deg, r.lon_deg) for r in home.rally)])
+    a, b, c = np.array([0.0, 0.0]), np.array([1500.0, 900.0]), np.array([4000.0, 0.0])
+    first = math.dist(a, b)
+    for along in np.linspace(0.0, first + math.dist(b, c), 400):
+        p = a + (b - a) * along / first if along <= first else b + (c - b) * (along - first) / math.dist(b, c)
+        target = spots[np.hypot(*(spots - p).T).argmin()]
+        t = np.linspace(0.0, 1.0, 400)[:, None]
+        met = np.hypot(*(p + t * (target - p) - np.array([1500.0, 0.0])).T).min() < 150.0
+        if met:
+            assert any(s.from_m <= along <= s.to_m for s in home.left), along
+
+
+def test_within_the_cone_less_is_climbed_and_both_are_judged() -> None:
+    # A knob beside home, 40 m high and 60 m away: with the cone a copter passes 10 m behind it at 3 · 70 = 210 m.
+    def knob(east: Floats, north: Floats) -> Floats:
+        return np.where((np.abs(east - 100.0) < 1.0) & (np.abs(north) < 1.0), 360.0, 300.0)
+
+    w = world(knob)
+    low = mission(w, [(0, 0, 30), (0, 300, 30), (180, 0, 30)])
+    steep = judged(w, low, vehicle(**BARE), 100.0)
+    gentle = judged(w, mission(w, [(0, 0, 30), (0, 300, 30), (180, 0, 30)], PX4), vehicle(PX4, **BARE), 250.0)
+    assert steep.unsafe == ()  # 3 · 180 m is more than 100 m
+    assert gentle.unsafe == ()  # 180 m is enough over 60
+    near = Zone("post", Circle(30.0, 0.0, 5.0), ceiling=Level(50.0, "agl"))
+    w = world(300.0, [near])
+    m = mission(w, [(0, 0, 20), (0, 200, 20), (45, 0, 20)])
+    px4 = mission(w, [(0, 0, 20), (0, 200, 20), (45, 0, 20)], PX4)
+    assert judged(w, m, vehicle(**BARE), 100.0).unsafe == ()  # from 45 m away it climbs to 100 m first
+    sharp = replace(vehicle(PX4, **BARE), corner_accel_m_s2=math.inf)
+    assert [s.zone for s in judged(w, px4, sharp, 100.0).unsafe] == ["post"]  # 45 m is too low
+
+
+def test_a_plane_climbs_on_its_way_and_may_meet_what_an_altitude_would_clear() -> None:
+    w = world(ridge)
+    far = [(0.0, 0.0, 150.0), (6000.0, 0.0, 150.0), (6000.0, 0.0, 60.0)]
+    near = [(0.0, 0.0, 150.0), (2000.0, 0.0, 150.0), (1330.0, 300.0, 30.0)]
+    limits = dict(BARE, track_error_m=10.0)
+    assert judged(w, mission(w, far, PLANE, land=False), vehicle(PLANE, **limits), 120.0).unsafe == ()
+    close = judged(w, mission(w, near, PLANE, land=False), vehicle(PLANE, **limits), 120.0)
+    assert close.unsafe
+    assert close.unsafe[-1].lowest_rel_home_m is None  # it cannot climb 75 m in 250
+    copter = judged(w, mission(w, near, land=False), vehicle(**limits), 120.0)
+    assert copter.unsafe == ()
+
+
+def test_a_planes_columns_are_left_out_and_said_so() -> None:
+    m = mission(world(), [(0, 0, 120), (3000, 0, 120)], PLANE)
+    home = judged(world(), m, vehicle(PLANE, **BARE), 100.0)
+    assert home.safe is True
+    assert home.lowest_rel_home_m is not None
+    assert any("take-off and landing" in n for n in home.notes)
+    v = replace(vehicle(PLANE, **dict(BARE, track_error_m=15.0)), turn_radius_m=60.0)
+    bent = judged(world(), mission(world(), [(0, 0, 120), (1500, 0, 120), (1500, 1500, 120)], PLANE), v, 100.0)
+    assert bent.unsafe == ()
+    assert max(p.to_m for p in bent.profile) < 3000.0  # the corner is cut by an arc
+
+
+def test_the_circle_over_home_is_judged_for_a_plane() -> None:
+    def bump(east: Floats, north: Floats) -> Floats:
+        return 300.0 + 90.0 * np.exp(-((east + 100.0) ** 2 + north**2) / 2e3)
+
+    w = world(bump)
+    m = mission(w, [(0, 0, 150), (2000, 0, 150)], PLANE, land=False)
+    assert judged(w, m, vehicle(PLANE, **BARE), 60.0).safe is False
+    assert judged(w, mission(w, [(0, 0, 150), (2000, 0, 150)], land=False), vehicle(**BARE), 60.0).safe is True
+
+
+def test_over_unknown_ground_no_return_is_safe() -> None:
+    def hole(east: Floats, north: Floats) -> Floats:
+        return np.where((np.abs(east - 1000.0) < 150.0) & (np.abs(north) < 150.0), np.nan, 300.0)
+
+    w = world(hole)
+    home = judged(w, mission(w, [(0, 0, 80), (0, 1500, 80), (2500, 0, 80)]), vehicle(**BARE), 60.0)
+    assert home.unsafe
+    assert "unknown" in home.unsafe[0].why
+    assert home.lowest_rel_home_m is None
+
+
+def test_max_agl_and_max_amsl_are_limits_but_not_obstacles() -> None:
+    def dip(east: Floats, north: Floats) -> Floats:
+        return 300.0 - 80.0 * np.exp(-((east - 1000.0) ** 2) / 4e4) + 0.0 * north
+
+    w = world(dip)
+    m = mission(w, [(0, 0, 60), (0, 800, 60), (2500, 0, 60)])
+    home = judged(w, m, vehicle(**BARE, max_agl_m=120.0), 60.0)
+    assert home.safe is True
+    assert {"max_agl_m" in s.why for s in home.irregular} == {True}
+    home = judged(w, m, vehicle(**BARE, max_amsl_m=370.0), 100.0)
+    assert home.safe is True
+    assert home.lowest_legal_rel_home_m is not None
+    assert {"max_amsl_m" in s.why for s in home.irregular} == {True}
+
+
+def test_a_low_landing_column_is_told_from_the_flight_above_it() -> None:
+    def step(east: Floats, north: Floats) -> Floats:
+        return 300.0 + 40.0 * np.clip((np.abs(east - 1500.0) < 300.0) * 1.0, 0, 1) + 0.0 * north
+
+    w = world(step)
+    home = judged(w, mission(w, [(0, 0, 100), (2500, 0, 100)]), vehicle(**BARE), 15.0)
+    (stretch,) = home.unsafe
+    assert (stretch.from_seq, stretch.to_seq) == (4, 4)
+    assert stretch.start[2] == pytest.approx(345.0, abs=4.5)
+    assert stretch.from_m == stretch.to_m == pytest.approx(2500.0, abs=0.5)
+
+
+def test_a_mission_that_returns_by_itself_has_its_other_stretches_judged() -> None:
+    w = world(ridge)
+    m = mission(w, OVER, land=False)
+    m = replace(m, items=(*m.items, Item(RTL, 2)))
+    home = judged(w, m, vehicle(**BARE), 50.0)
+    assert home.safe is False
+    assert home.not_judged == ()
+    assert home.unsafe[0].to_m == pytest.approx(3000.0, abs=1.0)
+
+
+def test_what_cannot_be_followed_is_not_called_safe() -> None:
+    w = world()
+    m = mission(w, [(0, 0, 80), (1000, 0, 80)], land=False)
+    home = judged(w, replace(m, items=(*m.items, Item(222, 2))), rtl=60.0)
+    assert home.safe is None
+    assert home.not_judged
+    nothing = judged(w, replace(m, items=()), rtl=60.0)
+    assert nothing.safe is None
+    assert nothing.as_dict()["lowest_rel_home_m"] is None
+
+
+def test_figures_are_plain_values_and_words() -> None:
+    w = world(ridge, [Zone("shelf", Circle(1000.0, 0.0, 200.0), floor=Level(520.0, "amsl"))])
+    v = vehicle(**BARE)
+    v = replace(v, energy=replace(v.energy, battery_j=450_000.0))
+    home = judged(w, mission(w, OVER), v, 50.0)
+    told = json.loads(json.dumps(home.as_dict(profile=True), allow_nan=False))
+    assert told["unsafe"][0]["why"] in home.describe()
+    assert told["highest_rel_home_m"] == pytest.approx(215.0, abs=0.01)
+    assert len(told["profile"]) == len(home.profile) > 20
+    along = [p.from_m for p in home.profile]
+    assert along == sorted(along)
+    assert max(p.to_m for p in home.profile) == pytest.approx(3000.0, abs=1.0)
+    assert max(p.clear_amsl_m or 0.0 for p in home.profile) == pytest.approx(405.0, abs=0.6)
+
+
+# -- brute force ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "seeds"), [(COPTER, (5002, 5119, 6077, 4000, 4002)), (PX4, (4003, 4007, 4011)), (PLANE, (4000, 4001))]
+)
+def test_never_kinder_than_brute_force_in_rough_random_worlds(autopilot: Autopilot, seeds: Sequence[int]) -> None:
+    worlds = unsafe = strict = looked = 0
+    for seed in seeds:
+        case = random_case(np.random.default_rng(seed), autopilot)
+        if case is None:
+            continue
+        worlds += 1
+        stored = replace(case.mission, items=tuple(manner(autopilot).stored(i) for i in case.mission.items))
+        flight = follow(stored, case.vehicle, case.world.ground_amsl, rtl_rel_home_m=case.level_rel_home_m)
+        trail = trail_of(flight, case.vehicle, case.world, 30.0)
+        assert trail is not None
+        east, north, ground = case.corners[0].tolist()
+        target, level = Target(east, north, ground, ground), ground + case.level_rel_home_m
+        study = study_of(trail, target, case.vehicle, level)
+        bad = [study.bad(grade, level) for grade in (CLEAR, LEGAL)]
+        lowest = [study.strict[grade].together(study.start) for grade in (CLEAR, LEGAL)]
+        first_leg = int(autopilot is PLANE)  # a plane's columns are not judged
+        for i in range(trail.mains):
+            for f in np.linspace(0.0, 1.0, 4):
+                u = trail.first[i] + f * (trail.last[i] - trail.first[i])
+                at, to = case.corners[i + first_leg : i + first_leg + 2]
+                at = at + f * (to - at)
+                assert trail.points(np.array([u]))[0, :3] == pytest.approx(at, abs=1e-3)
+                part = (study.cuts.start <= u + 1e-12) & (study.cuts.end >= u - 1e-12)
+                for grade in (CLEAR, LEGAL):
+                    found = breach(case, at, legal=grade == LEGAL)
+                    assert not found or bad[grade][part].any(), (seed, i, f, grade, found)
+                    looked, unsafe = looked + 1, unsafe + bool(found)
+                    strict += not found and bool(bad[grade][part].all())
+                for grade, least in enumerate(lowest):
+                    if math.isfinite(least):
+                        found = breach(replace(case, level_rel_home_m=least - ground), at, legal=grade == LEGAL)
+                        assert not found, (seed, "lowest", i, f, grade, found)
+    assert worlds >= 2
+    assert 0.1 < unsafe / looked < 0.9
+    assert strict <= 0.2 * looked  # on ground as rough as this the bounds beside a line cost that much
+
+
+def test_on_smooth_ground_the_lowest_altitude_is_hardly_higher_than_it_must_be() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(4):
+        knobs = [(rng.uniform(-2e3, 2e3, 2), rng.uniform(30, 150), rng.uniform(300, 700)) for _ in range(8)]
+
+        def hills(east: Floats, north: Floats, knobs: list[tuple[Floats, float, float]] = knobs) -> Floats:
+            rise = np.zeros_like(east)
+            for (e, n), top, wide in knobs:
+                rise = rise + top * np.exp(-((east - e) ** 2 + (north - n) ** 2) / (2.0 * wide**2))
+            return 300.0 + rise
+
+        w = world(hills, half_m=4_000.0)
+        places = [(0.0, 0.0, 1.0), *((float(e), float(n), 1.0) for e, n in rng.uniform(-2500, 2500, (3, 2)))]
+        v = vehicle(min_agl_m=20.0, track_error_m=3.0, altitude_error_m=5.0)
+        lowest = judged(w, mission(w, places), v).lowest_rel_home_m
+        assert lowest is not None
+        top = 0.0
+        corners = np.array(places)[:, :2]
+        surface, home = w.airspace.surface, w.ground_amsl(36.6, -84.3)
+        for a, b in pairwise(corners):
+            p = a + np.linspace(0.0, 1.0, 300)[:, None] * (b - a)
+            line = p[:, None] * np.linspace(0.0, 1.0, 300)[:, None]
+            top = max(top, float(surface.ground_at(line[..., 0], line[..., 1]).max()))
+        assert top + 5.0 - home - 0.1 <= lowest <= top + 5.0 - home + 3.0
+
+
+def test_walls_go_up_from_top_to_top() -> None:
+    back = np.array([0, 0, 0, 1, 2, 2], dtype=np.intp)
+    walls = Walls(
+        np.array([10.0, 10.0, 10.0]), back,
+        np.array([-np.inf, 15.0, 60.0, -np.inf, -np.inf, 25.0]), np.array([20.0, 40.0, np.inf, 50.0, 30.0, np.inf]),
+        np.array([10.0] * 6), np.array([np.inf, np.inf, np.inf, np.inf, np.inf, np.inf]),
+        np.array([-1, 0, 1, -1, -1, 2], dtype=np.intp),
+    )  # fmt: skip
+    each = walls.lowest(0.0)
+    assert each.tolist() == [40.0, 50.0, math.inf]  # over the ground it is in the zone; the third has a lid at 25
+    assert walls.together(0.0) == math.inf
+    two = np.array([True, True, False])
+    assert walls.together(0.0, two) == 50.0
+    kept = walls.take(two)
+    assert kept.together(0.0) == 50.0
+    assert kept.highest(50.0) == 60.0
+    assert kept.passes(50.0).all()
+    assert not kept.passes(60.1).any() or kept.passes(60.1).tolist() == [False, True]
+    assert rel_home(kept, 50.0, 3.0) == 47.0
+    swapped = kept.ordered(np.array([1, 0]))
+    assert swapped.lowest(0.0).tolist() == [50.0, 40.0]
+
+
+def test_the_return_from_the_middle_is_never_judged_more_strictly_than_from_the_whole() -> None:
+    w = world(ridge, [Zone("p", Polygon(np.array([[500.0, 50], [700, 50], [600, 300]])), ceiling=Level(60.0, "agl"))])
+    v = replace(vehicle(**BARE), limits=Limits(20.0, 150.0, 480.0, 30.0, 3.0, 5.0))
+    m = mission(w, OVER)
+    trail = trail_of(follow(m, v, w.ground_amsl, rtl_rel_home_m=50.0), v, w, 30.0)
+    assert trail is not None
+    cuts = trail.cut(50.0)
+    target = Target(0.0, 0.0, 300.0, 300.0)
+    whole, middle = (returns(trail, cuts, target, v, whole=x) for x in (True, False))
+    for grade in (CLEAR, LEGAL):
+        assert (middle[grade].lowest(300.0) <= whole[grade].lowest(300.0) + 1e-6).all()
+        for level in (320.0, 380.0, 430.0):
+            assert (middle[grade].passes(level) >= whole[grade].passes(level)).all()

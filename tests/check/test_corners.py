@@ -1,0 +1,218 @@
+"""Corners that autopilots cut: legs are judged as wide as the vehicle may fly beside them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from gcsplan.app.pipeline import plan
+from gcsplan.check.judge import judge
+from gcsplan.check.tuning import Tuning
+from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.build.multirotor import corner_m
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.mission_file import load_mission
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.world import World
+from gcsplan.world.zones import Circle, Level, Zone
+from tests.support.paths import DATA
+from tests.support.worlds import vehicle, world
+
+COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
+FLAT = world(half_m=4000.0)
+HOME = Home.at(36.6, -84.3, 300.0)
+
+
+def at(command: int, east: float, north: float, up: float, *params: float) -> MissionItem:
+    lat, lon = (float(x) for x in FLAT.frame.to_degrees(east, north))
+    p1, p2, p3, p4 = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return MissionItem(command, m.RELATIVE, (p1, p2, p3, p4), m.degrees_e7(lat), m.degrees_e7(lon), up)
+
+
+def mission(autopilot: Autopilot, *items: MissionItem) -> Mission:
+    up = at(m.VTOL_TAKEOFF if autopilot is PLANE else m.TAKEOFF, 0, 0, 100)
+    return Mission(autopilot, HOME, (up, *items, at(m.LOITER_UNLIM, 2000, 2000, 100)), "uav1")
+
+
+def around(
+    autopilot: Autopilot, radius_m: float, *, hold_s: float = 0.0, corner: tuple[float, float] = (1000, 0)
+) -> Mission:
+    """East, then north round a corner, with an acceptance radius there."""
+    return mission(autopilot, at(m.WAYPOINT, *corner, 100, hold_s, radius_m), at(m.WAYPOINT, 1000, 1000, 100, 0, 1.0))
+
+
+def inside(east: float, north: float, radius_m: float, *ceiling: float) -> World:
+    zone = Zone("inside", Circle(east, north, radius_m), None, Level(*ceiling, "agl") if ceiling else None)
+    return World(FLAT.frame, Airspace(FLAT.airspace.surface, [zone]))
+
+
+def verdict(flown: Mission, where: World, craft: Vehicle | None = None, tuning: Tuning | None = None) -> Verdict:
+    craft = craft or vehicle(flown.autopilot, horizontal_clearance_m=0.0)
+    return judge(flown, craft, where, **({} if tuning is None else {"tuning": tuning}))
+
+
+@pytest.mark.parametrize("autopilot", [PX4, PLANE])
+def test_an_acceptance_radius_that_cuts_through_a_zone_is_unsafe(autopilot: Autopilot) -> None:
+    # The zone of 100 m stands clear of both legs; 255 m before the corner it turns, straight through it.
+    zone = inside(880.0, 130.0, 100.0)
+    tight, wide = (verdict(around(autopilot, r), zone) for r in (2.0, 255.0))
+    assert tight.safe is True, tight.describe()
+    assert {(f.kind, f.zone) for f in wide.findings} == {("zone", "inside")}
+    assert {f.seq - wide.mission.first_seq for f in wide.findings} <= {1, 2}
+
+
+def test_px4_takes_its_own_parameter_where_the_item_gives_no_radius() -> None:
+    craft = vehicle(PX4, horizontal_clearance_m=0.0)
+    near = inside(991.0, 9.0, 4.0)  # 5 m from both legs; a turn begun 10 m before the corner passes it by at 2 m
+    for radius in (0.0, -3.0, math.nan, math.inf):
+        one = verdict(around(PX4, radius), near, craft)
+        assert one.safe is False, radius
+        assert any("NAV_ACC_RAD 10 m, the default" in n for n in one.notes)
+    assert verdict(around(PX4, 2.0), near, craft).safe is True
+    read = verdict(around(PX4, 0.0), near, craft, Tuning.of({"NAV_ACC_RAD": 2.0}))
+    assert read.safe is True, read.describe()
+
+
+def test_arduplane_turns_by_its_own_parameters_where_the_item_gives_no_radius() -> None:
+    craft = vehicle(PLANE, horizontal_clearance_m=0.0)  # at 15 m/s it turns 61 m before a right angle
+    near = inside(970.0, 30.0, 20.0)
+    assert verdict(around(PLANE, 0.0), near, craft).safe is False
+    assert verdict(around(PLANE, 5.0), near, craft).safe is True
+    assert verdict(around(PLANE, 0.0), near, craft, Tuning.of({"WP_RADIUS": 5.0})).safe is True
+
+
+def test_arduplane_flying_past_its_way_point_is_not_judged() -> None:
+    one = mission(PLANE, at(m.WAYPOINT, 1000, 0, 100, 0, 5.0, 40.0), at(m.WAYPOINT, 1000, 1000, 100, 0, 5.0))
+    found = verdict(one, FLAT)
+    assert found.safe is None
+    assert any(words.startswith("item 2: flies 40 m past") for words in found.not_judged)
+
+
+def test_arducopter_cuts_within_its_own_radius_and_stops_at_a_hold() -> None:
+    sharp = vehicle(COPTER, horizontal_clearance_m=0.0, track_error_m=0.5)
+    near = inside(998.5, 1.5, 0.9)  # 0.6 m from both legs, and 2 m from the corner
+    assert verdict(around(COPTER, 0.0), near, sharp).safe is False
+    assert verdict(around(COPTER, 0.0, hold_s=3.0), near, sharp).safe is True
+    assert verdict(around(COPTER, 0.0), near, sharp, Tuning.of({"WPNAV_RADIUS": 10.0})).safe is True
+    held = vehicle(COPTER, horizontal_clearance_m=0.0, track_error_m=2.0)  # holds the corner, by its definition
+    assert verdict(around(COPTER, 0.0), inside(996.0, 4.0, 1.9), held).safe is True
+    ideal = replace(sharp, corner_accel_m_s2=math.inf)
+    assert verdict(around(COPTER, 0.0), near, ideal).safe is True
+
+
+def test_a_hold_of_px4_begins_within_the_radius_too() -> None:
+    zone = inside(880.0, 130.0, 100.0)
+    assert verdict(around(PX4, 255.0, hold_s=20.0), zone).safe is False
+
+
+def test_a_leg_that_is_left_before_its_end_is_judged_in_height_too() -> None:
+    # Down into a dip over 400 m: who turns 200 m before the end of the descent is 25 m higher beside the next leg.
+    items = (
+        at(m.WAYPOINT, 600, 0, 150, 0, 2.0),
+        at(m.WAYPOINT, 1000, 0, 100, 0, 200.0),
+        at(m.WAYPOINT, 1000, 900, 100, 0, 2.0),
+    )
+    low = inside(1000.0, 30.0, 20.0)
+    above = World(
+        low.frame, type(low.airspace)(low.airspace.surface, [replace(low.airspace.zones[0], floor=Level(112.0, "agl"))])
+    )
+    craft = vehicle(PLANE, horizontal_clearance_m=0.0)
+    assert verdict(mission(PLANE, *items), above, craft).safe is False
+    near = [replace(i, params=(0.0, 2.0, 0.0, 0.0)) for i in items]
+    assert verdict(mission(PLANE, *near), above, craft).safe is True
+
+
+def test_a_landing_of_px4_begins_beside_its_place() -> None:
+    items = (at(m.WAYPOINT, 1000, 0, 100, 0, 2.0), at(m.LAND, 1000, 500, 0))
+    flown = Mission(PX4, HOME, (at(m.TAKEOFF, 0, 0, 100), *items), "uav1")
+    beside = inside(1008.0, 500.0, 2.0, 40.0)
+    assert verdict(flown, beside).safe is False
+    assert verdict(flown, beside, tuning=Tuning.of({"NAV_ACC_RAD": 2.0})).safe is True
+
+
+@pytest.mark.parametrize("autopilot", [COPTER, PLANE])
+def test_a_circle_may_be_left_anywhere(autopilot: Autopilot) -> None:
+    # The leg from the circle's northern edge to the east passes the zone, the one from its middle does not.
+    circle = at(m.LOITER_TURNS, 0, 1000, 100, 2.0, 0, 200.0)
+    one = mission(autopilot, circle, at(m.WAYPOINT, 1500, 1000, 100, 0, 2.0))
+    beside = inside(450.0, 1140.0, 30.0)
+    assert verdict(one, beside).safe is False
+    assert verdict(one, inside(1000.0, 1060.0, 5.0)).safe is False  # 67 m beside the leg when two thirds are flown
+    assert verdict(one, inside(450.0, 1400.0, 30.0)).safe is True
+
+
+@pytest.mark.parametrize("autopilot", [COPTER, PX4])
+def test_a_return_begins_where_the_vehicle_is_and_not_where_its_way_point_is(autopilot: Autopilot) -> None:
+    items = (at(m.LOITER_TURNS, 0, 2000, 100, 2.0, 0, 200.0),) if autopilot is COPTER else (
+        at(m.WAYPOINT, 1000, 1000, 100, 0, 2.0), at(m.WAYPOINT, 0, 2000, 100, 0, 200.0),
+    )  # fmt: skip
+    flown = Mission(autopilot, HOME, (at(m.TAKEOFF, 0, 0, 100), *items, MissionItem(m.RTL, m.NO_POSITION)), "uav1")
+    craft = vehicle(autopilot, horizontal_clearance_m=0.0)
+    post = Zone("post", Circle(70.0, 1000.0, 10.0), Level(150.0, "agl"))  # beside the middle of the way home
+    where = World(FLAT.frame, Airspace(FLAT.airspace.surface, [post]))
+    assert judge(flown, craft, where, rtl_rel_home_m=160.0).safe is False
+    assert judge(flown, craft, where, rtl_rel_home_m=120.0).safe is True
+
+
+def test_a_landing_behind_a_circle_is_on_the_circle_where_it_gives_no_place() -> None:
+    circle = at(m.LOITER_TURNS, 0, 1000, 100, 2.0, 0, 100.0)
+    ways = {}
+    for name, land in (("here", MissionItem(m.LAND, m.RELATIVE)), ("there", at(m.LAND, 0, 1000, 0))):
+        flown = Mission(COPTER, HOME, (at(m.TAKEOFF, 0, 0, 100), circle, land), "uav1")
+        ways[name] = verdict(flown, inside(90.0, 1000.0, 5.0, 60.0)).safe
+    assert ways == {"here": False, "there": True}
+
+
+@pytest.mark.parametrize("autopilot", [PX4, PLANE])
+def test_a_radius_longer_than_the_leg_skips_way_points(autopilot: Autopilot) -> None:
+    # From the first of three near points it may fly straight on: along the hypotenuse.
+    near = [at(m.WAYPOINT, 1000 + 20 * k, 20.0 * (k % 2), 100, 0, 100.0) for k in range(3)]
+    one = mission(autopilot, *near, at(m.WAYPOINT, 1040, 1000, 100, 0, 2.0))
+    assert verdict(one, inside(985.0, 400.0, 15.0)).safe is False
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("autopilot", [PX4, PLANE])
+def test_no_straight_line_from_where_it_turns_leaves_what_is_judged(autopilot: Autopilot, seed: int) -> None:
+    """Zones as wide as they may be for the check; the vehicle flies straight from each turn to the next."""
+    rng = np.random.default_rng([7, seed])
+    craft = vehicle(autopilot, horizontal_clearance_m=0.0, track_error_m=0.0, altitude_error_m=0.0)
+    for _ in range(5):
+        count = int(rng.integers(3, 6))
+        points = np.column_stack([rng.uniform(-600, 600, (count, 2)), np.full(count, 100.0)])
+        radii = np.floor(rng.choice([2.0, 20.0, 80.0, 250.0], count))
+        items = [at(m.WAYPOINT, *p, 0.0, r) for p, r in zip(points, radii, strict=True)]
+        flown, here = [np.zeros(2)], np.zeros(2)
+        for p, r in zip(points[:, :2], radii, strict=True):
+            far = float(np.hypot(*(p - here)))
+            if far > r:
+                here = here + (p - here) * (far - r) / far
+            flown.append(here)
+        flown.append(np.array([2000.0, 2000.0]))
+        track = np.concatenate([a + np.linspace(0, 1, 400)[:, None] * (b - a) for a, b in itertools.pairwise(flown)])
+        middle = track[int(rng.integers(0, len(track)))] + rng.normal(0, 60.0, 2)
+        low, high = 0.0, 3000.0
+        for _ in range(18):
+            half = 0.5 * (low + high)
+            safe = verdict(mission(autopilot, *items), inside(*middle, half), craft).safe
+            low, high = (half, high) if safe else (low, half)
+        nearest = float(np.hypot(*(track - middle).T).min())
+        assert nearest >= low - 0.05, (seed, middle, points, radii)
+
+
+@pytest.mark.parametrize("autopilot", [COPTER, PX4])
+def test_a_plan_keeps_what_its_corners_take_beyond_the_track_error(autopilot: Autopilot) -> None:
+    crossing = yaml.safe_load((DATA / "crossing.yaml").read_text())
+    crossing["limits"]["track_error_m"] = 0.5
+    crossing["vehicles"][0]["autopilot"] = str(autopilot)
+    (planned,) = plan(load_mission("corner.yaml", text=yaml.safe_dump(crossing))).vehicles
+    assert planned.verdict.safe is True
+    assert corner_m(planned.request.vehicle) == (2.0 if autopilot is COPTER else 1.0)
+    assert planned.verdict.nearest is None or planned.verdict.nearest.zone_clearance_m >= 30.0 + 0.5 + 1.0

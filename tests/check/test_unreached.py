@@ -1,0 +1,147 @@
+"""What is never flown, what is refused on upload, and params that make another flight of a command."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from gcsplan.check.judge import judge
+from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.vehicle import Autopilot, Energy, Vehicle
+from tests.support.worlds import vehicle, world
+
+COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
+FLAT = world(half_m=6000.0)
+HOME = Home.at(36.6, -84.3, 300.0)
+LAND_START, CAMERA = 189, 206
+
+
+def at(command: int, east: float, north: float = 0.0, up: float = 100.0, *params: float, frame: int = 3) -> MissionItem:
+    lat, lon = (float(x) for x in FLAT.frame.to_degrees(east, north))
+    p1, p2, p3, p4 = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return MissionItem(command, frame, (p1, p2, p3, p4), m.degrees_e7(lat), m.degrees_e7(lon), up)
+
+
+def do(command: int, *params: float) -> MissionItem:
+    p1, p2, p3, p4 = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return MissionItem(command, m.NO_POSITION, (p1, p2, p3, p4))
+
+
+def flown(
+    autopilot: Autopilot, *items: MissionItem, craft: Vehicle | None = None, rtl_m: float | None = None
+) -> Verdict:
+    up = at(m.VTOL_TAKEOFF if autopilot is PLANE else m.TAKEOFF, 0)
+    craft = craft or vehicle(autopilot)
+    return judge(Mission(autopilot, HOME, (up, *items), "uav1"), craft, FLAT, rtl_rel_home_m=rtl_m)
+
+
+A, B = at(m.WAYPOINT, 1000, 0, 100, 0, 2.0), at(m.WAYPOINT, 2000, 0, 100, 0, 2.0)
+WAIT, DOWN = at(m.LOITER_UNLIM, 1500), at(m.LAND, 2000, 0, 0)
+
+
+@pytest.mark.parametrize("autopilot", [COPTER, PX4])
+def test_what_stands_behind_a_hold_without_end_is_a_finding(autopilot: Autopilot) -> None:
+    verdict = flown(autopilot, A, WAIT, B, DOWN)
+    (finding,) = verdict.findings
+    wait = verdict.mission.first_seq + 2
+    assert (finding.kind, finding.seq) == ("unreachable", wait + 1)
+    assert f"item {wait} holds without end: items {wait + 1} to {wait + 2} are never reached" in finding.message
+    assert max(leg.seq for leg in verdict.legs) == wait  # nothing behind it counts as flown
+
+
+def test_a_hold_without_end_that_ends_the_mission_is_none() -> None:
+    craft = replace(vehicle(COPTER), energy=Energy(120.0, 100.0, hover_w=400.0, battery_j=1e6, reserve=0.2))
+    verdict = flown(COPTER, A, WAIT, craft=craft)
+    assert verdict.safe is True, verdict.describe()
+    used = 120.0 * 100 + 100.0 * 1500
+    assert verdict.until_reserve_s == pytest.approx((0.8e6 - used) / 400.0, rel=1e-3)
+    assert any("the battery comes to its reserve after" in n for n in verdict.notes)
+    short = replace(craft, energy=replace(craft.energy, battery_j=190_000.0))  # it does not get there
+    assert [f.kind for f in flown(COPTER, A, WAIT, craft=short).findings] == ["battery"]
+    unknown = replace(craft, energy=replace(craft.energy, hover_w=0.0))
+    assert any("is not known, for hover_w is 0" in n for n in flown(COPTER, A, WAIT, craft=unknown).notes)
+
+
+def test_a_plane_that_circles_without_end_takes_what_its_way_takes() -> None:
+    craft = replace(vehicle(PLANE), energy=Energy(120.0, 20.0, battery_j=1e6, reserve=0.0))
+    verdict = flown(PLANE, A, at(m.LOITER_UNLIM, 2000, 0, 100, 0, 0, 80.0), craft=craft)
+    left_j = 1e6 - verdict.energy_j
+    assert verdict.until_reserve_s == pytest.approx(left_j / (20.0 * craft.speed_max_m_s), rel=1e-6)
+
+
+def test_do_items_behind_a_hold_are_carried_out_by_ardupilot_and_not_by_px4() -> None:
+    shot = do(CAMERA, 25.0)
+    assert flown(COPTER, A, WAIT, shot).safe is True
+    assert [f.kind for f in flown(PX4, A, WAIT, shot).findings] == ["unreachable"]
+
+
+def test_a_landing_that_a_return_leads_to_is_not_judged() -> None:
+    verdict = flown(COPTER, A, WAIT, do(LAND_START), B, DOWN)
+    assert verdict.safe is None
+    assert any("DO_LAND_START" in words and "5 to 6" in words for words in verdict.not_judged)
+
+
+def test_what_stands_behind_a_loop_without_end_is_a_finding_and_how_long_it_lasts_is_told() -> None:
+    craft = replace(vehicle(COPTER), energy=Energy(120.0, 100.0, battery_j=1e6, reserve=0.0))
+    back = do(m.DO_JUMP, 2, -1)
+    verdict = flown(COPTER, A, B, back, DOWN, craft=craft)
+    assert [(f.kind, f.seq) for f in verdict.findings] == [("unreachable", 5)]
+    alone = flown(COPTER, A, B, back, craft=craft)
+    assert alone.safe is True
+    used, round_s = alone.energy_j, 2000.0 / 15.0
+    assert alone.until_reserve_s == pytest.approx((1e6 - used) / 200_000.0 * round_s, rel=1e-2)
+
+
+def test_px4_goes_on_with_nothing_behind_an_item_without_autocontinue() -> None:
+    stops = replace(A, autocontinue=False)
+    assert [f.kind for f in flown(PX4, stops, B, DOWN).findings] == ["unreachable"]
+    assert flown(COPTER, stops, B, DOWN).safe is True  # ArduPilot does not look at it
+    assert flown(PX4, A, B, replace(DOWN, autocontinue=False)).safe is True
+
+
+@pytest.mark.parametrize("item", [at(m.WAYPOINT, 1000, 0, 130, frame=10), at(m.WAYPOINT, 1000, 0, 130, frame=11)])
+def test_px4_takes_no_terrain_frame(item: MissionItem) -> None:
+    verdict = flown(PX4, item, DOWN)
+    assert [(f.kind, f.seq) for f in verdict.findings] == [("refused", 1)]
+    assert "PX4 takes no item in frame" in verdict.findings[0].message
+    assert flown(COPTER, item, DOWN, craft=vehicle(COPTER, min_agl_m=20.0)).safe is True
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "item"),
+    [
+        (PX4, at(m.LOITER_TURNS, 1500, 0, 100, 2, 0, 30)), (PX4, at(m.DO_CHANGE_SPEED, 0)), (PX4, do(m.WAYPOINT)),
+        (PLANE, at(m.SPLINE_WAYPOINT, 1500)), (COPTER, at(m.WAYPOINT, 1500, frame=1)),
+        (COPTER, at(m.WAYPOINT, 1500, 0, 100, math.inf)), (COPTER, at(m.LOITER_TIME, 1500, 0, 100, 5, 0, 0, math.nan)),
+    ],
+)  # fmt: skip
+def test_what_the_autopilot_will_not_take_is_a_finding(autopilot: Autopilot, item: MissionItem) -> None:
+    end = at(m.LOITER_UNLIM, 2000)
+    assert "refused" in {f.kind for f in flown(autopilot, A, item, end).findings}
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "item", "words"),
+    [
+        (PX4, at(m.LAND, 2000, 0, 0, 0, 2.0), "precision landing"),
+        (PX4, at(m.WAYPOINT, 1500, 0, 100, math.nan), "a hold of nan s"),
+        (PLANE, at(m.VTOL_LAND, 2000, 0, 0, 1.0), "a descent as a fixed wing"),
+    ],
+)
+def test_params_that_make_another_flight_of_a_command_are_named(
+    autopilot: Autopilot, item: MissionItem, words: str
+) -> None:
+    verdict = flown(autopilot, A, B, item)
+    assert verdict.safe is None
+    assert any(words in line for line in verdict.not_judged)
+
+
+def test_a_planes_return_that_leads_on_to_a_landing_is_not_judged() -> None:
+    assert flown(PLANE, A, do(m.RTL), rtl_m=120.0).safe is True
+    verdict = flown(PLANE, A, do(m.RTL), do(LAND_START), rtl_m=120.0)
+    assert verdict.safe is None
+    assert any("RTL_AUTOLAND" in line for line in verdict.not_judged)

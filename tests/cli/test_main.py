@@ -1,0 +1,261 @@
+"""The command line as scripts see it: exit codes, one message, one JSON document, nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gcsplan.cli import main as cli
+from gcsplan.mavlink.files.formats import read_mission_file
+from gcsplan.sim.misbehaviour import Misbehaviour
+from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.vehicle import Autopilot
+from tests.support.impatient import be_impatient
+from tests.support.paths import DATA
+
+CROSSING = DATA / "crossing.yaml"
+OUTPUTS = {"uav1.waypoints", "uav1.plan", "mission.kml", "mission.geojson", "profile.csv", "summary.json"}
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
+    """Call ``gcsplan ARGUMENTS`` in an empty directory; gives (exit code, standard output, standard error)."""
+    monkeypatch.chdir(tmp_path)
+    be_impatient(monkeypatch)
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        out, err = capfd.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        return code, out, err
+
+    return call
+
+
+def changed(tmp_path: Path, old: str, new: str) -> Path:
+    text = CROSSING.read_text()
+    assert old in text
+    file = tmp_path / "changed.yaml"
+    file.write_text(text.replace(old, new))
+    return file
+
+
+def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER, amsl_m: float = 471.0, **trouble: Any) -> LoopbackVehicle:
+    return LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.38, amsl_m=amsl_m, misbehave=Misbehaviour(**trouble))
+
+
+def test_plan_writes_its_outputs_into_a_directory_of_the_missions_name(run: Any, tmp_path: Path) -> None:
+    code, out, err = run("plan", CROSSING)
+    assert code == 0
+    assert out == ""
+    assert "safe" in err
+    assert "bare DEM" in err
+    assert {p.name for p in (tmp_path / "crossing").iterdir() if not p.name.startswith(".")} == OUTPUTS
+
+
+def test_the_same_plan_twice_gives_the_same_bytes(run: Any, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        assert run("plan", CROSSING, "-o", name)[0] == 0
+    for name in OUTPUTS:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+
+
+def test_plan_upload_sim_is_verified_and_says_simulated(run: Any, tmp_path: Path) -> None:
+    code, _, err = run("plan", CROSSING, "--upload", "sim")
+    assert code == 0
+    assert "verified" in err
+    assert "simulated" in err
+    upload = json.loads((tmp_path / "crossing" / "upload.json").read_text())["vehicles"][0]["upload"]
+    assert upload["verified"] is True
+    assert upload["simulated"] is True
+    assert "upload" not in json.loads((tmp_path / "crossing" / "summary.json").read_text())["vehicles"][0]
+
+
+def test_json_puts_exactly_one_document_on_standard_output(run: Any) -> None:
+    code, out, _ = run("plan", CROSSING, "--json", "--upload", "sim")
+    document = json.loads(out)
+    assert code == 0
+    assert document["vehicles"][0]["safe"] is True
+    assert document["vehicles"][0]["planning_s"] > 0
+    assert document["vehicles"][0]["upload"]["outcome"] == "accepted"
+
+
+def test_bad_input_is_exit_2_with_every_mistake_and_its_place(run: Any, tmp_path: Path) -> None:
+    bad = changed(tmp_path, "min_agl_m: 60, horizontal_clearance_m: 30", "min_agl_m: .nan, horizontal_clearence_m: 30")
+    code, out, err = run("plan", bad, "--json")
+    assert code == 2
+    assert "Traceback" not in err
+    error = json.loads(out)["error"]
+    assert error["code"] == 2
+    places = " ".join(p["where"] for p in error["problems"])
+    assert "limits.min_agl_m" in places
+    assert "horizontal_clearence_m" in places
+    assert not (tmp_path / "changed").exists()
+
+
+def test_no_way_is_exit_3_and_retires_the_outputs_of_an_earlier_plan(run: Any, tmp_path: Path) -> None:
+    assert run("plan", CROSSING, "-o", "out")[0] == 0
+    bad = changed(tmp_path, "min_agl_m: 60,", "min_agl_m: 60, max_amsl_m: 600.5,")
+    code, out, err = run("plan", bad, "-o", "out", "--json")
+    assert code == 3
+    assert json.loads(out)["error"]["reason"] in ("infeasible", "not_found")
+    assert "max_amsl_m" in err
+    assert "previous" in err
+    assert not (tmp_path / "out" / "uav1.waypoints").exists()
+    assert {p.name for p in (tmp_path / "out" / "previous").iterdir() if not p.name.startswith(".")} == OUTPUTS
+
+
+@pytest.mark.parametrize("arguments", [("plan",), ("plan", "x.yaml", "--nope"), ("frobnicate",), ("upload", "x.plan")])
+def test_wrong_usage_is_exit_2(run: Any, arguments: tuple[str, ...]) -> None:
+    code, _, err = run(*arguments)
+    assert code == 2
+    assert "Traceback" not in err
+
+
+def test_a_missing_mission_file_is_named(run: Any) -> None:
+    code, _, err = run("plan", "nowhere.yaml")
+    assert code == 2
+    assert "nowhere.yaml" in err
+
+
+@pytest.mark.parametrize("planner", ["optimal", "optimum"])
+def test_an_unknown_planner_names_the_nearest(run: Any, planner: str) -> None:
+    code, _, err = run("plan", CROSSING, "--planner", planner)
+    assert code == (0 if planner == "optimal" else 2)
+    assert planner == "optimal" or "optimal" in err
+
+
+def test_check_passes_what_plan_wrote_and_finds_what_was_spoilt(run: Any, tmp_path: Path) -> None:
+    assert run("plan", CROSSING, "-o", "out")[0] == 0
+    for name in ("uav1.waypoints", "uav1.plan"):
+        assert run("check", CROSSING, f"out/{name}")[0] == 0
+    rows = (tmp_path / "out" / "uav1.waypoints").read_text().splitlines()
+    for i in range(4, len(rows) - 1):
+        spoilt = rows[i].split("\t")
+        spoilt[10] = str(float(spoilt[10]) - 20)
+        rows[i] = "\t".join(spoilt)
+    (tmp_path / "uav1.waypoints").write_text("\n".join(rows) + "\n")
+    code, out, err = run("check", CROSSING, "uav1.waypoints", "--json")
+    assert code == 4
+    kinds = {v["kind"] for v in json.loads(out)["verdicts"][0]["violations"]}
+    assert "min_agl" in kinds
+    code, _, err = run("check", CROSSING, "uav1.waypoints")
+    assert code == 4
+    assert "too low above ground" in err
+
+
+def test_what_cannot_be_judged_is_exit_4_unless_allowed(run: Any, tmp_path: Path) -> None:
+    assert run("plan", CROSSING, "-o", "out")[0] == 0
+    text = (tmp_path / "out" / "uav1.waypoints").read_text()
+    text += f"{len(text.splitlines()) - 1}\t0\t2\t177\t3\t2\t0\t0\t0\t0\t0\t1\n"
+    (tmp_path / "uav1.waypoints").write_text(text)
+    assert run("check", CROSSING, "uav1.waypoints")[0] == 4
+    assert run("check", CROSSING, "uav1.waypoints", "--allow-unjudged")[0] == 0
+
+
+def test_files_are_uploaded_verified_downloaded_and_cleared(run: Any, tmp_path: Path) -> None:
+    assert run("plan", CROSSING, "-o", "out")[0] == 0
+    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        url = server.url_for_gcs
+        assert run("verify", "out/uav1.waypoints", "--to", url)[0] == 7
+        assert run("upload", "out/uav1.plan", "--to", url, "--mission", CROSSING)[0] == 0
+        assert run("verify", "out/uav1.waypoints", "--to", url)[0] == 0
+        assert run("download", "--from", url, "-o", "back.waypoints")[0] == 0
+        back = read_mission_file(tmp_path / "back.waypoints", autopilot=Autopilot.ARDUCOPTER).mission
+        sent = read_mission_file(tmp_path / "out" / "uav1.plan", autopilot=None).mission
+        assert [i.command for i in back.items] == [i.command for i in sent.items]
+        assert run("check", CROSSING, "uav1=back.waypoints")[0] == 0
+        assert run("clear", "--to", url)[0] == 0
+        assert server.vehicles[0].items()[1:] == ()
+
+
+def test_an_unsafe_file_is_not_sent_unless_unchecked(run: Any, tmp_path: Path) -> None:
+    assert run("plan", CROSSING, "-o", "out")[0] == 0
+    higher = changed(tmp_path, "min_agl_m: 60", "min_agl_m: 70")
+    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        assert run("upload", "out/uav1.plan", "--to", server.url_for_gcs, "--mission", higher)[0] == 4
+        assert server.vehicles[0].items()[1:] == ()
+        assert run("upload", "out/uav1.waypoints", "--to", server.url_for_gcs, "--unchecked")[0] == 0
+        assert len(server.vehicles[0].items()) > 5
+
+
+@pytest.mark.parametrize(
+    ("trouble", "code", "word"),
+    [
+        ({"armed": True}, 5, "armed"),
+        ({"refuse": 4, "refuse_code": 5}, 5, "item 4"),
+        ({"corrupt": 5, "corrupt_field": "z"}, 7, "5"),
+        ({"edit": 3}, 7, "3"),
+    ],
+)
+def test_each_kind_of_trouble_has_its_exit_code_and_is_named(
+    run: Any, trouble: dict[str, Any], code: int, word: str
+) -> None:
+    with SimServer([vehicle(**trouble)], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        got, _, err = run("plan", CROSSING, "--upload", server.url_for_gcs)
+    assert got == code, err
+    assert word in err
+    assert "Traceback" not in err
+
+
+def test_a_vehicle_that_stands_elsewhere_is_refused_unless_that_is_ignored(run: Any) -> None:
+    with SimServer([vehicle(amsl_m=900.0)], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        assert run("plan", CROSSING, "--upload", server.url_for_gcs)[0] == 5
+        assert run("plan", CROSSING, "--upload", server.url_for_gcs, "--ignore-position")[0] == 0
+
+
+def test_the_wrong_autopilot_is_refused(run: Any) -> None:
+    with SimServer([vehicle(Autopilot.PX4)], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        code, _, err = run("plan", CROSSING, "--upload", server.url_for_gcs)
+    assert code == 5
+    assert "PX4" in err
+
+
+@pytest.mark.parametrize("word", ["uav9=udpout:127.0.0.1:1", "carrier-pigeon", "link"])
+def test_an_upload_target_that_cannot_be_is_refused_before_planning(run: Any, tmp_path: Path, word: str) -> None:
+    assert run("plan", CROSSING, "--upload", word)[0] == 2
+    assert not (tmp_path / "crossing").exists()
+
+
+def test_planners_are_listed(run: Any) -> None:
+    code, out, _ = run("planners")
+    assert code == 0
+    assert "optimal" in out
+    assert json.loads(run("planners", "--json")[1])["planners"][0]["name"] == "optimal"
+
+
+def test_help_and_version(run: Any) -> None:
+    assert "plan" in run("--help")[1]
+    assert run("--version")[1].startswith("0.")
+
+
+def test_a_bug_of_ours_is_exit_70_with_one_message(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gcsplan.app import pipeline
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("boom")
+
+    monkeypatch.setattr(pipeline, "load_mission", broken)
+    code, out, err = run("plan", CROSSING, "--json")
+    assert code == 70
+    assert "Traceback" not in err
+    assert json.loads(out)["error"]["code"] == 70
+    assert "Traceback" in run("plan", CROSSING, "--debug")[2]
+
+
+def test_ctrl_c_is_exit_130(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gcsplan.app import pipeline
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipeline, "load_mission", interrupted)
+    assert run("plan", CROSSING)[0] == 130

@@ -1,0 +1,129 @@
+"""How planning stands: redrawn on a terminal though the planner is silent, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import time
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from gcsplan.cli import console
+from gcsplan.cli import main as cli
+from gcsplan.cli import planning_display as display
+from gcsplan.cli.planning_display import PlanningBoard, planning_display
+from gcsplan.planners.problem import Progress
+from tests.support.paths import MISSIONS
+
+SHOWN = re.compile(r"planning [^\r\n\x1b]*")
+
+
+def screen(monkeypatch: pytest.MonkeyPatch, *, terminal: bool, width: int = 100) -> io.StringIO:
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    shown = io.StringIO()
+    monkeypatch.setattr(console, "console", Console(file=shown, force_terminal=terminal, width=width))
+    return shown
+
+
+def test_a_terminal_shows_the_time_at_least_twice_a_second_while_the_planner_is_silent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shown = screen(monkeypatch, terminal=True)
+    with planning_display(["uav1"]) as report:
+        report("uav1", Progress(0.0, 20_134.0, 20_120.0, "bound"))
+        time.sleep(1.6)
+    lines = SHOWN.findall(shown.getvalue())
+    times = [float(found[1]) for line in lines if (found := re.search(r", ([\d.]+) s", line))]
+    assert len(set(times)) >= 4, lines
+    assert re.search(r"best 20\u2009134 m, bound 20\u2009120 m, gap 0\.07 %, bound", lines[1]), lines
+
+
+def test_the_line_is_gone_when_planning_is_done_or_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    for fails in (False, True):
+        shown = screen(monkeypatch, terminal=True)
+        try:
+            with planning_display(["uav1"]) as report:
+                report("uav1", Progress(0.0, None, 20_120.0, "search"))
+                time.sleep(0.3)
+                assert not fails
+        except AssertionError:
+            assert fails
+        assert shown.getvalue().rstrip("\r").endswith("\x1b[2K")
+
+
+def test_one_line_even_on_a_narrow_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = screen(monkeypatch, terminal=True, width=30)
+    with planning_display(["a" * 60, "uav2"]) as report:
+        report("a" * 60, Progress(0.0, 1.0, 1.0, "search"))
+        time.sleep(0.6)
+    assert max(len(line) for line in SHOWN.findall(shown.getvalue())) <= 30
+    assert "\x1b[1A" not in shown.getvalue().split("\x1b[?25h")[0]  # never up over a second line
+
+
+def test_no_color_is_respected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setenv("NO_COLOR", "1")
+    shown = io.StringIO()
+    monkeypatch.setattr(console, "console", Console(file=shown, force_terminal=True, width=100))
+    with planning_display(["uav1"]) as report:
+        report("uav1", Progress(0.0, 2.0, 1.0, "bound"))
+        time.sleep(0.3)
+    assert SHOWN.search(shown.getvalue())
+    assert re.search(r"\x1b\[[\d;]*m", shown.getvalue()) is None
+
+
+def test_elsewhere_there_is_a_line_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert display.LINE_S == 5.0
+    monkeypatch.setattr(display, "LINE_S", 0.2)
+    shown = screen(monkeypatch, terminal=False)
+    with planning_display(["uav1", "uav2", "uav3"], "energy") as report:
+        report("uav2", Progress(0.0, 2_040_000.0, 2_000_000.0, "improve"))
+        time.sleep(0.7)
+    after = shown.getvalue()
+    lines = after.splitlines()
+    assert 2 <= len(lines) <= 4
+    assert re.fullmatch(
+        r"planning uav2 \(2 of 3\), \d\.\d s, best 2\u2009040 kJ, bound 2\u2009000 kJ, gap 2\.00 %, improve", lines[-1]
+    )
+    time.sleep(0.3)
+    assert shown.getvalue() == after
+    assert "\x1b" not in after
+
+
+def test_a_dumb_terminal_gets_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(display, "LINE_S", 0.1)
+    shown = screen(monkeypatch, terminal=True)
+    monkeypatch.setenv("TERM", "dumb")
+    with planning_display(["uav1"]):
+        time.sleep(0.25)
+    assert re.search(r"planning, .*\d\.\d.* s\n", shown.getvalue())
+    assert "\x1b[2K" not in shown.getvalue()
+
+
+def test_another_vehicle_does_not_inherit_figures() -> None:
+    board = PlanningBoard(["uav1", "uav2"])
+    board.report("uav1", Progress(0.0, 500.0, 400.0, "improve"))
+    board.report("uav1", Progress(0.0, None, None, "search"))
+    assert "best 500 m, bound 400 m, gap 25.00 %, search" in board.line()
+    board.note("compiling the kernels")
+    assert board.line().endswith("compiling the kernels")
+    board.report("uav2", Progress(0.0, None, None, "search"))
+    assert "best" not in board.line()
+    assert board.line().startswith("planning uav2 (2 of 2), ")
+
+
+def test_lines_go_to_standard_error_and_the_document_to_standard_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(display, "LINE_S", 0.02)
+    arguments = ["plan", str(MISSIONS / "fleet-4.yaml"), "-o", str(tmp_path / "out"), "--json"]
+    assert cli.app(args=arguments, standalone_mode=False) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["planner"] == "optimal"
+    assert {f"uav{k} ({k} of 4)" for k in (1, 4)} <= {
+        line.split(", ")[0].removeprefix("planning ") for line in err.splitlines()
+    }

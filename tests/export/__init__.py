@@ -1,0 +1,1 @@
+"""Tests of outputs and their directory."""

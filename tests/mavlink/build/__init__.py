@@ -1,0 +1,1 @@
+"""Tests of from paths to mission items."""

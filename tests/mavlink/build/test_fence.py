@@ -1,0 +1,500 @@
+"""Zones as fences and back, fences held against their missions, and sent over bad links to both kinds of autopilot."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from gcsplan.app import delivery, fencing
+from gcsplan.check.judge import judge
+from gcsplan.cli import main as cli
+from gcsplan.errors import CheckFailed, InputError
+from gcsplan.mavlink.build.fence import areas_of, fence_of
+from gcsplan.mavlink.build.multirotor import build_mission
+from gcsplan.mavlink.build.order import Order
+from gcsplan.mavlink.files.formats import read_mission_file, write_plan
+from gcsplan.mavlink.link import session
+from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.autopilots import stored
+from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
+from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.mavlink.protocol.transfer import VerifiedUpload
+from gcsplan.sim.loopback import loopback_fleet
+from gcsplan.sim.misbehaviour import Misbehaviour
+from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.frame import Frame
+from gcsplan.world.path import Path as FlightPath
+from gcsplan.world.world import World
+from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support import lossy
+from tests.support.impatient import be_impatient
+from tests.support.lossy import Weather
+from tests.support.worlds import vehicle, world
+
+FRAME = Frame(36.6, -84.3)
+COPTER = Autopilot.ARDUCOPTER
+
+
+def square(east: float, north: float, half_m: float, name: str = "square", **levels: Level) -> Zone:
+    ring = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half_m + [east, north]
+    return Zone(name, Polygon(ring.astype(float)), **levels)
+
+
+metres = st.floats(-20_000, 20_000)
+
+
+@st.composite
+def zones(draw: st.DrawFn) -> Zone:
+    east, north, size = draw(metres), draw(metres), draw(st.floats(5.0, 3000.0))
+    if draw(st.booleans()):
+        return Zone("z", Circle(east, north, size))
+    turns = sorted(draw(st.lists(st.floats(0.0, 6.28), min_size=3, max_size=12, unique_by=lambda a: round(a, 1))))
+    radii = draw(st.lists(st.floats(0.5 * size, size), min_size=len(turns), max_size=len(turns)))
+    ring = np.array([[east + r * math.cos(a), north + r * math.sin(a)] for a, r in zip(turns, radii, strict=True)])
+    polygon = shapely.Polygon(ring)
+    if len(turns) < 3 or not polygon.is_valid or polygon.area < 20.0 or not polygon.exterior.is_ccw:
+        return Zone("z", Circle(east, north, size))
+    return Zone("z", Polygon(ring))
+
+
+FIVE = np.array([(3.0, 0.0), (1.621, 2.524), (-5.546, 2.29), (-3.96, 0.564), (1.418, -4.795)])
+
+
+def outline(shape: Circle | Polygon) -> shapely.Polygon:
+    if isinstance(shape, Polygon):
+        return shapely.Polygon(shape.vertices)
+    return shapely.Point(shape.east_m, shape.north_m).buffer(shape.radius_m, 256)
+
+
+@pytest.mark.slow
+@settings(max_examples=80)
+@given(zones(), st.sampled_from(list(Autopilot)))
+@example(Zone("two corners as far out", Polygon(FIVE)), Autopilot.ARDUCOPTER)
+def test_a_zone_comes_back_from_its_items_as_they_are_stored(zone: Zone, autopilot: Autopilot) -> None:
+    fence = fence_of([zone], FRAME, autopilot)
+    kept = [stored(item, autopilot) for item in fence.items]
+    (area,) = areas_of(kept, FRAME)
+    assert area.inclusion is False
+    assert all(item.frame == m.GLOBAL and math.isfinite(item.params[0]) for item in fence.items)
+    if isinstance(zone.shape, Circle):
+        assert isinstance(area.shapes[0], Circle)
+        assert -1e-3 <= area.shapes[0].radius_m - zone.shape.radius_m <= 0.011
+        off = math.hypot(area.shapes[0].east_m - zone.shape.east_m, area.shapes[0].north_m - zone.shape.north_m)
+        assert off < 0.01
+    else:
+        # Between its corners a fence is straight in degrees, a zone here straight in the plane.
+        places = np.array([(item.lat_deg, item.lon_deg) for item in kept])
+        bow_m = float(FRAME.bow_m(places, np.roll(places, -1, axis=0)).max())
+        assert outline(area.shapes[0]).hausdorff_distance(outline(zone.shape)) < 0.12 + bow_m
+        if bow_m > 0.05:
+            return
+    # Made again of what came back, it is the same to the bit, from whichever corner on.
+    again = fence_of([Zone("z", area.shapes[0])], FRAME, autopilot).items
+    assert any(again[k:] + again[:k] == fence.items for k in range(len(again)))
+
+
+def test_corners_that_only_follow_a_straight_edge_are_left_out() -> None:
+    side = np.linspace(-500, 500, 21)[:-1]
+    ring = np.concatenate(
+        [
+            np.c_[side, side * 0 - 500],
+            np.c_[side * 0 + 500, side],
+            np.c_[-side, side * 0 + 500],
+            np.c_[side * 0 - 500, -side],
+        ]
+    )
+    fence = fence_of([Zone("z", Polygon(ring))], FRAME, COPTER)
+    assert len(fence.items) == 4
+    (area,) = areas_of(fence.items, FRAME)
+    assert outline(area.shapes[0]).symmetric_difference(outline(Polygon(ring))).area < 30.0
+
+
+def test_zones_with_a_floor_or_a_ceiling_are_left_out_and_named_or_taken_to_the_sky() -> None:
+    mast = Zone("mast", Circle(0, 0, 60), None, Level(100, "agl"))
+    shelf = square(3000, 0, 200, "shelf", floor=Level(900, "amsl"))
+    yard = Zone("yard", Circle(1000, 0, 50))
+    fence = fence_of([mast, shelf, yard], FRAME, COPTER)
+    assert [z.name for z in fence.zones] == ["yard"]
+    assert fence.left_out == ("mast", "shelf")
+    assert any("mast" in words and "shelf" in words and "left out" in words for words in fence.told)
+    whole = fence_of([mast, shelf, yard], FRAME, COPTER, infinite=True)
+    assert len(whole.items) == 1 + 4 + 1
+    assert whole.left_out == ()
+    assert any("to the sky" in words for words in whole.told)
+
+
+def circles(count: int) -> list[Zone]:
+    return [Zone(f"c{i}", Circle(100.0 * i, 0, 40)) for i in range(count)]
+
+
+def test_more_circles_than_arducopter_keeps_are_refused_and_circles_in_circles_are_joined() -> None:
+    assert len(fence_of(circles(42), FRAME, COPTER).items) == 42
+    with pytest.raises(InputError, match=r"43 circle.*42 circles"):
+        fence_of(circles(43), FRAME, COPTER)
+    assert len(fence_of(circles(43), FRAME, Autopilot.PX4).items) == 43
+    with pytest.raises(InputError, match="keeps 64"):
+        fence_of(circles(65), FRAME, Autopilot.PX4)
+    inside = [Zone("big", Circle(0, 0, 9000)), *circles(60), Zone("big too", Circle(0, 0, 9000))]
+    fence = fence_of(inside, FRAME, COPTER)
+    assert [z.name for z in fence.zones] == ["big"]
+    assert "inside another circle" in fence.told[0]
+    ring = np.array([[1000 * math.cos(a), 1000 * math.sin(a)] for a in np.linspace(0, 2 * math.pi, 71)[:-1]])
+    with pytest.raises(InputError, match="70 corners"):
+        fence_of([Zone("round", Polygon(ring))], FRAME, COPTER)
+
+
+@pytest.mark.parametrize(
+    ("items", "said"),
+    [
+        ([MissionItem(5004, 0, (math.nan, 0, 0, 0), 1, 1)], "radius"),
+        ([MissionItem(5002, 0, (3, 0, 0, 0), 1, 1)] * 2, "not whole"),
+        ([MissionItem(5002, 0, (2, 0, 0, 0), 1, 1)] * 2, "not whole"),
+        ([MissionItem(16, 0)], "command 16"),
+        ([MissionItem(5002, 0, (3, 0, 0, 0), i, i) for i in (0, 1, 2)], "touches"),
+        ([MissionItem(5001, 0, (3, 0, 0, 0), i, 0) for i in (0, 1, 0)], "3 different points"),
+        ([MissionItem(5001, 0, (4, 0, 0, 0), x, y) for x, y in ((0, 0), (9, 9), (9, 0), (0, 9))], "crosses"),
+    ],
+)
+def test_what_is_no_fence_is_refused(items: list[MissionItem], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        areas_of(items, FRAME)
+
+
+def corners(command: int, *places: tuple[float, float]) -> list[MissionItem]:
+    """A polygon's items at (latitude, longitude) each."""
+    count = (float(len(places)), 0.0, 0.0, 0.0)
+    return [MissionItem(command, 0, count, round(lat * 1e7), round(lon * 1e7)) for lat, lon in places]
+
+
+def inside_in_degrees(lat: float, lon: float, ring: list[tuple[float, float]]) -> bool:
+    """By the crossings of its parallel to the east; no edge goes farther round than half a turn."""
+    crossings = 0
+    for (lat0, lon0), (lat1, lon1) in zip(ring, ring[1:] + ring[:1], strict=True):
+        if (lat0 > lat) != (lat1 > lat):
+            crossings += lon0 + (lat - lat0) / (lat1 - lat0) * (lon1 - lon0) > lon
+    return crossings % 2 == 1
+
+
+@pytest.mark.parametrize("far", [0.01, 0.5, 3.0, 30.0, 84.3, 90.0, 95.0])
+def test_a_fences_edges_are_straight_in_degrees_however_far_its_corners_are(far: float) -> None:
+    """The plane bends long edges by hundreds of metres, and has no place for what is a quarter of the globe away."""
+    rng = np.random.default_rng(int(far * 100))
+    for _ in range(6):
+        near = [(36.6 + a, -84.3 + b) for a, b in rng.uniform(-0.05, 0.05, (2, 2))]
+        ring = [*near, (float(np.clip(36.6 + rng.uniform(-far, far), -89, 89)), -84.3 + far)]
+        (area,) = areas_of(corners(5002, *ring), FRAME)
+        shape = shapely.union_all([outline(s) for s in area.shapes])
+        found = 0
+        for lat, lon in rng.uniform((36.54, -84.36), (36.66, -84.24), (400, 2)):
+            point = shapely.Point(*FRAME.to_plane(lat, lon))
+            if shape.boundary.distance(point) > 0.2:
+                assert shape.contains(point) == inside_in_degrees(lat, lon, ring), (ring, lat, lon)
+                found += shape.contains(point)
+        assert 0 < found < 400 or far < 0.1
+
+
+@pytest.mark.parametrize("command", [5003, 5004])
+def test_areas_far_away_have_no_shape_and_places_that_are_none_are_refused(command: int) -> None:
+    circle = MissionItem(command, 0, (900.0, 0, 0, 0), 0, 57_000_000)
+    polygon = corners(command - 2, (0.0, 5.7), (1.0, 5.7), (1.0, 6.5))
+    assert [a.shapes for a in areas_of([circle, *polygon], FRAME)] == [(), ()]
+    assert [a.inclusion for a in areas_of([circle, *polygon], FRAME)] == [command == 5003] * 2
+    for wrong in (replace(circle, x=2**31 - 1), replace(circle, y=-(2**31)), replace(circle, params=(1e6, 0, 0, 0))):
+        with pytest.raises(InputError, match=r"item 1 .*(not a place|100000 m)"):
+            areas_of([MissionItem(5000, 0), wrong], FRAME)
+
+
+# -- held against the mission ---------------------------------------------------------------------------------------
+
+OVER = [[0.0, 0, 420], [3000, 0, 420], [6000, 1000, 420]]
+
+
+def mission_in(where: World, craft: Vehicle) -> Mission:
+    return build_mission(FlightPath(np.array(OVER)), where, craft, (36.6, -84.3), Order())
+
+
+def test_a_fence_that_the_mission_flies_over_is_refused_by_name() -> None:
+    mast = Zone("mast", Circle(1500, 10, 60), None, Level(50, "agl"))
+    where, craft = world(zones=[mast, Zone("yard", Circle(1500, 300, 100))]), vehicle(horizontal_clearance_m=30)
+    mission = mission_in(where, craft)
+    fence = fencing.fence_for(mission, craft, where)
+    assert [z.name for z in fence.zones] == ["yard"]
+    with pytest.raises(CheckFailed, match=r"mast(.|\n)*fence-infinite") as refused:
+        fencing.fence_for(mission, craft, where, infinite=True)
+    assert refused.value.reason == "fence"
+    assert "yard" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("east", "north"), [(0.0, 90.0), (6000.0, 900.0)])
+def test_start_and_goal_keep_their_clearance_from_the_fence_too(east: float, north: float) -> None:
+    low = Zone("low", Circle(east, north, 80), None, Level(1, "agl"))
+    where, craft = world(zones=[low]), vehicle(horizontal_clearance_m=30)
+    with pytest.raises(CheckFailed, match="low"):
+        fencing.fence_for(mission_in(where, craft), craft, where, infinite=True)
+
+
+def test_a_mission_that_touches_its_clearance_does_not_fail_for_the_rounding_of_the_fence() -> None:
+    zone = Zone("near", Circle(1500, 133.025, 100.0))
+    where, craft = world(zones=[zone]), vehicle(horizontal_clearance_m=30)
+    assert len(fencing.fence_for(mission_in(where, craft), craft, where).items) == 1
+
+
+def test_inclusion_areas_must_hold_the_whole_flight() -> None:
+    where, craft = world(), vehicle()
+    mission = mission_in(where, craft)
+    ring = np.array([[-100.0, -100], [6100, -100], [6100, 1100], [-100, 1100]])
+
+    def found(shape: Circle | Polygon) -> list[str]:
+        (item_zone,) = fence_of([Zone("z", shape)], FRAME, Autopilot.PX4).zones
+        items = [replace(i, command=i.command - 1) for i in fence_of([item_zone], FRAME, Autopilot.PX4).items]
+        return [f.message for f in fencing.breaches(areas_of(items, FRAME), mission, craft, where)]
+
+    assert found(Polygon(ring)) == []
+    assert found(Circle(3000, 0, 4000)) == []
+    assert any("item" in w and "leaves" in w for w in found(Polygon(ring * [0.9, 1])))
+    assert found(Circle(3000, 0, 3001)) != []  # three metres of track error
+    notch = np.array([[-100.0, -100], [1400, -100], [1500, 50], [1600, -100], [6100, -100], [6100, 1100], [-100, 1100]])
+    assert found(Polygon(notch)) != []
+
+
+def own(items: list[MissionItem], path: list[list[float]] = OVER, half_m: float = 12_000.0) -> Any:
+    """The verdict on a safe mission beside a fence of its own."""
+    where, craft = world(half_m=half_m), vehicle()
+    mission = build_mission(FlightPath(np.array(path)), where, craft, (36.6, -84.3), Order())
+    if half_m > 12_000.0:  # a long leg is given as many short ones: here it is flown as one
+        mission = replace(mission, items=(*mission.items[:2], *mission.items[-2:]))
+    verdict = judge(mission, craft, where)
+    assert verdict.safe is True
+    return fencing.own_fence(items, verdict, craft, where)[0]
+
+
+def ring_of(command: int, *metres: tuple[float, float]) -> list[MissionItem]:
+    return corners(command, *(tuple(p) for p in FRAME.to_degrees(*np.array(metres).T).tolist()))
+
+
+def test_a_mission_that_begins_outside_its_inclusion_area_leaves_it_at_once() -> None:
+    """A take-off is a line without length in the plane."""
+    verdict = own(ring_of(5001, (500, -500), (6500, -500), (6500, 1500), (500, 1500)))
+    assert [(f.seq, f.kind, round(f.by, -1)) for f in verdict.findings] == [(1, "fence", 500)]
+
+
+def test_far_inclusion_areas_are_left_and_far_exclusion_areas_never_met() -> None:
+    far = [(0.0, 5.7), (1.0, 5.7), (1.0, 6.5)]
+    (found,) = own(corners(5001, *far)).findings
+    assert found.kind == "fence"
+    assert "far away" in found.message
+    assert math.isnan(found.by)
+    assert own(corners(5002, *far)).safe is True
+    # Around the mission, with a corner where the plane has no place: held, or flown through.
+    around = [(36.5, -84.5), (37.0, -84.5), (0.0, 5.7)]
+    assert own(corners(5001, *around)).safe is True
+    assert own(corners(5002, *around)).safe is False
+
+
+def test_an_inclusion_area_holds_the_bow_of_a_long_leg() -> None:
+    """A leg of 40 km to the east, straight in degrees, bows by 23 m against the plane."""
+    there = np.linspace(-1000.0, 41_000.0, 10)
+    for half_m, safe in ((40.0, True), (15.0, False)):
+        south, north = ([(east, side) for east in there] for side in (-half_m, half_m))
+        verdict = own(ring_of(5001, *south, *north[::-1]), [[0.0, 0, 420], [40_000, 0, 420]], half_m=45_000.0)
+        assert verdict.safe is safe, half_m
+
+
+def test_an_inclusion_area_holds_corners_as_they_are_cut() -> None:
+    """PX4 turns at a way point's own radius: 60 m before this one, and is beside both legs then."""
+    where, craft = world(), vehicle(Autopilot.PX4)
+    path = FlightPath(np.array([[0.0, 0, 420], [3000, 0, 420], [3000, 3000, 420]]))
+    mission = build_mission(path, where, craft, (36.6, -84.3), Order())
+    ring = ring_of(5001, (-200, -200), (3200, -200), (3200, 3200), (2980, 3200), (2980, 20), (-200, 20))
+    for radius_m, safe in ((1.0, True), (60.0, False)):
+        items = [replace(i, params=(0.0, radius_m, 0.0, math.nan)) if i.command == 16 else i for i in mission.items]
+        cut = replace(mission, items=tuple(items))
+        verdict = judge(cut, craft, where)
+        assert verdict.safe is True
+        assert fencing.own_fence(ring, verdict, craft, where)[0].safe is safe, radius_m
+
+
+def test_a_fence_that_crosses_itself_is_not_judged() -> None:
+    verdict = own(ring_of(5001, (-500, -500), (6500, 1500), (6500, -500), (-500, 1500)))
+    assert verdict.safe is None
+    assert any("crosses" in words for words in verdict.not_judged)
+
+
+def test_a_zone_too_thin_for_a_fence_is_refused_with_the_cure() -> None:
+    where, craft = world(zones=[Zone("hair", Polygon(np.array([[0, 900], [900, 900], [900, 900.004]])))]), vehicle()
+    with pytest.raises(InputError, match="too thin"):
+        fencing.fence_for(mission_in(where, craft), craft, where)
+
+
+def test_a_plan_files_own_fence_is_read_and_judged(tmp_path: Path) -> None:
+    where, craft = world(), vehicle()
+    mission = mission_in(where, craft)
+    for north, safe in ((300.0, True), (50.0, False)):
+        fence = fence_of([Zone("z", Circle(1500, north, 100))], FRAME, COPTER)
+        file = tmp_path / "uav1.plan"
+        file.write_text(write_plan(mission, fence=fence.items))
+        read = read_mission_file(file, autopilot=COPTER)
+        assert read.fence == fence.items
+        verdict, told = fencing.own_fence(read.fence, judge(mission, craft, where), craft, where)
+        assert "1 area(s) to stay out of" in told[0]
+        assert verdict.safe is safe
+
+
+# -- to vehicles ----------------------------------------------------------------------------------------------------
+
+MIXED = [Zone("a", Circle(500, 500, 120.5)), square(3000, -900, 200), Zone("b", Circle(-700, 0, 80))]
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_a_fence_is_uploaded_read_back_and_compared(autopilot: Autopilot) -> None:
+    fence = fence_of(MIXED, FRAME, autopilot)
+    craft = LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0)
+    with SimServer([craft], "udpin:127.0.0.1:0", speedup=10.0) as server, Link(server.url_for_gcs) as link:
+        options = session.Options(listen_s=0.1, discover_s=5.0)
+        result = session.upload_items(link, 1, fence.items, autopilot, FENCE, options=options, name="uav1")
+        assert result.outcome == "accepted"
+        assert result.verified, result.differences
+        enforced = autopilot is Autopilot.PX4
+        assert enforced or any("FENCE_ENABLE is 0" in w for w in result.warnings)
+        read = session.download_items(link, 1, FENCE, options=options)
+    assert faults(compare(fence.items, read, autopilot, FENCE)) == ()
+    back = areas_of(read, FRAME)
+    assert len(back) == len(MIXED)
+    for area, zone in zip(back, fence.zones, strict=True):
+        assert outline(area.shapes[0]).hausdorff_distance(outline(zone.shape)) < 0.12
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_over_bad_links_a_fence_that_is_called_verified_is_on_board(autopilot: Autopilot) -> None:
+    """Where a link is so bad that nothing can be known, nothing is claimed."""
+    items = fence_of(MIXED, FRAME, autopilot).items
+    sure = 0
+    for seed in range(60):
+        weather = Weather(loss=0.03 * (seed % 8), duplicate=0.1, held_up=0.1)
+        board = LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0)
+        machine = VerifiedUpload(items, autopilot, us=Address(255, 190), vehicle=Address(1, 1), mission_type=FENCE)
+        lossy.run(machine, board, weather, seed, lambda machine=machine: machine.result is not None)  # type: ignore[misc]
+        assert machine.result is not None
+        if machine.result.verified:
+            sure += 1
+            assert faults(compare(items, board.items(FENCE), autopilot, FENCE)) == (), seed
+    assert sure >= 50
+
+
+def job_of(name: str, sysid: int, url: str, mission: Mission, craft: Vehicle, where: World) -> delivery.Job:
+    craft = replace(craft, name=name, sysid=sysid)
+    mission = replace(mission, name=name, sysid=sysid)
+    return delivery.Job(name, url, mission, judge(mission, craft, where), craft, where)
+
+
+def test_fences_go_before_the_missions_and_a_vehicle_that_is_not_there_stops_nobody_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    be_impatient(monkeypatch)
+    where, craft = world(zones=MIXED), vehicle()
+    mission = mission_in(where, craft)
+    boards = [
+        LoopbackVehicle(1, COPTER, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0),
+        LoopbackVehicle(2, COPTER, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0, misbehave=Misbehaviour(no_space=True)),
+    ]
+    with SimServer(boards, "udpin:127.0.0.1:0", speedup=10.0) as server:
+        plain = [job_of(f"uav{n}", n, server.url_for_gcs, mission, craft, where) for n in (1, 2)]
+        jobs, notes = fencing.with_fences(plain)
+        assert notes == []
+        first, second = delivery.deliver(jobs, delivery.Options())
+    assert first.verified
+    assert first.as_dict()["fence"]["verified"] is True
+    assert any("FENCE_ENABLE is 0" in w for w in first.warnings)
+    assert len(boards[0].items(FENCE)) == 6
+    assert second.verified is False
+    assert "fence is not on board" in second.message
+    assert second.code in (5, 6)
+    assert boards[1].items(FENCE) == ()
+    assert boards[1].items() == ()
+
+
+def test_vehicles_without_zones_keep_their_fence(monkeypatch: pytest.MonkeyPatch) -> None:
+    be_impatient(monkeypatch)
+    where, craft = world(), vehicle()
+    jobs, notes = fencing.with_fences([job_of("uav1", 1, delivery.SIM, mission_in(where, craft), craft, where)])
+    assert "left as it is" in notes[0][1]
+    (done,) = delivery.deliver(jobs, delivery.Options(), simulator=loopback_fleet)
+    assert done.verified
+    assert "fence" not in done.as_dict()
+
+
+def test_a_simulated_upload_sends_the_fence_too() -> None:
+    where, craft = world(zones=MIXED), vehicle()
+    jobs, _ = fencing.with_fences([job_of("uav1", 1, delivery.SIM, mission_in(where, craft), craft, where)])
+    (done,) = delivery.deliver(jobs, delivery.Options(), simulator=loopback_fleet)
+    assert done.verified
+    assert done.as_dict()["fence"]["items"] == 6
+
+
+# -- on the command line --------------------------------------------------------------------------------------------
+
+MISSION = """
+version: 1
+terrain: {dem: "sample:jacksboro"}
+limits: {min_agl_m: 60, horizontal_clearance_m: 30, track_error_m: 3, altitude_error_m: 5}
+no_fly:
+  - {name: mast, center: [36.598, -84.367], radius_m: 150}
+  - {name: shed, center: [36.5975, -84.373], radius_m: 60, ceiling_agl_m: 40}
+vehicles:
+  - {name: uav1, sysid: 1, autopilot: arducopter, start: [36.600, -84.380], goal: [36.596, -84.355], max_climb_deg: 15}
+planner: {gap_percent: 5}
+"""
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
+    monkeypatch.chdir(tmp_path)
+    be_impatient(monkeypatch)
+    (tmp_path / "m.yaml").write_text(MISSION)
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["gcsplan", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        out, err = capfd.readouterr()
+        assert isinstance(ended.value.code, int)
+        return ended.value.code, out, err
+
+    return call
+
+
+def test_plan_and_upload_send_the_fence_where_that_is_asked_for(run: Any) -> None:
+    code, _, err = run("plan", "m.yaml", "-o", "out", "--upload", "sim", "--fence")
+    assert code == 0, err
+    assert "'shed' is left out" in err
+    assert "a fence of 1 item(s) is on board too" in err
+    board = LoopbackVehicle(1, COPTER, lat_deg=36.6, lon_deg=-84.38, amsl_m=471.0)
+    with SimServer([board], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        to = ("--to", server.url_for_gcs)
+        code, out, _ = run("upload", "out/uav1.plan", *to, "--mission", "m.yaml", "--fence", "--json")
+        assert code == 0
+        assert json.loads(out)["vehicles"][0]["fence"]["verified"] is True
+        (circle,) = board.items(FENCE)
+        assert circle.params[0] == 150.0
+        # Over the shed it flies legally, and a fence without a height would turn it round.
+        code, _, err = run("upload", "out/uav1.plan", *to, "--mission", "m.yaml", "--fence-infinite")
+        assert code == 4
+        assert "shed" in err
+        assert board.items(FENCE) == (circle,)
+        assert run("upload", "out/uav1.plan", *to, "--unchecked", "--fence")[0] == 2
+        assert run("clear", *to, "--type", "fence")[0] == 0
+    assert board.items(FENCE) == ()

@@ -1,0 +1,1 @@
+"""Tests of missions and what autopilots keep of them."""

@@ -1,0 +1,1 @@
+"""Tests of the mission protocol without sockets or clock."""

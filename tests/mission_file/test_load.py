@@ -1,0 +1,752 @@
+"""The mission file: what it means, and that every mistake in it is told, all at once, with place and cure."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rasterio
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rasterio.transform import Affine
+
+from gcsplan.errors import InputError, Problem
+from gcsplan.mission_file import MissionFile, load_mission
+from gcsplan.vehicle import Autopilot, Energy
+from gcsplan.world.frame import Frame
+from gcsplan.world.limits import Limits
+from gcsplan.world.zones import Circle, Level, Polygon
+from tests.support.paths import DATA
+
+EXAMPLE = DATA / "interface_example.yaml"
+PLANNERS = ("optimal", "krill")
+
+
+def base(**changes: Any) -> dict[str, Any]:
+    """A small good mission on the sample; ``changes`` replace its top-level keys."""
+    whole = {
+        "version": 1,
+        "terrain": {"dem": "sample:jacksboro", "vertical_datum": "EGM96"},
+        "limits": {"min_agl_m": 60, "horizontal_clearance_m": 30, "track_error_m": 3, "altitude_error_m": 5},
+        "no_fly": [{"name": "village", "center": [36.61, -84.31], "radius_m": 400}],
+        "vehicles": [vehicle()],
+    }
+    return {k: v for k, v in (whole | changes).items() if v is not ...}
+
+
+def vehicle(**changes: Any) -> dict[str, Any]:
+    whole = {"name": "uav1", "sysid": 1, "autopilot": "arducopter", "start": [36.6, -84.38], "goal": [36.55, -84.2]}
+    return {k: v for k, v in (whole | changes).items() if v is not ...}
+
+
+def local(**changes: Any) -> dict[str, Any]:
+    """The krill paper's mound: 100 m cube, one peak."""
+    whole = {
+        "version": 1,
+        "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        "terrain": {"peaks": [{"center": [50, 50], "height_m": 70, "decay_m": [20, 20]}]},
+        "limits": {"min_agl_m": 3},
+        "vehicles": [
+            vehicle(
+                start={"east_m": 0, "north_m": 0, "up_m": 0},
+                goal={"east_m": 100, "north_m": 100, "up_m": 60},
+                end="loiter",
+            )
+        ],
+    }
+    return {k: v for k, v in (whole | changes).items() if v is not ...}
+
+
+def load(whole: Any, folder: Path = Path()) -> MissionFile:
+    text = whole if isinstance(whole, str) else yaml.safe_dump(whole, sort_keys=False)
+    return load_mission(folder / "m.yaml", text=text, planner_names=PLANNERS)
+
+
+def problems(whole: Any, folder: Path = Path()) -> tuple[Problem, ...]:
+    with pytest.raises(InputError) as caught:
+        load(whole, folder)
+    assert caught.value.exit_code == 2
+    return caught.value.problems
+
+
+def the_problem(whole: Any, folder: Path = Path()) -> tuple[str, str]:
+    """Key path and message of the only problem."""
+    found = problems(whole, folder)
+    assert len(found) == 1, found
+    return found[0].where.split(": ", 1)[-1], found[0].message
+
+
+# -- the example --------------------------------------------------------------------------------------------------
+
+
+def test_the_example_of_the_interface_loads_as_printed() -> None:
+    mission = load_mission(EXAMPLE)
+    assert mission.name == "Ridge crossing near Jacksboro"
+    assert mission.stem == "interface_example"
+    assert [z.name for z in mission.zones] == ["village", "mast", "airfield"]
+    assert [z.floor for z in mission.zones] == [None, None, None]
+    assert [z.ceiling for z in mission.zones] == [None, Level(100.0, "agl"), Level(300.0, "agl")]
+    one, two = mission.vehicles
+    assert one.vehicle.limits == Limits(
+        min_agl_m=60, max_amsl_m=780.5, horizontal_clearance_m=30, track_error_m=3, altitude_error_m=5,
+        max_climb_deg=15, max_descent_deg=15,
+    )  # fmt: skip
+    assert one.vehicle.energy == Energy(120, 100, 400, 5.0e6, 0.2)
+    assert one.vehicle.link == "udpout:127.0.0.1:14560"
+    assert one.vehicle.autopilot is Autopilot.ARDUCOPTER
+    assert (one.takeoff_agl_m, one.approach_agl_m, two.takeoff_agl_m, two.approach_agl_m) == (65.0, 65.0, None, None)
+    assert (one.start_deg, one.goal_deg) == ((36.6, -84.38), (36.55, -84.2))
+    assert np.allclose(one.start[:2], mission.frame.to_plane(36.6, -84.38))
+    assert one.start[2] == pytest.approx(float(mission.surface.ground_at(one.start[0], one.start[1])))
+    assert one.start_amsl_m is None
+    arrival = mission.arrival
+    assert arrival is not None
+    assert (arrival.mode, arrival.order, arrival.interval_s, arrival.separation_m) == (
+        "sequence",
+        ("uav1", "uav2"),
+        9,
+        30,
+    )
+    assert mission.planner.name == "optimal"
+    assert mission.altitude_frame == "relative"
+    assert not mission.local
+    assert mission.inputs["vertical_datum"] == "EGM96"
+    assert mission.inputs["resolution_m"] == 92
+    assert mission.inputs["bare_dem"] is True
+    assert {len(str(mission.inputs[k])) for k in ("dem_sha256", "zones_sha256")} == {64}
+    assert json.loads(json.dumps(mission.inputs)) == mission.inputs
+
+
+def test_the_plane_lies_in_the_middle_and_its_scale_holds_over_the_whole_surface() -> None:
+    mission = load(base())
+    assert (mission.frame.lat_deg, mission.frame.lon_deg) == (36.575, -84.29)
+    rows, cols = mission.surface.ground_m.shape
+    corners = mission.surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
+    assert mission.airspace_scale >= 1.0 + 0.99 * float((corners[:, 0] ** 2).min()) / (2 * 6371e3**2)
+    assert mission.airspace_scale < 1.00002
+
+
+def test_the_surface_leaves_room_for_detours() -> None:
+    mission = load(base())
+    start, goal = mission.vehicles[0].start, mission.vehicles[0].goal
+    # A quarter of the extent to the south, where the sample goes on for long enough.
+    south = min(start[1], goal[1]) - 0.25 * (goal[0] - start[0])
+    assert math.isfinite(float(mission.surface.ground_at(0.0, south)))
+
+
+def test_a_start_in_the_file_is_kept_to_the_last_digit() -> None:
+    mission = load(base(vehicles=[vehicle(start=[36.6000001, -84.3800001])]))
+    assert mission.vehicles[0].start_deg == (36.6000001, -84.3800001)
+
+
+# -- limits and defaults ------------------------------------------------------------------------------------------
+
+
+def test_a_vehicle_overrides_the_limits_of_the_file() -> None:
+    own = vehicle(min_agl_m=80, max_amsl_m=None, limits={"track_error_m": 7})
+    limits = load(base(limits={"min_agl_m": 60, "max_amsl_m": 900}, vehicles=[own])).vehicles[0].vehicle.limits
+    assert (limits.min_agl_m, limits.max_amsl_m, limits.track_error_m) == (80, None, 7)
+
+
+def test_errors_that_are_not_given_are_not_zero_on_the_real_earth_and_are_told() -> None:
+    mission = load(base(limits={"min_agl_m": 60}))
+    limits = mission.vehicles[0].vehicle.limits
+    assert (limits.horizontal_clearance_m, limits.track_error_m, limits.altitude_error_m) == (30, 3, 5)
+    assert sum("is not given" in n for n in mission.notes) == 3
+
+
+def test_a_plane_is_not_taken_to_climb_at_any_angle() -> None:
+    mission = load(base(vehicles=[vehicle(autopilot="arduplane")]))
+    limits = mission.vehicles[0].vehicle.limits
+    assert (limits.max_climb_deg, limits.max_descent_deg) == (15, 15)
+    assert any("max_climb_deg" in n for n in mission.notes)
+
+
+def test_min_agl_must_be_said_somewhere() -> None:
+    assert the_problem(base(limits=...))[0] == "vehicles[0].min_agl_m"
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "words"),
+    [
+        ({"min_agl_m": 70, "max_agl_m": 60}, "min_agl_m", "not be above max_agl_m"),
+        ({"min_agl_m": 60, "max_agl_m": 69}, "max_agl_m", "leaves no room"),
+        ({"speed_m_s": [15, 3]}, "speed_m_s", "slowest"),
+        ({"takeoff_agl_m": 64}, "takeoff_agl_m", "at least 65 m AGL"),
+        ({"approach_agl_m": 64.9}, "approach_agl_m", "at least 65 m AGL"),
+        ({"approach_agl_m": 120, "max_agl_m": 120}, "approach_agl_m", "at most 115 m AGL"),
+        ({"via": [[36.58, -84.3, 20]]}, "via[0]", "at least 65 m AGL"),
+        ({"turn_radius_m": 80}, "turn_radius_m", "a multicopter has no turn radius"),
+        ({"end": "rtl"}, "rtl_rel_home_m", "is missing"),
+        ({"min_agl_m": 70, "limits": {"min_agl_m": 70}}, "min_agl_m", "keep one"),
+        ({"name": "uav 1"}, "name", "letters, digits"),
+        ({"name": 7}, "name", "must be text"),
+        ({"sysid": 0}, "sysid", "at least 1"),
+        ({"sysid": 256}, "sysid", "at most 255"),
+        ({"sysid": 1.0}, "sysid", "whole number"),
+        ({"sysid": True}, "sysid", "whole number"),
+        ({"autopilot": "arducoptr"}, "autopilot", "did you mean arducopter?"),
+        ({"climb_m_s": "2.5"}, "climb_m_s", "must be a number, given the text '2.5'"),
+        ({"climb_m_s": True}, "climb_m_s", "must be a number, given true"),
+        ({"climb_m_s": 0}, "climb_m_s", "above 0"),
+        ({"climb_m_s": 1e-320}, "climb_m_s", "at least 0.001"),
+        ({"accel_m_s2": 9e-4}, "accel_m_s2", "at least 0.001"),
+        ({"energy": {"battery_j": 1e-300}}, "energy.battery_j", "at least 0.001"),
+        ({"climb_m_s": math.nan}, "climb_m_s", "finite"),
+        ({"descent_m_s": math.inf}, "descent_m_s", "finite"),
+        ({"descent_m_s": 10**400}, "descent_m_s", "number"),
+        ({"max_climb_deg": 91}, "max_climb_deg", "at most 90"),
+        ({"energy": {"reserve": 1}}, "energy.reserve", "below 1"),
+        ({"energy": {"hover": 1}}, "energy.hover", "did you mean hover_w?"),
+        ({"takeof_agl_m": 65}, "takeof_agl_m", "did you mean takeoff_agl_m?"),
+        ({"speed_m_s": [3]}, "speed_m_s", "at least 2 values"),
+        ({"speed_m_s": [3, math.nan]}, "speed_m_s[1]", "finite"),
+        ({"start": "36.6, -84.38"}, "start", "must be [lat, lon]"),
+        ({"start": [36.6]}, "start", "at least 2 values [lat, lon]"),
+        ({"start": [36.6, "x"]}, "start[1]", "must be a number"),
+        ({"goal": ...}, "goal", "is missing"),
+        ({"goal": {"east_m": 1, "north_m": 2}}, "goal", "frame: {origin"),
+        ({"link": 14550}, "link", "must be text"),
+        ({"rtl_rel_home_m": -1}, "rtl_rel_home_m", "above 0"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_vehicle_is_told_with_its_key(change: dict[str, Any], key: str, words: str) -> None:
+    where, message = the_problem(base(vehicles=[vehicle(**change)]))
+    assert where == f"vehicles[0].{key}"
+    assert words in message
+
+
+def test_obstacles_count_for_take_off() -> None:
+    terrain = {"dem": "sample:jacksboro", "obstacle_height_m": 20}
+    where, message = the_problem(base(terrain=terrain, vehicles=[vehicle(takeoff_agl_m=70)]))
+    assert where == "vehicles[0].takeoff_agl_m"
+    assert "at least 85" in message
+
+
+# -- points and zones ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "words"),
+    [
+        ({"start": [-84.38, 36.6]}, "start", "look swapped"),
+        ({"goal": [36.55, 84.2]}, "goal", "outside the DEM"),
+        ({"goal": [-95.0, 36.6]}, "goal", "look swapped"),
+        ({"goal": [95.0, 195.0]}, "goal", "latitude must be within"),
+        ({"goal": [36.55, -284.2]}, "goal", "longitude must be within"),
+        ({"goal": [89.9, 0.0]}, "goal", "outside the DEM"),
+        ({"via": [[36.58, -84.3], [38.0, -84.3]]}, "via[1]", "outside the DEM"),
+        ({"via": [[36.58, -84.3], [-84.3, 36.58]]}, "via[1]", "look swapped"),
+        ({"start": [36.6, -84.4136]}, "start", "edge of the DEM"),
+        ({"start": [36.61, -84.31]}, "start", "the start lies inside the no-fly zone 'village'"),
+        ({"goal": [36.611, -84.312]}, "goal", "the goal lies inside the no-fly zone 'village'"),
+        ({"via": [[36.61, -84.31]]}, "via[0]", "inside the no-fly zone 'village'"),
+        ({"via": [[36.61, -84.31, 90]]}, "via[0]", "inside the no-fly zone 'village'"),
+    ],
+)  # fmt: skip
+def test_a_point_that_cannot_be_flown_from_or_to_is_told(change: dict[str, Any], key: str, words: str) -> None:
+    where, message = the_problem(base(vehicles=[vehicle(**change)]))
+    assert where == f"vehicles[0].{key}"
+    assert words in message
+
+
+def test_a_start_on_a_void_is_told(tmp_path: Path) -> None:
+    heights = np.full((100, 100), 300, "int16")
+    heights[48:52, 48:52] = -32768
+    dem(tmp_path / "a.tif", heights)
+    spec = {"dem": "a.tif", "vertical_datum": "EGM96"}
+    where, message = the_problem(
+        base(terrain=spec, no_fly=..., vehicles=[vehicle(start=[36.5, -84.5], goal=[36.55, -84.45])]), tmp_path
+    )
+    assert where == "vehicles[0].start"
+    assert "void" in message
+
+
+@pytest.mark.parametrize(
+    ("bounds", "inside"),
+    [({}, True), ({"ceiling_agl_m": 1}, True), ({"floor_agl_m": 0}, True), ({"floor_agl_m": 1}, False),
+     ({"floor_amsl_m": 100}, True), ({"floor_amsl_m": 900}, False), ({"ceiling_amsl_m": 900}, True)],
+)  # fmt: skip
+def test_a_start_is_inside_a_zone_that_reaches_its_ground(bounds: dict[str, float], inside: bool) -> None:
+    zone = {"name": "z", "center": [36.6, -84.38], "radius_m": 100} | bounds
+    if inside:
+        assert "zone 'z'" in the_problem(base(no_fly=[zone]))[1]
+    else:
+        assert len(load(base(no_fly=[zone])).zones) == 1
+
+
+def test_a_start_may_touch_a_zone() -> None:
+    at = {"east_m": 10, "north_m": 0}
+    zone = {"center": {"east_m": 0, "north_m": 0}, "radius_m": 10}
+    square = {"polygon": [{"east_m": x, "north_m": y} for x, y in ((10, -5), (15, -5), (15, 5), (10, 5))]}
+    goal = {"east_m": 100, "north_m": 100}
+    touching = local(terrain={"flat_m": 0}, no_fly=[zone, square], vehicles=[vehicle(start=at, goal=goal)])
+    assert load(touching).vehicles[0].start == (10.0, 0.0, 0.0)
+    zone["radius_m"] = 10.001
+    assert "zone 'no_fly[0]'" in the_problem(touching)[1]
+
+
+@pytest.mark.parametrize(
+    ("zone", "key", "words"),
+    [
+        ({"center": [36.61, -84.31], "radius_m": -4}, ".radius_m", "above 0"),
+        ({"center": [36.61, -84.31], "radius_m": 1e9}, ".radius_m", "at most 100000"),
+        ({"center": [36.61, -84.31], "radius_m": math.nan}, ".radius_m", "finite"),
+        ({"center": [36.61, -84.31]}, ".radius_m", "is missing"),
+        ({"radius_m": 4}, "", "one of center (with radius_m), polygon and file, given none"),
+        ({"center": [36.6, -84.3], "radius_m": 4, "polygon": []}, "", "given center and polygon"),
+        ({"center": [-84.31, 36.61], "radius_m": 40}, "", "look swapped"),
+        ({"center": [36.61, 84.31], "radius_m": 40}, "", "too far from the mission"),
+        ({"center": [-91, 36], "radius_m": 40}, ".center", "look swapped"),
+        ({"center": [36.61, -84.31], "radius_m": 40, "ceiling_amsl_m": 100}, ".ceiling_amsl_m", "wholly under ground"),
+        ({"center": [36.61, -84.31], "radius_m": 40, "ceiling_agl_m": 0}, ".ceiling_agl_m", "wholly under ground"),
+        ({"center": [36.61, -84.31], "radius_m": 40, "floor_agl_m": 90, "ceiling_agl_m": 50}, ".floor_agl_m", "below"),
+        ({"center": [36.61, -84.31], "radius_m": 40, "floor_agl_m": 900, "ceiling_amsl_m": 800}, "", "nowhere below"),
+        ({"center": [36.61, -84.31], "radius_m": 40, "floor_amsl_m": 2900, "ceiling_agl_m": 80}, "", "nowhere below"),
+        ({"center": [36.61, -84.31], "radius_m": 40, "floor_amsl_m": 9, "floor_agl_m": 8}, ".floor_agl_m", "both"),
+        ({"center": [36.61, -84.31], "radius_m": 4, "celing_agl_m": 8}, ".celing_agl_m", "mean ceiling_agl_m?"),
+        ({"polygon": [[36.6, -84.3], [36.61, -84.3]]}, ".polygon", "at least 3 different points"),
+        ({"polygon": [[36.6, -84.3], [36.61, -84.29], [36.6, -84.29], [36.61, -84.3]]}, ".polygon", "crosses"),
+        ({"polygon": [[36.6, -84.3], [36.61, -84.29], {"east_m": 0, "north_m": 0}]}, ".polygon[2]", "frame: {origin"),
+        ({"polygon": [[36.6, -84.3], [36.61, -84.29], [36.6, -84.29]], "radius_m": 5}, ".radius_m", "not to a polygon"),
+        ({"file": "none.geojson"}, ".file", "is not there"),
+        ({"file": "zones.txt"}, ".file", ".geojson, .json and .kml"),
+        ("village", "", "must be a mapping"),
+        ({"center": [36.61, -84.31], "radius_m": 9, "name": 5}, ".name", "must be text"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_zone_is_told_with_its_key(zone: Any, key: str, words: str) -> None:
+    where, message = the_problem(base(no_fly=[zone]))
+    assert where == f"no_fly[0]{key}"
+    assert words in message
+
+
+def test_a_zone_of_one_dem_cell_is_judged_by_the_ground_in_it_alone() -> None:
+    """On a slope the lowest corner of the cell is far below the lowest ground in a small zone."""
+    mission = load(base())
+    east, north = mission.frame.to_plane(36.61, -84.31)
+    turn = np.linspace(0, 2 * np.pi, 1000)
+    lowest = float(mission.surface.ground_at(east + 10 * np.cos(turn), north + 10 * np.sin(turn)).min())
+    for ceiling_m, buried in ((lowest - 0.1, True), (lowest + 0.1, False)):
+        zone = {"name": "z", "center": [36.61, -84.31], "radius_m": 10, "ceiling_amsl_m": ceiling_m}
+        if buried:
+            assert "wholly under ground" in the_problem(base(no_fly=[zone]))[1]
+        else:
+            assert load(base(no_fly=[zone])).zones[0].ceiling == Level(ceiling_m, "amsl")
+
+
+def test_a_floor_that_is_nowhere_above_ground_is_no_floor() -> None:
+    zone = {"center": [36.61, -84.31], "radius_m": 400, "ceiling_agl_m": 50}
+    mission = load(base(no_fly=[zone | {"floor_amsl_m": 100}, zone | {"floor_amsl_m": 650, "ceiling_agl_m": 500}]))
+    assert mission.zones[0].floor is None
+    assert mission.zones[1].floor == Level(650.0, "amsl")
+
+
+def test_polygons_in_the_file_are_prisms() -> None:
+    corners = [[36.60, -84.30], [36.61, -84.30], [36.61, -84.29]]
+    (zone,) = load(base(no_fly=[{"name": "t", "polygon": corners, "ceiling_agl_m": 50}])).zones
+    assert isinstance(zone.shape, Polygon)
+    assert len(zone.shape.vertices) >= 3
+
+
+def test_zones_from_files_are_found_beside_the_mission_and_keep_their_names_apart(tmp_path: Path) -> None:
+    def point(lon: float, lat: float, **properties: Any) -> dict[str, Any]:
+        return {"type": "Feature", "properties": properties, "geometry": {"type": "Point", "coordinates": [lon, lat]}}
+
+    (tmp_path / "sub").mkdir()
+    features = [point(-84.3, 36.6, name="R", radius_m=50), point(-84.25, 36.58, name="R", radius_m=60),
+                point(8.0, 47.0, name="far", radius_m=70)]  # fmt: skip
+    (tmp_path / "sub" / "z.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    mission = load(base(no_fly=[{"file": "sub/z.geojson"}]), tmp_path)
+    assert [z.name for z in mission.zones] == ["R", "R #2"]
+    assert any("1 zone(s)" in n for n in mission.notes)
+    features[1]["properties"]["radius_m"] = "60"
+    features[2]["geometry"]["coordinates"] = [36.6, -84.3]
+    (tmp_path / "sub" / "z.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    found = problems(base(no_fly=[{"file": "sub/z.geojson"}]), tmp_path)
+    assert "features[1].properties.radius_m" in found[0].where
+    assert "look swapped" in found[1].message
+
+
+def test_bounds_of_a_file_stand_in_the_file(tmp_path: Path) -> None:
+    found = problems(base(no_fly=[{"file": "z.kml", "ceiling_agl_m": 50}]), tmp_path)
+    assert [p.where.split(": ")[1] for p in found] == ["no_fly[0].ceiling_agl_m", "no_fly[0].file"]
+
+
+# -- terrain ------------------------------------------------------------------------------------------------------
+
+
+def dem(path: Path, heights: Any, west: float = -84.6, north: float = 36.6) -> None:
+    transform = Affine(0.002, 0, west, 0, -0.002, north)
+    rows, cols = heights.shape
+    with rasterio.open(
+        path, "w", driver="GTiff", width=cols, height=rows, count=1, dtype=heights.dtype, crs="EPSG:4326",
+        transform=transform,
+    ) as file:  # fmt: skip
+        file.write(heights, 1)
+
+
+def test_tiles_are_found_beside_the_mission(tmp_path: Path) -> None:
+    dem(tmp_path / "w.tif", np.full((100, 100), 300, "int16"))
+    dem(tmp_path / "e.tif", np.full((100, 100), 310, "int16"), west=-84.4)
+    whole = base(
+        terrain={"dem": ["w.tif", "e.tif"], "vertical_datum": "EGM96"}, no_fly=...,
+        vehicles=[vehicle(start=[36.5, -84.5], goal=[36.5, -84.3])],
+    )  # fmt: skip
+    mission = load(whole, tmp_path)
+    assert (mission.vehicles[0].start[2], mission.vehicles[0].goal[2]) == pytest.approx((300, 310))
+
+
+@pytest.mark.parametrize(
+    ("terrain", "key", "words"),
+    [
+        ({"dem": "none.tif"}, ".dem", "is not there"),
+        ({"dem": ["none.tif", "none2.tif"]}, ".dem[0]", "is not there"),
+        ({"dem": 5}, ".dem", "must be text"),
+        ({"dem": []}, ".dem", "at least 1"),
+        ({}, "", "either"),
+        ({"dem": "sample:jacksboro", "flat_m": 0}, "", "either"),
+        ({"flat_m": math.inf}, ".flat_m", "finite"),
+        ({"peaks": [{"center": [0, 0], "height_m": 1, "decay_m": [1, 1]}]}, ".peaks", "add `frame:"),
+        ({"peaks": [{"center": [0, 0], "height_m": 1, "decay_m": [1, 0]}]}, ".peaks[0].decay_m[1]", "at least 0.001"),
+        ({"dem": "sample:jacksboro", "obstacle_height_m": -1}, ".obstacle_height_m", "at least 0"),
+        ({"dem": "sample:jacksboro", "canopy": "none.tif"}, ".canopy", "is not there"),
+        ({"dem": "sample:jacksboro", "geoid_grid": "g.gtx"}, ".geoid_grid", "remove it"),
+        ({"dem": "sample:jacksboro", "vertical_datum": "EGM2008"}, ".vertical_datum", "EGM96"),
+        ({"dem": "sample:jacksboro", "vertical_datums": "EGM96"}, ".vertical_datums", "did you mean vertical_datum?"),
+        ("sample:jacksboro", "", "must be a mapping"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_the_terrain_is_told_with_its_key(terrain: Any, key: str, words: str, tmp_path: Path) -> None:
+    where, message = the_problem(base(terrain=terrain), tmp_path)
+    assert where == f"terrain{key}"
+    assert words in message
+
+
+def test_a_mission_wider_than_the_plane_is_refused() -> None:
+    whole = base(
+        terrain={"flat_m": 0}, no_fly=..., vehicles=[vehicle(), vehicle(name="b", sysid=2, goal=[36.5, -80.0])]
+    )
+    where, message = the_problem(whole)
+    assert where == "vehicles[1].goal"
+    assert "more than 150 km" in message
+
+
+def test_a_mission_at_the_pole_is_refused() -> None:
+    whole = base(terrain={"flat_m": 0}, no_fly=..., vehicles=[vehicle(start=[86.0, 0.0], goal=[86.01, 0.0])])
+    assert "±85°" in the_problem(whole)[1]
+
+
+def test_a_mission_across_the_antimeridian_is_small() -> None:
+    whole = base(terrain={"flat_m": 10}, no_fly=..., vehicles=[vehicle(start=[10, 179.99], goal=[10, -179.99])])
+    mission = load(whole)
+    assert mission.vehicles[0].goal[0] - mission.vehicles[0].start[0] == pytest.approx(2193, abs=3)
+
+
+# -- local metres -------------------------------------------------------------------------------------------------
+
+
+def test_a_mission_in_local_metres_has_no_errors_of_its_own_and_may_hang_its_goal_in_the_air() -> None:
+    mission = load(local())
+    assert mission.local
+    one = mission.vehicles[0]
+    limits = one.vehicle.limits
+    assert (limits.horizontal_clearance_m, limits.track_error_m, limits.altitude_error_m) == (0, 0, 0)
+    assert one.start == pytest.approx((0.0, 0.0, 0.0), abs=0.011)
+    assert one.start_amsl_m is None
+    assert one.goal == pytest.approx((100.0, 100.0, 0.0), abs=0.011)
+    assert one.goal_amsl_m == pytest.approx(60.0)
+    assert np.allclose(mission.frame.to_plane(*one.goal_deg), (100, 100), atol=1e-6)
+    assert float(mission.surface.ground_at(50, 50)) == pytest.approx(70.0, abs=0.011)
+    box = [float(x) for x in mission.surface.grid.to_plane(0, mission.surface.ground_m.shape[0] - 1)]
+    assert box == pytest.approx([-50, -50])
+
+
+def test_amsl_of_a_local_frame_lifts_ground_and_points_but_not_amsl_words() -> None:
+    zone = {"center": {"east_m": 50, "north_m": 0}, "radius_m": 5, "ceiling_amsl_m": 1010}
+    end = {"east_m": 100, "north_m": 100, "agl_m": 7}
+    whole = local(
+        frame={"origin": [36.6, -84.3], "amsl_m": 1000}, terrain={"flat_m": 2}, no_fly=[zone],
+        vehicles=[vehicle(start={"east_m": 0, "north_m": 0}, goal=end, via=[{"east_m": 9, "north_m": 9, "up_m": 12}])],
+    )  # fmt: skip
+    mission = load(whole)
+    one = mission.vehicles[0]
+    assert one.start == (0.0, 0.0, 1002.0)
+    assert one.goal_amsl_m == 1009.0
+    assert one.via == ((9.0, 9.0, 10.0),)
+    assert mission.zones[0].ceiling == Level(1010.0, "amsl")
+    assert isinstance(mission.zones[0].shape, Circle)
+
+
+def test_a_local_mission_may_give_some_points_in_degrees() -> None:
+    whole = local(terrain={"flat_m": 0}, vehicles=[vehicle(start={"east_m": 0, "north_m": 0}, goal=[36.601, -84.3])])
+    assert load(whole).vehicles[0].goal[:2] == pytest.approx(Frame(36.6, -84.3).to_plane(36.601, -84.3))
+
+
+@pytest.mark.parametrize(
+    ("point", "key", "words"),
+    [
+        ({"east_m": 50, "north_m": 50, "up_m": 10}, "start.up_m", "under ground"),
+        ({"east_m": 50, "north_m": 50, "up_m": 10, "agl_m": 5}, "start", "not both"),
+        ({"east_m": 50}, "start.north_m", "is missing"),
+        ({"east": 50, "east_m": 1, "north_m": 1}, "start.east", "did you mean east_m?"),
+        ({"east_m": 5e5, "north_m": 0}, "start", "from the frame's origin"),
+        ({"east_m": math.nan, "north_m": 0}, "start.east_m", "finite"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_local_point_is_told(point: dict[str, float], key: str, words: str) -> None:
+    where, message = the_problem(local(vehicles=[vehicle(start=point, goal={"east_m": 9, "north_m": 9})]))
+    assert where == f"vehicles[0].{key}"
+    assert words in message
+
+
+def test_a_start_in_the_air_takes_no_take_off_height() -> None:
+    start = {"east_m": 0, "north_m": 0, "up_m": 30}
+    whole = local(vehicles=[vehicle(start=start, goal={"east_m": 9, "north_m": 9}, takeoff_agl_m=30)])
+    assert "leave takeoff_agl_m out" in the_problem(whole)[1]
+
+
+@pytest.mark.parametrize(
+    ("frame", "key"),
+    [
+        ({}, "frame.origin"),
+        ({"origin": [36.6]}, "frame.origin"),
+        ({"origin": [88.0, 0.0]}, "frame.origin"),
+        (5, "frame"),
+    ],
+)
+def test_a_bad_frame_is_told(frame: Any, key: str) -> None:
+    assert the_problem(local(frame=frame))[0] == key
+
+
+# -- the fleet, the planner and the rest --------------------------------------------------------------------------
+
+
+def fleet(*vehicles: dict[str, Any], **more: Any) -> dict[str, Any]:
+    return base(vehicles=list(vehicles), **more)
+
+
+def test_doubled_names_and_system_ids_are_told() -> None:
+    found = problems(fleet(vehicle(), vehicle(name="UAV1"), vehicle(name="uav3", sysid="x")))
+    assert {p.where.split(": ")[1] for p in found} == {"vehicles[1].name", "vehicles[1].sysid", "vehicles[2].sysid"}
+
+
+@pytest.mark.parametrize(
+    ("arrival", "key", "words"),
+    [
+        ({"mode": "sequence", "order": ["uav1", "uav3"], "interval_s": 9}, "arrival.order[1]", "did you mean"),
+        ({"mode": "sequence", "order": ["uav1"], "interval_s": 9}, "arrival.order", "missing: uav2"),
+        ({"mode": "sequence", "order": ["uav1", "uav2", "uav1"], "interval_s": 9}, "arrival.order[2]", "stands twice"),
+        ({"mode": "sequence", "order": ["uav1", "uav2"]}, "arrival.interval_s", "is missing"),
+        ({"mode": "sequenz", "interval_s": 9}, "arrival.mode", "did you mean sequence?"),
+        ({"mode": "together", "separation_m": -1}, "arrival.separation_m", "at least 0"),
+        ({"order": []}, "arrival.mode", "is missing"),
+        ([1], "arrival", "must be a mapping"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_the_arrival_is_told(arrival: Any, key: str, words: str) -> None:
+    found = problems(fleet(vehicle(), vehicle(name="uav2", sysid=2), arrival=arrival))
+    told = {p.where.split(": ", 1)[1]: p.message for p in found}
+    assert words in told[key]
+    assert len(told) <= 2
+
+
+def test_the_order_of_arrival_is_that_of_the_file_unless_said() -> None:
+    mission = load(fleet(vehicle(), vehicle(name="uav2", sysid=2), arrival={"mode": "together"}))
+    assert mission.arrival is not None
+    assert mission.arrival.order == ("uav1", "uav2")
+    assert load(base()).arrival is None
+
+
+def test_the_planner_takes_keys_that_only_some_planners_know() -> None:
+    keys = {"name": "krill", "seed": 7, "encoding": "bspline", "parameters": {"delta": 0.6}}
+    planner = load(base(planner=keys)).planner
+    assert (planner.name, planner.seed, planner.gap_percent) == ("krill", 7, 0.1)
+    assert planner.extras == {"encoding": "bspline", "parameters": {"delta": 0.6}}
+
+
+@pytest.mark.parametrize(
+    ("planner", "key", "words"),
+    [
+        ({"name": "optiml"}, "planner.name", "did you mean optimal?"),
+        ({"name": "zzz"}, "planner.name", "known are optimal, krill"),
+        ({"sede": 1}, "planner.sede", "did you mean seed?"),
+        ({"seed": -1}, "planner.seed", "at least 0"),
+        ({"objective": "time"}, "planner.objective", "one of length, energy"),
+        ({"budget_s": 0}, "planner.budget_s", "above 0"),
+        ({"parameters": {"a": [1]}}, "planner.parameters", "plain number or word"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_the_planner_is_told(planner: Any, key: str, words: str) -> None:
+    where, message = the_problem(base(planner=planner))
+    assert where == key
+    assert words in message
+
+
+def test_the_planners_own_table_is_asked_where_none_is_handed_in() -> None:
+    with pytest.raises(InputError, match=r"planner\.name"):
+        load_mission("m.yaml", text=yaml.safe_dump(base(planner={"name": "no such planner"})))
+
+
+@pytest.mark.parametrize(
+    ("top", "key", "words"),
+    [
+        ({"version": 2}, "version", "version 1, given 2"),
+        ({"version": True}, "version", "version 1, given true"),
+        ({"version": "1"}, "version", "given the text '1'"),
+        ({"version": ...}, "version", "write `version: 1`"),
+        ({"terrain": ...}, "terrain", "is missing"),
+        ({"vehicles": ...}, "vehicles", "is missing"),
+        ({"vehicles": []}, "vehicles", "1 to 255 vehicles"),
+        ({"vehicles": {}}, "vehicles", "1 to 255 vehicles"),
+        ({"no_fly": {}}, "no_fly", "must be a list"),
+        ({"no_flie": []}, "no_flie", "did you mean no_fly?"),
+        ({"altitude_frame": "amls"}, "altitude_frame", "did you mean amsl?"),
+        ({"altitude_frame": 3}, "altitude_frame", "one of relative, amsl, terrain"),
+        ({"name": 3}, "name", "must be text"),
+        ({"limits": 3}, "limits", "must be a mapping"),
+        ({"terrain_error_m": -1}, "terrain_error_m", "from 0 to 1000"),
+        ({"altitude_frame": "terrain", "vehicles": [vehicle(autopilot="px4")]}, "vehicles[0].autopilot", "px4"),
+    ],
+)  # fmt: skip
+def test_a_mistake_at_the_top_is_told(top: dict[str, Any], key: str, words: str) -> None:
+    where, message = the_problem(base(**top))
+    assert where == key
+    assert words in message
+
+
+def test_terrain_frames_carry_the_vehicles_own_terrain_error() -> None:
+    assert load(base()).terrain_error_m == 0.0
+    assert load(base(altitude_frame="terrain")).terrain_error_m == 30.0
+    assert load(base(altitude_frame="terrain", terrain_error_m=12)).terrain_error_m == 12.0
+
+
+def test_every_mistake_is_told_at_once_schema_and_world_alike() -> None:
+    whole = base(
+        limits={"min_agl_m": 60, "max_agl_m": 50},
+        no_fly=[{"name": "a", "center": [36.61, -84.31], "radius_m": 40, "ceiling_amsl_m": 100},
+                {"name": "a", "center": [36.6, -84.3], "radius_m": -1}, {"file": "none.kml"}],
+        vehicles=[vehicle(start=[-84.38, 36.6], speed_m_s=[9, 3]), vehicle(sysid="2"), vehicle(name="c", sysid=3)],
+        planner={"name": "optimalt"}, altitude_frame="amsel", typo=1,
+    )  # fmt: skip
+    told = {p.where.split(": ", 1)[1] for p in problems(whole)}
+    assert told >= {
+        "typo", "altitude_frame", "planner.name", "vehicles[0].speed_m_s", "vehicles[0].min_agl_m", "vehicles[1].sysid",
+        "vehicles[1].name", "vehicles[0].start", "no_fly[0].ceiling_amsl_m", "no_fly[1].radius_m", "no_fly[1].name",
+        "no_fly[2].file", "vehicles[2].min_agl_m",
+    }  # fmt: skip
+
+
+def test_the_message_names_file_key_given_and_wanted(tmp_path: Path) -> None:
+    path = tmp_path / "ridge.yaml"
+    path.write_text(yaml.safe_dump(base(no_fly=[{"center": [36.6, -84.3], "radius_m": "400"}])))
+    with pytest.raises(InputError) as caught:
+        load_mission(path, planner_names=PLANNERS)
+    assert str(caught.value) == f"{path}: no_fly[0].radius_m: must be a number, given the text '400'"
+
+
+# -- files --------------------------------------------------------------------------------------------------------
+
+
+def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+    (tmp_path / "latin.yaml").write_bytes(b"name: \xe9")
+    (tmp_path / "big.yaml").write_bytes(b"#" * 5_000_001)
+    cases = {
+        "none.yaml": "no such file",
+        "": "folder",
+        "latin.yaml": "UTF-8",
+        "big.yaml": "at most",
+        "a\0b": "cannot be read",
+    }
+    for name, words in cases.items():
+        with pytest.raises(InputError, match=words):
+            load_mission(tmp_path / name if name else tmp_path)
+
+
+@pytest.mark.parametrize("text", ["", "- 1", "5", "a", "version: 1\nversion: 1", "\tversion: 1", "version: 1\n  x: ["])
+def test_text_that_is_no_mission_is_told(text: str) -> None:
+    assert problems(text)
+
+
+def test_a_byte_order_mark_is_no_key(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_bytes(b"\xef\xbb\xbf" + yaml.safe_dump(base()).encode())
+    assert load_mission(path, planner_names=PLANNERS).stem == "m"
+
+
+# -- hostile files ------------------------------------------------------------------------------------------------
+
+JUNK = st.one_of(
+    st.none(), st.booleans(), st.integers(-(10**30), 10**30), st.floats(), st.text(max_size=6),
+    st.sampled_from([0, -1, 1e308, 36.6, -84.3, "sample:jacksboro", "land", [], {}, [[]], [36.6, -84.3], [1, 2, 3],
+                     {"east_m": 1, "north_m": 2}, {"file": "x.kml"}, {"name": "a"}]),
+)  # fmt: skip
+
+
+def paths_into(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    found = [path] if path else []
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        found += paths_into(inner, (*path, key))
+    return found
+
+
+@pytest.fixture(scope="module")
+def seeds() -> list[Any]:
+    return [yaml.safe_load(EXAMPLE.read_text(encoding="utf-8").replace("5.0e6", "5.0e+6")), local(), base()]
+
+
+@settings(max_examples=75, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_any_mutation_of_a_mission_loads_or_is_refused(seeds: list[Any], tmp_path: Path, data: st.DataObject) -> None:
+    whole = copy.deepcopy(data.draw(st.sampled_from(seeds)))
+    for _ in range(data.draw(st.integers(1, 4))):
+        paths = paths_into(whole)
+        if not paths:
+            break
+        *parents, last = data.draw(st.sampled_from(paths))
+        at = whole
+        for key in parents:
+            at = at[key]
+        match data.draw(st.sampled_from(["junk", "delete", "scale", "swap", "rename"])):
+            case "delete":
+                del at[last]
+            case "scale" if isinstance(at[last], int | float):
+                at[last] = at[last] * data.draw(st.sampled_from([-1, 0, 1e-9, 1e3, 1e300]))
+            case "swap" if isinstance(at, list):
+                at.reverse()
+            case "rename" if isinstance(at, dict):
+                at[str(last)[:-1]] = at.pop(last)
+            case _:
+                at[last] = copy.deepcopy(data.draw(JUNK))
+    try:
+        mission = load(json.dumps(whole), tmp_path)
+    except InputError as error:
+        assert all(p.where and p.message for p in error.problems)  # noqa: PT017
+        return
+    assert np.isfinite([x for v in mission.vehicles for x in (*v.start, *v.goal)]).all()
+    assert all(math.isfinite(x) for z in mission.zones for x in z.bounds)
+    assert mission.surface.ground_m.size <= 4_000_000
+    assert mission.airspace_scale >= 1.0
+
+
+@settings(max_examples=50)
+@given(st.data())
+def test_any_damage_to_the_text_of_a_mission_is_read_or_refused(data: st.DataObject) -> None:
+    text = EXAMPLE.read_text(encoding="utf-8")
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(text)))
+        junk = data.draw(
+            st.sampled_from(["", ":", "\n", "  ", "\t", "[", "}", "-", "'", "#", "&a ", "*a", "!!x ", "\x00", "9"])
+        )
+        text = text[:at] + junk + text[at + data.draw(st.integers(0, 12)) :]
+    try:
+        load(text)
+    except InputError as error:
+        assert error.problems  # noqa: PT017

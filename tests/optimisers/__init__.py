@@ -1,0 +1,1 @@
+"""Tests of optimisers on the unit box."""

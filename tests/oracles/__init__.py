@@ -1,0 +1,1 @@
+"""Independent implementations that clever code is held to."""

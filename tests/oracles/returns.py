@@ -1,0 +1,187 @@
+"""Brute force for the way home: dense points on a mission, dense samples along each return; shares no code with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.mavlink.mission.mission import (
+    LAND,
+    RELATIVE,
+    TAKEOFF,
+    VTOL_LAND,
+    VTOL_TAKEOFF,
+    WAYPOINT,
+    Home,
+    Mission,
+    MissionItem,
+)
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.frame import Frame
+from gcsplan.world.limits import Limits
+from gcsplan.world.surface import GridMap
+from gcsplan.world.world import World
+from gcsplan.world.zones import Circle, Zone
+from tests.oracles.legs import Oracle
+from tests.support.random_worlds import Ground, in_plane, oracle_of, random_limits, random_zones, surface_of, turned
+
+Floats = NDArray[np.float64]
+CONE = {Autopilot.ARDUCOPTER: 3.0, Autopilot.PX4: 1.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A world, a vehicle, a mission in it, and its corners in the plane: home, up, along, down."""
+
+    world: World
+    oracle: Oracle
+    vehicle: Vehicle
+    mission: Mission
+    corners: Floats
+    level_rel_home_m: float
+
+
+def wide_ground(rng: np.random.Generator) -> Ground:
+    """Room enough for a circle over home."""
+    rows, cols = (int(n) for n in rng.integers(10, 16, 2))
+    dx, dy = rng.uniform(60.0, 120.0, 2)
+    north = (rows - 1) * dy
+    z = rng.uniform(0.0, rng.choice([5.0, 40.0, 120.0]), (rows, cols))
+    box = (0.0, 0.0, (cols - 1) * dx, north)
+    grid = GridMap.affine(0.0, north, dx, dy)
+    return Ground(z, grid, lambda e, n: (e / dx, (north - n) / dy), box, min(dx, dy) / 4.0)
+
+
+def random_case(rng: np.random.Generator, autopilot: Autopilot) -> Case | None:
+    """A small rough world and a mission of a few legs in it; None where home is unknown."""
+    plane = autopilot is Autopilot.ARDUPLANE
+    ground = wide_ground(rng) if plane else (in_plane, turned)[int(rng.integers(0, 2))](rng)
+    flat = rng.random() < 0.5
+    if flat:  # enough for zones to be what is in the way
+        ground = replace(ground, heights=0.04 * np.nan_to_num(ground.heights, nan=20.0))
+    limits = replace(random_limits(rng, ground), max_climb_deg=90.0, max_descent_deg=90.0)
+    if rng.random() < 0.4:
+        limits = Limits(min_agl_m=5.0, horizontal_clearance_m=float(rng.choice([0.0, 3.0])))
+    west, south, east, north = ground.box
+    wide = 0.15 * (east - west), 0.15 * (north - south)
+    count = int(rng.integers(2, 5))
+    en = np.stack(
+        [
+            rng.uniform(west + wide[0], east - wide[0], count),
+            rng.uniform(south + wide[1], north - wide[1], count),
+        ],
+        axis=-1,
+    )
+    reach = limits.track_error_m + limits.horizontal_clearance_m + 1.0
+    zones = [z for _ in range(4 if flat else 1) for z in random_zones(rng, ground, 4)]
+    if rng.random() < 0.8:  # not all of them shut in at home
+        zones = [z for z in zones if _away(z, en[0]) > reach]
+    surface = surface_of(rng, ground)
+    scale = float(rng.choice([1.0, 1.0005]))
+    world = World(Frame(36.6, -84.3), Airspace(surface, zones, scale=scale))
+    vehicle = Vehicle("uav1", 1, autopilot, limits, climb_m_s=float(rng.uniform(1.0, 8.0)))
+    degrees = world.frame.to_degrees(*en.T)
+    home = Home.at(*degrees[0].tolist(), 0.0)
+    level = world.ground_amsl(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
+    if math.isnan(level):
+        return None
+    up = rng.uniform(1.0, 60.0 if flat else 150.0, count).round(1)
+    takeoff, land = (VTOL_TAKEOFF, VTOL_LAND) if plane else (TAKEOFF, LAND)
+    items = [MissionItem(takeoff, RELATIVE, z=float(up[0]), x=home.lat_e7, y=home.lon_e7)]
+    for (lat, lon), z in zip(degrees[1:].tolist(), up[1:].tolist(), strict=True):
+        items.append(MissionItem(WAYPOINT, RELATIVE, x=round(lat * 1e7), y=round(lon * 1e7), z=z + 0.005))
+    last = items[-1]
+    ends = rng.random() < 0.5
+    if ends:
+        items.append(MissionItem(land, RELATIVE, x=last.x, y=last.y, z=0.0))
+    mission = Mission(autopilot, replace(home, amsl_m=level), tuple(items))
+    places = [(home.lat_e7 / 1e7, home.lon_e7 / 1e7, level)]
+    least = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}.get(autopilot, 0.0)
+    places.append((*places[0][:2], level + max(_stored(items[0].z, autopilot), least)))
+    places += [(i.lat_deg, i.lon_deg, level + _stored(i.z, autopilot)) for i in items[1 : len(up)]]
+    corners = np.array(places)
+    corners[:, :2] = world.frame.to_plane(corners[:, 0], corners[:, 1])
+    if ends:
+        down = float(surface.ground_at(*corners[-1, :2]))
+        if not math.isnan(down):
+            corners = np.vstack([corners, [*corners[-1, :2], down]])
+    if plane:  # its columns are not judged
+        corners = corners[: len(up) + 1]
+    oracle = oracle_of(surface, ground, zones, scale, step_m=max(0.4, 0.15 * ground.cell_m))
+    return Case(world, oracle, vehicle, mission, corners, float(rng.uniform(2.0, 60.0 if flat else 160.0)))
+
+
+def _away(zone: Zone, place: Floats) -> float:
+    """How far a zone's surrounding circle lies from a place, about."""
+    if isinstance(zone.shape, Circle):
+        middle, radius = np.array([zone.shape.east_m, zone.shape.north_m]), zone.shape.radius_m
+    else:
+        middle = zone.shape.vertices.mean(axis=0)
+        radius = float(np.hypot(*(zone.shape.vertices - middle).T).max())
+    return float(np.hypot(*(place - middle))) - 1.001 * radius
+
+
+def _stored(z: float, autopilot: Autopilot) -> float:
+    """Whole centimetres, cut towards zero, on ArduPilot."""
+    return z if autopilot is Autopilot.PX4 else math.trunc(float(np.float32(z) * np.float32(100.0))) / 100.0
+
+
+def breach(case: Case, at: Floats, *, legal: bool, more_m: float = 0.0, lift_m: float = 0.0) -> str:
+    """What the return from ``at`` (east, north, AMSL) meets, or nothing.
+
+    ``more_m``: how much farther than demanded is looked beside the way, ``lift_m`` likewise in height.
+    """
+    limits, oracle, home = case.vehicle.limits, case.oracle, case.corners[0]
+    if legal and (found := breach(case, at, legal=False, more_m=more_m, lift_m=lift_m)):
+        return found
+    if not legal:
+        limits = replace(limits, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None)
+    track, altitude = limits.track_error_m + more_m / oracle.scale, limits.altitude_error_m + lift_m
+    level = home[2] + case.level_rel_home_m
+    for start, end, column in _ways(case, at, level, cone=not legal):
+        for k in range(len(oracle.zones)):
+            if oracle.zone_breach(k, start, end, track, altitude, limits, spokes=10, rings=2):
+                return f"zone {k}, column {column}"
+        if column:
+            continue
+        depths = oracle.depths(start, end, False, track, altitude, limits)
+        depths["coverage"] -= 0.5
+        bad = [name for name, depth in depths.items() if depth > 1e-6 and name not in ("climb", "descent")]
+        if bad:
+            return f"{bad[0]} by {depths[bad[0]]:.3f}"
+    return ""
+
+
+def _ways(case: Case, at: Floats, level: float, *, cone: bool) -> list[tuple[Floats, Floats, bool]]:
+    """Straight pieces (start, end, column) of ways that the autopilot may take from ``at``."""
+    home, away = case.corners[0], math.hypot(*(at[:2] - case.corners[0][:2]))
+
+    def point(en: Floats, amsl: float) -> Floats:
+        return np.array([*en[:2], amsl])
+
+    near = away <= max(5.0, case.vehicle.limits.track_error_m)
+    if case.vehicle.autopilot is not Autopilot.ARDUPLANE:
+        full = max(level, at[2])
+        least = max(at[2], min(level, home[2] + CONE[case.vehicle.autopilot] * away)) if cone else full
+        ways = []
+        for flown in (least, 0.5 * (least + full), full):
+            up, over = point(at, flown), point(home, flown)
+            ways += [(at, up, True), (over, home, True)] + ([] if near else [(up, over, False)])
+        return ways
+    over = point(home, level)
+    circle = [(point(over + 55.0 * np.array([c, s, 0.0]), level), over, False) for c, s in ((1, 0), (0, 1), (-1, -0.2))]
+    if near:
+        return circle
+    climb = case.vehicle.climb_m_s / case.vehicle.speed_max_m_s
+    if at[2] >= level:  # down at once, late, or all along
+        lines = [(point(at, level), over), (point(at, at[2]), point(home, at[2])), (at, over)]
+        return circle + [(a, b, False) for a, b in lines]
+    part = min((level - at[2]) / climb / away, 1.0)
+    there = at + part * (point(home, at[2]) - at)
+    there[2] = min(at[2] + climb * part * away, level)
+    slow = [(at, there, False), (there, point(home, there[2]), False)]
+    return circle + slow + [(point(at, level), over, False), (at, at + 1e-3, False)]

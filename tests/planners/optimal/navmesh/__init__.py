@@ -1,0 +1,1 @@
+"""Tests of outlines, meshes and shortest tracks over them."""

@@ -1,0 +1,93 @@
+"""Paths along the ways of bounds: a notch that was passed by is found, one that is shut is not, and the rest stays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from gcsplan.planners.lattice.planner import plan_band
+from gcsplan.planners.optimal.plane_search import PlaneSearch
+from gcsplan.planners.optimal.sources import bound_corridor
+from gcsplan.planners.problem import Via
+from gcsplan.world.path import Path
+from tests.planners.optimal.sources.test_notches import MIDDLE_M, ROUND_M, STRAIGHT_M, ridge
+from tests.support.planner_worlds import faults
+from tests.support.searches import improve, looked
+
+Floats = NDArray[np.float64]
+
+
+def through(over_m: float, **more: object) -> PlaneSearch:
+    """With a path round the ridge, and the way of a bound through its notch."""
+    problem = replace(ridge(over_m, 0.2, 80.0, True), **more)  # type: ignore[arg-type]
+    plane = looked(problem)
+    below = plane.incumbent
+    assert below.best is None
+    below.take(plan_band(problem, below.tell, below.budget.begun_s).path.points)
+    assert below.cost > ROUND_M
+    for leg in plane.legs:
+        limit_m = 1.05 * leg.straight_m
+        leg.bound(plane.top_m, leg.corridor(limit_m), limit_m)
+    return plane
+
+
+def test_a_path_leads_through_a_notch_that_was_passed_by() -> None:
+    plane = through(0.1)
+    below = plane.incumbent
+    assert bound_corridor.follow(plane)
+    assert below.best is not None
+    assert below.cost < STRAIGHT_M
+    assert faults(below.problem, Path(below.best)) == []
+    assert not bound_corridor.follow(plane)  # there is no other
+
+
+def test_a_notch_that_is_shut_is_left_alone() -> None:
+    plane = through(-0.3)
+    before = plane.incumbent.cost
+    assert not bound_corridor.follow(plane)
+    assert plane.incumbent.cost == before
+
+
+def test_stops_are_passed_as_before() -> None:
+    plane = through(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
+    below = plane.incumbent
+    assert below.best is not None
+    assert not bound_corridor.follow(plane)  # nobody knows where on the path its stops are
+    stop = np.array([500.0, MIDDLE_M + 30.0, 82.0])
+    below.pinned = (np.abs(below.best - stop) < 1e-6).all(axis=1)
+    below.pinned[[0, -1]] = True
+    assert bound_corridor.follow(plane)
+    assert below.best is not None
+    assert below.cost < STRAIGHT_M + 10.0
+    assert below.pinned.sum() == 3
+    assert np.abs(below.best[below.pinned][1] - stop).max() < 1e-6
+    assert faults(below.problem, Path(below.best)) == []
+
+
+def test_the_planner_asks_for_it() -> None:
+    plane = through(0.1)
+    improve(plane, ())
+    assert plane.incumbent.cost < STRAIGHT_M
+    assert plane.incumbent.gap < 0.003
+
+
+places = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), min_size=2, max_size=6, unique=True)
+
+
+@given(places, places)
+def test_the_nearest_place_of_a_track_is_as_near_as_any(some: list[tuple[float, float]], track: object) -> None:
+    line = np.array(track, dtype=float)
+    away, where = bound_corridor._nearest(np.array(some), line)
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    t = np.linspace(0.0, s[-1], 2001)
+    dense = np.stack([np.interp(t, s, line[:, k]) for k in range(2)], axis=-1)
+    for place, far, at in zip(some, away, where, strict=True):
+        assert far <= np.hypot(*(dense - place).T).min() + 1e-6
+        there = [np.interp(at, s, line[:, k]) for k in range(2)]
+        assert math.dist(there, place) == pytest.approx(far, abs=1e-6)

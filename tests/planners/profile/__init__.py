@@ -1,0 +1,1 @@
+"""Tests of altitudes over a fixed track."""

@@ -1,0 +1,1 @@
+"""Tests of swarm planners and the papers they come from."""

@@ -1,0 +1,218 @@
+"""Swarm planners: what they hand back passes the exact check, and what was wrong with the search's curve is said."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcsplan.app.pipeline import plan
+from gcsplan.errors import InputError, NoMission
+from gcsplan.planners.problem import Problem, Via
+from gcsplan.planners.registry import TABLE, get, names
+from gcsplan.planners.swarm import planner as swarm_planner
+from gcsplan.planners.swarm.planner import Settings, search
+from gcsplan.planners.swarm.repair import repair, violations
+from gcsplan.planners.swarm.scene import Scene
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.zones import Circle, Level, Zone
+from tests.support.paths import MISSIONS
+from tests.support.planner_worlds import FIELD, faults, ground, jacksboro, random_mission
+
+SWARMS = [name for name in names() if TABLE[name].optimiser and name != "aco"]
+LIMITS = Limits(min_agl_m=30.0, horizontal_clearance_m=10.0, track_error_m=2.0, altitude_error_m=2.0)
+
+
+def hills(east: np.ndarray, north: np.ndarray) -> np.ndarray:
+    return 100.0 + 60.0 * np.sin(east / 300.0) * np.cos(north / 250.0)
+
+
+def toy(limits: Limits = LIMITS, **options: object) -> Problem:
+    zones = (
+        Zone("wall", Circle(1000.0, 950.0, 220.0)),
+        Zone("mast", Circle(600.0, 600.0, 60.0), None, Level(120.0, "agl")),
+    )
+    air = Airspace(ground(hills), zones)
+    a, b = (300.0, 400.0), (1700.0, 1300.0)
+    low = air.floor_amsl([a[0], b[0]], [a[1], b[1]], limits) + 0.5
+    return Problem(air, limits, (*a, float(low[0])), (*b, float(low[1])), options=options)
+
+
+@pytest.mark.parametrize("name", SWARMS)
+def test_every_swarm_solves_a_toy_map_and_says_what_it_did(name: str) -> None:
+    problem = toy(encoding="bspline", points=4, iterations=10, population=20)
+    solution = get(name).plan(problem)
+    assert violations(problem, solution.path.points) == ()
+    assert faults(problem, solution.path) == []
+    assert solution.raw_violations is not None
+    assert solution.repaired is not None
+    assert bool(solution.notes) == (solution.raw_violations > 0 or solution.repaired)
+    assert solution.lower_bound is None
+
+
+@pytest.mark.parametrize("encoding", ["box", "sections", "polar", "bspline", "offsets"])
+def test_every_encoding_and_cost_go_together(encoding: str) -> None:
+    for cost in ("krill", "ssgwo", "msfoa", "abo", "ib-abc"):
+        problem = toy(encoding=encoding, cost=cost, iterations=8, population=30)
+        assert violations(problem, get("de").plan(problem).path.points) == ()
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_path() -> None:
+    problem = toy(encoding="sections", iterations=20)
+    plans = [get("ib-abc").plan(replace(problem, seed=s)).path.points for s in (1, 1, 2)]
+    assert plans[0].tobytes() == plans[1].tobytes() != plans[2].tobytes()
+
+
+def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sampled cost is made blind: every curve looks free, and the straight one looks best."""
+    problem = toy(encoding="sections", points=3, iterations=30, population=30)
+
+    def blind(name: str) -> object:
+        from gcsplan.planners.swarm import cost_kernels as k
+        from gcsplan.planners.swarm.objectives import Objective
+
+        return Objective(name, "", "", 0, lambda terms, unit: terms[:, k.LENGTH])
+
+    monkeypatch.setattr(swarm_planner, "get_objective", blind)
+    found = search(problem, "de", Settings.of(get("de").defaults, problem.options))
+    assert found.collisions > 0
+    assert any(v.kind == "zone" for v in found.violations)
+    solution = get("de").plan(problem)
+    assert solution.repaired
+    assert solution.raw_violations == len(found.violations)
+    assert "zone 'wall'" in solution.notes[0]
+    assert "passes the check" in solution.notes[0]
+    assert violations(problem, solution.path.points) == ()
+    assert faults(problem, solution.path) == []
+
+
+def test_a_curve_that_cannot_be_mended_is_refused_by_name() -> None:
+    wall = [Zone(f"wall {i}", Circle(1000.0, float(n), 60.0)) for i, n in enumerate(range(-50, 2100, 90))]
+    problem = toy(encoding="sections", iterations=5)
+    shut = replace(problem, airspace=Airspace(problem.airspace.surface, wall))
+    with pytest.raises(NoMission, match=r"curve that krill found breaks limits.*zone 'wall") as refusal:
+        get("krill").plan(shut)
+    assert refusal.value.reason == "not_found"
+
+
+def test_few_way_points_stay_within_the_corridor_of_the_curve() -> None:
+    problem = toy(encoding="bspline", points=4, cost="krill")
+    found = search(problem, "de", Settings.of(get("de").defaults, problem.options))
+    points = swarm_planner.way_points_beside(problem, found)
+    assert points is not None
+    assert 2 < len(points) < len(found.curve) / 2
+    corridor = swarm_planner.CORRIDORS[0] * found.scene.straight_m
+    for q in found.curve:
+        off = []
+        for a, b in itertools.pairwise(points):
+            t = np.clip((q - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+            off.append(np.linalg.norm(q - a - t * (b - a)))
+        assert min(off) <= corridor + 0.1
+
+
+def test_a_repaired_curve_passes_its_via_points() -> None:
+    limits = replace(LIMITS, max_climb_deg=25.0, max_descent_deg=25.0)
+    plain = toy(limits)
+    z = float(plain.airspace.surface.ground_at(700.0, 1200.0)) + 80.0
+    problem = replace(plain, via=(Via(700.0, 1200.0, z), Via(1350.0, 1250.0)))
+    scene = Scene.of(problem)
+    t = np.linspace(0.0, 1.0, 41)[:, None]
+    a, b, c, d = scene.stops
+    line = np.vstack([a + t * (b - a), (b + t * (c - b))[1:], (c + t * (d - c))[1:]])
+    mended = repair(problem, scene, line, np.array([0, 40, 80, 120]))
+    assert mended is not None
+    assert violations(problem, mended.points) == ()
+    for via in ((700.0, 1200.0, z),):
+        assert np.linalg.norm(mended.points - np.array(via), axis=1).min() < 1e-3
+    assert np.hypot(*(mended.points[:, :2] - (1350.0, 1250.0)).T).min() < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_repaired_passes_on_real_ground(seed: int) -> None:
+    problem = random_mission(seed, replace(FIELD, max_amsl_m=900.0))
+    scene = Scene.of(problem)
+    line = np.linspace(scene.stops[0], scene.stops[-1], 187)
+    mended = repair(problem, scene, line, np.array([0, 186]))
+    if mended is not None:
+        assert violations(problem, mended.points) == ()
+    assert mended is not None or violations(problem, line) != ()
+
+
+def test_settings_come_from_the_row_and_the_options() -> None:
+    defaults = get("ssgwo").defaults
+    assert Settings.of(defaults, {}).points == 30
+    assert Settings.of(defaults, {"encoding": "box", "iterations": None}).points == 30
+    swapped = Settings.of(defaults, {"encoding": "bspline"})
+    assert swapped.points is None
+    assert swapped.iterations == 500
+    assert Settings.of(defaults, {"encoding": "bspline", "points": 6}).points == 6
+    with pytest.raises(InputError, match=r"no option 'encodings'\. Did you mean 'encoding'"):
+        Settings.of(defaults, {"encodings": "box"})
+
+
+def test_parameters_are_the_optimisers_and_the_volumes() -> None:
+    problem = toy(iterations=2, parameters={"east_m": 1900.0, "step": 0.2})
+    assert search(problem, "krill", Settings.of(get("krill").defaults, problem.options)).scene.high[0] == 1900.0
+    with pytest.raises(InputError, match="krill has no parameter 'stepp'"):
+        get("krill").plan(toy(parameters={"stepp": 0.2}))
+
+
+def test_a_budget_of_evaluations_is_kept_exactly() -> None:
+    problem = toy(evaluations=777, encoding="bspline")
+    found = search(problem, "gwo", Settings.of(get("gwo").defaults, problem.options))
+    assert found.result.evaluations == 777
+
+
+def test_an_earlier_vehicle_bends_the_path_of_the_next() -> None:
+    plain = toy(encoding="bspline", points=4, iterations=25, population=40)
+    plain = replace(plain, airspace=Airspace(plain.airspace.surface))
+    first = get("de").plan(plain).path.points
+    options = {**plain.options, "earlier": (first,), "speed_m_s": 15.0}
+    settings = Settings.of(get("de").defaults, options)
+    second = search(plain, "de", settings)
+    alone = search(plain, "de", Settings.of(get("de").defaults, plain.options))
+    assert second.result.cost > alone.result.cost
+    assert second.length_m > 0.0
+    assert not np.allclose(second.curve, alone.curve)
+
+
+def test_every_row_names_its_source_and_a_known_optimiser() -> None:
+    from gcsplan.optimisers.registry import TABLE as OPTIMISERS
+
+    assert names()[0] == "optimal"
+    for name in names()[1:]:
+        row = TABLE[name]
+        assert row.paper
+        assert name == "aco" or row.optimiser in OPTIMISERS
+
+
+def test_the_scene_of_a_mission_over_unknown_ground_is_made() -> None:
+    z = np.full((21, 21), 50.0)
+    z[:3] = np.nan
+    from gcsplan.world.surface import GridMap, Surface
+
+    air = Airspace(Surface(z, z, GridMap.affine(0.0, 2000.0, 100.0, 100.0)))
+    problem = Problem(air, Limits(10.0), (300.0, 300.0, 80.0), (1700.0, 1000.0, 80.0), options={"iterations": 10})
+    assert violations(problem, get("krill").plan(problem).path.points) == ()
+
+
+def test_a_refusal_has_a_place_on_real_ground() -> None:
+    problem = random_mission(3, replace(FIELD, max_amsl_m=560.0))
+    assert problem.airspace.surface is jacksboro()
+    with pytest.raises(NoMission, match="the curve that abo found breaks") as refusal:
+        get("abo").plan(replace(problem, options={"iterations": 3}))
+    assert refusal.value.reason == "not_found"
+    assert getattr(refusal.value, "east_m", None) is not None
+
+
+# With its own 30 points anywhere in the volume, SSGWO finds a way that can be mended from half of the seeds.
+@pytest.mark.parametrize(("name", "seed"), [("krill", 1), ("ssgwo", 4), ("msfoa", 1), ("abo", 1), ("ib-abc", 1)])
+def test_the_five_systems_plan_a_mission_over_real_ground(name: str, seed: int) -> None:
+    mission = MISSIONS / "jacksboro-high.yaml"
+    planned = plan(mission, planner=name, seed=seed).vehicles[0]
+    assert planned.verdict.safe
+    assert planned.solution.raw_violations is not None
+    assert planned.verdict.length_m > 19_900.0

@@ -1,0 +1,206 @@
+"""The report in a real browser: no error, no request, every figure drawn, in light and dark, on a desk and a phone."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from gcsplan.check.rtl.everywhere import way_home
+from gcsplan.report.page import render_page
+from tests.report.test_page import HOSTILE, fleet_page, small_page
+from tests.support import browser as chromium
+from tests.support.browser import Browser
+
+PROGRAM = chromium.find()
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        PROGRAM is None,
+        reason=f"no browser: none of {', '.join(chromium.NAMES)} is installed (GCSPLAN_CHROMIUM names one)",
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    assert PROGRAM is not None
+    with chromium.browser(PROGRAM, tmp_path_factory.mktemp("home")) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A fleet of two with a way home: every kind of figure is in it."""
+    told = fleet_page()
+    first = told.subjects[0]
+    home = way_home(first.verdict, first.vehicle, told.world, rtl_rel_home_m=20.0)
+    file = tmp_path_factory.mktemp("report") / "report.html"
+    text = render_page(replace(told, title=HOSTILE, subjects=(replace(first, home=home), *told.subjects[1:])))
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def pixels(page: Browser) -> np.ndarray[tuple[int, int, int], np.dtype[np.int16]]:
+    return np.asarray(Image.open(io.BytesIO(page.picture())).convert("RGB"), dtype=np.int16)
+
+
+def show(page: Browser, selector: str) -> tuple[float, float, float, float]:
+    """Scroll to an element; its left, top, width and height in the window."""
+    box = page.evaluate(
+        f"(() => {{ const e = document.querySelector({selector!r}); e.scrollIntoView({{block: 'center'}}); "
+        "const b = e.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; })()"
+    )
+    page.settle()
+    return box[0], box[1], box[2], box[3]
+
+
+def tip(page: Browser) -> str:
+    return str(page.evaluate("document.getElementById('tip').hidden ? '' : document.getElementById('tip').innerText"))
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", [1200, 390], ids=["desk", "phone"])
+def test_the_page_is_drawn_without_an_error_or_a_request(page: Browser, report: Path, dark: bool, width: int) -> None:
+    page.visit(report, width=width, height=900, dark=dark, phone=width < 500)
+    assert page.complaints() == []
+    assert page.requests() == [report.as_uri()]
+    assert page.evaluate("document.documentElement.scrollWidth") <= width  # nothing sticks out to the right
+    figures = page.evaluate("[...document.querySelectorAll('figure')].map((f) => f.id)")
+    assert set(figures) == {"map", "scene", "profile-0", "profile-1", "home-0", "distance", "separation"}
+    for name in figures:
+        _, _, wide, tall = show(page, f"#{name}")
+        assert wide > 0.8 * width - 60 or name == "map", name
+        assert tall > 150, name
+    paper = pixels(page)[5, 5].mean()
+    assert paper < 60 if dark else paper > 200
+    assert page.evaluate("document.querySelectorAll('script').length") == 2
+
+
+def test_the_view_in_space_is_really_drawn_and_can_be_turned(page: Browser, report: Path) -> None:
+    page.visit(report)
+    left, top, wide, tall = show(page, "#scene")
+    assert page.evaluate("document.querySelector('#scene .nothing')") is None
+    box = np.s_[int(top) : int(top + tall), int(left) : int(left + wide)]
+
+    def seen() -> np.ndarray[tuple[int, int, int], np.dtype[np.int16]]:
+        return pixels(page)[box]
+
+    before = seen()
+    assert len(np.unique(before.reshape(-1, 3) // 8, axis=0)) > 300  # ground, zones and tracks, not one colour
+    track = np.array([0xB3, 0x15, 0x7E])  # --t1 of the style sheet: both fly the same way, the second is drawn last
+    assert (np.abs(before - track).max(axis=2) < 12).sum() > 100
+    x, y = left + 0.5 * wide, top + 0.5 * tall
+    page.ask("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", clickCount=1)
+    page.ask("Input.dispatchMouseEvent", type="mouseMoved", x=x + 150, y=y + 20, button="left", buttons=1)
+    page.ask("Input.dispatchMouseEvent", type="mouseReleased", x=x + 150, y=y + 20, button="left", clickCount=1)
+    page.settle()
+    assert (np.abs(seen() - before).max(axis=2) > 20).mean() > 0.1
+    assert page.complaints() == []
+
+
+def test_pointing_tells_numbers_with_their_units_in_every_figure(page: Browser, report: Path) -> None:
+    page.visit(report)
+    told = {}
+    for name, u, v in (
+        ("#map", 0.5, 0.05), ("#profile-0 .plot", 0.5, 0.5), ("#home-0 .plot", 0.5, 0.5), ("#distance .plot", 0.5, 0.5),
+        ("#separation .plot", 0.5, 0.5), ("#scene", 0.5, 0.6),
+    ):  # fmt: skip
+        left, top, wide, tall = show(page, name)
+        page.point(left + u * wide, top + v * tall)
+        told[name] = tip(page)
+    assert "ground about" in told["#map"]
+    assert "m AMSL" in told["#map"]
+    for words in ("above ground", "lowest allowed", "energy used", "kJ", "along the track"):
+        assert words in told["#profile-0 .plot"], words
+    assert "return judged at" in told["#home-0 .plot"]
+    assert "uav2" in told["#distance .plot"]
+    assert "nearest two" in told["#separation .plot"]
+    assert told["#scene"]
+    left, top, _, _ = show(page, "#map .mark.wp")
+    page.point(left, top)
+    assert "above ground" in tip(page)
+    assert page.complaints() == []
+
+
+def test_the_map_and_a_profile_can_be_enlarged_and_shown_whole_again(page: Browser, report: Path) -> None:
+    page.visit(report)
+    for name in ("map", "profile-0"):
+        view = f"document.querySelector('#{name} svg').getAttribute('viewBox')"
+        press = f"document.querySelector('.tools[data-for={name}] [data-do=%s]').click()"
+        whole = page.evaluate(view)
+        page.evaluate(press % "in")
+        page.settle()
+        width = [float(page.evaluate(view).split()[2]), float(whole.split()[2])]
+        assert width[0] == pytest.approx(width[1] / 1.6, rel=1e-6)
+        assert page.evaluate(f"document.querySelectorAll('#{name} .mark.out').length") > 0
+        page.evaluate(press % "home")
+        assert [float(x) for x in page.evaluate(view).split()] == pytest.approx([float(x) for x in whole.split()])
+        assert page.evaluate(f"document.querySelectorAll('#{name} .mark.out').length") == 0
+
+
+def test_labels_do_not_lie_on_each_other(page: Browser, report: Path) -> None:
+    for width in (1200, 390):
+        page.visit(report, width=width)
+        boxes = page.evaluate(
+            "[...document.querySelectorAll('#map .mark:not(.mute):not(.out) b')].map((b) => { "
+            "const r = b.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom]; })"
+        )
+        assert len(boxes) >= 4
+        for i, a in enumerate(boxes):
+            for b in boxes[:i]:
+                wide, tall = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+                assert wide <= 1 or tall <= 4, (width, a, b)
+
+
+def test_on_paper_everything_is_unfolded_light_and_the_view_in_space_is_there(page: Browser, report: Path) -> None:
+    page.visit(report, dark=True)
+    show(page, "#scene")
+    colours = (
+        "(() => { const c = document.querySelector('#scene canvas.over'); "
+        "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0; "
+        "for (let i = 3; i < d.length; i += 4) n += d[i] === 255; return n / (d.length / 4); })()"
+    )
+    assert page.evaluate(colours) < 0.2  # labels alone
+    assert page.evaluate("document.querySelectorAll('details:not([open])').length") > 0
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate("document.querySelectorAll('details:not([open])').length") == 0
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert page.evaluate(colours) > 0.95
+    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate("document.querySelectorAll('details:not([open])').length") > 0
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
+
+
+def test_a_tap_tells_numbers_and_the_page_can_still_be_scrolled_by_a_finger(page: Browser, report: Path) -> None:
+    page.visit(report, width=390, height=800, phone=True)
+    left, top, wide, tall = show(page, "#profile-0 .plot")
+    x, y = left + 0.5 * wide, top + 0.5 * tall
+    page.ask("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+    page.ask("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+    page.settle()
+    assert "above ground" in tip(page)
+    for name in ("#map", "#scene", "#profile-0 .plot"):
+        assert page.evaluate(f"getComputedStyle(document.querySelector({name!r})).touchAction") == "pan-y"
+    assert page.complaints() == []
+
+
+def test_without_scripts_the_map_the_profile_and_every_number_are_there(page: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "bare.html"
+    text = render_page(small_page())
+    head, tail = text.rsplit("<script>", 1)
+    file.write_text(head + "<script>document.documentElement.dataset.ready='yes'</script>" + tail.split("</script>")[1])
+    page.ask("Page.setBypassCSP", enabled=True)  # only for the one line that says that it is loaded
+    page.visit(file)
+    page.ask("Page.setBypassCSP", enabled=False)
+    left, top, wide, tall = show(page, "#map")
+    shown = pixels(page)[int(top) : int(top + tall), int(left) : int(left + wide)]
+    assert len(np.unique(shown.reshape(-1, 3) // 8, axis=0)) > 100
+    assert page.evaluate("getComputedStyle(document.querySelector('#space')).display") == "none"
+    assert page.evaluate("document.querySelectorAll('.tools:not([hidden])').length") == 0
+    assert "lowest above ground" in page.evaluate("document.body.innerText")

@@ -1,0 +1,1 @@
+"""Worlds, bad links and other things that tests share."""

@@ -1,0 +1,9 @@
+"""Where files lie that tests read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+REPOSITORY = Path(__file__).parents[2]
+MISSIONS = REPOSITORY / "missions"
+DATA = REPOSITORY / "tests" / "data"

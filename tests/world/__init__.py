@@ -1,0 +1,1 @@
+"""Tests of terrain, zones, the exact check of legs."""
