@@ -24,11 +24,14 @@ RATES = {
     "corner": 12e-6,
     "label": 12e-6,
     "pull": 80e-6,
+    "sighted": 1e-6,
+    "walked": 0.7e-6,
 }
 """Counted seconds of a lattice's node made ready, a mesh's portal and an interval opened on one, a call of the exact
 check with what is made of it, a leg under it and a cell of terrain that it crosses, a piece of a tube, a place whose
-floor is read, a corner of an outline triangulated, a label of the lattice search, and a point of a line that is pulled,
-for each size of move. Rounded from a fit over plans of all kinds."""
+floor is read, a corner of an outline triangulated, a label of the lattice search, a point of a line that is pulled, for
+each size of move, and a node that an end of a leg is looked at from, or walked to. Rounded from a fit over plans of all
+kinds."""
 COUNTED = 0.4
 """What part of the budget's seconds may be spent as counted work."""
 FIRST, FIRST_S = 3.0, 0.5

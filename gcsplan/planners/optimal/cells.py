@@ -16,6 +16,8 @@ COARSE_M = 100.0
 """Cells of the first look are no larger, if the terrain model's are not."""
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 """Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
+LEAST_M = 1.0
+"""Cells are cut no smaller: walls of zones are drawn between nodes where they are, and ground is straight in there."""
 MOST_FIRST, NODE_BYTES = 1.5e6, 400.0
 """Nodes of the first look's lattice, at most, and what one takes with its mesh and a search over that."""
 BOX_NODE_BYTES = 50.0
@@ -49,8 +51,8 @@ def choose(problem: Problem, place: tuple[float, float], straight_m: float, box:
     col0, row0, col1, row1 = extent(problem, box)
     area_m2 = float((col1 - col0) * (row1 - row0) * size[0] * size[1])
     most = min(MOST_FIRST, 1e6 * problem.budget.room_mb / NODE_BYTES)
-    wanted_m = max(_wanted_m(problem, straight_m), math.sqrt(area_m2 / most))
-    cell_m, finest_m = float(size.max()), min(FINE_M, straight_m / FINE_PARTS)
+    wanted_m = max(_wanted_m(problem, straight_m), LEAST_M, math.sqrt(area_m2 / most))
+    cell_m, finest_m = float(size.max()), max(min(FINE_M, straight_m / FINE_PARTS), LEAST_M)
     parts = max(1, round(cell_m / wanted_m))
     # Between nodes that are left out heights are guessed, so few are better kept.
     fine_stride = 1 if parts > 1 or finest_m < 2.0 * cell_m else round(finest_m / cell_m)

@@ -39,6 +39,8 @@ LEARNT = 10
 """Times that a track is looked for where nodes alone are as high as the exact check has them."""
 BESIDE = 8
 """How many cells more the finer lattice is over than those that are asked for: later tracks may lie beside them."""
+MUCH_LONGER, ROUGHLY = 1.1, 3
+"""Where tracks may be so many times as long as is known, cells for their bound are so many times larger."""
 RAISED, WORTHWHILE = 4, 0.05
 """Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
 
@@ -134,6 +136,7 @@ class Leg:
         under: Bools | None = None,
         over: Bools | None = None,
         exact: bool = False,
+        roughly: bool = False,
     ) -> tuple[ClearanceGrid, Guide]:
         """What to make a mesh of, finer ``within`` a corridor, or else the first look's for tracks shorter than
         ``limit_m``; and how far the goal is."""
@@ -151,6 +154,8 @@ class Leg:
                 and has_room(self.problem, cells, BESIDE, self.cells_of.ratio)
             ):
                 plane, cells = self._over(cells)
+        if roughly:
+            fineness = -(-fineness // ROUGHLY)
         return ClearanceGrid(plane, cap_m, low, fineness, cells, ends, under, over, exact=exact), guide
 
     def track(
@@ -193,7 +198,7 @@ class Leg:
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         known = self.length_m
         try:
-            clearance, guide = self._clearance(cap_m, True, within, limit)
+            clearance, guide = self._clearance(cap_m, True, within, limit, roughly=limit > MUCH_LONGER * known)
         except Exhausted:
             return known
         for _ in range(RAISED):

@@ -13,7 +13,6 @@ from gcsplan.planners.optimal.bounds.shorter import bound_by_caps, halve, raise_
 from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.governor import Search, Size
 from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.leg import LARGE
 from gcsplan.planners.optimal.level_world import in_window
 from gcsplan.planners.optimal.plane_search import PAST, SLACKS, PlaneSearch
 from gcsplan.planners.optimal.sources.bound_corridor import follow
@@ -23,8 +22,8 @@ from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
 FAR, MUCH, SLANTED, NEAR = 5e-3, 5e-2, 1e-2, 5e-2
 """Gaps, as parts: beyond which other ways to find a path are asked for a better one; beyond which small worlds are
-searched before time is spent on a bound; beyond which slopes of large terrain models are climbed aslant; and up to
-which cells are cut once more."""
+searched before time is spent on a bound; beyond which slopes are climbed aslant for length; and up to which cells are
+cut once more."""
 TWICE = 2.0
 """From so many times the wanted gap on bounds that cost more are asked for."""
 PAST_FINE, ROUNDS = 9, 2
@@ -237,10 +236,9 @@ class Searches:
         raise_climb(self.plane)
 
     def _is_slanted(self) -> bool:
-        incumbent, energy = self.incumbent, self.problem.objective == "energy"
-        large = self.problem.airspace.surface.ground_m.size >= LARGE
-        far = incumbent.best is not None and incumbent.gap > (SLANTED if large and not energy else FAR)
-        return far and incumbent.climbs
+        incumbent = self.incumbent
+        worth = FAR if self.problem.objective == "energy" else SLANTED
+        return incumbent.best is not None and incumbent.gap > worth and incumbent.climbs
 
     def _climb_aslant(self) -> None:
         incumbent, energy = self.incumbent, self.problem.objective == "energy"

@@ -170,6 +170,7 @@ class ClearanceGrid:
         self._held += cones
         lone = _apart(self._held, self.cap_m, 8.0 * cell_m)
         excess, lift, x, y = self._excess, self._lift, self._x, self._y
+        spend = self.plane.problem.budget.spend
         for east, north, height, slope in cones:
             c, r = self.plane.at((east, north))
             c, r = (c - self.col) * self.fineness, (r - self.row) * self.fineness
@@ -180,6 +181,7 @@ class ClearanceGrid:
             missing = look_around(
                 self._around, excess, self._floor, lift, self._of, self._values, x, y, cone, seen, away
             )
+            spend("sighted", float(np.count_nonzero(seen)))
             if missing:
                 way, root = self._array("way", self.shape), self._array("root", self.shape, np.int32)
                 done = np.zeros(self.shape, np.int8)
@@ -187,6 +189,7 @@ class ClearanceGrid:
                 walk_around(
                     self._around, excess, lift, self._of, x, y, cone, seen, away, missing, way, root, done, heap, ids
                 )
+                spend("walked", float(np.count_nonzero(done)))
             hold_down(
                 self._around, excess, self._floor, lift, self._either, self._of, self._values, x, y, cone, lone, seen,
                 away,
