@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.problem import Problem, terminals
+from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
@@ -41,8 +41,8 @@ def goes_on(problem: Problem) -> bool:
     reach = _reach_m(problem.airspace, problem.limits)
     corners = surface.grid.to_plane([0, surface.ground_m.shape[1] - 1], [surface.ground_m.shape[0] - 1, 0])
     low, high = corners.min(axis=0) + reach, corners.max(axis=0) - reach
-    stops = np.array(terminals(problem))
-    if not ((stops > low) & (stops < high)).all():
+    terminals = np.array(terminals_of(problem))
+    if not ((terminals > low) & (terminals < high)).all():
         return True
     for zone in problem.airspace.zones:
         west, south, east, north = _bounds(zone, problem.airspace, problem.limits)
@@ -59,9 +59,9 @@ def exit_cost(problem: Problem) -> float:
     if not goes_on(problem):
         return math.inf
     lines, bow_m = border(problem)
-    stops = np.array(terminals(problem))
-    legs = np.hypot(*np.diff(stops, axis=0).T)
-    more_m = min(_past(a, b, lines) - leg for a, b, leg in zip(stops[:-1], stops[1:], legs.tolist(), strict=True))
+    terminals = np.array(terminals_of(problem))
+    legs = np.hypot(*np.diff(terminals, axis=0).T)
+    more_m = min(_past(a, b, lines) - leg for a, b, leg in zip(terminals[:-1], terminals[1:], legs.tolist(), strict=True))
     track_m = float(legs.sum()) + max(more_m - 4.0 * bow_m, 0.0)
     heights = [problem.start[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None), problem.goal[2]]
     rise_m = sum(abs(b - a) for a, b in pairwise(heights))
@@ -78,8 +78,8 @@ def within_m(problem: Problem) -> float:
     import shapely  # for words alone
 
     lines, _ = border(problem)
-    stops = terminals(problem)
-    way = shapely.LineString(stops) if len(set(stops)) > 1 else shapely.Point(stops[0])
+    terminals = terminals_of(problem)
+    way = shapely.LineString(terminals) if len(set(terminals)) > 1 else shapely.Point(terminals[0])
     return float(shapely.distance(shapely.MultiLineString(list(lines)), way))
 
 
@@ -87,7 +87,7 @@ def margin_for(problem: Problem, cost: float) -> float:
     """How far around the stops a path may lead that costs ``cost``; inf for all costs."""
     if math.isinf(cost):
         return math.inf
-    legs = [math.dist(a, b) for a, b in pairwise(terminals(problem))]
+    legs = [math.dist(a, b) for a, b in pairwise(terminals_of(problem))]
     straight_m, track_m = sum(legs), cost
     if problem.objective == "energy":
         if problem.horizontal_j_per_m <= 0.0:
@@ -139,7 +139,7 @@ def _by_ground(problem: Problem) -> bool:
     is_open = lowest + limits.min_agl_m + limits.altitude_error_m <= ceiling + 1e-6
     parts, _ = label(is_open, structure=np.ones((3, 3)))
     rows, cols = top.shape
-    at = surface.grid(*np.array(terminals(problem)).T)
+    at = surface.grid(*np.array(terminals_of(problem)).T)
     cells = np.clip(np.floor(at).astype(int), 0, [cols - 2, rows - 2])
     # What keeps off the border is not seen to reach it: a few cells more are looked at.
     reach = _reach_m(problem.airspace, limits) / _least_step_m(surface)
@@ -172,8 +172,8 @@ def _by_zones(problem: Problem) -> bool:
     lines = shapely.MultiLineString(list(border(problem)[0]))
     leaves = [bool(p.intersects(lines)) for p in free]
     numbers = set()
-    for stop in shapely.points(terminals(problem)):
-        at = [k for k, p in enumerate(free) if p.intersects(stop)]
+    for terminal in shapely.points(terminals_of(problem)):
+        at = [k for k, p in enumerate(free) if p.intersects(terminal)]
         if not at:
             return False  # in a wall by rounding alone: its refusal is another one
         numbers.add(-1 if any(leaves[k] for k in at) else at[0])

@@ -96,10 +96,10 @@ class Budget:
 
     def fits(self, seconds: float, megabytes: float) -> bool:
         """Whether so much counted work and memory is left."""
-        return seconds <= self.left and megabytes <= self.room_mb
+        return seconds <= self.left and megabytes <= self.left_mb
 
     @property
-    def room_mb(self) -> float:
+    def left_mb(self) -> float:
         """Megabytes that the next search may take."""
         return self.megabytes
 

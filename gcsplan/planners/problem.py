@@ -167,11 +167,11 @@ class Refusal(NoMission):
         self.untried = untried
 
 
-def terminals(problem: Problem) -> list[tuple[float, float]]:
+def terminals_of(problem: Problem) -> list[tuple[float, float]]:
     """Start, every via, goal: (east_m, north_m)."""
     return [problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]]
 
 
 def straight_way_m(problem: Problem) -> float:
     """Metres of the straight track from terminal to terminal."""
-    return sum(math.dist(a, b) for a, b in pairwise(terminals(problem)))
+    return sum(math.dist(a, b) for a, b in pairwise(terminals_of(problem)))

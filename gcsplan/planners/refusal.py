@@ -14,7 +14,7 @@ import numpy as np
 from gcsplan.planners.border import enclosed, goes_on, within_m
 from gcsplan.planners.cures import floor_words, rounded_up, with_cures
 from gcsplan.planners.lattice.lattice import levels_of, near_zone
-from gcsplan.planners.problem import Problem, Refusal, terminals
+from gcsplan.planners.problem import Problem, Refusal, terminals_of
 from gcsplan.planners.trials import Plan
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
@@ -42,17 +42,17 @@ def explain(problem: Problem, *, proved: bool | None = None, plan: Plan | None =
 
 def check_ends(problem: Problem) -> None:
     """Raise Refusal if start, a via or the goal breaks a limit by itself."""
-    stops = terminals(problem)
+    terminals = terminals_of(problem)
     heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
     names = ["the start", *(f"via point {k + 1}" for k in range(len(problem.via))), "the goal"]
-    for name, place, amsl in zip(names, stops, heights, strict=True):
+    for name, place, amsl in zip(names, terminals, heights, strict=True):
         _check_end(problem, name, place, amsl)
-    one_place = all(math.dist(stops[0], x) < 1e-3 for x in stops)
+    one_place = all(math.dist(terminals[0], x) < 1e-3 for x in terminals)
     if one_place and not problem.via and abs(problem.start[2] - problem.goal[2]) > 1e-3:
         return  # a climb on the spot, in laps
     if one_place:
-        raise Refusal("start and goal are the same place: there is nothing to fly", reason="infeasible", place=stops[0])
-    for k, (a, b) in enumerate(pairwise(stops)):
+        raise Refusal("start and goal are the same place: there is nothing to fly", reason="infeasible", place=terminals[0])
+    for k, (a, b) in enumerate(pairwise(terminals)):
         z0, z1 = heights[k], heights[k + 1]
         if math.dist(a, b) < 1e-3 and z0 is not None and z1 is not None and abs(z1 - z0) > 1e-3:
             raise Refusal(

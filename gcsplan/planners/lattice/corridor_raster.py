@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.lattice import near_zone
-from gcsplan.planners.problem import Problem, terminals
+from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
 
@@ -96,10 +96,10 @@ class Guide:
         p, n = self.problem, len(line.points)
         energy = p.objective == "energy"
         unit = p.horizontal_j_per_m if energy else 1.0
-        room = pull_kernels.MOST_POINTS
-        if n > room - 2:
+        capacity = pull_kernels.MOST_POINTS
+        if n > capacity - 2:
             return line
-        points, pinned, pin_m, amsl = np.zeros((room, 2)), np.zeros(room), np.full(room, np.nan), np.zeros(room)
+        points, pinned, pin_m, amsl = np.zeros((capacity, 2)), np.zeros(capacity), np.full(capacity, np.nan), np.zeros(capacity)
         points[:n], pinned[:n], pin_m[:n], amsl[:n] = line.points, line.pinned, line.pin_m, line.amsl_m
         pin_m[[0, n - 1]] = np.nan
         length = float(np.hypot(*np.diff(line.points, axis=0).T).sum())
@@ -159,7 +159,7 @@ def make_guide(
     west, south = (float(x) for x in everything.min(axis=0) - radius_m)
     east, north = (float(x) for x in everything.max(axis=0) + radius_m)
     length = sum(float(np.hypot(*np.diff(w, axis=0).T).sum()) for w in ways)
-    cell = float(air.surface.grid.metres_per_cell(*terminals(problem)[0]).min())
+    cell = float(air.surface.grid.metres_per_cell(*terminals_of(problem)[0]).min())
     area = min((east - west) * (north - south), 2.0 * radius_m * (length + 2.0 * radius_m))
     step = max(min(FINEST_PART * cell, finest_m, 0.02 * length), math.sqrt(area / MOST_NODES), 0.05)
     x: Floats = np.arange(west, east + step, step)
@@ -218,7 +218,7 @@ def _passed(
 ) -> bool:  # fmt: skip
     """Make the way over (under) a zone a part of the rasters; False where there is none: the zone is a wall."""
     error = problem.limits.altitude_error_m
-    room = []
+    capacity = []
     for upper, level in ((True, zone.ceiling), (False, zone.floor)):
         if level is None or over is (not upper):
             continue
@@ -231,10 +231,10 @@ def _passed(
             else np.minimum(ceiling[jj, ii], at) - floor[jj, ii]
         )
         if (spare >= 0.0).any():
-            room.append((float(np.median(spare)), upper, at))
-    if not room:
+            capacity.append((float(np.median(spare)), upper, at))
+    if not capacity:
         return False
-    _, upper, at = max(room, key=lambda r: r[0])
+    _, upper, at = max(capacity, key=lambda r: r[0])
     if upper:
         floor[jj, ii] = np.minimum(np.maximum(floor[jj, ii], at), SHUT_M)
     else:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.problem import ENDS_M, Problem, terminals
+from gcsplan.planners.problem import ENDS_M, Problem, terminals_of
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
@@ -120,9 +120,9 @@ def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: NDArray[np.
 def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_m: float) -> NDArray[np.bool_]:
     if math.isinf(detour):
         return np.ones((len(y), len(x)), bool)
-    stops = terminals(problem)
+    terminals = terminals_of(problem)
     out = np.zeros((len(y), len(x)), bool)
-    for a, b in pairwise(stops):
+    for a, b in pairwise(terminals):
         to = np.hypot(x[None, :] - a[0], y[:, None] - a[1]) + np.hypot(x[None, :] - b[0], y[:, None] - b[1])
         out |= to <= detour * math.hypot(b[0] - a[0], b[1] - a[1]) + 2.0 * slack_m
     return out

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
-from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m, terminals
-from gcsplan.planners.profile.climb_laps import pins_of, ways_up, with_climbs
+from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m, terminals_of
+from gcsplan.planners.profile.climb_laps import pins_of, climb_tracks, with_climbs
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle
 from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, make_track
 from gcsplan.planners.simplify import fewer
@@ -62,8 +62,8 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     path is found.
     """
     bound = straight_bound(problem)
-    stops = terminals(problem)
-    if all(math.dist(stops[0], x) < 1e-3 for x in stops):
+    terminals = terminals_of(problem)
+    if all(math.dist(terminals[0], x) < 1e-3 for x in terminals):
         return _solution(problem, _on_the_spot(problem), bound, begun, time.perf_counter() - begun, False)
     way = straight_way_m(problem)
     best = straight(problem, way)
@@ -165,7 +165,7 @@ def _run(problem: Problem, a: tuple[float, float], b: tuple[float, float]) -> fl
 def _on_the_spot(problem: Problem) -> Floats:
     """Way points from start to goal where both are one place."""
     place, low, high = problem.start[:2], problem.start[2], problem.goal[2]
-    found = None if problem.via else ways_up(problem, place, low, high)
+    found = None if problem.via else climb_tracks(problem, place, low, high)
     if found is None:
         kind, angle = (
             ("climb", problem.limits.max_climb_deg) if high > low else ("descent", problem.limits.max_descent_deg)
@@ -182,13 +182,13 @@ def _on_the_spot(problem: Problem) -> Floats:
 
 def straight(problem: Problem, way_m: float) -> Floats | None:
     """Way points straight from stop to stop, where that is legal."""
-    stops = np.array(terminals(problem))
+    terminals = np.array(terminals_of(problem))
     pin_m = np.array([math.nan, *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via), math.nan])
-    pinned = np.ones(len(stops), bool)
-    if not isinstance(fly(problem, make_track(problem, stops, pinned, pin_m)), Flown):
+    pinned = np.ones(len(terminals), bool)
+    if not isinstance(fly(problem, make_track(problem, terminals, pinned, pin_m)), Flown):
         return None
     judge = Judge(problem)
-    found = settle(problem, judge, stops, pinned, pin_m)
+    found = settle(problem, judge, terminals, pinned, pin_m)
     return None if isinstance(found, Unsettled) else fewer(problem, *found, WORTH * _unit(problem) * way_m)[0]
 
 

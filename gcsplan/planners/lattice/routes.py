@@ -10,7 +10,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.lattice import Lattice, Links, make_lattice, make_links
 from gcsplan.planners.lattice.search import Found, Label, search
-from gcsplan.planners.problem import Problem, terminals
+from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Obstruction, Track, make_track
 
 SHUT_IN = 200
@@ -45,16 +45,16 @@ def coverage(problem: Problem) -> tuple[float, float, float, float]:
 def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float, float], float]:
     """Box and spacing of a lattice for ``level``."""
     west, south, east, north = coverage(problem)
-    stops = np.array(terminals(problem))
-    way = float(np.hypot(*np.diff(stops, axis=0).T).sum())
+    terminals = np.array(terminals_of(problem))
+    way = float(np.hypot(*np.diff(terminals, axis=0).T).sum())
     # No ellipse of a detour reaches farther from its ends than this; a whole box reaches four ways at most.
     out = (0.5 * (level.detour - 1.0) if math.isfinite(level.detour) else 4.0) * way + 1.0
     if math.isfinite(level.detour):
         out = max(out, 0.5 * way * math.sqrt(level.detour**2 - 1.0))
-    low, high = stops.min(axis=0) - out, stops.max(axis=0) + out
+    low, high = terminals.min(axis=0) - out, terminals.max(axis=0) + out
     box = (max(west, low[0]), max(south, low[1]), min(east, high[0]), min(north, high[1]))
     area = max(box[2] - box[0], 1e-3) * max(box[3] - box[1], 1e-3)
-    cell = float(problem.airspace.surface.grid.metres_per_cell(*stops[0]).min())
+    cell = float(problem.airspace.surface.grid.metres_per_cell(*terminals[0]).min())
     step = max(math.sqrt(area / level.nodes), min(cell, way) / 8.0)
     return box, step
 
@@ -70,7 +70,7 @@ class Router:
 
     problem: Problem
     lattice: Lattice
-    stops: list[tuple[float, float]]
+    terminals: list[tuple[float, float]]
     links: list[Links]
     climb_factor: float = 1.0
     last: Obstruction | None = None
@@ -84,10 +84,10 @@ class Router:
         """Build the lattice of ``level``."""
         box, step = frame_of(problem, level)
         lattice = make_lattice(problem, box, step, level.detour)
-        stops = terminals(problem)
+        terminals = terminals_of(problem)
         heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
-        links = [make_links(problem, lattice, s, z) for s, z in zip(stops, heights, strict=True)]
-        return cls(problem, lattice, stops, links)
+        links = [make_links(problem, lattice, s, z) for s, z in zip(terminals, heights, strict=True)]
+        return cls(problem, lattice, terminals, links)
 
     def way(self, cap_m: float = math.inf, weight: float = 0.0) -> Floats | None:
         """(N, 2) places of the best way over the lattice under ``cap_m``, through every stop; None if there is none."""
@@ -109,9 +109,9 @@ class Router:
         z = heights[here]
         found = search(
             self.lattice,
-            [Label(0.0, z, z, z, z, np.array([self.stops[here]]))],
-            self.stops[here],
-            self.stops[there],
+            [Label(0.0, z, z, z, z, np.array([self.terminals[here]]))],
+            self.terminals[here],
+            self.terminals[there],
             self.links[here],
             self.links[there],
             (heights[there], heights[there]),
@@ -130,7 +130,7 @@ class Router:
         """How the goal is reached, cheapest first."""
         p = self.problem
         z = p.start[2]
-        labels: tuple[Label, ...] = (Label(0.0, z, z, z, z, np.array([self.stops[0]])),)
+        labels: tuple[Label, ...] = (Label(0.0, z, z, z, z, np.array([self.terminals[0]])),)
         ranges = [*((-math.inf, math.inf) if v.amsl_m is None else (v.amsl_m, v.amsl_m) for v in p.via)]
         ranges.append((p.goal[2], p.goal[2]))
         for k, goal_m in enumerate(ranges):
@@ -138,8 +138,8 @@ class Router:
             found: Found = search(
                 self.lattice,
                 list(labels),
-                self.stops[k],
-                self.stops[k + 1],
+                self.terminals[k],
+                self.terminals[k + 1],
                 self.links[k],
                 self.links[k + 1],
                 goal_m,
@@ -166,9 +166,9 @@ class Router:
         for here, there, amsl, climb, descent in ((0, -1, p.start[2], up, down), (-1, 0, p.goal[2], down, up)):
             found = search(
                 self.lattice,
-                [Label(0.0, amsl, amsl, amsl, amsl, np.array([self.stops[here]]))],
-                self.stops[here],
-                self.stops[there],
+                [Label(0.0, amsl, amsl, amsl, amsl, np.array([self.terminals[here]]))],
+                self.terminals[here],
+                self.terminals[there],
                 self.links[here],
                 self.links[there],
                 (-math.inf, math.inf),
@@ -184,7 +184,7 @@ class Router:
         pinned = np.zeros(len(way), bool)
         pin_m = np.full(len(way), np.nan)
         pinned[0] = pinned[-1] = True
-        for (east, north), via in zip(self.stops[1:-1], self.problem.via, strict=True):
+        for (east, north), via in zip(self.terminals[1:-1], self.problem.via, strict=True):
             at = np.flatnonzero((way[:, 0] == east) & (way[:, 1] == north) & ~pinned)
             if len(at):
                 pinned[at[0]] = True

@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 LABELS_A_NODE = 8
 """Most labels that a node keeps; beyond it a search is no longer complete, and says so."""
 
-ROOM = 32_768
+FIRST_CAPACITY = 32_768
 """Labels to begin with."""
 
 
@@ -90,7 +90,7 @@ def search(
     ends = np.array(
         [[(p[0] - lattice.west_m) * scale, (p[1] - lattice.south_m) * scale] for p in (start, goal)], np.float64
     )
-    told = np.array([lattice.step_m, *ends[1], *goal_m, cap_m, climb_slope, descent_slope, weight, spare_m], np.float64)
+    terms = np.array([lattice.step_m, *ends[1], *goal_m, cap_m, climb_slope, descent_slope, weight, spare_m], np.float64)
     name, value, state, goals = _run(
         lattice,
         labels,
@@ -101,7 +101,7 @@ def search(
             np.ascontiguousarray(low[order]),
             np.ascontiguousarray(high[order]),
         ),
-        told,
+        terms,
         want,
         most_opened,
     )
@@ -120,14 +120,14 @@ def search(
 
 
 def _run(
-    lattice: Lattice, starts: Floats, links: tuple[Ints, Ints, Floats, Floats, Floats], told: Floats, want: int,
+    lattice: Lattice, starts: Floats, links: tuple[Ints, Ints, Floats, Floats, Floats], terms: Floats, want: int,
     most_opened: int,
 ) -> tuple[Ints, Floats, Ints, Ints]:  # fmt: skip
     """Labels (their names and numbers), the state, and the labels at the goal, after as much room as it takes."""
     nodes = lattice.nx * lattice.ny
-    room = ROOM
-    name, value = np.zeros((room, 4), np.int64), np.empty((room, 5))
-    keys, ids = np.empty(room), np.empty(room, np.int64)
+    capacity = FIRST_CAPACITY
+    name, value = np.zeros((capacity, 4), np.int64), np.empty((capacity, 5))
+    keys, ids = np.empty(capacity), np.empty(capacity, np.int64)
     n = len(starts)
     name[:n] = (nodes, -1, -1, 1)
     value[:n] = starts
@@ -140,12 +140,12 @@ def _run(
     while True:
         status = search_kernels.reach(
             lattice.floor_m, lattice.ceiling_m, lattice.ground_m, STEPS, lattice.band_at, lattice.band_low,
-            lattice.band_high, lattice.band_agl, *links, told, want, most_opened, LABELS_A_NODE, state, name, value,
+            lattice.band_high, lattice.band_agl, *links, terms, want, most_opened, LABELS_A_NODE, state, name, value,
             keys, ids, first, held, goals, v, door,
         )  # fmt: skip
         if status == search_kernels.DONE:
             break
-        room *= 4
-        name, value = np.resize(name, (room, 4)), np.resize(value, (room, 5))
-        keys, ids = np.resize(keys, room), np.resize(ids, room)
+        capacity *= 4
+        name, value = np.resize(name, (capacity, 4)), np.resize(value, (capacity, 5))
+        keys, ids = np.resize(keys, capacity), np.resize(ids, capacity)
     return name, value, state, goals[: state[search_kernels.REACHED]]

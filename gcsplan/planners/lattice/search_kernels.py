@@ -53,25 +53,25 @@ def pop(keys, ids, size):  # type: ignore[no-untyped-def]
 
 
 @device
-def through(v, run, low, high, told):  # type: ignore[no-untyped-def]
+def through(v, run, low, high, terms):  # type: ignore[no-untyped-def]
     """Carry a label's numbers over ``run`` metres through a door, in place; False where the door is out of reach."""
     lo, hi = v[LOW], v[HIGH]
     if run > 0.0:
-        lo -= told[DOWN] * run
-        hi += told[UP] * run
+        lo -= terms[DOWN] * run
+        hi += terms[UP] * run
     lo = low if low > lo else lo
     hi = high if high < hi else hi
     if not lo <= hi:
         return False
     v[LOW], v[HIGH] = lo, hi
     a, b = v[CHEAP_LOW], v[CHEAP_HIGH]
-    if told[WEIGHT] == 0.0:
+    if terms[WEIGHT] == 0.0:
         a, b = lo, hi
     elif a > hi:
-        v[COST] += told[WEIGHT] * (a - hi)  # all cheap altitudes are shut: the nearest open one costs the way to it
+        v[COST] += terms[WEIGHT] * (a - hi)  # all cheap altitudes are shut: the nearest open one costs the way to it
         a = b = hi
     elif b < lo:
-        v[COST] += told[WEIGHT] * (lo - b)
+        v[COST] += terms[WEIGHT] * (lo - b)
         a = b = lo
     else:
         a = lo if lo > a else a
@@ -114,18 +114,18 @@ def doors_of(x, y, dx, dy, k, floor, ceiling, ground, step, door):  # type: igno
 
 
 @device
-def admit(to, v, value, name, first, held, most, told):  # type: ignore[no-untyped-def]
+def admit(to, v, value, name, first, held, most, terms):  # type: ignore[no-untyped-def]
     """1 if a label with numbers ``v`` may stay at a node, 0 if another rules it, -1 if there is no room.
 
     Another rules it that reaches as much and costs no more at any altitude; those that it rules itself are dropped.
     """
-    weight, before, other = told[WEIGHT], -1, first[to]
+    weight, before, other = terms[WEIGHT], -1, first[to]
     while other >= 0:
         o = value[other]
         following = name[other, NEXT]
         if (
-            o[LOW] <= v[LOW] + told[SPARE]
-            and o[HIGH] >= v[HIGH] - told[SPARE]
+            o[LOW] <= v[LOW] + terms[SPARE]
+            and o[HIGH] >= v[HIGH] - terms[SPARE]
             and o[COST] + weight * farther(v[CHEAP_LOW], v[CHEAP_HIGH], o[CHEAP_LOW], o[CHEAP_HIGH]) <= v[COST]
         ):
             return 0
@@ -152,12 +152,12 @@ def admit(to, v, value, name, first, held, most, told):  # type: ignore[no-untyp
 )
 def reach(  # type: ignore[no-untyped-def]
     floor, ceiling, ground, steps, band_at, band_low, band_high, band_agl, link_at, link_to, link_length, link_low,
-    link_high, told, want, most_opened, most_held, state, name, value, keys, ids, first, held, goals, v, door,
+    link_high, terms, want, most_opened, most_held, state, name, value, keys, ids, first, held, goals, v, door,
 ):  # fmt: skip
     """Search until ``want`` labels have reached the goal; `DONE`, or `SHORT` where there must be more room to go on.
 
     ``floor``, ``ceiling``, ``ground`` (2·ny - 1, 2·nx - 1) on the half lattice; ``steps`` (8, 2); ``band_*``: see
-    `Lattice`; ``link_*``: of the terminals, by source (nodes, start, goal). ``told``, ``state``: by the names above.
+    `Lattice`; ``link_*``: of the terminals, by source (nodes, start, goal). ``terms``, ``state``: by the names above.
     ``name`` (room, 4) and ``value`` (room, 5): the labels; ``keys``, ``ids`` (room,): the heap; ``first``, ``held``
     (nodes + 2,): each node's labels; ``goals`` (want,). ``v`` (5,) and ``door`` (16, 4): room to work in.
     """
@@ -199,8 +199,8 @@ def reach(  # type: ignore[no-untyped-def]
                 to = j * nx + i
                 edge = (node if sign > 0 else to) * 8 + k
                 b0, b1 = band_at[edge], band_at[edge + 1]
-                doors = doors_of(x, y, dx, dy, k, floor, ceiling, ground, told[STEP], door)
-                length = math.sqrt(float(dx * dx + dy * dy)) * told[STEP]
+                doors = doors_of(x, y, dx, dy, k, floor, ceiling, ground, terms[STEP], door)
+                length = math.sqrt(float(dx * dx + dy * dy)) * terms[STEP]
             else:
                 link = link_at[node] + m - moves
                 to, length = link_to[link], link_length[link]
@@ -212,9 +212,9 @@ def reach(  # type: ignore[no-untyped-def]
                 continue
             rest = 0.0
             if to < nodes:
-                rest = told[STEP] * math.sqrt((told[GOAL_X] - to % nx) ** 2 + (told[GOAL_Y] - to // nx) ** 2)
+                rest = terms[STEP] * math.sqrt((terms[GOAL_X] - to % nx) ** 2 + (terms[GOAL_Y] - to // nx) ** 2)
             else:
-                door[doors, 0], door[doors, 1], door[doors, 2] = 0.0, told[GOAL_LOW], told[GOAL_HIGH]
+                door[doors, 0], door[doors, 1], door[doors, 2] = 0.0, terms[GOAL_LOW], terms[GOAL_HIGH]
                 doors += 1
             # Over some of the edge's bands and under the others is a way of its own.
             for b in range(b0, b1 + 1):
@@ -223,17 +223,17 @@ def reach(  # type: ignore[no-untyped-def]
                 v[COST] += length
                 is_open = True
                 for q in range(doors):
-                    low, high = door[q, 1], told[CAP] if told[CAP] < door[q, 2] else door[q, 2]
+                    low, high = door[q, 1], terms[CAP] if terms[CAP] < door[q, 2] else door[q, 2]
                     for c in range(b0, b):
                         top = band_high[c] + (door[q, 3] if band_agl[c, 1] else 0.0)
                         low = top if top > low else low
                     for c in range(b, b1):
                         bottom = band_low[c] + (door[q, 3] if band_agl[c, 0] else 0.0)
                         high = bottom if bottom < high else high
-                    is_open = is_open and through(v, door[q, 0], low, high, told)
+                    is_open = is_open and through(v, door[q, 0], low, high, terms)
                 if not is_open:
                     continue
-                stays = admit(to, v, value, name, first, held, most_held, told) if count < len(keys) else -1
+                stays = admit(to, v, value, name, first, held, most_held, terms) if count < len(keys) else -1
                 if stays < 0:
                     state[COMPLETE] = 0
                 if stays <= 0:
@@ -245,15 +245,15 @@ def reach(  # type: ignore[no-untyped-def]
                 held[to] += 1
                 # What is left is no shorter than the straight way, nor than the climb (descent) takes.
                 ahead, vertical = rest, 0.0
-                if told[GOAL_LOW] > v[HIGH] and (told[GOAL_LOW] - v[HIGH]) / told[UP] > ahead:
-                    ahead = (told[GOAL_LOW] - v[HIGH]) / told[UP]
-                if v[LOW] > told[GOAL_HIGH] and (v[LOW] - told[GOAL_HIGH]) / told[DOWN] > ahead:
-                    ahead = (v[LOW] - told[GOAL_HIGH]) / told[DOWN]
-                if v[CHEAP_LOW] > told[GOAL_HIGH]:
-                    vertical = v[CHEAP_LOW] - told[GOAL_HIGH]
-                elif v[CHEAP_HIGH] < told[GOAL_LOW]:
-                    vertical = told[GOAL_LOW] - v[CHEAP_HIGH]
-                push(keys, ids, size, v[COST] + ahead + told[WEIGHT] * vertical, count)
+                if terms[GOAL_LOW] > v[HIGH] and (terms[GOAL_LOW] - v[HIGH]) / terms[UP] > ahead:
+                    ahead = (terms[GOAL_LOW] - v[HIGH]) / terms[UP]
+                if v[LOW] > terms[GOAL_HIGH] and (v[LOW] - terms[GOAL_HIGH]) / terms[DOWN] > ahead:
+                    ahead = (v[LOW] - terms[GOAL_HIGH]) / terms[DOWN]
+                if v[CHEAP_LOW] > terms[GOAL_HIGH]:
+                    vertical = v[CHEAP_LOW] - terms[GOAL_HIGH]
+                elif v[CHEAP_HIGH] < terms[GOAL_LOW]:
+                    vertical = terms[GOAL_LOW] - v[CHEAP_HIGH]
+                push(keys, ids, size, v[COST] + ahead + terms[WEIGHT] * vertical, count)
                 size += 1
                 count += 1
     state[COUNT], state[SIZE] = count, size

@@ -50,7 +50,7 @@ def choose(problem: Problem, place: tuple[float, float], straight_m: float, box:
     size = surface.grid.metres_per_cell(*place)
     col0, row0, col1, row1 = extent(problem, box)
     area_m2 = float((col1 - col0) * (row1 - row0) * size[0] * size[1])
-    most = min(MOST_FIRST, 1e6 * problem.budget.room_mb / NODE_BYTES)
+    most = min(MOST_FIRST, 1e6 * problem.budget.left_mb / NODE_BYTES)
     wanted_m = max(_wanted_m(problem, straight_m), LEAST_M, math.sqrt(area_m2 / most))
     cell_m, finest_m = float(size.max()), max(min(FINE_M, straight_m / FINE_PARTS), LEAST_M)
     parts = max(1, round(cell_m / wanted_m))
@@ -77,8 +77,8 @@ def _wanted_m(problem: Problem, straight_m: float) -> float:
     return max(least, min([most, *(r / 3.0 for r in radii)]))
 
 
-def has_room(problem: Problem, cells: NDArray[np.bool_], beside: int, ratio: int) -> bool:
+def fits_memory(problem: Problem, cells: NDArray[np.bool_], beside: int, ratio: int) -> bool:
     """Whether a lattice ``ratio`` times finer over the box of some cells, and ``beside`` more, fits into memory."""
     row, col, last_row, last_col = box_of(cells)
     nodes = (last_row - row + 2 * beside) * (last_col - col + 2 * beside) * ratio**2
-    return nodes * BOX_NODE_BYTES <= 1e6 * problem.budget.room_mb
+    return nodes * BOX_NODE_BYTES <= 1e6 * problem.budget.left_mb

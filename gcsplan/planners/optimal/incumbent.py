@@ -41,10 +41,8 @@ class Incumbent:
         self.cost = math.inf
         self.bound = straight_bound(problem) * (1.0 - 1e-12)
         self.first_s = math.inf
-        self.proved_shut = False
+        self.proved_infeasible = False
         """Whether it is proved that there is no path."""
-        self.improved = 0
-        """How often a better path came."""
         self.unsettled: Unsettled | None = None
         """Why the last track that was looked at closely holds no path."""
         self.steps: list[Step] = []
@@ -54,22 +52,22 @@ class Incumbent:
 
     # ------------------------------------------------------------------------------------------------- paths
 
-    def take_along(self, stops: PinnedTrack, *, fine: bool = True) -> bool:
+    def take_along(self, terminals: PinnedTrack, *, fine: bool = True) -> bool:
         """Look for a path over a track; True if it is the best so far."""
-        track = make_track(self.problem, *stops)
+        track = make_track(self.problem, *terminals)
         flown = fly(self.problem, track)
         if not isinstance(flown, Flown) and flown.kind != "pinched":
             return False
         found = self.exact(track, flown)
         return found is not None and self.take_simpler(*found, fine=fine, longer=False)
 
-    def take_longer(self, stops: PinnedTrack, fine: bool) -> bool:
+    def take_longer(self, terminals: PinnedTrack, fine: bool) -> bool:
         """Look for a path over a track, with laps where it is too steep; True if it is the best so far."""
-        track = make_track(self.problem, *stops)
+        track = make_track(self.problem, *terminals)
         flown = fly(self.problem, track)
         if isinstance(flown, Flown) and (found := self.exact(track, flown)) is not None:
             return self.take_simpler(*found, fine=fine, longer=False)
-        found = with_laps(self.problem, *stops, self.exact)
+        found = with_laps(self.problem, *terminals, self.exact)
         return found is not None and self.take_simpler(*found, fine=fine, longer=True)
 
     def exact(self, track: Track, flown: Flown | Obstruction) -> tuple[Floats, Bools] | None:
@@ -108,7 +106,6 @@ class Incumbent:
             return False
         self._first()
         self.best, self.cost, self.pinned = points, cost, pinned
-        self.improved += 1
         self.tell("improve")
         return True
 

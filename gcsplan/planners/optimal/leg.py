@@ -15,7 +15,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, AltitudeIntervals, Reached, Terminal
-from gcsplan.planners.optimal.cells import choose, has_room
+from gcsplan.planners.optimal.cells import choose, fits_memory
 from gcsplan.planners.optimal.corridor import Corridor, End, Nearby, Spare
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh_of
 from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
@@ -69,7 +69,7 @@ class Leg:
         self._mesh: Mesh
         self._guide: Guide
         self._ahead: Guide | None = None
-        self.last_way = np.array([start.place, goal.place])  # of flood or bound
+        self.last_track = np.array([start.place, goal.place])  # of flood or bound
         self._close: Nearby | None = None
         self._reached: tuple[Nearby, Reached] | None = None
         self.cells_of = choose(problem, start.place, self.straight_m, self._box(DETOURS[0]))
@@ -119,7 +119,7 @@ class Leg:
                 self._guide = self._mesh.flood(a, b, self.reach_m, slack)[1]
                 return
             if way is not None:
-                self.length_m, self.last_way = way.length_m, way.points
+                self.length_m, self.last_track = way.length_m, way.points
                 self.reach_m = min(within, way.length_m * (1.0 + slack))
                 return
             if limited:
@@ -151,7 +151,7 @@ class Leg:
             elif (
                 plane is self.plane
                 and self.cells_of.has_fine
-                and has_room(self.problem, cells, BESIDE, self.cells_of.ratio)
+                and fits_memory(self.problem, cells, BESIDE, self.cells_of.ratio)
             ):
                 plane, cells = self._over(cells)
         if roughly:
@@ -211,7 +211,7 @@ class Leg:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:
                 return limit
-            self.last_way = way.points
+            self.last_track = way.points
             # Ways are longer between the walls that the cones raised, so there is less to spare for a climb: again.
             enough = not cones or way.length_m < known + WORTHWHILE * spare or not self.problem.budget.goes_on()
             known = max(known, way.length_m)
@@ -235,7 +235,7 @@ class Leg:
         most = MOST_NODES if self.problem.airspace.surface.ground_m.size < LARGE else MOST_BESIDE
         if (last_row - row) * (last_col - col) * (self.cells_of.ratio * parts) ** 2 > most:
             return False
-        if not has_room(self.problem, wanted, 0, self.cells_of.ratio * parts):
+        if not fits_memory(self.problem, wanted, 0, self.cells_of.ratio * parts):
             return False
         if self.cells_of.fine_stride > 1 or np.count_nonzero(wanted) * self.cells_of.ratio**2 > MOST_ALONE:
             cut = 1

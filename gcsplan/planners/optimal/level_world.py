@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.problem import Problem, terminals
+from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.surface import GridMap, Surface
 
@@ -33,7 +33,7 @@ def in_window(incumbent: Incumbent) -> Problem:
     low, high = corners.min(axis=0), corners.max(axis=0)
     length_m = incumbent.longest(math.inf)
     if math.isfinite(length_m):
-        places = np.array(terminals(problem))
+        places = np.array(terminals_of(problem))
         straight = float(np.hypot(*np.diff(places, axis=0).T).sum())
         # No place of a track that long is farther from all terminals than this.
         reach = 0.5 * (length_m - straight) * (1.0 + MARGIN) + 0.5 * straight * MARGIN

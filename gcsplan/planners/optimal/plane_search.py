@@ -14,7 +14,7 @@ from gcsplan.planners.optimal.corridor import End, PinnedTrack, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Lacking, Leg
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
-from gcsplan.planners.problem import Problem, terminals
+from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Flown, fly, make_track
 
 SLACKS = (0.008, 0.15, 0.6)
@@ -46,7 +46,7 @@ class PlaneSearch:
         limits = problem.limits
         top_m = limits.max_amsl_m
         self.top_m = above_all(problem) if top_m is None else top_m - limits.altitude_error_m
-        places = terminals(problem)
+        places = terminals_of(problem)
         heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
         ends = [End(*place, z) for place, z in zip(places, heights, strict=True)]
         self.legs = [Leg(problem, a, b, self.top_m) for a, b in pairwise(ends) if math.dist(a.place, b.place) > 1e-3]
@@ -58,7 +58,7 @@ class PlaneSearch:
         self.choice = self._open
         """With what shut the last tracks were found that had to go past something."""
 
-    def stops(
+    def terminals(
         self, choice: Choice, cap_m: float, fine: bool, shut: Sequence[Lacking] | None = None
     ) -> PinnedTrack | None:
         """The shortest track of a choice below a cap, from terminal to terminal; see `Leg.track`."""
@@ -96,7 +96,7 @@ class PlaneSearch:
         for leg in self.legs:
             leg.flood(slack)
             if math.isinf(leg.length_m):
-                self.incumbent.proved_shut = True
+                self.incumbent.proved_infeasible = True
                 return False
         return True
 
@@ -120,17 +120,17 @@ class PlaneSearch:
         """Look for a path below a cap; True if it is the best so far."""
         incumbent = self.incumbent
         incumbent.unsettled = None
-        stops = self.stops(self.choice, cap_m, fine, shut)
-        if stops is None:
+        terminals = self.terminals(self.choice, cap_m, fine, shut)
+        if terminals is None:
             return False
-        track = make_track(incumbent.problem, *stops)
+        track = make_track(incumbent.problem, *terminals)
         flown = fly(incumbent.problem, track)
         if isinstance(flown, Flown) or flown.kind == "pinched":  # by centimetres, or tracks would not lead there
             found = incumbent.exact(track, flown)
             if found is not None or isinstance(flown, Flown):
                 return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)
         past = flown.kind == "zone" or incumbent.best is None
-        return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=stops)
+        return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=terminals)
 
     def narrow_passage(self) -> bool:
         """Look for a path through what is open for the exact check alone: a lattice keeps as much beside its tracks as
@@ -163,7 +163,7 @@ class PlaneSearch:
         laps = incumbent.climbs and (incumbent.best is None or (incumbent.laps and cap_m is None))
         spare_m = self.longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
         below_m = self.top_m if cap_m is None else cap_m
-        search = DetourSearch(incumbent, lambda choice: self.stops(choice, below_m, fine), fine)
+        search = DetourSearch(incumbent, lambda choice: self.terminals(choice, below_m, fine), fine)
         roots = [self.choice]
         if cap_m is None:
             roots = [replace(c, most_m=(spare_m, spare_m)) for c in dict.fromkeys([self._open, self.choice])]

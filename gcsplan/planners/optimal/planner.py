@@ -37,7 +37,7 @@ from gcsplan.planners.optimal.governor import govern
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.searches import Searches, left_out
 from gcsplan.planners.optimal.window import plan_over
-from gcsplan.planners.problem import Problem, Refusal, Solution, terminals
+from gcsplan.planners.problem import Problem, Refusal, Solution, terminals_of
 from gcsplan.planners.refusal import check_ends, explain
 from gcsplan.world.path import Path
 
@@ -76,12 +76,12 @@ def search(problem: Problem, laps: bool = True) -> Searches:
 
 def _sharp(problem: Problem, laps: bool = True) -> Solution:
     check_ends(problem)
-    if all(math.dist(terminals(problem)[0], x) < 1e-3 for x in terminals(problem)):
+    if all(math.dist(terminals_of(problem)[0], x) < 1e-3 for x in terminals_of(problem)):
         return plan_band(problem, Incumbent(problem).tell, problem.budget.begun_s)  # a climb on the spot
     searches = search(problem, laps)
     incumbent = searches.incumbent
     if incumbent.best is None:
-        raise explain(problem, proved=True if incumbent.proved_shut else None)
+        raise explain(problem, proved=True if incumbent.proved_infeasible else None)
     found = incumbent.solution()
     if problem.limits.max_agl_m is not None and found.stopped_by != "gap":
         found = replace(found, notes=(BAND_NOTE,))
@@ -90,7 +90,7 @@ def _sharp(problem: Problem, laps: bool = True) -> Solution:
 
 def _turning(problem: Problem) -> Solution:
     """A path with sharp corners, laid on arcs; with more room around it where that is needed."""
-    from gcsplan.planners.turns.planner import roomier, rounded  # few missions have wings
+    from gcsplan.planners.turns.planner import with_more_clearance, rounded  # few missions have wings
 
     # Laps are short and have sharp corners: what they gain is lost again on the arcs.
     sharp = _sharp(replace(problem, turn_radius_m=0.0), laps=False)
@@ -98,12 +98,12 @@ def _turning(problem: Problem) -> Solution:
 
     def replan(extra_m: float) -> tuple[Floats, NDArray[np.bool_]] | None:
         try:
-            again = _sharp(roomier(problem, extra_m), laps=False).path.points
+            again = _sharp(with_more_clearance(problem, extra_m), laps=False).path.points
         except NoMission:
             return None
-        return again, _stops(problem, again)
+        return again, _terminals(problem, again)
 
-    found = rounded(problem, points, _stops(problem, points), replan)
+    found = rounded(problem, points, _terminals(problem, points), replan)
     if found is None:
         raise Refusal(
             f"a path with sharp corners was found, but none was whose arcs of turn_radius_m {problem.turn_radius_m:g} "
@@ -121,8 +121,8 @@ def _turning(problem: Problem) -> Solution:
     )
 
 
-def _stops(problem: Problem, points: Floats) -> NDArray[np.bool_]:
+def _terminals(problem: Problem, points: Floats) -> NDArray[np.bool_]:
     """Which points of a path are its ends and vias."""
-    stops = np.array(terminals(problem))
-    away = np.hypot(*(points[:, None, :2] - stops[None]).transpose(2, 0, 1)).min(axis=1)
+    terminals = np.array(terminals_of(problem))
+    away = np.hypot(*(points[:, None, :2] - terminals[None]).transpose(2, 0, 1)).min(axis=1)
     return np.asarray(away < 1e-3)

@@ -18,7 +18,7 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import ENDS_M, Problem
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
-from gcsplan.planners.profile.track import Flown, Lacking, Shut, Track, distances, fly, lacking
+from gcsplan.planners.profile.track import Flown, Lacking, Closed, Track, distances, fly, lacking
 from gcsplan.planners.simplify import fewer
 from gcsplan.world.path import Path
 
@@ -43,7 +43,7 @@ SPARE = 1.02
 """Length beyond what the height takes."""
 
 
-def ways_up(problem: Problem, place: tuple[float, float], from_amsl: float, to_amsl: float) -> Floats | None:
+def climb_tracks(problem: Problem, place: tuple[float, float], from_amsl: float, to_amsl: float) -> Floats | None:
     """(N, 3) way points from one altitude over ``place`` to another, up or down, that the exact check passes.
 
     The fewest laps that fit between floor, ceilings and zones; None where none were found.
@@ -57,7 +57,7 @@ def ways_up(problem: Problem, place: tuple[float, float], from_amsl: float, to_a
     part = replace(problem, start=(*place, from_amsl), goal=(*place, to_amsl), via=())
     judge = Judge(problem)
     for one, count in laps(problem, length, None):
-        if not _has_room(problem, np.vstack([place, np.asarray(place) + one, place])):
+        if not _fits(problem, np.vstack([place, np.asarray(place) + one, place])):
             continue
         points = np.vstack([place, np.asarray(place) + wound(one, count), place])
         pinned = np.zeros(len(points), bool)
@@ -72,7 +72,7 @@ def highest(problem: Problem, place: tuple[float, float], amsl_m: float, *, down
     """About how high one can climb over ``place`` from ``amsl_m`` (``down``: descend to it), `HIGHEST_M` at most."""
 
     def can(other_m: float) -> bool:
-        return ways_up(problem, place, *((other_m, amsl_m) if down else (amsl_m, other_m))) is not None
+        return climb_tracks(problem, place, *((other_m, amsl_m) if down else (amsl_m, other_m))) is not None
 
     top = min(float(problem.airspace.ceiling_amsl(*place, problem.limits)), amsl_m + HIGHEST_M)
     if top <= amsl_m + 1.0:
@@ -117,9 +117,9 @@ def _lowered(problem: Problem, points: Floats) -> Floats | None:
             found.append(fewer(problem, *settled, 0.0)[0])
     whole: list[Floats | None] = [points]
     if points[0, 2] > problem.start[2]:
-        whole.insert(0, ways_up(problem, problem.start[:2], problem.start[2], float(points[0, 2])))
+        whole.insert(0, climb_tracks(problem, problem.start[:2], problem.start[2], float(points[0, 2])))
     if points[-1, 2] > problem.goal[2]:
-        whole.append(ways_up(problem, problem.goal[:2], float(points[-1, 2]), problem.goal[2]))
+        whole.append(climb_tracks(problem, problem.goal[:2], float(points[-1, 2]), problem.goal[2]))
     parts = [p for p in whole if p is not None]
     if len(parts) == len(whole):
         joined = np.vstack([parts[0], *(p[1:] for p in parts[1:])])
@@ -151,7 +151,7 @@ def extend(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> tu
     track = sampled_track(problem, points, pinned, pin_m)
     lack = lacking(problem, track)
     for _ in range(ROUNDS):
-        if isinstance(lack, Shut):
+        if isinstance(lack, Closed):
             return None
         if not lack.steep:
             flown = fly(problem, track)
@@ -217,7 +217,7 @@ def _lengthened(problem: Problem, track: Track, lack: Lacking) -> tuple[Track, L
     for detour in _promising(problem, track, lack, SPARE * needed + 1.0):
         tried = _with_detour(problem, track, detour)
         left = lacking(problem, tried)
-        if isinstance(left, Shut):
+        if isinstance(left, Closed):
             continue
         if left.laps_m <= lack.laps_m - 0.8 * needed:
             return tried, left
@@ -259,7 +259,7 @@ def _promising(problem: Problem, track: Track, lack: Lacking, length_m: float) -
     out: list[_Detour] = []
     for k in np.argsort(above.clip(0.0), kind="stable")[: 4 * TRIED]:
         high = float(amsl[k]) + why.by
-        if np.isfinite(above[k]) and _has_room(problem, found[k].shape, float(amsl[k]), high):
+        if np.isfinite(above[k]) and _fits(problem, found[k].shape, float(amsl[k]), high):
             out.append(found[k])
             if len(out) == TRIED:
                 break
@@ -331,7 +331,7 @@ def _circle(radius_m: float, turn: float, sense: float) -> Floats:
     return np.asarray(radius_m * (middle + np.stack([np.cos(angles), np.sin(angles)], axis=-1)))
 
 
-def _has_room(problem: Problem, shape: Floats, low_m: float = -FAR_M, high_m: float = FAR_M) -> bool:
+def _fits(problem: Problem, shape: Floats, low_m: float = -FAR_M, high_m: float = FAR_M) -> bool:
     """False where a way (N, 2) meets a zone, or ground, past which there is none, at any altitude or between two."""
     tube = problem.airspace.tube(shape, problem.limits)
     if not (tube.floor_m <= tube.ceiling_m + 2.0 * ENDS_M).all():

@@ -129,11 +129,11 @@ def settle(
             worst = v
             k = min(max(int(np.searchsorted(tube.s_m, at, "right")) - 1, 0), len(tube.s_m) - 2)
             z = flown.profile.at(tube.s_m[k : k + 2])
-            room = v.by + CORRECTED_M
+            apart_m = v.by + CORRECTED_M
             if v.kind in ("min_agl", "terrain_clearance"):
-                tube.floor_m[k] = np.maximum(tube.floor_m[k], z + room)
+                tube.floor_m[k] = np.maximum(tube.floor_m[k], z + apart_m)
             elif v.kind == "max_agl":
-                tube.ceiling_m[k] = np.minimum(tube.ceiling_m[k], z - room)
+                tube.ceiling_m[k] = np.minimum(tube.ceiling_m[k], z - apart_m)
             else:
                 place = np.array([v.east_m, v.north_m])
                 return refused(
@@ -152,16 +152,16 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
         at.append(a + (b - a) * np.arange(1, n + 1) / n)
     s = np.concatenate(at)
     s[-1] = exact.tube.s_m[-1]
-    floor, ceiling = _room(problem, exact, s)
+    floor, ceiling = _tube_at(problem, exact, s)
     with np.errstate(invalid="ignore"):  # unknown ground: infinite on both sides
-        room = np.abs(ceiling - floor)
-    tight = np.minimum(room[:-1], room[1:]) < TIGHT_M
+        apart_m = np.abs(ceiling - floor)
+    tight = np.minimum(apart_m[:-1], apart_m[1:]) < TIGHT_M
     if tight.any():
         parts = np.where(tight, np.ceil(np.diff(s) / TIGHT_SAMPLE_M), 1.0).astype(np.intp)
         first = np.cumsum(parts) - parts
         part = (np.arange(parts.sum()) - np.repeat(first, parts)) / np.repeat(parts, parts)
         s = np.append(np.repeat(s[:-1], parts) + part * np.repeat(np.diff(s), parts), s[-1])
-        floor, ceiling = _room(problem, exact, s)
+        floor, ceiling = _tube_at(problem, exact, s)
     with np.errstate(invalid="ignore"):
         spare = np.clip(0.25 * (ceiling - floor), 0.0, SPARE_M)
     spare[[0, -1]] = 0.0
@@ -173,7 +173,7 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
     return Track(exact.points, exact.pinned, exact.pin_m, exact.s_m, tube)
 
 
-def _room(problem: Problem, track: Track, s_m: Floats) -> tuple[Floats, Floats]:
+def _tube_at(problem: Problem, track: Track, s_m: Floats) -> tuple[Floats, Floats]:
     """Floor and ceiling at places along a track, zones left aside."""
     east, north = (np.interp(s_m, track.s_m, track.points[:, k]) for k in range(2))
     air, limits = problem.airspace, problem.limits

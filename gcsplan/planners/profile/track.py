@@ -24,7 +24,7 @@ from gcsplan.world.airspace import Tube
 KEEP_M = 1e-4
 """Kept from floors and ceilings where there is room, so that rounding never decides."""
 
-CLOSE_M, CLOSE_STEP_M, CLOSE_ROOM_M = 60.0, 1.0, 0.03
+CLOSE_M, CLOSE_STEP_M, CLOSE_SPARE_M = 60.0, 1.0, 0.03
 """Where a tube shuts an end in: so far from it the floor is read point by point, so often, with so much to spare."""
 
 DEARER = 2e-4
@@ -92,7 +92,7 @@ class Lacking:
 
 
 @dataclass(frozen=True, slots=True)
-class Shut:
+class Closed:
     """Why a track cannot be flown, however long: at the best of its worst places ``by`` metres of room are missing,
     between what is passed there over and under; ``zones``: which of that are zones, as far as is known."""
 
@@ -151,12 +151,12 @@ def fly(
     """
     tube, limits = track.tube, problem.limits
     ends = (problem.start[2], problem.goal[2])
-    room = _rooms(problem, track, known)
-    horizontal = float(room.s_m[-1])
+    sections = _sections(problem, track, known)
+    horizontal = float(sections.s_m[-1])
 
     def solve(over: Sides) -> Profile | Blocked:
-        low, high = room.between(over)
-        return taut_string(room.s_m, low, high, *ends, limits.max_climb_slope, limits.max_descent_slope)
+        low, high = sections.between(over)
+        return taut_string(sections.s_m, low, high, *ends, limits.max_climb_slope, limits.max_descent_slope)
 
     def cost_of(p: Profile) -> float:
         if problem.objective == "energy":
@@ -174,7 +174,7 @@ def fly(
         cost, _, over, profile = heappop(open_set)
         if cost >= below:
             break
-        hit = room.hits(profile, over)
+        hit = sections.hits(profile, over)
         if not hit:
             return Flown(profile, cost, over)
         deepest = max(hit, key=lambda h: h.depth_m)
@@ -203,25 +203,25 @@ def fly(
     return first or Obstruction("zone", 0.0, horizontal, 0.0)
 
 
-def lacking(problem: Problem, track: Track) -> Lacking | Shut:
+def lacking(problem: Problem, track: Track) -> Lacking | Closed:
     """What the track lacks in length to be flown, where length helps.
 
     What climbs as steeply as allowed over pieces that are too short costs a convex function of the slope, like all
     that a taut string makes least; so sides are searched as in `fly`.
     """
     tube, limits = track.tube, problem.limits
-    room = _rooms(problem, track, ())
+    sections = _sections(problem, track, ())
     up, down = (min(slope, NO_LIMIT) + 1e-9 for slope in (limits.max_climb_slope, limits.max_descent_slope))
-    shut = Shut(math.inf, ())
+    closed = Closed(math.inf, ())
     deepest_zone: tuple[int, ...] = ()
 
     def solve(over: Sides) -> tuple[float, Profile, Floats] | None:
-        nonlocal shut
-        low, high = room.between(over)
-        found = taut_string(room.s_m, low, high, problem.start[2], problem.goal[2])
+        nonlocal closed
+        low, high = sections.between(over)
+        found = taut_string(sections.s_m, low, high, problem.start[2], problem.goal[2])
         if isinstance(found, Blocked):
-            if found.by < shut.by or not shut.zones:
-                shut = Shut(found.by, room.zones(tube, over, found.s0_m, found.s1_m))
+            if found.by < closed.by or not closed.zones:
+                closed = Closed(found.by, sections.zones(tube, over, found.s0_m, found.s1_m))
             return None
         run, rise = np.diff(found.s_m), np.diff(found.amsl_m)
         needed = np.maximum(run, np.maximum(rise / up, -rise / down))
@@ -234,12 +234,12 @@ def lacking(problem: Problem, track: Track) -> Lacking | Shut:
     none: Sides = (None,) * len(tube.bands)
     root = solve(none)
     if root is None:
-        return shut
+        return closed
     open_set = [(root[0], 0, none, root)]
     count = 0
     while open_set and count < BRANCHES:
         cost, _, over, (_, profile, more) = heappop(open_set)
-        hit = room.hits(profile, over)
+        hit = sections.hits(profile, over)
         if not hit:
             s, rise = profile.s_m, np.diff(profile.amsl_m)
             missing = more * np.where(rise > 0.0, up, down)
@@ -250,7 +250,7 @@ def lacking(problem: Problem, track: Track) -> Lacking | Shut:
             )
             zones = deepest_zone if cost > root[0] * (1.0 + DEARER) else ()
             if steep:
-                zones = room.zones(tube, over, steep[0].s0_m, steep[0].s1_m)
+                zones = sections.zones(tube, over, steep[0].s0_m, steep[0].s1_m)
             return Lacking(profile, cost, float(more[missing > 0.0].sum()), steep, zones)
         deepest = max(hit, key=lambda h: h.depth_m)
         deepest_zone = deepest_zone or (tube.bands[deepest.band].zone,)
@@ -260,7 +260,7 @@ def lacking(problem: Problem, track: Track) -> Lacking | Shut:
             found = solve(choice)
             if found is not None:
                 heappush(open_set, (found[0], count, choice, found))
-    return shut
+    return closed
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,7 +273,7 @@ class _Hit:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Room:
+class _Sections:
     """Doors at every breakpoint of a tube, its bands and the pins; for each band its doors' span and edges."""
 
     s_m: Floats
@@ -317,15 +317,15 @@ class _Room:
 
 def _narrow(low: Floats, high: Floats) -> None:
     with np.errstate(invalid="ignore"):  # a door between infinities has no room, or any
-        room, middle = high - low, 0.5 * (low + high)
-    wide, open_ = room >= 2.0 * KEEP_M, room >= 0.0
+        sections, middle = high - low, 0.5 * (low + high)
+    wide, open_ = sections >= 2.0 * KEEP_M, sections >= 0.0
     ends = low[[0, -1]] - 1e-6, high[[0, -1]] + 1e-6
     low[:] = np.where(wide, low + KEEP_M, np.where(open_, middle, low))
     high[:] = np.where(wide, high - KEEP_M, np.where(open_, middle, high))
     low[[0, -1]], high[[0, -1]] = ends
 
 
-def _rooms(problem: Problem, track: Track, known: Sequence[tuple[float, float, float]]) -> _Room:
+def _sections(problem: Problem, track: Track, known: Sequence[tuple[float, float, float]]) -> _Sections:
     tube, z0, z1 = track.tube, problem.start[2], problem.goal[2]
     fixed = track.pinned & np.isfinite(track.pin_m)
     close = _close_to_ends(problem, tube)
@@ -339,7 +339,7 @@ def _rooms(problem: Problem, track: Track, known: Sequence[tuple[float, float, f
     if len(close):
         near = np.flatnonzero((s <= CLOSE_M) | (s >= s[-1] - CLOSE_M))
         east, north = (np.interp(s[near], track.s_m, track.points[:, i]) for i in range(2))
-        low[near] = np.minimum(low[near], problem.airspace.floor_amsl(east, north, problem.limits) + CLOSE_ROOM_M)
+        low[near] = np.minimum(low[near], problem.airspace.floor_amsl(east, north, problem.limits) + CLOSE_SPARE_M)
     pins = [(at, z, z) for at, z in zip(track.s_m[fixed], track.pin_m[fixed], strict=True)]
     for at, under, over in (*pins, *known):
         k = int(np.argmin(np.abs(s - at)))
@@ -359,7 +359,7 @@ def _rooms(problem: Problem, track: Track, known: Sequence[tuple[float, float, f
             _forgive(top, bottom, -1, z1)
         bottoms.append(bottom)
         tops.append(top)
-    return _Room(s, low, high, spans, bottoms, tops)
+    return _Sections(s, low, high, spans, bottoms, tops)
 
 
 def _close_to_ends(problem: Problem, tube: Tube) -> Floats:

@@ -74,21 +74,21 @@ def search(problem: Problem, settings: Settings) -> Found:
             reason="not_found",
         )
     curve = cost.curve.samples(nodes[None])[0]
-    curve[cost.curve.stops] = scene.stops
-    return judged(problem, result, scene, curve, cost.curve.stops, cost.stride)
+    curve[cost.curve.terminals] = scene.terminals
+    return judged(problem, result, scene, curve, cost.curve.terminals, cost.stride)
 
 
 def make_layers(scene: Scene, points: tuple[int, ...]) -> list[Floats]:
     """Nodes (n, 3) of each layer: stops are layers of one node, sections of at most 21 × 21."""
-    layers = [scene.stops[:1]]
+    layers = [scene.terminals[:1]]
     for i, count in enumerate(points):
-        a, b = scene.stops[i], scene.stops[i + 1]
+        a, b = scene.terminals[i], scene.terminals[i + 1]
         ahead = b[:2] - a[:2]
         long = max(float(np.hypot(*ahead)), 1e-9)
         left = np.array([-ahead[1], ahead[0]]) / long if ahead.any() else np.array([0.0, 1.0])
         for j in range(count):
             layers.append(_section(scene, a[:2] + (j + 1) / (count + 1) * ahead, left, LATERAL * long))
-        layers.append(scene.stops[i + 1 : i + 2])
+        layers.append(scene.terminals[i + 1 : i + 2])
     return layers
 
 

@@ -20,13 +20,13 @@ DEGREE = 3
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Control points (N, 3) to samples (S, 3): ``basis`` (N, S); ``stops`` (M,) samples that are stops.
+    """Control points (N, 3) to samples (S, 3): ``basis`` (N, S); ``terminals`` (M,) samples that are stops.
 
     ``bands`` (4, S), ``spans`` (n, 3): the same as kernels want it, without its zeros (`curve_kernels.draw`).
     """
 
     basis: Floats
-    stops: NDArray[np.intp]
+    terminals: NDArray[np.intp]
     bands: Floats
     spans: NDArray[np.int64]
 
@@ -46,14 +46,14 @@ def curve(points: tuple[int, ...], legs: tuple[int, ...]) -> Curve:
     controls, samples = sum(points) + len(points) + 1, sum(legs) + 1
     basis = np.zeros((controls, samples))
     row = column = 0
-    stops = [0]
+    terminals = [0]
     for free, count in zip(points, legs, strict=True):
         part = _basis(free + 2, count + 1)
         basis[row : row + free + 2, column : column + count + 1] = part
         row, column = row + free + 1, column + count
-        stops.append(column)
+        terminals.append(column)
     basis.setflags(write=False)
-    return Curve(basis, np.array(stops), *_bands(basis))
+    return Curve(basis, np.array(terminals), *_bands(basis))
 
 
 def _bands(basis: Floats) -> tuple[Floats, NDArray[np.int64]]:

@@ -124,9 +124,9 @@ class Code:
     def of(cls, name: str, scene: Scene, points: int | None = None) -> Code:
         """``points`` way points in all (the encoding's own number unless given), shared out by the stages' lengths."""
         encoding = get_encoding(name)
-        stages = len(scene.stops) - 1
+        stages = len(scene.terminals) - 1
         wanted = max(encoding.points if points is None else points, stages)
-        lengths = np.linalg.norm(np.diff(scene.stops, axis=0), axis=1)
+        lengths = np.linalg.norm(np.diff(scene.terminals, axis=0), axis=1)
         return cls(encoding, scene, shares(wanted, lengths))
 
     @property
@@ -136,15 +136,15 @@ class Code:
 
     def controls(self, u: Floats) -> Floats:
         """(n, dim) in the unit box to (n, N, 3) control points, stops included."""
-        stops, n, v = self.scene.stops, len(u), self.encoding.variables
-        out = np.empty((n, sum(self.points) + len(stops), 3))
+        terminals, n, v = self.scene.terminals, len(u), self.encoding.variables
+        out = np.empty((n, sum(self.points) + len(terminals), 3))
         at = row = 0
         for i, count in enumerate(self.points):
-            out[:, row] = stops[i]
+            out[:, row] = terminals[i]
             part = u[:, at : at + v * count].reshape(n, count, v)
-            self.encoding.decode(self.scene, stops[i], stops[i + 1], part, out[:, row + 1 : row + 1 + count])
+            self.encoding.decode(self.scene, terminals[i], terminals[i + 1], part, out[:, row + 1 : row + 1 + count])
             at, row = at + v * count, row + count + 1
-        out[:, row] = stops[-1]
+        out[:, row] = terminals[-1]
         return out
 
 

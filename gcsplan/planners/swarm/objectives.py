@@ -260,15 +260,15 @@ class Cost:
 
     def _straight(self) -> Floats:
         """(N, 3) control points of the straight line from stop to stop."""
-        stops, rows = self.code.scene.stops, []
+        terminals, rows = self.code.scene.terminals, []
         for i, count in enumerate(self.code.points):
             t = np.arange(count + 1)[:, None] / (count + 1.0)
-            rows.append(stops[i] + t * (stops[i + 1] - stops[i]))
-        return np.vstack([*rows, stops[-1:]])
+            rows.append(terminals[i] + t * (terminals[i + 1] - terminals[i]))
+        return np.vstack([*rows, terminals[-1:]])
 
 
 def sampled(scene: Scene, points: tuple[int, ...]) -> tuple[Curve, int]:
     """The curve past ``points`` free control points a stage, and how many samples lie between two nodes."""
     stride = max(1, round(SAMPLES / (NODES + 1)))
-    legs = shares((NODES + 1) * stride, np.linalg.norm(np.diff(scene.stops, axis=0), axis=1))
+    legs = shares((NODES + 1) * stride, np.linalg.norm(np.diff(scene.terminals, axis=0), axis=1))
     return curve(points, legs), stride

@@ -80,13 +80,13 @@ class Settings:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Found:
-    """What a search ended in: ``curve`` (S, 3) with its ``stops``, ``cost`` by the objective, ``violations`` by the
+    """What a search ended in: ``curve`` (S, 3) with its ``terminals``, ``cost`` by the objective, ``violations`` by the
     exact check. ``pitch_deg``, ``yaw_deg``: mean angle, and mean change of heading, between nodes (SSGWO's tables)."""
 
     result: Result
     scene: Scene
     curve: Floats
-    stops: NDArray[np.intp]
+    terminals: NDArray[np.intp]
     violations: tuple[Violation, ...]
     pitch_deg: float
     yaw_deg: float
@@ -127,12 +127,12 @@ def search(problem: Problem, optimiser: str, settings: Settings) -> Found:
         tell=None if problem.progress is None else _teller(problem),
     )
     curve = cost.curve.samples(code.controls(result.x[None]))[0]
-    curve[cost.curve.stops] = scene.stops
-    return judged(problem, result, scene, curve, cost.curve.stops, cost.stride)
+    curve[cost.curve.terminals] = scene.terminals
+    return judged(problem, result, scene, curve, cost.curve.terminals, cost.stride)
 
 
 def judged(
-    problem: Problem, result: Result, scene: Scene, curve: Floats, stops: NDArray[np.intp], stride: int
+    problem: Problem, result: Result, scene: Scene, curve: Floats, terminals: NDArray[np.intp], stride: int
 ) -> Found:
     """A search's curve with what the exact check says of it."""
     curve = np.ascontiguousarray(curve)
@@ -141,7 +141,7 @@ def judged(
     turn = np.diff(np.arctan2(d[:, 1], d[:, 0]))
     yaw = np.degrees(np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi))
     found = violations(problem, curve)
-    return Found(result, scene, curve, stops, found, float(pitch.mean()), float(yaw.mean()) if len(yaw) else 0.0)
+    return Found(result, scene, curve, terminals, found, float(pitch.mean()), float(yaw.mean()) if len(yaw) else 0.0)
 
 
 def plan(problem: Problem, optimiser: str, defaults: Mapping[str, object]) -> Solution:
@@ -165,7 +165,7 @@ def finish(problem: Problem, found: Found, begun: float) -> Solution:
         if wrong:  # between stops the curve touched a limit that its chords do not
             notes = (f"the curve that {name} found breaks {summary_of(problem, wrong)}; its way points pass",)
     else:
-        mended = repair(problem, found.scene, found.curve, found.stops)
+        mended = repair(problem, found.scene, found.curve, found.terminals)
         if mended is None:
             raise Refusal(
                 f"no mission: the curve that {name} found breaks {summary_of(problem, wrong)}, and pushing it out and "
@@ -195,7 +195,7 @@ def way_points_beside(problem: Problem, found: Found) -> Floats | None:
     if any(v.kind in COLLISIONS for v in found.violations):
         return None
     for part in CORRIDORS:
-        points = found.curve[fewer(found.curve, found.stops, part * found.scene.straight_m)].copy()
+        points = found.curve[fewer(found.curve, found.terminals, part * found.scene.straight_m)].copy()
         points[0], points[-1] = problem.start, problem.goal
         if not violations(problem, points):
             return points

@@ -49,18 +49,18 @@ def violations(problem: Problem, points: Floats) -> tuple[Violation, ...]:
     return problem.airspace.examine(Legs.of_path(points, problem.limits), problem.limits).violations
 
 
-def repair(problem: Problem, scene: Scene, samples: Floats, stops: NDArray[np.intp]) -> Repaired | None:
-    """A legal path near the curve ``samples`` (S, 3) whose ``stops`` must stay; None where none is found.
+def repair(problem: Problem, scene: Scene, samples: Floats, terminals: NDArray[np.intp]) -> Repaired | None:
+    """A legal path near the curve ``samples`` (S, 3) whose ``terminals`` must stay; None where none is found.
 
     First the curve's own track with a new profile; then tracks pushed out further and further.
     """
     flat = samples[:, :2]
-    points = _with_profile(problem, flat, stops)
+    points = _with_profile(problem, flat, terminals)
     if points is not None:
         return Repaired(points, 0.0)
-    way = float(np.hypot(*np.diff(scene.stops[:, :2], axis=0).T).sum())
+    way = float(np.hypot(*np.diff(scene.terminals[:, :2], axis=0).T).sum())
     for width, margin in PUSHES:
-        pushed = _push(problem, scene, flat, stops, width * way, margin * way)
+        pushed = _push(problem, scene, flat, terminals, width * way, margin * way)
         if pushed is None:
             continue
         track, at, by = pushed
@@ -70,12 +70,12 @@ def repair(problem: Problem, scene: Scene, samples: Floats, stops: NDArray[np.in
     return None
 
 
-def _with_profile(problem: Problem, flat: Floats, stops: NDArray[np.intp]) -> Floats | None:
+def _with_profile(problem: Problem, flat: Floats, terminals: NDArray[np.intp]) -> Floats | None:
     """Way points over a track (N, 2) with the best altitude profile; None where there is none that passes."""
     pinned = np.zeros(len(flat), bool)
-    pinned[stops] = True
+    pinned[terminals] = True
     pin_m = np.full(len(flat), np.nan)
-    for i, via in zip(stops[1:-1], problem.via, strict=True):
+    for i, via in zip(terminals[1:-1], problem.via, strict=True):
         pin_m[i] = math.nan if via.amsl_m is None else via.amsl_m
     track = make_track(problem, np.ascontiguousarray(flat), pinned, pin_m)
     with np.errstate(invalid="ignore"):  # a zone without a top under no ceiling: room from infinity to infinity
@@ -113,14 +113,14 @@ def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
 
 
 def _push(
-    problem: Problem, scene: Scene, flat: Floats, stops: NDArray[np.intp], half_m: float, margin_m: float
+    problem: Problem, scene: Scene, flat: Floats, terminals: NDArray[np.intp], half_m: float, margin_m: float
 ) -> tuple[Floats, NDArray[np.intp], float] | None:
     """The track pushed to open places within ``half_m``, its stops' indices, and how far it went at most.
 
     The cheapest chain of side steps by length; a step is open if no point of it is shut, and if the altitudes that
     can be reached along the cheapest chain so far meet its room.
     """
-    base, left, at_stop = _ribbon(flat, stops, half_m)
+    base, left, at_terminal = _ribbon(flat, terminals, half_m)
     n, m = len(base), 2 * SIDES + 1
     step = half_m / SIDES
     aside = (np.arange(m) - SIDES) * step
@@ -130,7 +130,7 @@ def _push(
     legal = (source >= 0) & (source < m)
     source = np.clip(source, 0, m - 1)
     low, high = _room(problem, scene, places, margin_m)
-    low, high = _pin(problem, scene, low, high, at_stop)
+    low, high = _pin(problem, scene, low, high, at_terminal)
     up, down = min(problem.limits.max_climb_slope, 1e6), min(problem.limits.max_descent_slope, 1e6)
     cost = np.where(np.arange(m) == SIDES, 0.0, np.inf)
     least, most = np.full(m, problem.start[2]), np.full(m, problem.start[2])
@@ -162,28 +162,28 @@ def _push(
         sides.append(side)
     chosen = np.array(sides[::-1])
     track = places[np.arange(n), chosen]
-    track[at_stop] = flat[stops]
-    return track, at_stop, float(np.abs(aside[chosen]).max())
+    track[at_terminal] = flat[terminals]
+    return track, at_terminal, float(np.abs(aside[chosen]).max())
 
 
-def _ribbon(flat: Floats, stops: NDArray[np.intp], half_m: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
+def _ribbon(flat: Floats, terminals: NDArray[np.intp], half_m: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
     """Stations (n, 2) along a track, unit vectors to the left there (n, 2), and which stations are its stops.
 
     A ribbon must not fold: the track's own turns within its half-width are smoothed away, between stop and stop.
     """
-    parts, at_stop = [flat[:1]], [0]
+    parts, at_terminal = [flat[:1]], [0]
     whole = float(distances(flat)[-1])
-    for a, b in itertools.pairwise(stops):
+    for a, b in itertools.pairwise(terminals):
         track = _smoothed(flat[a : b + 1], half_m)
         s = distances(track)
         count = max(2, round(STATIONS * s[-1] / max(whole, 1e-9)))
         at = np.linspace(0.0, s[-1], count + 1)[1:]
         parts.append(np.stack([np.interp(at, s, track[:, i]) for i in range(2)], axis=-1))
-        at_stop.append(at_stop[-1] + count)
+        at_terminal.append(at_terminal[-1] + count)
     base = np.vstack(parts)
     ahead = base[np.minimum(np.arange(len(base)) + 2, len(base) - 1)] - base[np.maximum(np.arange(len(base)) - 2, 0)]
     long = np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)
-    return base, np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / long[:, None], np.array(at_stop)
+    return base, np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / long[:, None], np.array(at_terminal)
 
 
 def _smoothed(track: Floats, reach_m: float, count: int = 400) -> Floats:
@@ -215,11 +215,11 @@ def k_keep(max_agl_m: float | None) -> float:
     return 0.0 if max_agl_m is None else 0.02 * max_agl_m
 
 
-def _pin(problem: Problem, scene: Scene, low: Floats, high: Floats, at_stop: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def _pin(problem: Problem, scene: Scene, low: Floats, high: Floats, at_terminal: NDArray[np.intp]) -> tuple[Floats, Floats]:
     """At stops the middle of the ribbon alone is open, at the altitude that is asked for there."""
     low, high = low.copy(), high.copy()
     heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
-    for i, z in zip(at_stop, heights, strict=True):
+    for i, z in zip(at_terminal, heights, strict=True):
         here = low[i, SIDES], high[i, SIDES]
         low[i], high[i] = np.inf, -np.inf
         low[i, SIDES], high[i, SIDES] = here if z is None else (z, z)

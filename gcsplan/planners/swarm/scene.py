@@ -40,7 +40,7 @@ class Scene:
     """``heights`` (rows, cols) top of the ground about the volume; ``quadratic`` (2, 6) the plane to (col, row) over 1,
     u, v, u², uv, v²; ``floors`` and ``floor_map`` the same of the lowest legal altitude, terrain clearance and errors
     included; ``numbers``, ``zones`` and ``corners`` as `cost_kernels` names them; ``low``, ``high`` (3,)
-    the flight volume; ``stops`` (M, 3) start, via points, goal; ``straight_m`` from stop to stop in space."""
+    the flight volume; ``terminals`` (M, 3) start, via points, goal; ``straight_m`` from stop to stop in space."""
 
     heights: NDArray[np.float32]
     quadratic: Floats
@@ -51,7 +51,7 @@ class Scene:
     corners: Floats
     low: Floats
     high: Floats
-    stops: Floats
+    terminals: Floats
     straight_m: float
 
     @classmethod
@@ -103,19 +103,19 @@ class Scene:
             np.zeros((0, 3)),
             0.0,
         )  # what follows asks it for heights
-        stops = scene._stops(problem, flat)
-        if not ((stops >= low - 1e-6).all() and (stops <= high + 1e-6).all()):
+        terminals = scene._terminals(problem, flat)
+        if not ((terminals >= low - 1e-6).all() and (terminals <= high + 1e-6).all()):
             raise InputError(
                 f"the flight volume of the swarm ({', '.join(VOLUME_KEYS)}) must hold start, via points and goal: "
                 f"from {np.round(low, 1).tolist()} to {np.round(high, 1).tolist()} it does not"
             )
-        straight = float(np.linalg.norm(np.diff(stops, axis=0), axis=1).sum())
+        straight = float(np.linalg.norm(np.diff(terminals, axis=0), axis=1).sum())
         # Between two samples a chord dips into a circle by at most spacing² / 8R.
         spacing = 1.5 * straight / samples
         numbers[k.SPACING] = spacing
         zones = scene.zones.copy()
         zones[:, k.REACH] += np.minimum(spacing**2 / (8.0 * zones[:, k.ZR]), 0.2 * zones[:, k.ZR]) + KEEP_M
-        return cls(heights, quadratic, floors, floor_map, numbers, zones, scene.corners, low, high, stops, straight)
+        return cls(heights, quadratic, floors, floor_map, numbers, zones, scene.corners, low, high, terminals, straight)
 
     @property
     def ceiling_follows_ground(self) -> bool:
@@ -151,7 +151,7 @@ class Scene:
         high = np.clip(high, self.low[2], self.high[2])
         return np.minimum(np.clip(floor, self.low[2], self.high[2]), high), high
 
-    def _stops(self, problem: Problem, flat: Floats) -> Floats:
+    def _terminals(self, problem: Problem, flat: Floats) -> Floats:
         """Start, via points and goal; a via point whose height is free stands on the line between, if there is room."""
         known = [problem.start[2], *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via), problem.goal[2]]
         z = np.array(known)
@@ -162,9 +162,9 @@ class Scene:
         return np.column_stack([flat, z])
 
 
-def _flat_volume(stops: Floats, given: Mapping[str, float]) -> tuple[float, float, float, float]:
+def _flat_volume(terminals: Floats, given: Mapping[str, float]) -> tuple[float, float, float, float]:
     """West, south, east, north of the square about the stops, grown by `GROWN`."""
-    low, high = stops.min(axis=0), stops.max(axis=0)
+    low, high = terminals.min(axis=0), terminals.max(axis=0)
     longest = float((high - low).max())
     more = 0.5 * (longest - (high - low)) + GROWN * longest
     low, high = low - more, high + more

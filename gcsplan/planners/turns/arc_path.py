@@ -30,7 +30,7 @@ NO_TURN = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Belt:
+class ArcPath:
     """``ends`` (2, 2) start and goal; discs in order: ``centre`` (K, 2), ``sense`` (K,) +1 for a left turn, -1 right.
 
     ``pin`` (K, 2): the point that a disc touches, NaN where free; ``pin_m`` (K,) its altitude, NaN where free.
@@ -76,91 +76,91 @@ class Outline:
 
 def through(
     ends: Floats, radius_m: float, contact: Floats, sense: Floats, pinned: NDArray[np.bool_], pin_m: Floats
-) -> Belt:
+) -> ArcPath:
     """The belt whose turns pass through ``contact`` (K, 2) in the middle; contacts it need not touch are left out."""
     heading = _headings(np.vstack([ends[:1], contact, ends[1:]]))
     sense, centre = sense.copy(), np.zeros_like(contact)
     pin = np.where(pinned[:, None], contact, np.nan)
-    belt = Belt(ends, radius_m, centre, sense, pin, pin_m, heading, np.zeros(len(sense)), 0.0)
+    arc_path = ArcPath(ends, radius_m, centre, sense, pin, pin_m, heading, np.zeros(len(sense)), 0.0)
     for _ in range(ROUNDS):
-        middle = _middles(belt.heading)
+        middle = _middles(arc_path.heading)
         normal = np.stack([-np.sin(middle), np.cos(middle)], axis=-1)
-        belt = _drawn(replace(belt, centre=contact + radius_m * belt.sense[:, None] * normal), parted=True)
-        loose = (belt.turn <= NO_TURN) & ~belt.pinned
-        if belt.gap_m == 0.0 and loose.any():
-            contact, belt = contact[~loose], _drawn(_without(belt, loose))
-    return tight(belt)
+        arc_path = _drawn(replace(arc_path, centre=contact + radius_m * arc_path.sense[:, None] * normal), parted=True)
+        loose = (arc_path.turn <= NO_TURN) & ~arc_path.pinned
+        if arc_path.gap_m == 0.0 and loose.any():
+            contact, arc_path = contact[~loose], _drawn(_without(arc_path, loose))
+    return tight(arc_path)
 
 
-def tight(belt: Belt) -> Belt:
+def tight(arc_path: ArcPath) -> ArcPath:
     """The belt drawn around its discs as they lie, those that it need not touch left out, pins touched."""
-    belt = _drawn(belt)
-    for _ in range(len(belt.sense) + ROUNDS):
-        loose = (belt.turn <= NO_TURN) & ~belt.pinned
-        if belt.gap_m == 0.0 and loose.any():
+    arc_path = _drawn(arc_path)
+    for _ in range(len(arc_path.sense) + ROUNDS):
+        loose = (arc_path.turn <= NO_TURN) & ~arc_path.pinned
+        if arc_path.gap_m == 0.0 and loose.any():
             worst = np.zeros(len(loose), bool)
-            worst[np.argmin(np.where(loose, belt.turn, np.inf))] = True
-            belt = _drawn(_without(belt, worst))
+            worst[np.argmin(np.where(loose, arc_path.turn, np.inf))] = True
+            arc_path = _drawn(_without(arc_path, worst))
             continue
-        if not belt.pinned.any():
+        if not arc_path.pinned.any():
             break
-        laid = _pins_laid(belt)
-        if np.abs(laid.centre - belt.centre).max() < 1e-9:
+        laid = _pins_laid(arc_path)
+        if np.abs(laid.centre - arc_path.centre).max() < 1e-9:
             break
-        belt = laid
-    return belt
+        arc_path = laid
+    return arc_path
 
 
-def moved(belt: Belt, disc: int, by: Floats) -> Belt:
+def moved(arc_path: ArcPath, disc: int, by: Floats) -> ArcPath:
     """The belt with one free disc moved by (2,) metres."""
-    centre = belt.centre.copy()
+    centre = arc_path.centre.copy()
     centre[disc] += by
-    return tight(replace(belt, centre=centre))
+    return tight(replace(arc_path, centre=centre))
 
 
-def inserted(belt: Belt, at: int, contact: Floats, heading: float, sense: float) -> Belt:
+def inserted(arc_path: ArcPath, at: int, contact: Floats, heading: float, sense: float) -> ArcPath:
     """The belt with a disc more, before disc ``at``, touching ``contact`` where the way there is ``heading``."""
-    normal = sense * belt.radius_m * np.array([-math.sin(heading), math.cos(heading)])
+    normal = sense * arc_path.radius_m * np.array([-math.sin(heading), math.cos(heading)])
     return tight(
         replace(
-            belt,
-            centre=np.insert(belt.centre, at, contact + normal, axis=0),
-            sense=np.insert(belt.sense, at, sense),
-            pin=np.insert(belt.pin, at, np.nan, axis=0),
-            pin_m=np.insert(belt.pin_m, at, np.nan),
+            arc_path,
+            centre=np.insert(arc_path.centre, at, contact + normal, axis=0),
+            sense=np.insert(arc_path.sense, at, sense),
+            pin=np.insert(arc_path.pin, at, np.nan, axis=0),
+            pin_m=np.insert(arc_path.pin_m, at, np.nan),
         )
     )
 
 
-def without(belt: Belt, disc: int) -> Belt:
+def without(arc_path: ArcPath, disc: int) -> ArcPath:
     """The belt without one disc."""
-    gone = np.zeros(len(belt.sense), bool)
+    gone = np.zeros(len(arc_path.sense), bool)
     gone[disc] = True
-    return tight(_without(belt, gone))
+    return tight(_without(arc_path, gone))
 
 
-def unlooped(belt: Belt) -> Belt:
+def unlooped(arc_path: ArcPath) -> ArcPath:
     """The belt without free discs that it goes more than half round, as long as there are any."""
-    while belt.gap_m == 0.0:
-        loops = (belt.turn > math.pi) & ~belt.pinned
+    while arc_path.gap_m == 0.0:
+        loops = (arc_path.turn > math.pi) & ~arc_path.pinned
         if not loops.any():
             break
-        belt = without(belt, int(np.argmax(np.where(loops, belt.turn, 0.0))))
-    return belt
+        arc_path = without(arc_path, int(np.argmax(np.where(loops, arc_path.turn, 0.0))))
+    return arc_path
 
 
-def outline(belt: Belt) -> Outline:
+def outline(arc_path: ArcPath) -> Outline:
     """The belt as chords, each at most `CHORD_M` inside its arc."""
     size = 2
-    step = 2.0 * math.acos(max(1.0 - CHORD_M / belt.radius_m, 0.5))
+    step = 2.0 * math.acos(max(1.0 - CHORD_M / arc_path.radius_m, 0.5))
     most = math.radians(MOST_DEG)
-    for turn in belt.turn:
+    for turn in arc_path.turn:
         size += 4 * (math.ceil(abs(turn) / most) + 2) + 2 * math.ceil(abs(turn) / step) + 8
     points, true_m, widen = np.empty((size, 2)), np.empty(size), np.zeros(size)
     arcs, corners = np.empty((size, 3), np.int64), np.empty((size, 2))
-    disc, pin_at = np.empty(size, np.int64), np.full(len(belt.sense), -1, np.int64)
+    disc, pin_at = np.empty(size, np.int64), np.full(len(arc_path.sense), -1, np.int64)
     n = fill_outline(
-        belt.ends, belt.radius_m, belt.centre, belt.sense, belt.pin, belt.heading, belt.turn, step, most,
+        arc_path.ends, arc_path.radius_m, arc_path.centre, arc_path.sense, arc_path.pin, arc_path.heading, arc_path.turn, step, most,
         points, true_m, widen, arcs, corners, disc, pin_at,
     )  # fmt: skip
     points, turns = points[:n].copy(), int(disc[-1])
@@ -168,7 +168,7 @@ def outline(belt: Belt) -> Outline:
     touched = pin_at >= 0
     return Outline(
         points, s, true_m[:n].copy(), arcs[:turns].copy(), corners[:turns].copy(), widen[1:n].copy(),
-        disc[:turns].copy(), pin_at[touched], belt.pin_m[touched],
+        disc[:turns].copy(), pin_at[touched], arc_path.pin_m[touched],
     )  # fmt: skip
 
 
@@ -183,34 +183,34 @@ def _middles(heading: Floats) -> Floats:
     return np.asarray(heading[:-1] + 0.5 * ((turn + math.pi) % (2.0 * math.pi) - math.pi))
 
 
-def _without(belt: Belt, gone: NDArray[np.bool_]) -> Belt:
+def _without(arc_path: ArcPath, gone: NDArray[np.bool_]) -> ArcPath:
     keep = ~gone
     return replace(
-        belt, centre=belt.centre[keep], sense=belt.sense[keep], pin=belt.pin[keep], pin_m=belt.pin_m[keep]
+        arc_path, centre=arc_path.centre[keep], sense=arc_path.sense[keep], pin=arc_path.pin[keep], pin_m=arc_path.pin_m[keep]
     )  # fmt: skip
 
 
-def _drawn(belt: Belt, *, parted: bool = False) -> Belt:
-    count = len(belt.sense)
-    heading, turn, centre = np.empty(count + 1), np.empty(count), belt.centre.copy()
+def _drawn(arc_path: ArcPath, *, parted: bool = False) -> ArcPath:
+    count = len(arc_path.sense)
+    heading, turn, centre = np.empty(count + 1), np.empty(count), arc_path.centre.copy()
     gap = np.empty(1)
-    tangents(belt.ends, belt.radius_m, centre, belt.sense, heading, turn, gap)
+    tangents(arc_path.ends, arc_path.radius_m, centre, arc_path.sense, heading, turn, gap)
     if parted and gap[0] > 0.0:
         for _ in range(4 * ROUNDS):
-            part_neighbours(belt.ends, belt.radius_m, centre, belt.sense, belt.pinned)
-            tangents(belt.ends, belt.radius_m, centre, belt.sense, heading, turn, gap)
+            part_neighbours(arc_path.ends, arc_path.radius_m, centre, arc_path.sense, arc_path.pinned)
+            tangents(arc_path.ends, arc_path.radius_m, centre, arc_path.sense, heading, turn, gap)
             if gap[0] == 0.0:
                 break
-    return replace(belt, centre=centre, heading=heading, turn=turn, gap_m=float(gap[0]))
+    return replace(arc_path, centre=centre, heading=heading, turn=turn, gap_m=float(gap[0]))
 
 
-def _pins_laid(belt: Belt) -> Belt:
+def _pins_laid(arc_path: ArcPath) -> ArcPath:
     """Pinned discs laid through their pins again, half-way between the legs; on the other side where it turns so."""
-    if belt.gap_m > 0.0:
-        return belt
-    sense = np.where(belt.pinned & (belt.turn < 0.0), -belt.sense, belt.sense)
+    if arc_path.gap_m > 0.0:
+        return arc_path
+    sense = np.where(arc_path.pinned & (arc_path.turn < 0.0), -arc_path.sense, arc_path.sense)
     # A turn of more than half a circle goes on in its own sense, so its middle is not the nearer one.
-    middle = belt.heading[:-1] + 0.5 * belt.sense * belt.turn
+    middle = arc_path.heading[:-1] + 0.5 * arc_path.sense * arc_path.turn
     normal = np.stack([-np.sin(middle), np.cos(middle)], axis=-1)
-    centre = np.where(belt.pinned[:, None], belt.pin + belt.radius_m * sense[:, None] * normal, belt.centre)
-    return _drawn(replace(belt, centre=centre, sense=sense))
+    centre = np.where(arc_path.pinned[:, None], arc_path.pin + arc_path.radius_m * sense[:, None] * normal, arc_path.centre)
+    return _drawn(replace(arc_path, centre=centre, sense=sense))

@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
-from gcsplan.planners.turns.arc_path import Belt, through, unlooped
+from gcsplan.planners.turns.arc_path import ArcPath, through, unlooped
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
 from gcsplan.world.path import Path
 
 Replan = Callable[[float], tuple[Floats, NDArray[np.bool_]] | None]
-"""A path and its pinned points, planned with so many metres of track error more (`roomier`); None: there is none."""
+"""A path and its pinned points, planned with so many metres of track error more (`with_more_clearance`); None: there is none."""
 
 LEVELS = (0.15, 0.4, 1.0)
 """Room asked for in new plans where a path cannot be rounded, in turn radii."""
@@ -89,7 +89,7 @@ def rounded(
     return found
 
 
-def roomier(problem: Problem, extra_m: float) -> Problem:
+def with_more_clearance(problem: Problem, extra_m: float) -> Problem:
     """``problem`` with so many metres of track error more, for a path that leaves room for arcs; no turn radius.
 
     Start and goal are lifted to where they are legal with it. A path for it begins and ends higher than it should:
@@ -111,8 +111,8 @@ def _rounded(problem: Problem, points: Floats, pinned: NDArray[np.bool_], patien
     given = problem.cost(Path(points))
     best: Tried | None = None
     cost = math.inf
-    for belt in _belts(problem, points, pinned):
-        found = mended(problem, belt, Patience(patience))
+    for arc_path in _arc_paths(problem, points, pinned):
+        found = mended(problem, arc_path, Patience(patience))
         if found is None:
             continue
         found = polished(problem, found, (1.0 + WORTH) * given, Patience(patience))
@@ -128,22 +128,22 @@ def _rounded(problem: Problem, points: Floats, pinned: NDArray[np.bool_], patien
     return Rounded(risen.way_points, risen.flown, risen.widen_m, length, cost)
 
 
-def _belts(problem: Problem, points: Floats, pinned: NDArray[np.bool_]) -> Iterator[Belt]:
+def _arc_paths(problem: Problem, points: Floats, pinned: NDArray[np.bool_]) -> Iterator[ArcPath]:
     """Belts to begin with: around all corners, then around fewer, each without the loops that it may have first."""
     counts = set()
     for slack in SLACKS_M:
-        belt = belt_of(problem, points, pinned, slack)
-        if len(belt.sense) in counts:
+        arc_path = arc_path_of(problem, points, pinned, slack)
+        if len(arc_path.sense) in counts:
             continue
-        counts.add(len(belt.sense))
-        open_ = unlooped(belt)
+        counts.add(len(arc_path.sense))
+        open_ = unlooped(arc_path)
         if len(open_.sense) not in counts:
             counts.add(len(open_.sense))
             yield open_
-        yield belt
+        yield arc_path
 
 
-def belt_of(problem: Problem, points: Floats, pinned: NDArray[np.bool_], slack_m: float) -> Belt:
+def arc_path_of(problem: Problem, points: Floats, pinned: NDArray[np.bool_], slack_m: float) -> ArcPath:
     """The belt around those corners of a path that lie farther than ``slack_m`` from straight; not checked yet."""
     flat = np.ascontiguousarray(points[:, :2], dtype=np.float64)
     must = np.array(pinned, dtype=bool)
@@ -175,8 +175,8 @@ def _right(a: Floats, b: Floats) -> Floats:
 def _corners(flat: Floats, must: NDArray[np.bool_], slack_m: float) -> NDArray[np.intp]:
     """Indices of the points that are left when those near a straight line are not (Ramer, Douglas and Peucker)."""
     keep = must.copy()
-    stops = np.flatnonzero(must)
-    spans = list(zip(stops[:-1].tolist(), stops[1:].tolist(), strict=True))
+    terminals = np.flatnonzero(must)
+    spans = list(zip(terminals[:-1].tolist(), terminals[1:].tolist(), strict=True))
     while spans:
         i, j = spans.pop()
         if j - i < 2:

@@ -16,7 +16,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import Obstruction, Track
-from gcsplan.planners.turns.arc_path import Belt, Outline, inserted, moved, outline, tight, without
+from gcsplan.planners.turns.arc_path import ArcPath, Outline, inserted, moved, outline, tight, without
 from gcsplan.planners.turns.kernels import pinched, shut
 from gcsplan.planners.turns.profile import Risen, rise, track_of
 
@@ -60,7 +60,7 @@ class Patience:
 class Tried:
     """A belt and how much it breaks (0: nothing that was seen), and where along ``line``; or ``risen``, its flight."""
 
-    belt: Belt
+    arc_path: ArcPath
     line: Outline | None
     track: Track | None
     broken: float
@@ -68,10 +68,10 @@ class Tried:
     risen: Risen | None = None
 
 
-def mended(problem: Problem, belt: Belt, patience: Patience) -> Tried | None:
-    """A legal flight along ``belt``, or one that its discs can be moved to; None where none was found."""
+def mended(problem: Problem, arc_path: ArcPath, patience: Patience) -> Tried | None:
+    """A legal flight along ``arc_path``, or one that its discs can be moved to; None where none was found."""
     rng = np.random.default_rng(problem.seed)
-    here = tried(problem, belt)
+    here = tried(problem, arc_path)
     spared = 0
     while here.risen is None:
         best = here
@@ -103,10 +103,10 @@ def polished(problem: Problem, here: Tried, enough: float, patience: Patience) -
     improved = True
     while improved:
         improved = False
-        for k in range(len(here.belt.sense) - 1, -1, -1):
+        for k in range(len(here.arc_path.sense) - 1, -1, -1):
             if here.risen is None or cost_of(problem, here.risen) <= enough:
                 return here
-            if k >= len(here.belt.sense) or here.belt.pinned[k]:
+            if k >= len(here.arc_path.sense) or here.arc_path.pinned[k]:
                 continue
             better = _shortened(problem, here, k, patience)
             improved |= better is not here
@@ -116,12 +116,12 @@ def polished(problem: Problem, here: Tried, enough: float, patience: Patience) -
 
 def _shortened(problem: Problem, here: Tried, k: int, patience: Patience) -> Tried:
     """``here`` without disc ``k``, or with it farther inwards, if that is legal and cheaper."""
-    belt, radius = here.belt, problem.turn_radius_m
+    arc_path, radius = here.arc_path, problem.turn_radius_m
     assert here.line is not None
     assert here.risen is not None
     worth = GAIN * float(here.line.s_m[-1])
 
-    def better(other: Belt) -> Tried | None:
+    def better(other: ArcPath) -> Tried | None:
         if patience.left <= 0:
             return None
         patience.left -= 1
@@ -130,17 +130,17 @@ def _shortened(problem: Problem, here: Tried, k: int, patience: Patience) -> Tri
         cheaper = found.risen is not None and cost_of(problem, found.risen) < cost_of(problem, here.risen) - 1e-3
         return found if cheaper else None
 
-    rest = without(belt, k)
+    rest = without(arc_path, k)
     if rest.gap_m == 0.0 and float(here.line.s_m[-1]) - float(outline(rest).s_m[-1]) > worth:
         found = better(rest)
         if found is not None:
             return found
-    if 2.0 * radius * math.sin(0.5 * min(belt.turn[k], math.pi)) > worth:
-        out = _outwards(belt, k)
-        first = better(moved(belt, k, -PROBE * radius * out))
+    if 2.0 * radius * math.sin(0.5 * min(arc_path.turn[k], math.pi)) > worth:
+        out = _outwards(arc_path, k)
+        first = better(moved(arc_path, k, -PROBE * radius * out))
         if first is not None:  # nothing holds it, near by
             for part in (1.0, 0.25, 0.06):
-                found = better(moved(belt, k, -part * radius * out))
+                found = better(moved(arc_path, k, -part * radius * out))
                 if found is not None:
                     return found
             return first
@@ -156,54 +156,54 @@ def cost_of(problem: Problem, risen: Risen) -> float:
     return float(np.hypot(np.diff(risen.true_m), climbs).sum())
 
 
-def tried(problem: Problem, belt: Belt, like: Tried | None = None) -> Tried:
-    """What ``belt`` breaks, or how it is flown; quicker where another is ``like`` it."""
-    if belt.gap_m > 0.0:
-        return Tried(belt, None, None, GAP_M * (1.0 + belt.gap_m), math.nan)
-    line = outline(belt)
+def tried(problem: Problem, arc_path: ArcPath, like: Tried | None = None) -> Tried:
+    """What ``arc_path`` breaks, or how it is flown; quicker where another is ``like`` it."""
+    if arc_path.gap_m > 0.0:
+        return Tried(arc_path, None, None, GAP_M * (1.0 + arc_path.gap_m), math.nan)
+    line = outline(arc_path)
     known = None if like is None or like.line is None or like.track is None else (like.line, like.track)
     track = track_of(problem, line, known)
     broken, worst = _broken(problem, track)
     if broken > 0.0:
-        return Tried(belt, line, track, broken, worst)
+        return Tried(arc_path, line, track, broken, worst)
     found = rise(problem, track, line)
     if isinstance(found, Obstruction):
-        return Tried(belt, line, track, 1e-3 * max(found.by, 1e-6), 0.5 * (found.s0_m + found.s1_m))
-    return Tried(belt, line, track, 0.0, 0.0, found)
+        return Tried(arc_path, line, track, 1e-3 * max(found.by, 1e-6), 0.5 * (found.s0_m + found.s1_m))
+    return Tried(arc_path, line, track, 0.0, 0.0, found)
 
 
-def _middle(belt: Belt, k: int) -> float:
+def _middle(arc_path: ArcPath, k: int) -> float:
     """Heading in the middle of a turn."""
-    return float(belt.heading[k] + 0.5 * belt.sense[k] * belt.turn[k])
+    return float(arc_path.heading[k] + 0.5 * arc_path.sense[k] * arc_path.turn[k])
 
 
-def _outwards(belt: Belt, k: int) -> Floats:
+def _outwards(arc_path: ArcPath, k: int) -> Floats:
     """Away from the centre in the middle of a turn, unit vector."""
-    at = _middle(belt, k)
-    return np.asarray(belt.sense[k] * np.array([math.sin(at), -math.cos(at)]))
+    at = _middle(arc_path, k)
+    return np.asarray(arc_path.sense[k] * np.array([math.sin(at), -math.cos(at)]))
 
 
 def _near(here: Tried) -> list[int]:
     """Free discs, the nearest to the worst place first."""
-    belt, line = here.belt, here.line
+    arc_path, line = here.arc_path, here.line
     if line is None:
-        return [k for k in range(len(belt.sense)) if not belt.pinned[k]]
+        return [k for k in range(len(arc_path.sense)) if not arc_path.pinned[k]]
     order = line.disc[np.argsort(np.abs(line.s_m[line.arcs[:, 1]] - here.worst_m), kind="stable")]
-    return [k for k in dict.fromkeys(order.tolist()) if not belt.pinned[k]][:NEAREST]
+    return [k for k in dict.fromkeys(order.tolist()) if not arc_path.pinned[k]][:NEAREST]
 
 
-def _moves(here: Tried) -> Iterator[Belt]:
+def _moves(here: Tried) -> Iterator[ArcPath]:
     """One disc moved, left out, or put in at the worst place."""
-    belt, line, near = here.belt, here.line, _near(here)
+    arc_path, line, near = here.arc_path, here.line, _near(here)
     for step in STEPS_M:
         for k in near:
-            at = _middle(belt, k)
+            at = _middle(arc_path, k)
             along = np.array([math.cos(at), math.sin(at)])
-            out = _outwards(belt, k)
+            out = _outwards(arc_path, k)
             for by in (out, -out, along, -along):
-                yield moved(belt, k, step * by)
+                yield moved(arc_path, k, step * by)
     for k in near:
-        yield without(belt, k)
+        yield without(arc_path, k)
     if line is None:
         return
     leg = int(np.clip(np.searchsorted(line.s_m, here.worst_m) - 1, 0, len(line.s_m) - 2))
@@ -216,20 +216,20 @@ def _moves(here: Tried) -> Iterator[Belt]:
         for sense in (1.0, -1.0):
             # A disc on the left shifts the track to the right, and the other way round.
             shift = sense * step * np.array([math.sin(heading), -math.cos(heading)])
-            yield inserted(belt, at_disc, place + shift, heading, sense)
+            yield inserted(arc_path, at_disc, place + shift, heading, sense)
 
 
-def _ways_out(problem: Problem, here: Tried) -> Iterator[Belt]:
+def _ways_out(problem: Problem, here: Tried) -> Iterator[ArcPath]:
     """Another first turn, where what is broken is near the start; another last one, near the goal."""
     if here.line is None:
         return
-    belt, radius = here.belt, problem.turn_radius_m
+    arc_path, radius = here.arc_path, problem.turn_radius_m
     for at_goal in (False, True):
         away = float(here.line.s_m[-1]) - here.worst_m if at_goal else here.worst_m
         if away > NEAR_END * radius:
             continue
         for gone in range(5):
-            rest = belt
+            rest = arc_path
             for _ in range(gone):
                 k = len(rest.sense) - 1 if at_goal else 0
                 if len(rest.sense) == 0 or rest.pinned[k]:
@@ -245,14 +245,14 @@ def _ways_out(problem: Problem, here: Tried) -> Iterator[Belt]:
                             yield inserted(rest, len(rest.sense) if at_goal else 0, contact, heading, sense)
 
 
-def _kicks(here: Tried, rng: np.random.Generator) -> Iterator[Belt]:
+def _kicks(here: Tried, rng: np.random.Generator) -> Iterator[ArcPath]:
     """The discs near the worst place moved at random, near and far in turn."""
     near = _near(here)
     for k in range(KICKS if near else 0):
-        wide = here.belt.radius_m * (0.02, 0.1, 0.4, 1.0)[k % 4]
-        centre = here.belt.centre.copy()
+        wide = here.arc_path.radius_m * (0.02, 0.1, 0.4, 1.0)[k % 4]
+        centre = here.arc_path.centre.copy()
         centre[near] += rng.normal(0.0, wide, (len(near), 2))
-        yield tight(replace(here.belt, centre=centre))
+        yield tight(replace(here.arc_path, centre=centre))
 
 
 def _broken(problem: Problem, track: Track) -> tuple[float, float]:

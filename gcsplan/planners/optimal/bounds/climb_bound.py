@@ -20,7 +20,7 @@ STEPS = 400
 """Places along a leg at which the floor is looked up."""
 
 
-def rooms(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats, Floats]:
+def altitude_ranges(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats, Floats]:
     """Places along a leg (M,), the floor and the ceiling there (M,), for tracks as long as ``track_m`` at least.
 
     Tracks of more than ``limit_m`` are not asked about. A longer track is squeezed into ``track_m`` by moving its
@@ -74,7 +74,7 @@ def _string(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> Pr
     places, lows, highs = [np.zeros(1)], [np.full(1, -np.inf)], [np.full(1, np.inf)]
     begin = 0.0
     for k, (leg, track_m, limit_m) in enumerate(zip(legs, tracks_m, limits_m, strict=True)):
-        at, low, high = rooms(leg, track_m, limit_m)
+        at, low, high = altitude_ranges(leg, track_m, limit_m)
         end = leg.goal.amsl_m if k < len(legs) - 1 else None
         places += [begin + at, np.array([begin + track_m])]
         lows += [np.where(np.isfinite(low), low, -np.inf), np.array([-np.inf if end is None else end])]

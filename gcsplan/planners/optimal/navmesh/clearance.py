@@ -84,7 +84,7 @@ class ClearanceGrid:
         self._diagonal = np.zeros((rows - 1) * (cols - 1), np.int8)
         looked_at = float((self._around[:, 1] - self._around[:, 0]).clip(0).sum())
         plane.problem.budget.spend("node", looked_at)
-        if looked_at * NODE_BYTES > 1e6 * plane.problem.budget.room_mb:
+        if looked_at * NODE_BYTES > 1e6 * plane.problem.budget.left_mb:
             raise Exhausted(0.0)
         more = limits.min_agl_m + limits.altitude_error_m
         if low:
@@ -206,13 +206,13 @@ class ClearanceGrid:
         piece = self._array("piece", (diagonal.size, 2), np.int32)
         block = 1 if single else self.plane.block * self.fineness
         count = make_pieces(excess, of, values, diagonal, self._around, span, piece, block)
-        room, part = 2 * count + 1024, np.empty(2)
+        capacity, part = 2 * count + 1024, np.empty(2)
         while True:
-            ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
+            ends, names, joins = np.empty((capacity, 4)), np.empty((capacity, 2), np.int64), np.empty((capacity, 2), np.int32)
             n = make_portals(excess, of, values, diagonal, span, piece, self._x, self._y, ends, names, joins, part)
-            if n <= room:
+            if n <= capacity:
                 break
-            room = n
+            capacity = n
         start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
         sort_portals(joins[:n], start, order)
         names, named = names[:n], 8 * (rows * cols + 1)

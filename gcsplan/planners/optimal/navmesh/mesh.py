@@ -137,7 +137,7 @@ class Mesh(Portals):
     ) -> GroundTrack | None:
         budget = self.plane.problem.budget
         most = min(MOST_OPENED, ANYHOW + OF_PORTAL * len(self.joins))
-        most = int(min(most, budget.room_mb * 1e6 / NODE_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
+        most = int(min(most, budget.left_mb * 1e6 / NODE_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
         budget.spend("portal", len(self.joins))
         opened = float(most)
         try:

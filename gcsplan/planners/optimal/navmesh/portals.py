@@ -75,22 +75,22 @@ class Portals:
         """
         if not len(start_pieces) or not len(goal_pieces):
             return None, 0.0
-        portals, room = len(self.joins), max(FIRST_NODES, NODES_OF_PIECE * self.pieces)
+        portals, capacity = len(self.joins), max(FIRST_NODES, NODES_OF_PIECE * self.pieces)
         sources = np.array([(*start, 0.0)] * len(start_pieces))
         remaining, met = (np.zeros(0) if a is None else a for a in (remaining, met))
         while True:
             best, origin = np.zeros(self.named), np.zeros(self.named, np.int64)
-            node, link, name = np.empty((room, 8)), np.empty((room, 6), np.int32), np.empty((room, 3), np.int64)
+            node, link, name = np.empty((capacity, 8)), np.empty((capacity, 6), np.int32), np.empty((capacity, 3), np.int64)
             first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
             out = np.empty((MOST_CORNERS, 3))
             n = search(
                 self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span, sources,
                 np.array(start_pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32), limit_m,
-                slack, most, remaining, met, node, link, name, np.empty(room), np.empty(room, np.int32), out,
+                slack, most, remaining, met, node, link, name, np.empty(capacity), np.empty(capacity, np.int32), out,
             )  # fmt: skip
             if n != -1:
                 break
-            room *= 4
+            capacity *= 4
             met[:] = np.inf
         opened = float(out[2, 2])
         if n == -2:

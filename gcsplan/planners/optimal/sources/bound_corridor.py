@@ -26,7 +26,7 @@ Point = tuple[float, float, float]
 
 STEP_M = 8.0
 """Between places of a way at which the exact check is asked."""
-ROOM_M = 8.0
+OPEN_M = 8.0
 """Over the floor at both ends of a stretch: there the slit is over."""
 UNDER_M = 0.5
 """How far below the cap stretches begin and end."""
@@ -52,10 +52,10 @@ def follow(plane: PlaneSearch) -> bool:
     incumbent = plane.incumbent
     if incumbent.best is None:
         return _first(plane)
-    stops = [0, len(incumbent.best) - 1] if incumbent.pinned is None else np.flatnonzero(incumbent.pinned).tolist()
-    if len(stops) != len(plane.legs) + 1:
+    terminals = [0, len(incumbent.best) - 1] if incumbent.pinned is None else np.flatnonzero(incumbent.pinned).tolist()
+    if len(terminals) != len(plane.legs) + 1:
         return False
-    parts = [incumbent.best[a : b + 1] for a, b in pairwise(stops)]
+    parts = [incumbent.best[a : b + 1] for a, b in pairwise(terminals)]
     found = [_nearer(plane, leg, part) for leg, part in zip(plane.legs, parts, strict=True)]
     if all(new is None for new in found):
         return False
@@ -70,7 +70,7 @@ def _first(plane: PlaneSearch) -> bool:
     before: Floats | None = None
     for leg in plane.legs:
         leg.bound(plane.top_m, leg.corridor(leg.reach_m), leg.reach_m)  # whose way is nearer to what is open
-        at, s, places = _sampled(leg.last_way)
+        at, s, places = _sampled(leg.last_track)
         start, goal = (_end(plane, leg, end, at[-1]) for end in (0.0, at[-1]))
         part = _along(plane, leg, [start if before is None else before, goal], places, s, at[-1])
         if part is None:
@@ -101,7 +101,7 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
     """(N, 3) a cheaper path of a leg than a known one, which it leaves where the way of the last bound does; None where
     none was found."""
     on_path = distances(path[:, :2])
-    at, s, places = _sampled(leg.last_way)
+    at, s, places = _sampled(leg.last_track)
     away, nearest = _nearest(places, path[:, :2])
     better: list[tuple[float, float, Floats]] = []
     for first, last in _runs(away > BESIDE_M):
@@ -152,7 +152,7 @@ def _along(
         if sub.best is None:
             for _ in found.first_looks(SLACKS):
                 pass
-        if sub.best is None and not sub.proved_shut and found.legs:
+        if sub.best is None and not sub.proved_infeasible and found.legs:
             found.narrow_passage()
         if sub.best is None or not plane.incumbent.budget.goes_on():
             return None
@@ -190,7 +190,7 @@ def _point(place: Floats) -> Point:
 def _stretches(over: Floats) -> list[tuple[int, int]]:
     """First and last of places, between which there is less room than `ROOM_M`, and somewhere none."""
     out: list[tuple[int, int]] = []
-    tight = over > -ROOM_M
+    tight = over > -OPEN_M
     for k in np.flatnonzero(over > 0.0).tolist():
         if out and k <= out[-1][1]:
             continue
@@ -204,10 +204,10 @@ def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float,
     there; and what can be reached from start and goal."""
     limits = plane.problem.limits
     z = plane.top_m - min(UNDER_M, max(-0.5 * over_m, 0.0))
-    for stop, way_m, slope in (
+    for terminal, way_m, slope in (
         (leg.start, from_start_m, limits.max_climb_slope),
         (leg.goal, to_goal_m, limits.max_descent_slope),
     ):
-        if stop.amsl_m is not None:
-            z = stop.amsl_m if way_m < APART_M else min(z, stop.amsl_m + REACHED * slope * way_m)
+        if terminal.amsl_m is not None:
+            z = terminal.amsl_m if way_m < APART_M else min(z, terminal.amsl_m + REACHED * slope * way_m)
     return z

@@ -24,7 +24,7 @@ from gcsplan.planners.optimal.corridor import PinnedTrack, Spare
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import sampled_track
-from gcsplan.planners.profile.track import Lacking, Shut, distances, lacking
+from gcsplan.planners.profile.track import Lacking, Closed, distances, lacking
 
 LACKING_M, HAIR_M = 3.0, 0.2
 """So little room is missing because cells are more lenient than the check, about terrain that is kept clear of
@@ -60,11 +60,11 @@ is known; and that track, where a path over it is to be looked for."""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DetourSearch:
-    """Tracks past what is in the way. ``stops``: the shortest track of a choice's zones and most metres, from terminal
+    """Tracks past what is in the way. ``terminals``: the shortest track of a choice's zones and most metres, from terminal
     to terminal; ``fine``: whether that is of a fine lattice. What is found goes to the ``incumbent``."""
 
     incumbent: Incumbent
-    stops: Callable[[Choice], PinnedTrack | None]
+    terminals: Callable[[Choice], PinnedTrack | None]
     fine: bool
 
     def run(
@@ -77,7 +77,7 @@ class DetourSearch:
         """
         open_set: list[_Open] = []
         best: Choice | None = None
-        known: dict[bytes, Lacking | Shut] = {}
+        known: dict[bytes, Lacking | Closed] = {}
         flat: set[tuple[bytes, bytes, Lacking]] = set()
         done: set[tuple[bytes, bytes, Spare, float]] = set()
         looked = taken = pushed = 0
@@ -117,27 +117,27 @@ class DetourSearch:
                 continue
             done.add(asked)
             looked += 1
-            known_stops = given if choice is roots[0] else None
-            stops = known_stops or self.stops(choice)
-            if stops is None:
+            known_terminals = given if choice is roots[0] else None
+            terminals = known_terminals or self.terminals(choice)
+            if terminals is None:
                 continue
-            length_m = float(distances(stops[0])[-1])
+            length_m = float(distances(terminals[0])[-1])
             if not self._may_help(length_m, choice):
                 continue
-            name = stops[0].tobytes()
+            name = terminals[0].tobytes()
             seen = name in known
             if not seen:
-                known[name] = lacking(self.incumbent.problem, sampled_track(self.incumbent.problem, *stops))
+                known[name] = lacking(self.incumbent.problem, sampled_track(self.incumbent.problem, *terminals))
             lack = known[name]
-            if isinstance(lack, Shut):
+            if isinstance(lack, Closed):
                 if not seen and lack.by < LACKING_M:
                     push(length_m, replace(choice, lower_m=choice.lower_m + lack.by + HAIR_M))
-                self._shut(length_m, choice, lack.zones, push)
+                self._closed(length_m, choice, lack.zones, push)
                 continue
             if not seen and (laps or not lack.steep):
-                push(length_m, replace(choice, most_m=_needed(self.incumbent.problem, choice, lack)), lack, stops)
+                push(length_m, replace(choice, most_m=_needed(self.incumbent.problem, choice, lack)), lack, terminals)
                 hoped = min(hoped, lack.cost)
-            self._shut(length_m, choice, lack.zones, push)
+            self._closed(length_m, choice, lack.zones, push)
             if lack.laps_m > MORE * sum(choice.most_m):
                 flat.add((*sides, lack))  # with more to spare it is no other track
             else:
@@ -150,7 +150,7 @@ class DetourSearch:
         little = min(NARROW * (cost - self.incumbent.bound), LITTLE * cost) if math.isfinite(cost) else 0.0
         return self.incumbent.least(length_m + sum(choice.least_m)) < cost - little
 
-    def _shut(self, length_m: float, choice: Choice, zones: tuple[int, ...], push: Callable[..., None]) -> None:
+    def _closed(self, length_m: float, choice: Choice, zones: tuple[int, ...], push: Callable[..., None]) -> None:
         """The same with a side of one of the ``zones`` shut."""
         for zone in zones:
             levels, more = self.incumbent.problem.airspace.zones[zone], replace(choice, tried=frozenset())

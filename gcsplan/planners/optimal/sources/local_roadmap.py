@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.sources.roadmap_3d import Lattice, path_of, stops_of
+from gcsplan.planners.optimal.sources.roadmap_3d import Lattice, path_of, terminals_by_leg
 from gcsplan.planners.optimal.sources.section_dp import cost_of
-from gcsplan.planners.problem import Problem, terminals
+from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.zones import Circle
 
 Ints = NDArray[np.intp]
@@ -52,8 +52,8 @@ def small_path(problem: Problem, known: Floats | None, in_time: Callable[[], boo
     found: tuple[Floats, Bools] | None = None
     best = math.inf if known is None else cost_of(problem, known)
     for _ in range(2):
-        stops = stops_of(problem, _straight(problem) if known is None else known)
-        better = path_of(problem, stops, best, known, in_time, _lattice, HOPE)
+        terminals = terminals_by_leg(problem, _straight(problem) if known is None else known)
+        better = path_of(problem, terminals, best, known, in_time, _lattice, HOPE)
         if better is None:
             break
         before, found, known = best, better, better[0]
@@ -65,7 +65,7 @@ def small_path(problem: Problem, known: Floats | None, in_time: Callable[[], boo
 
 def _straight(problem: Problem) -> Floats:
     """(K, 3) the stops, heights that are free in between those that are not, but not below the floor."""
-    flat = np.array(terminals(problem))
+    flat = np.array(terminals_of(problem))
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])
     heights = np.array([problem.start[2], *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via),
                         problem.goal[2]])  # fmt: skip

@@ -19,7 +19,7 @@ from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.navmesh.outlines import Solids
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
-from gcsplan.planners.problem import terminals
+from gcsplan.planners.problem import terminals_of
 from gcsplan.world.zones import Zone
 
 TRACKS = 24
@@ -33,7 +33,7 @@ class OutlineTracks:
 
     def __init__(self, incumbent: Incumbent, top_m: float) -> None:
         self.incumbent, self.problem = incumbent, incumbent.problem
-        places = terminals(self.problem)
+        places = terminals_of(self.problem)
         heights = [*(v.amsl_m for v in self.problem.via), self.problem.goal[2]]
         self.legs = [(a, b, z) for (a, b), z in zip(pairwise(places), heights, strict=True) if math.dist(a, b) > 1e-3]
         self.under, self.over = _sides(self.problem.airspace.zones, incumbent, top_m)
@@ -41,7 +41,7 @@ class OutlineTracks:
         self._hints: list[Floats] = []
         """The tracks of the bound: paths may lead along them through slits that coarse outlines shut."""
 
-    def stops(self, choice: Choice) -> PinnedTrack | None:
+    def terminals(self, choice: Choice) -> PinnedTrack | None:
         """The shortest track past the zones that a choice shuts; None where there is none, or too much to look at."""
         which = ~((choice.under & self.under) | (choice.over & self.over))
         try:
@@ -60,7 +60,7 @@ class OutlineTracks:
         except Exhausted:
             tracks = []
         if tracks is None:
-            incumbent.proved_shut = True
+            incumbent.proved_infeasible = True
             return
         if tracks:
             self._hints = tracks
@@ -72,7 +72,7 @@ class OutlineTracks:
         roots = [root]
         if laps and math.isfinite(incumbent.cost):
             roots.insert(0, replace(root, most_m=(incumbent.cost - incumbent.bound,) * 2))
-        DetourSearch(incumbent, self.stops, False).run(roots, TRACKS, first=False, laps=laps)
+        DetourSearch(incumbent, self.terminals, False).run(roots, TRACKS, first=False, laps=laps)
 
     def _tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
         """The shortest track of each leg past some zones; None where one has none. Raises Exhausted."""

@@ -53,8 +53,8 @@ def is_steep(problem: Problem, points: Floats) -> bool:
     limits = problem.limits
     track_m = float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
     may = min(limits.max_climb_slope, limits.max_descent_slope)
-    stops = stops_of(problem, points)
-    apart = all(math.dist(a[:2], b[:2]) > 1e-3 for a, b in pairwise(stops))
+    terminals = terminals_by_leg(problem, points)
+    apart = all(math.dist(a[:2], b[:2]) > 1e-3 for a, b in pairwise(terminals))
     return apart and may >= RATIO and float(np.ptp(points[:, 2])) >= RATIO * track_m
 
 
@@ -65,13 +65,13 @@ def steep_path(problem: Problem, known: Floats, in_time: Callable[[], bool]) -> 
     ``known`` (M, 3): the best path so far. Deterministic but for ``in_time``,
     which ends it early.
     """
-    stops = stops_of(problem, known)
-    return path_of(problem, stops, cost_of(problem, known), None, in_time, _lattice)
+    terminals = terminals_by_leg(problem, known)
+    return path_of(problem, terminals, cost_of(problem, known), None, in_time, _lattice)
 
 
 def path_of(
     problem: Problem,
-    stops: Floats,
+    terminals: Floats,
     best: float,
     known: Floats | None,
     in_time: Callable[[], bool],
@@ -80,13 +80,13 @@ def path_of(
 ) -> tuple[Floats, Bools] | None:
     """The same over lattices of any kind: ``lattice(problem, starts, goals, limit)`` makes that between two stops.
 
-    ``stops`` (K, 3) as of `stops_of`; ``best``: the cost to beat, inf where there is no path. ``known`` (M, 3) is drawn
+    ``terminals`` (K, 3) as of `stops_of`; ``best``: the cost to beat, inf where there is no path. ``known`` (M, 3) is drawn
     together, too, where it is given. A path drawn together coarsely that costs ``hope`` times ``best`` is not worth
     more.
     """
-    straight = problem.leg_costs(stops[:-1], stops[1:])
+    straight = problem.leg_costs(terminals[:-1], terminals[1:])
     spare = WINDING * best - float(straight.sum())
-    columns = [stops[:1], *(_heights(problem, k, stops) for k in range(1, len(stops) - 1)), stops[-1:]]
+    columns = [terminals[:1], *(_heights(problem, k, terminals) for k in range(1, len(terminals) - 1)), terminals[-1:]]
     lattices, reached = [], [np.zeros(1)]
     for k, limit in enumerate((straight + spare).tolist()):
         if not in_time():
@@ -131,25 +131,25 @@ def _kinds_of(problem: Problem, points: Floats) -> Ints:
     return kinds
 
 
-def stops_of(problem: Problem, points: Floats) -> Floats:
+def terminals_by_leg(problem: Problem, points: Floats) -> Floats:
     """(K, 3) start, vias, goal; a via of free height as high as the path ``points`` (N, 3) is there."""
-    stops = [np.array(problem.start)]
+    terminals = [np.array(problem.start)]
     for via in problem.via:
         off = np.hypot(points[:, 0] - via.east_m, points[:, 1] - via.north_m)
         amsl_m = float(points[off.argmin(), 2]) if via.amsl_m is None else via.amsl_m
-        stops.append(np.array([via.east_m, via.north_m, amsl_m]))
-    return np.array([*stops, np.array(problem.goal)])
+        terminals.append(np.array([via.east_m, via.north_m, amsl_m]))
+    return np.array([*terminals, np.array(problem.goal)])
 
 
-def _heights(problem: Problem, k: int, stops: Floats) -> Floats:
+def _heights(problem: Problem, k: int, terminals: Floats) -> Floats:
     """(K, 3) where the stop ``k`` may be passed."""
     if problem.via[k - 1].amsl_m is not None:
-        return stops[k : k + 1]
-    low = float(problem.airspace.floor_amsl(stops[k, 0], stops[k, 1], problem.limits))
-    low = low if math.isfinite(low) else float(stops[k, 2])
-    high = max(float(stops[:, 2].max()), low)
-    levels = np.unique([stops[k, 2], *np.linspace(low + 0.01, high, LEVELS)])
-    return np.column_stack([np.broadcast_to(stops[k, :2], (len(levels), 2)), levels])
+        return terminals[k : k + 1]
+    low = float(problem.airspace.floor_amsl(terminals[k, 0], terminals[k, 1], problem.limits))
+    low = low if math.isfinite(low) else float(terminals[k, 2])
+    high = max(float(terminals[:, 2].max()), low)
+    levels = np.unique([terminals[k, 2], *np.linspace(low + 0.01, high, LEVELS)])
+    return np.column_stack([np.broadcast_to(terminals[k, :2], (len(levels), 2)), levels])
 
 
 def _best(problem: Problem, ways: list[Floats], step_m: float, in_time: Callable[[], bool]) -> Floats:

@@ -61,8 +61,8 @@ def cheapest(problem: Problem, points: Floats, kinds: Ints) -> tuple[Floats, Int
     """The cheapest path over some points of a legal one, in order: all of its stops, and of the others what helps."""
     n = len(points)
     first, last = np.triu_indices(n, 1)
-    stops = np.concatenate([[0], np.cumsum(kinds != FREE)])
-    near = (stops[last] == stops[first + 1]) & (last - first <= FAR_AHEAD)
+    terminals = np.concatenate([[0], np.cumsum(kinds != FREE)])
+    near = (terminals[last] == terminals[first + 1]) & (last - first <= FAR_AHEAD)
     first, last = first[near], last[near]
     legal = last == first + 1
     legal[~legal] = problem.legal(points[first[~legal]], points[last[~legal]])
