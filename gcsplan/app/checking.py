@@ -268,7 +268,7 @@ def _judged(
         notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")
     home: WayHome | None = None
     if returns:
-        from gcsplan.check.rtl.everywhere import way_home
+        from gcsplan.check.rtl.way_home import way_home
 
         rtl_m = request.rtl_rel_home_m
         home = way_home(verdict, vehicle, world, rtl_rel_home_m=rtl_m, terrain_error_m=terrain_error_m)

@@ -70,7 +70,7 @@ def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
 
 def homes_of(plan: Plan) -> dict[str, WayHome]:
     """The way home of every vehicle, from everywhere on its mission: about a second for 20 km."""
-    from gcsplan.check.rtl.everywhere import way_home
+    from gcsplan.check.rtl.way_home import way_home
 
     return {
         v.name: way_home(

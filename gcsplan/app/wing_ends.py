@@ -15,8 +15,8 @@ import numpy as np
 
 from gcsplan.app.problems import lowest_amsl
 from gcsplan.arrays import Floats
+from gcsplan.check.circles import circle_growth
 from gcsplan.check.climb_out import REACHED_M, above_slant, circle_missing_m, flared, slant_room
-from gcsplan.check.rtl.returning import circle_growth
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import pitch_deg
 from gcsplan.mavlink.build.order import MARGINS

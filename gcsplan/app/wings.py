@@ -20,7 +20,7 @@ from gcsplan.app.problems import built, looked_over, make_problem, run_planner, 
 from gcsplan.app.wing_ends import FlightEnd, circle_m, goals, starts
 from gcsplan.arrays import Floats
 from gcsplan.check.arcs import UNFITTING
-from gcsplan.check.rtl.returning import circle_growth
+from gcsplan.check.circles import circle_growth
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned

@@ -25,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.check.rtl.returning import circle_growth
+from gcsplan.check.circles import circle_growth
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m
 from gcsplan.check.tuning import DEFAULTS, Tuning

@@ -25,7 +25,8 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.aboard import Aboard
-from gcsplan.check.rtl.returning import circle_growth, flat_m
+from gcsplan.check.circles import circle_growth
+from gcsplan.check.geodesy import flat_m
 from gcsplan.check.spline import towards
 from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding

@@ -29,7 +29,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from gcsplan.check.arcs import bend
-from gcsplan.check.rtl.returning import circle_growth, flat_m
+from gcsplan.check.circles import circle_growth
+from gcsplan.check.geodesy import flat_m
 from gcsplan.check.spline import Vector, towards
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning

@@ -18,7 +18,7 @@ never passed over in silence. Facts about the autopilots: ArduPilot's and PX4's 
   LOITER_TIME takes WP_LOITER_RAD whatever the item says, and so does a radius of 1 m or less (commands_logic.cpp).
 - LAND with a place flies there level (in terrain frame at its height above ground), then descends. ArduCopter before
   4.6 holds its height above ground wherever it has terrain data: that way is judged besides.
-- RTL: `returning`. Jumps: `route`. Splines: `spline`.
+- RTL: `rtl.model`. Jumps: `route`. Splines: `spline`.
 """
 
 from __future__ import annotations
@@ -30,10 +30,12 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.check.aboard import Aboard
+from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
 from gcsplan.check.commands import LOITER_TO_ALT, flown_otherwise, moves_nothing
+from gcsplan.check.geodesy import flat_m
 from gcsplan.check.route import DO_JUMP_TAG, fly_in_order
-from gcsplan.check.rtl.returning import PLANE_LOITER_RADIUS_M, circle_growth, flat_m, return_home
+from gcsplan.check.rtl.model import RULES, about_turn_m, return_pieces
 from gcsplan.check.spline import chords, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
 from gcsplan.mavlink.mission import mission as m
@@ -353,10 +355,9 @@ class _Pilot(Aboard):
             self.flight.not_judged.append(f"item {seq}: the return home is not judged: {why}")
             self.landed = True
             return
-        # Without a turn radius the track error holds it: to turn about takes twice as much.
-        pieces = return_home(
-            self.autopilot, self.at, self.home, self.home[2] + self.rtl_rel_home_m,
-            about_m=2.0 * max(self.vehicle.limits.track_error_m, self.vehicle.turn_radius_m),
+        pieces = return_pieces(
+            RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
+            about_m=about_turn_m(self.vehicle),
         )  # fmt: skip
         for piece in pieces:
             fly = self.instead if piece.instead else self.add
