@@ -21,7 +21,7 @@ from gcsplan.export.rows import ItemRow, Track
 from gcsplan.export.summary import write_summary
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
-from gcsplan.mavlink.mission.compare import command_name
+from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ from gcsplan.check.circles import circle_growth
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
@@ -89,7 +89,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
     flight.not_judged += [
         f"item {k}: flies {item.params[2]:.0f} m past its way point before it turns (param3): that is not judged"
         for k, item in enumerate(mission.items, mission.first_seq)
-        if item.command == m.WAYPOINT and item.params[2] >= 1.0
+        if item.command == cmd.WAYPOINT and item.params[2] >= 1.0
     ]
     wander_m = 0.0
     for first, last in _runs(flight.stretches):
@@ -204,7 +204,7 @@ class _Run:
     def _begins_m(self, mission: Mission, s: Stretch, turn: float, flight: Flight) -> tuple[float, float]:
         """How far before the end of ``s`` the turn behind it begins, at least and at most."""
         item = _item(mission, s.seq)
-        if item is None or item.command != m.WAYPOINT:
+        if item is None or item.command != cmd.WAYPOINT:
             return 0.0, 0.0  # a take-off ends where its height is reached, not before
         if math.isfinite(item.params[1]) and item.params[1] > 0.0:
             return item.params[1], item.params[1]

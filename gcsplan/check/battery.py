@@ -39,7 +39,7 @@ class LegBattery:
 
 @dataclass(frozen=True, slots=True)
 class BatteryHome:
-    """Whether the battery reaches for the return, from everywhere.
+    """Whether the battery reaches for the return, from every point.
 
     ``usable_j``: the battery less its reserve. ``most_j``: the most that spent and return come to, anywhere, at
     ``most_at`` (``most_m`` along the mission). ``point_of_no_return``: the first place beyond which the return is not

@@ -39,7 +39,7 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.world import World
 
 LEAST_PITCH_DEG = 4.0
-"""ArduPlane's where the item gives none."""
+"""ArduPlane's where the item has none."""
 
 NEAR_M = 1.0
 """An item this near to home does not say where a climb-out leads."""
@@ -239,7 +239,7 @@ def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World)
         touch = mine[home[kind]]
         point = touch.start if kind == "takeoff" else touch.end
         for s in mine:
-            worst = slant_room(_in_plane(s, world), _one(point, world), s.reach_m, vehicle.limits, world.airspace)
+            worst = slant_shortage(_in_plane(s, world), _one(point, world), s.reach_m, vehicle.limits, world.airspace)
             if worst is not None:
                 found.append(_low(s, *worst, world))
             steep = math.degrees(math.atan2(s.start[2] - s.end[2], max(flat_m(s.start, s.end), 1e-9)))
@@ -250,13 +250,13 @@ def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World)
     return found
 
 
-def slant_room(
+def slant_shortage(
     line: Floats, touch: Floats, reach_m: float, limits: Limits, air: Airspace
 ) -> tuple[float, float, float, float] | None:
     """The worst place where ``line`` (2, 3), rising from ``touch`` (3,) or falling to it, is too near to bare ground.
 
-    (east, north, amsl, metres missing), or None where it has its room all along. The room that is wanted rises evenly
-    from 0 at ``touch`` to the altitude error, so both parts of the line are straight lines below it.
+    (east, north, amsl, metres missing), or None where it is high enough all along. The clearance that is needed rises
+    evenly from 0 at ``touch`` to the altitude error, so both parts of the line are straight lines below it.
     """
     a, b = (line[0], line[1]) if line[0, 2] <= line[1, 2] else (line[1], line[0])
     rise = float(b[2] - a[2])
@@ -265,7 +265,7 @@ def slant_room(
     error = limits.altitude_error_m
     begun = float(a[2] - touch[2])
 
-    def room(z: float) -> float:
+    def clearance(z: float) -> float:
         return min(error, SPARED * max(z - float(touch[2]), 0.0))
 
     split = min(max((error / SPARED - begun) / rise, 0.0), 1.0)
@@ -274,8 +274,8 @@ def slant_room(
     for p, q in ((a, middle), (middle, b)):
         if float(np.linalg.norm(q - p)) <= 1e-6:
             continue
-        starts.append(p - [0.0, 0.0, room(p[2])])
-        ends.append(q - [0.0, 0.0, room(q[2])])
+        starts.append(p - [0.0, 0.0, clearance(p[2])])
+        ends.append(q - [0.0, 0.0, clearance(q[2])])
         low = p[2] - touch[2] < error / SPARED - 1e-9
         track.append(reach_m if low else limits.track_error_m + reach_m)  # on the strip it is where the strip is
         height.append(0.0)

@@ -12,12 +12,12 @@ A way point counts as reached within a radius. There the vehicle turns, and flie
   turns with a radius is `arcs`'; here is what flies as a VTOL.
 - Behind a circle the next leg begins anywhere on it.
 
-Nothing is assumed of how a vehicle gets onto its next leg, but that it stays between that leg and the straight line
+The only assumption on how a vehicle gets onto its next leg is that it stays between that leg and the straight line
 from where it turned to the leg's end. With the turn begun R before a corner of angle A, that line is R·sin(A) off the
 next leg at its beginning and on it at its end, and no more than R·sin(A)·cos(A) off the leg before.
 
-What lies within ``track_error_m`` and ``altitude_error_m`` is in them by their definition (corners are named there).
-What lies beyond widens the legs, and is flown instead of them. A vehicle whose ``corner_accel_m_s2`` is not bounded
+``track_error_m`` and ``altitude_error_m`` include corners by definition, so what lies within them widens nothing. What
+lies beyond widens the legs, and is flown instead of them. A vehicle whose ``corner_accel_m_s2`` is not bounded
 turns on the spot by definition.
 """
 
@@ -34,7 +34,7 @@ from gcsplan.check.geodesy import flat_m
 from gcsplan.check.spline import Vector, towards
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
@@ -142,13 +142,13 @@ class _Cutter:
             return 0.0
         if self.copter:
             nearby = self._item(after.seq)
-            curves = nearby is not None and nearby.command == m.SPLINE_WAYPOINT
-            fast = item.command == m.WAYPOINT and after.kind == "cruise" and not (stops or curves)
+            curves = nearby is not None and nearby.command == cmd.SPLINE_WAYPOINT
+            fast = item.command == cmd.WAYPOINT and after.kind == "cruise" and not (stops or curves)
             if fast and self.tuning.copter_radius_m > self.limits.track_error_m:
                 self._say(f"corners are cut within {self.tuning.says('WPNAV_RADIUS', self.tuning.copter_radius_m)}")
             return self.tuning.copter_radius_m if fast else 0.0
         if self.mission.autopilot is Autopilot.PX4:
-            own = item.params[1] if item.command == m.WAYPOINT else 0.0
+            own = item.params[1] if item.command == cmd.WAYPOINT else 0.0
             if math.isfinite(own) and own > 1e-7:
                 return own
             if self.tuning.px4_radius_m > self.limits.track_error_m:
@@ -158,7 +158,7 @@ class _Cutter:
         return self._plane_radius_m(s, item, turn)
 
     def _plane_radius_m(self, s: Stretch, item: MissionItem, turn: float) -> float:
-        if item.command != m.WAYPOINT:
+        if item.command != cmd.WAYPOINT:
             return 0.0
         if item.params[2] >= 1.0:
             words = (

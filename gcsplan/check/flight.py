@@ -1,7 +1,7 @@
 """What an autopilot does with a mission: its items as the straight stretches that are flown.
 
 Only motion is read here, judging is `judge`'s. A command whose motion we do not know is named in ``not_judged``,
-never passed over in silence. Facts about the autopilots: ArduPilot's and PX4's sources and a flown ArduCopter.
+and so is never lost. Facts about the autopilots: ArduPilot's and PX4's sources and a flown ArduCopter.
 
 - Frame-3 altitudes count from where the vehicle arms: the ground at home.
 - The frame of the *target* decides how altitude runs along a leg: to a terrain-frame item it is interpolated above
@@ -32,12 +32,13 @@ import numpy as np
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
-from gcsplan.check.commands import LOITER_TO_ALT, flown_otherwise, moves_nothing
+from gcsplan.check.commands import flown_otherwise, moves_nothing
 from gcsplan.check.geodesy import flat_m
-from gcsplan.check.route import DO_JUMP_TAG, fly_in_order
+from gcsplan.check.route import fly_in_order
 from gcsplan.check.rtl.model import RULES, about_turn_m, return_pieces
 from gcsplan.check.spline import chords, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -102,25 +103,25 @@ class _Pilot(Aboard):
         command = item.command
         if self.autopilot is Autopilot.PX4 and self.off_africa(item):
             self._lose(seq, item)
-        elif command in (m.TAKEOFF, m.VTOL_TAKEOFF):
+        elif command in (cmd.TAKEOFF, cmd.VTOL_TAKEOFF):
             self._take_off(seq, item)
-        elif command == m.WAYPOINT:
+        elif command == cmd.WAYPOINT:
             self._go(seq, item, hold_s=self.hold(item))
-        elif command == m.SPLINE_WAYPOINT:
+        elif command == cmd.SPLINE_WAYPOINT:
             self._curve(seq, item)
-        elif command in (m.LOITER_UNLIM, m.LOITER_TIME, m.LOITER_TURNS):
+        elif command in (cmd.LOITER_UNLIM, cmd.LOITER_TIME, cmd.LOITER_TURNS):
             self._loiter(seq, item)
-        elif command == LOITER_TO_ALT:
+        elif command == cmd.LOITER_TO_ALT:
             self._change_altitude(seq, item)
-        elif command in (m.LAND, m.VTOL_LAND):
+        elif command in (cmd.LAND, cmd.VTOL_LAND):
             self._land(seq, item)
-        elif command == m.RTL:
+        elif command == cmd.RTL:
             self._return_home(seq)
-        elif command == m.DO_CHANGE_SPEED:
-            self.pace, told = self.pace.changed(item, self.vehicle)
-            if told:
-                self.note(f"item {seq}: {told}")
-        elif command == m.DELAY:
+        elif command == cmd.DO_CHANGE_SPEED:
+            self.pace, note = self.pace.changed(item, self.vehicle)
+            if note:
+                self.note(f"item {seq}: {note}")
+        elif command == cmd.DELAY:
             self._wait(seq, item)
         elif not moves_nothing(command, item.params[0]):
             self._lose(seq, item)
@@ -141,7 +142,7 @@ class _Pilot(Aboard):
         if self.airborne:
             self._lose(seq, item)
             return
-        if item.command == m.TAKEOFF and self.autopilot is Autopilot.ARDUPLANE:
+        if item.command == cmd.TAKEOFF and self.autopilot is Autopilot.ARDUPLANE:
             if is_wing(self.vehicle):
                 climb_out(self, seq, item, self._next(seq))
                 return
@@ -151,7 +152,7 @@ class _Pilot(Aboard):
             )
             self.airborne, self.known = True, False
             return
-        if item.command == m.VTOL_TAKEOFF and self.autopilot is not Autopilot.ARDUPLANE:
+        if item.command == cmd.VTOL_TAKEOFF and self.autopilot is not Autopilot.ARDUPLANE:
             self._lose(seq, item)
             return
         lat, lon, ground = self.home
@@ -216,7 +217,7 @@ class _Pilot(Aboard):
         beyond = self.target(after) if self.has_place(after) else None
         self.at = here
         if beyond is not None and self.hold(item) == 0.0:
-            arrives = towards(here if after.command == m.SPLINE_WAYPOINT else target, beyond)
+            arrives = towards(here if after.command == cmd.SPLINE_WAYPOINT else target, beyond)
         before = self.direction if self.direction is not None else np.zeros(3)
         for leaves, fly in ((before, self.add), (np.zeros(3), self.instead)):
             if fly == self.instead and not before.any():
@@ -232,11 +233,11 @@ class _Pilot(Aboard):
     def _next(self, seq: int) -> MissionItem | None:
         """The item that is flown to after ``seq``; None where a jump decides, or nothing comes."""
         for item in self.items[seq + 1 - self.first_seq :]:
-            if item.command in (m.DO_JUMP, DO_JUMP_TAG):
+            if item.command in (cmd.DO_JUMP, cmd.DO_JUMP_TAG):
                 return None
-            if item.command < 95:
+            if cmd.is_nav(item.command):
                 return item
-        return MissionItem(m.RTL, m.NO_POSITION)
+        return MissionItem(cmd.RTL, m.NO_POSITION)
 
     def _leg(self, seq: int, kind: StretchKind, target: Place, *, terrain: bool, hold_s: float = 0.0) -> None:
         """From here to ``target``, in whatever way the autopilot changes its altitude on the way."""
@@ -259,16 +260,16 @@ class _Pilot(Aboard):
             self.instead(seq, kind, low, high, terrain=terrain, band_m=abs(middle))
 
     def _loiter(self, seq: int, item: MissionItem) -> None:
-        turns = item.command == m.LOITER_TURNS
+        turns = item.command == cmd.LOITER_TURNS
         if turns and self.autopilot is Autopilot.PX4:  # refused on upload
             self._lose(seq, item)
             return
         plane = self.autopilot is Autopilot.ARDUPLANE
         reach_m = 0.0
         if turns or plane:
-            reach_m = self._circle(seq, 0.0 if item.command == m.LOITER_TIME else item.params[2])
+            reach_m = self._circle(seq, 0.0 if item.command == cmd.LOITER_TIME else item.params[2])
         if turns and not plane:
-            self.circle_m = reach_m  # a radius once given holds for later circles that give none
+            self.circle_m = reach_m  # holds for later circles without a radius
         self._go(seq, item, short_m=0.0 if plane else reach_m)
         if not self.known:
             return
@@ -278,10 +279,10 @@ class _Pilot(Aboard):
         self.add(seq, "loiter", self.at, self.at, reach_m=reach_m, hold_s=hold_s)
         self.direction = None
 
-    def _circle(self, seq: int, given_m: float) -> float:
-        """Radius of a circle for which an item gives ``given_m`` (the sign is the direction)."""
+    def _circle(self, seq: int, radius_m: float) -> float:
+        """Radius of a circle whose item says ``radius_m`` (the sign is the direction)."""
         plane = self.autopilot is Autopilot.ARDUPLANE
-        radius_m = abs(given_m) if math.isfinite(given_m) else 0.0
+        radius_m = abs(radius_m) if math.isfinite(radius_m) else 0.0
         if radius_m > (1.0 if plane else 0.0):
             return max(radius_m, self.vehicle.turn_radius_m)
         parameter, default_m = (
@@ -316,7 +317,7 @@ class _Pilot(Aboard):
         if not self.known or not self.airborne:
             self._lose(seq, item)
             return
-        if item.command == m.LAND and self.autopilot is Autopilot.ARDUPLANE:
+        if item.command == cmd.LAND and self.autopilot is Autopilot.ARDUPLANE:
             if is_wing(self.vehicle):
                 glide(self, seq, item)
                 return
@@ -381,7 +382,7 @@ class _Pilot(Aboard):
             f"item {seq}: what {self.autopilot} flies for command {item.command} is not judged"
         )
         target = self.target(item) if self.has_place(item) else None
-        if target is not None and item.command < 95:
+        if target is not None and cmd.is_nav(item.command):
             self.at, self.known, self.airborne = target, True, True
-        elif item.command < 95 or item.command in (m.DO_JUMP, m.DO_SET_HOME):
+        elif cmd.is_nav(item.command) or item.command in (cmd.DO_JUMP, cmd.DO_SET_HOME):
             self.known = False

@@ -22,7 +22,7 @@ from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
-from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Violation
@@ -52,7 +52,7 @@ def judge(
     ``misses``: look too how near it comes to each limit (half as much work again). ``tuning``: the parameters that
     decide where the autopilot turns, where they were read from the vehicle.
     """
-    table = manner(mission.autopilot)
+    table = profile_of(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
     flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
     findings: list[Finding] = []
@@ -93,7 +93,7 @@ def judge(
 
 def _refused(mission: Mission) -> list[Finding]:
     """The items that the autopilot will not take: the upload would end there."""
-    refuses, found = manner(mission.autopilot).refuses, []
+    refuses, found = profile_of(mission.autopilot).refuses, []
     for seq, item in enumerate(mission.items, mission.first_seq):
         if why := refuses(item):
             words = f"item {seq}: would be refused on upload: {why}"

@@ -34,16 +34,16 @@ Slopes = list[tuple[float, float]]
 
 
 def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[list[Place], float, Slopes]:
-    """The curve's points from ``start`` to ``end`` (both given back exactly), and its bulge beyond their chords.
+    """The curve's points from ``start`` to ``end`` (both returned exactly), and its bulge beyond their chords.
 
     ``leaves``, ``arrives``: (3,) directions with their lengths, metres. Last, for each chord, the steepest rise over
     run of the curve over it, up and down (negative).
     """
     way = towards(start, end)
     both = float(np.linalg.norm(leaves) + np.linalg.norm(arrives))
-    room = LONGEST * float(np.linalg.norm(way))
-    if both > room:
-        leaves, arrives = leaves * (room / both), arrives * (room / both)
+    most = LONGEST * float(np.linalg.norm(way))
+    if both > most:
+        leaves, arrives = leaves * (most / both), arrives * (most / both)
     square = 3.0 * way - 2.0 * leaves - arrives
     cube = leaves + arrives - 2.0 * way
     bend = max(float(np.linalg.norm(2.0 * square)), float(np.linalg.norm(2.0 * square + 6.0 * cube)))
@@ -56,7 +56,7 @@ def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[l
 
 
 def _slopes(leaves: Vector, square: Vector, cube: Vector, pieces: int) -> Slopes:
-    """Steepest slopes of each piece, up and down, looked at in `LOOKS` places and given a part of their spread more."""
+    """Steepest slopes of each piece, up and down, sampled in `LOOKS` places and raised by a part of their spread."""
     t = np.linspace(0.0, 1.0, pieces * LOOKS + 1)[:, None]
     speed = leaves + 2.0 * square * t + 3.0 * cube * t**2
     run = np.hypot(speed[:, 0], speed[:, 1])

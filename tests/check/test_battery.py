@@ -13,17 +13,8 @@ from hypothesis import strategies as st
 from gcsplan.check.battery import BatteryHome, battery_home, flown
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import LegFigures, Verdict
-from gcsplan.mavlink.mission.mission import (
-    LAND,
-    LOITER_TIME,
-    RELATIVE,
-    RTL,
-    TAKEOFF,
-    WAYPOINT,
-    Home,
-    Mission,
-    MissionItem,
-)
+from gcsplan.mavlink.mission.commands import LAND, LOITER_TIME, RTL, TAKEOFF, WAYPOINT
+from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.world import World
 from tests.support.worlds import vehicle, world

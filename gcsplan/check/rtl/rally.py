@@ -2,7 +2,7 @@
 
 The autopilot goes to the nearest of home and its rally points, not to the one that it can reach: ArduPilot with
 RALLY_INCL_HOME 1 and no RALLY_LIMIT_KM (0; by default a point farther than 0.3 km, for planes 5 km, is not used), PX4
-with RTL_TYPE 0. A proposal is judged the same way: from every part of the mission, to each place that may be the nearest
+with RTL_TYPE 0. A proposal is judged the same way: from every part of the mission, to each place that may be nearest
 from there. Of many points the one that matters least is left out, one by one, as long as that costs little. What the
 altitude of a point means to each autopilot is `model.RallyAltitude`.
 """
@@ -24,10 +24,10 @@ from gcsplan.check.rtl.stretches import stretches_of
 from gcsplan.check.rtl.sweep import GradedObstacles, Target, obstacles_of_returns
 from gcsplan.check.rtl.trace import MissionTrace, TraceParts
 from gcsplan.check.rtl.verdict import RallyPoint, UnsafeStretch
+from gcsplan.mavlink.mission.commands import RALLY_POINT
 from gcsplan.mavlink.mission.mission import RELATIVE, MissionItem
 from gcsplan.vehicle import Vehicle
 
-RALLY_POINT = 5100  # MAV_CMD_NAV_RALLY_POINT
 MOST_POINTS = 6
 LEVELS = 40
 """Return altitudes that are compared."""
@@ -68,7 +68,7 @@ class _Place:
 
 
 def rally_items(points: Sequence[RallyPoint]) -> tuple[MissionItem, ...]:
-    """The wire items (MAV_CMD 5100, relative to home) of proposed rally points."""
+    """The wire items (MAV_CMD_NAV_RALLY_POINT, relative to home) of proposed rally points."""
     return tuple(
         MissionItem(RALLY_POINT, RELATIVE, x=round(p.lat_deg * 1e7), y=round(p.lon_deg * 1e7), z=p.rel_home_m)
         for p in points

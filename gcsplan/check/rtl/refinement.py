@@ -1,8 +1,8 @@
 """Refinement: parts of a mission are split until it is known from where the return is safe, and at which level.
 
 Each part of the trace is judged twice: with the return from its middle alone, which can only be too lenient, and with
-the returns from all of it, which can only be too strict. Where the two differ in what matters, and where safe and unsafe
-parts meet, parts are split. A smallest part on which the two still differ counts as unsafe.
+the returns from all of it, which can only be too strict. Where the two differ in what matters, and where safe and
+unsafe parts meet, parts are split. A smallest part on which the two still differ counts as unsafe.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ LEVEL_M = 0.5
 
 
 class Refinement:
-    """``parts``, ``strict`` and ``lenient`` belong together, in the order of the trace; ``start`` is the lowest level."""
+    """``parts``, ``strict`` and ``lenient`` belong together, in the order of the trace; ``start``: the lowest level."""
 
     def __init__(
         self,

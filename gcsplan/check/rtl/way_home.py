@@ -3,7 +3,7 @@
 Each point of a mission has its own straight way home. Parts of the mission are judged as a whole: every return from a
 part lies within half its length of the one from its middle; the ground is bounded over the line so widened, with the
 kernels and margins of the exact check (`gcsplan.world.ways`), and zones are held against the region that the returns
-sweep. Nothing is sampled, so what is called safe is safe. What is called unsafe is unsafe, except: the ends of a stretch
+sweep. Nothing is sampled, so what is called safe is safe. What is called unsafe is so, except: the ends of a stretch
 (`refinement.SMALLEST_M`), safe gaps shorter than `COARSE_M` (`COARSEST_M` on long missions) within one, and what the
 bounds of the ground beside a line cost: the widening times the slope there. The lowest altitude is beside that at most
 `LEVEL_M` too high.
@@ -29,7 +29,7 @@ from gcsplan.check.rtl.trace import MissionTrace, TraceParts, trace_of
 from gcsplan.check.rtl.verdict import ProfilePoint, RallyPoint, UnsafeStretch, WayHome
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import Verdict
-from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
@@ -58,7 +58,7 @@ def way_home(
     propose rally points where no altitude is clear from every point. Never raises for a mission that is merely unsafe.
     """
     mission, rule = verdict.mission, RULES[vehicle.autopilot]
-    stored = replace(mission, items=tuple(manner(mission.autopilot).stored(item) for item in mission.items))
+    stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
     lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
     ground = world.ground_amsl(lat, lon)
     judged_m = rule.default_rel_home_m if rtl_rel_home_m is None else rtl_rel_home_m
@@ -153,8 +153,8 @@ def _notes(vehicle: Vehicle, judged_m: float, assumed: bool) -> list[str]:
     notes = []
     if assumed:
         notes.append(
-            f"the return is judged at {judged_m:g} m above home, the default of {rule.parameter}: give the vehicle's own "
-            f"with rtl_rel_home_m"
+            f"the return is judged at {judged_m:g} m above home, the default of {rule.parameter}: give the vehicle's "
+            f"own with rtl_rel_home_m"
         )
     if not rule.climbs_first:
         notes.append("a plane's return is judged from its flight, not from its take-off and landing")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.mavlink.build.order import Order, split_legs
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
@@ -34,7 +35,6 @@ ROUNDED_M = 1e-3
 
 LEAST_ACCEPTED_M = 1.0
 
-LOITER_TO_ALT = 31
 
 NEAREST_M, SLIGHT_M = 3.0, 0.5
 """Way points nearer than the first are one, if the arc at one of them begins within the second."""
@@ -136,24 +136,24 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
     speed = vehicle.speed_max_m_s if order.speed_m_s is None else order.speed_m_s
     items = [
         item(
-            m.TAKEOFF, top, m.RELATIVE, round((wing.top[2] - datum) * 100), (float(pitch_deg(vehicle)), 0.0, 0.0, 0.0)
+            cmd.TAKEOFF, top, m.RELATIVE, round((wing.top[2] - datum) * 100), (float(pitch_deg(vehicle)), 0.0, 0.0, 0.0)
         ),
-        MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (0.0, speed, -1.0, 0.0)),
+        MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (0.0, speed, -1.0, 0.0)),
     ]
     if wing.up is not None:
         place, up_cm = world.frame.to_degrees(wing.up[0], wing.up[1]), round((wing.up[2] - datum) * 100)
-        items.insert(1, item(LOITER_TO_ALT, place, m.RELATIVE, up_cm, (0.0, wing.up_m, 0.0, 0.0)))
+        items.insert(1, item(cmd.LOITER_TO_ALT, place, m.RELATIVE, up_cm, (0.0, wing.up_m, 0.0, 0.0)))
     for i in range(len(points)):
         if i == len(points) - 1 and order.end == "loiter":
-            items.append(item(m.LOITER_UNLIM, places[i], frame, int(cm[i]), (0.0, 0.0, wing.circle_m, 0.0)))
+            items.append(item(cmd.LOITER_UNLIM, places[i], frame, int(cm[i]), (0.0, 0.0, wing.circle_m, 0.0)))
             continue
         accepted = min(max(LEAST_ACCEPTED_M, math.ceil(float(tangent[i]) - ROUNDED_M)), FARTHEST_ACCEPTED_M)
-        items.append(item(m.WAYPOINT, places[i], frame, int(cm[i]), (0.0, accepted, 0.0, 0.0)))
+        items.append(item(cmd.WAYPOINT, places[i], frame, int(cm[i]), (0.0, accepted, 0.0, 0.0)))
     if wing.touch is not None:
         touch = world.frame.to_degrees(wing.touch[0], wing.touch[1])
-        items.append(item(m.LAND, touch, m.RELATIVE, round((wing.touch[2] - datum) * 100), (0.0, 0.0, 0.0, 0.0)))
+        items.append(item(cmd.LAND, touch, m.RELATIVE, round((wing.touch[2] - datum) * 100), (0.0, 0.0, 0.0, 0.0)))
     elif order.end == "rtl":
-        items.append(MissionItem(m.RTL, m.NO_POSITION))
+        items.append(MissionItem(cmd.RTL, m.NO_POSITION))
     return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)
 
 

@@ -13,9 +13,9 @@ from typing import Any
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mavlink.files.file_items import MAX_ITEMS, degrees_e7_of, float32_text, whole
+from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, POLYGON_OUT, RALLY_POINT
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, MissionItem
 
-POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT, RALLY_POINT = 5001, 5002, 5003, 5004, 5100
 MAX_PROBLEMS = 20
 
 

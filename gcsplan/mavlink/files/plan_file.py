@@ -29,17 +29,8 @@ from gcsplan.mavlink.files.file_items import (
 )
 from gcsplan.mavlink.files.plan_fence import fence_items, fence_json, json_float, json_number, rally_items, rally_json
 from gcsplan.mavlink.files.plan_landing import LANDINGS, landing_entries
-from gcsplan.mavlink.mission.mission import (
-    DO_CHANGE_SPEED,
-    DO_JUMP,
-    FRAME_SYNONYMS,
-    GLOBAL,
-    RELATIVE,
-    TERRAIN,
-    Home,
-    Mission,
-    MissionItem,
-)
+from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP
+from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, RELATIVE, TERRAIN, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
 ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT

@@ -21,18 +21,9 @@ from gcsplan.check.rtl.stretches import rel_home
 from gcsplan.check.rtl.sweep import Target, obstacles_of_returns
 from gcsplan.check.rtl.trace import trace_of
 from gcsplan.check.rtl.way_home import WayHome, refinement_of, way_home
-from gcsplan.mavlink.mission.autopilots import manner
-from gcsplan.mavlink.mission.mission import (
-    LAND,
-    RELATIVE,
-    RTL,
-    TAKEOFF,
-    VTOL_LAND,
-    VTOL_TAKEOFF,
-    WAYPOINT,
-    Home,
-    Mission,
-)
+from gcsplan.mavlink.mission.autopilots import profile_of
+from gcsplan.mavlink.mission.commands import LAND, RTL, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT
+from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission
 from gcsplan.mavlink.mission.mission import MissionItem as Item
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
@@ -377,7 +368,7 @@ def test_never_kinder_than_brute_force_in_rough_random_worlds(autopilot: Autopil
         if case is None:
             continue
         worlds += 1
-        stored = replace(case.mission, items=tuple(manner(autopilot).stored(i) for i in case.mission.items))
+        stored = replace(case.mission, items=tuple(profile_of(autopilot).stored(i) for i in case.mission.items))
         flight = follow(stored, case.vehicle, case.world.ground_amsl, rtl_rel_home_m=case.level_rel_home_m)
         trace = trace_of(flight, case.vehicle, case.world, 30.0)
         assert trace is not None
