@@ -11,7 +11,7 @@ Two modules read these rules. `return_pieces` is the return of an RTL item, from
 after a failsafe, from every point of a mission. Where an autopilot may fly one of several altitudes, both judge all of
 them: in the cone from the cone's altitude up to the return altitude, on a plane's way home from its altitude to the
 return altitude. Not judged: RTL_ALT_TYPE 1 (terrain), RTL_CLIMB_MIN, fences that cap the return, Q_RTL_MODE, missions
-with DO_LAND_START.
+with DO_LAND_START. Versions of PX4 that do not climb near home are judged in `return_pieces` alone.
 """
 
 from __future__ import annotations

@@ -425,7 +425,7 @@ def test_on_smooth_ground_the_lowest_altitude_is_hardly_higher_than_it_must_be()
         assert top + 5.0 - home - 0.1 <= lowest <= top + 5.0 - home + 3.0
 
 
-def test_walls_go_up_from_top_to_top() -> None:
+def test_the_lowest_level_goes_up_from_top_to_top() -> None:
     back = np.array([0, 0, 0, 1, 2, 2], dtype=np.intp)
     obstacles = Obstacles(
         np.array([10.0, 10.0, 10.0]), back,
