@@ -49,19 +49,19 @@ class Aboard:
         self.airborne = False
         self.known = True
         self.landed = self.stopped = False
-        self.low_m, self.around_m = 0.0, 0.0  # so far below `at`, and aside, it may begin its next leg
+        self.low_m, self.around_m = 0.0, 0.0  # how far below `at`, and to the side, the next leg may begin
 
     def note(self, words: str) -> None:
-        """Say ``words`` once: a round may be flown more than once."""
+        """Note ``words``, once only: a round may be flown more than once."""
         if words not in self.flight.notes:
             self.flight.notes.append(words)
 
     def instead(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
-        """A stretch that some versions fly in place of another one."""
+        """Add a stretch that some versions fly in place of another one."""
         self.flight.instead.append(self.stretch(seq, kind, start, end, more))
 
     def add(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
-        """The next stretch; ``more`` are `Stretch`'s own fields."""
+        """Add the next stretch; ``more`` are fields of `Stretch`."""
         self.flight.stretches.append(self.stretch(seq, kind, start, end, more))
 
     def stretch(self, seq: int, kind: StretchKind, start: Place, end: Place, more: dict[str, object]) -> Stretch:

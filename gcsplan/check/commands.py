@@ -1,6 +1,6 @@
-"""Commands that a flight passes over, because they move nothing; and params that make another flight of a command.
+"""Commands that move nothing, and params with which a command is flown in another way.
 
-The whole table, command by autopilot by param, stands in docs/safety.md.
+The whole table, by command, autopilot and param, is in docs/safety.md.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ FW_DESCENT = 1.0  # NAV_VTOL_LAND_OPTIONS
 
 
 def flown_otherwise(item: MissionItem, mission: Mission) -> str:
-    """Why what ``item`` (as stored) makes its autopilot fly is not what its command says; empty where it is.
+    """Why the autopilot flies ``item`` (as stored) in another way than its command says; empty if it does not.
 
     PX4: a precision landing looks for its beacon (navigator/precland.cpp); a hold that is no number has no known end.
     ArduPlane: a VTOL landing may begin as a fixed wing's spiral (quadplane.cpp, `landing_with_fixed_wing_spiral_

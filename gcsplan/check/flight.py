@@ -17,7 +17,7 @@ and so is never lost. Facts about the autopilots: ArduPilot's and PX4's sources 
 - A circle's radius is param3's of LOITER_TURNS, of ArduPlane's LOITER_UNLIM and param2's of its LOITER_TO_ALT; its
   LOITER_TIME takes WP_LOITER_RAD whatever the item says, and so does a radius of 1 m or less (commands_logic.cpp).
 - LAND with a place flies there level (in terrain frame at its height above ground), then descends. ArduCopter before
-  4.6 holds its height above ground wherever it has terrain data: that way is judged besides.
+  4.6 holds its height above ground wherever it has terrain data: that is judged too.
 - RTL: `rtl.model`. Jumps: `route`. Splines: `spline`.
 """
 
@@ -205,7 +205,7 @@ class _Pilot(Aboard):
         self._leg(seq, "cruise", target, terrain=terrain, hold_s=hold_s)
 
     def _curve(self, seq: int, item: MissionItem) -> None:
-        """A spline, as ArduCopter flies it from where it passes or stands; what it leaves open is judged both ways."""
+        """A spline as ArduCopter flies it; passing or standing at its beginning are both judged."""
         target, after = self.target(item), self._next(seq)
         terrain = any(i is not None and i.frame in (m.TERRAIN, 11) for i in (item, after))
         copter = self.autopilot is Autopilot.ARDUCOPTER
@@ -231,7 +231,7 @@ class _Pilot(Aboard):
         self.note("splines are judged as ArduCopter 4.1 and later fly them")
 
     def _next(self, seq: int) -> MissionItem | None:
-        """The item that is flown to after ``seq``; None where a jump decides, or nothing comes."""
+        """The item that is flown to after ``seq``, the return where none is left; None where a jump decides."""
         for item in self.items[seq + 1 - self.first_seq :]:
             if item.command in (cmd.DO_JUMP, cmd.DO_JUMP_TAG):
                 return None
@@ -247,7 +247,7 @@ class _Pilot(Aboard):
         self.direction = None if hold_s else towards(here, target)
         if self.autopilot is not Autopilot.ARDUPLANE:
             return
-        if self.low_m and not terrain:  # it regains that soon: within half the leg
+        if self.low_m and not terrain:  # it makes up for that within half the leg
             half = tuple(0.5 * (a + b) for a, b in zip(here, target, strict=True))
             low, on = (*here[:2], here[2] - self.low_m), (half[0], half[1], half[2] - self.low_m)
             self.instead(seq, kind, low, on, reach_m=self.around_m)

@@ -65,8 +65,8 @@ def nearest_misses(
 ) -> tuple[Miss, ...]:
     """A `Miss` for each limit that the vehicle has, and for the zones that it comes nearest to.
 
-    ``owner`` (N,): the stretch of each leg. Heights are those of the exact check, what lies beside the track within
-    its error included.
+    ``owner`` (N,): the stretch of each leg. Heights are those of the exact check: the lowest or highest within the
+    track error.
     """
     limits = vehicle.limits
     run = np.hypot(*(legs.end - legs.start)[:, :2].T)

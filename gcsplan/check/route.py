@@ -1,6 +1,6 @@
 """In which order the items of a mission are flown: jumps with their counts, as the autopilots count them.
 
-- A jump's count belongs to the jump and is never given back: reached again after it is used up, it is passed
+- A jump's count belongs to the jump and is never reset: once it is used up, the jump is passed
   (ArduPilot's `AP_Mission::get_next_cmd`, PX4's `getNonJumpItem`). 0 never jumps; −1 is without end on ArduPilot, and
   65,535 rounds on PX4, which keeps 16 bits.
 - ArduPilot counts `MOST_JUMPS` jumps of one mission and takes the rest for used up. Jump tags are ArduPilot's alone.

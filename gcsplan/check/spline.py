@@ -4,7 +4,7 @@ A cubic Hermite curve between two way points with a direction at either end, of 
 together exceed `LONGEST` times the distance (ArduCopter 4.1 and later: SplineCurve.cpp, `set_origin_and_destination`;
 AC_WPNav.cpp, `set_spline_destination`). It leaves along the leg before it, or with no direction where the aircraft
 stopped, and arrives parallel to the leg after it, or, if that is a spline too, to the line from its own beginning to
-that one's end. A flown ArduCopter 4.6.0 kept within 1.2 m of these chords, 57 m beside the straight line.
+that one's end. In simulation ArduCopter 4.6.0 flew within 1.2 m of these chords, 57 m beside the straight line.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def _slopes(leaves: Vector, square: Vector, cube: Vector, pieces: int) -> Slopes
     known = np.flatnonzero(moves)
     if not len(known):
         return [(np.inf, -np.inf)] * pieces
-    slope = np.interp(np.arange(len(run)), known, slope[known])  # standing still it has none of its own
+    slope = np.interp(np.arange(len(run)), known, slope[known])  # standing still it has no direction
     by_piece = np.column_stack([slope[k : len(slope) - LOOKS + k : LOOKS] for k in range(LOOKS + 1)])
     up, down = by_piece.max(axis=1), by_piece.min(axis=1)
     more = SPREAD * (up - down)

@@ -85,7 +85,7 @@ class Refinement:
 
     @staticmethod
     def _between(bad: Bools, bad_lenient: Bools) -> Bools:
-        """Bad parts that may be good in part: good in the middle, or beside a good one."""
+        """Unsafe parts that may be safe in part: safe in the middle, or beside a safe part."""
         beside = np.zeros(len(bad), np.bool_)
         beside[1:] |= ~bad[:-1]
         beside[:-1] |= ~bad[1:]

@@ -1,4 +1,4 @@
-"""`WayHome`: what is said of the way home from every point of a mission, in numbers, in words and as plain values."""
+"""`WayHome`: the result of judging the way home, in numbers, in words and as plain values."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class WayHome:
     clearance and enters no zone or its clearance. *Legal*: it keeps min AGL, max AGL and max AMSL besides.
 
     ``parameter`` is the autopilot's name for the return altitude; ``rtl_rel_home_m`` what was judged, ``assumed``
-    where nobody gave it and the autopilot's default was taken. ``lowest_rel_home_m`` … ``highest_rel_home_m``: return
+    where it was not set and the autopilot's default was taken. ``lowest_rel_home_m`` … ``highest_rel_home_m``: return
     altitudes that are clear from every point (None: none is; highest None: no limit from above);
     ``lowest_legal_rel_home_m`` likewise for legal. ``unsafe``: where the return is not clear; ``irregular``: where it
     is clear but not legal. ``advised_rel_home_m``: the lowest clear altitude, or where none is clear from every point,

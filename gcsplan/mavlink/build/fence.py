@@ -37,9 +37,9 @@ HEAD_BYTES, CIRCLE_BYTES, POLYGON_BYTES, CORNER_BYTES = 5, 13, 2, 8  # AC_PolyFe
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """One area of a fence in the plane; ``inclusion``: to be stayed inside of.
+    """One area of a fence in the plane; ``inclusion``: the vehicle must stay inside.
 
-    ``shapes``: what of it is near the frame: none of an area far away, several where it comes near in several parts.
+    ``shapes``: its parts near the frame: none of an area far away, several where several parts are near.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Area:
 class Fence:
     """A fence for one autopilot: its items in wire order, the zones in it, and what a user should know (``notes``).
 
-    ``left_out`` names the zones that a fence has no words for.
+    ``left_out`` names the zones that a fence cannot express.
     """
 
     items: tuple[MissionItem, ...]
@@ -63,7 +63,7 @@ class Fence:
 def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infinite: bool = False) -> Fence:
     """The fence that keeps an aircraft out of ``zones``.
 
-    Zones with a floor or a ceiling are left out and named, or with ``infinite`` taken as if they had neither. A circle
+    Zones with a floor or a ceiling are left out and named; with ``infinite`` they count as if without. A circle
     inside another one is dropped. Raises InputError where the autopilot cannot keep so much.
     """
     notes: list[str] = []
@@ -91,8 +91,8 @@ def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infin
 def areas_of(items: Sequence[MissionItem], frame: Frame) -> list[Area]:
     """The areas of a fence from its wire items; return points (5000) are passed over.
 
-    Raises InputError for a polygon that is not whole or not simple, a radius that is none or beyond
-    `LARGEST_RADIUS_M`, places that are none, and other commands.
+    Raises InputError for a polygon that is not whole or not simple, a radius that is not positive or beyond
+    `LARGEST_RADIUS_M`, places off the globe, and other commands.
     """
     areas: list[Area] = []
     index = 0
@@ -127,7 +127,7 @@ def _circle_of(item: MissionItem, index: int, frame: Frame) -> tuple[Circle, ...
 
 
 def _polygon_of(items: Sequence[MissionItem], index: int, frame: Frame) -> tuple[int, tuple[Polygon, ...]]:
-    """How many items the polygon that begins there has, and what of it is near."""
+    """How many items the polygon that begins there has, and its parts near the frame."""
     first = items[index]
     count = first.params[0]
     corners = items[index : index + int(count)] if math.isfinite(count) and count >= 3 else []
@@ -150,7 +150,7 @@ def _corner(item: MissionItem, index: int) -> tuple[float, float]:
 def _circle(circle: Circle, frame: Frame) -> list[MissionItem]:
     lat, lon = (float(x) for x in frame.to_degrees(circle.east_m, circle.north_m))
     cm = circle.radius_m * 100.0
-    radius_m = math.ceil(cm - max(1e-6, 1.2e-7 * cm)) / 100.0  # what comes back as float32 is the same again
+    radius_m = math.ceil(cm - max(1e-6, 1.2e-7 * cm)) / 100.0  # its float32 is the same number
     return [MissionItem(CIRCLE_OUT, GLOBAL, (radius_m, 0.0, 0.0, 0.0), degrees_e7(lat), degrees_e7(lon))]
 
 

@@ -1,9 +1,9 @@
 """A fixed wing's mission on the wire: take-off straight ahead, way points that are flown by, and how it ends.
 
 - NAV_TAKEOFF: param1 is the least pitch in whole degrees; ArduPlane holds the heading it is launched on. The place of
-  the item is where the climb-out leads to, for whoever launches it, and for whoever checks the file.
+  the item is where the climb-out leads to: it tells the launching person and the check the heading.
 - NAV_WAYPOINT: param2, the acceptance radius, is the tangent length of the corner, rounded up to whole metres: there
-  the turn begins. ArduPlane keeps a byte of it, so a corner that needs more is given two way points, on one arc.
+  the turn begins. ArduPlane keeps a byte of it, so a corner that needs more becomes two way points on one arc.
 - No DO_LAND_START before a landing: with it ArduPlane does not arm unless RTL_AUTOLAND is set.
 """
 
@@ -31,13 +31,13 @@ FARTHEST_ACCEPTED_M = 255.0
 """What ArduPlane keeps of an acceptance radius at most."""
 
 ROUNDED_M = 1e-3
-"""A tangent this little beyond whole metres is not rounded up: the turn begins so much late."""
+"""A tangent less than this beyond whole metres is not rounded up: the turn then begins this late at most."""
 
 LEAST_ACCEPTED_M = 1.0
 
 
 NEAREST_M, SLIGHT_M = 3.0, 0.5
-"""Way points nearer than the first are one, if the arc at one of them begins within the second."""
+"""Way points nearer to each other than the first are joined, if the arc at one of them begins within the second."""
 
 
 def pitch_deg(vehicle: Vehicle) -> int:
@@ -46,7 +46,7 @@ def pitch_deg(vehicle: Vehicle) -> int:
 
 
 def turns_of(points: Floats) -> Floats:
-    """(N - 2,) turn at each inner point, radians, left positive; 0 where the way does not go on."""
+    """(N - 2,) turn at each inner point, radians, left positive; 0 where the path ends."""
     way = np.diff(points[:, :2], axis=0)
     heading = np.arctan2(way[:, 1], way[:, 0])
     turn = (np.diff(heading) + math.pi) % (2.0 * math.pi) - math.pi

@@ -26,14 +26,14 @@ COPTER_ACCEPTANCE_M = 2.0  # ArduCopter WPNAV_RADIUS, default
 
 
 def acceptance_radius_m(vehicle: Vehicle) -> float:
-    """How near counts as reached: ArduCopter's own parameter; elsewhere the track error, sent with each item."""
+    """The acceptance radius: ArduCopter's own parameter; elsewhere the track error, sent with each item."""
     if vehicle.autopilot is Autopilot.ARDUCOPTER:
         return COPTER_ACCEPTANCE_M
     return min(max(1.0, math.floor(vehicle.limits.track_error_m)), 255.0)
 
 
 def corner_m(vehicle: Vehicle) -> float:
-    """What a planner keeps beside its track for corners that are cut by more than ``track_error_m`` holds; mostly 0."""
+    """The margin that a planner keeps for corners that are cut by more than ``track_error_m``; mostly 0."""
     if vehicle.turn_radius_m > 0.0 or math.isinf(vehicle.corner_accel_m_s2):
         return 0.0
     radius_m = acceptance_radius_m(vehicle)
@@ -81,7 +81,7 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
         item(cmd.VTOL_TAKEOFF if plane else cmd.TAKEOFF, 0, m.RELATIVE, top_cm),
         MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (speed_kind, speed, -1.0, 0.0)),
     ]
-    if order.hold_s > 0 or order.gate_utc is not None:  # before the speed, which is exact from a standstill
+    if order.hold_s > 0 or order.gate_utc is not None:  # before the speed change: a gate is exact from a standstill
         items.insert(1, _gate(order, vehicle))
     last = len(points) - 1
     items += [item(cmd.WAYPOINT, i, frame, int(cm[i]), radius_m=radius) for i in range(1, last)]

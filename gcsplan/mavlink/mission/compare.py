@@ -1,7 +1,7 @@
-"""Is what was read back what was sent? Item by item, by wire integers and float32, with the autopilot's own rounding.
+"""Compares what was read back with what was sent: by wire integers and float32, with the autopilot's own rounding.
 
 A number is right if it equals what the autopilot is known to keep (`autopilots.stored`) or what was sent (peers that
-keep everything). All else is a `Difference`, a command that we do not know included. ArduPilot's item 0 is the
+keep everything). Anything else is a `Difference`, for unknown commands too. ArduPilot's item 0 is the
 vehicle's own home: it is reported, but excused.
 """
 

@@ -1,4 +1,4 @@
-"""`Mission`: decoded wire items, the autopilot, and home. The one thing that is checked, written and sent.
+"""`Mission`: decoded wire items, the autopilot, and home. It is what is checked, written and sent.
 
 Numbers are those of the wire: degrees times 1e7 as int32, everything else float32. Home is not among the items;
 `Mission.wire_items` puts it in front where the autopilot keeps it as item 0 (ArduPilot).

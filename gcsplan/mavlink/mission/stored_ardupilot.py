@@ -1,4 +1,4 @@
-"""What ArduPilot makes of a mission item: 15 bytes of storage each, so numbers come back other than they were sent.
+"""What ArduPilot stores of a mission item: 15 bytes each, so some numbers read back differently.
 
 Source: ArduPilot 4.6, ``AP_Mission.cpp`` (`mavlink_int_to_mission_cmd`, `mission_cmd_to_mavlink_int`, the packed
 structs of ``AP_Mission.h``), ``MissionItemProtocol_Fence.cpp`` and ``MissionItemProtocol_Rally.cpp``; the common
@@ -25,7 +25,7 @@ _M_PER_CM = float32(0.01)
 
 
 def _whole(value: float) -> int:
-    """``(int32_t)value``: towards zero. Beyond int32 C leaves it open; x86 gives INT_MIN, as here."""
+    """``(int32_t)value``: towards zero. Beyond int32 C does not define it; x86 gives INT_MIN, as here."""
     return int(value) if abs(value) < 2**31 else -(2**31)  # NaN compares False
 
 
@@ -244,7 +244,7 @@ def _stored(item: MissionItem, rule: Rule | None) -> MissionItem:
         item.y,
         read_back_altitudes(stored_cm(item.z))[0],
     )
-    if rule is None:  # not a command that we know: the numbers are expected back, and a difference is named
+    if rule is None:  # an unknown command: the same numbers are expected back, and a difference is reported
         return located
     p1, p2, p3, p4 = (keep(value) for keep, value in zip(rule.params, item.params, strict=True))
     if item.command == cmd.LOITER_TURNS:

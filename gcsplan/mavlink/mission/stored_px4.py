@@ -1,4 +1,4 @@
-"""What PX4 makes of a mission item: floats as they are, but only the params that a command uses; yaw in radians.
+"""What PX4 stores of a mission item: floats as they are, but only the params that a command uses; yaw in radians.
 
 Source: PX4 1.15, ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavlink_mission_item`),
 ``navigation.h``, ``Limits.hpp`` (`radians`, `degrees`) and ``helper_functions.hpp`` (`wrap_2pi`).
@@ -138,6 +138,6 @@ def stored_by_px4(item: MissionItem) -> MissionItem:
         return MissionItem(item.command, frame, params, x, y, item.z, item.autocontinue)
     rule = LOCATED.get(item.command, (_f32, _f32, _f32, _f32))
     p1, p2, p3, p4 = (keep(value) for keep, value in zip(rule, item.params, strict=True))
-    if item.command in _FENCE:  # neither "relative" nor autocontinue is stored with a fence point
+    if item.command in _FENCE:  # a fence point is stored without "relative" and autocontinue
         return MissionItem(item.command, GLOBAL, (p1, p2, p3, p4), item.x, item.y, item.z, False)
     return MissionItem(item.command, frame, (p1, p2, p3, p4), item.x, item.y, item.z, item.autocontinue)

@@ -86,7 +86,7 @@ class VerifiedUpload:
     """Upload ``items`` (wire order) to ``vehicle``, read them back and compare, at most ``attempts`` times.
 
     Used like the machines that it is made of; ``result`` is None until it has ended. ``gate``: of `machine`.
-    ``most``: a longer list is none that the vehicle can hold, and is not read.
+    ``most``: the vehicle cannot hold a longer list; one that it announces is not read.
     """
 
     def __init__(
