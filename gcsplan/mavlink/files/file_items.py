@@ -159,8 +159,8 @@ def _xy(command: int, frame: int, raw: RawItem, bad: Callable[[str], None]) -> t
             return degrees_e7_of(raw.x), degrees_e7_of(raw.y)
         return None, None
     x, y = whole(raw.x, -(2**31), 2**31 - 1), whole(raw.y, -(2**31), 2**31 - 1)
-    for number, given, value in ((5, x, raw.x), (6, y, raw.y)):
-        if given is None:
+    for number, read, value in ((5, x, raw.x), (6, y, raw.y)):
+        if read is None:
             bad(f"param{number} of command {command} in frame {frame} must be a whole 32-bit number, given {value:g}")
     return x, y
 
