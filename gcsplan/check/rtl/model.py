@@ -3,7 +3,8 @@
 ArduCopter (mode_rtl.cpp, ``compute_return_target``): climbs on the spot to the greatest of its altitude and RTL_ALT
 (RTL_ALT_M since 4.7; relative to home), flies straight home at it, descends. Within a cone around home it climbs less:
 to RTL_CONE_SLOPE times the distance, 2.5 m at least. RTL_CLIMB_MIN (0) adds to its own altitude.
-PX4 (rtl.cpp): the same with RTL_RETURN_ALT and RTL_CONE_ANG (45 degrees); versions differ in what they do near home.
+PX4 (rtl.cpp): the same with RTL_RETURN_ALT and RTL_CONE_ANG (45 degrees). Later versions have the cone only within
+RTL_MIN_DIST (10 m) of home and climb fully beyond it; older ones go to RTL_DESCEND_ALT within that distance.
 ArduPlane, a QuadPlane too: turns and flies home at once, climbing to RTL_ALTITUDE (ALT_HOLD_RTL before 4.5; -1 keeps
 its altitude) as it goes, or gliding down to it, and circles over home with WP_LOITER_RAD, grown with altitude.
 
@@ -11,7 +12,7 @@ Two modules read these rules. `return_pieces` is the return of an RTL item, from
 after a failsafe, from every point of a mission. Where an autopilot may fly one of several altitudes, both judge all of
 them: in the cone from the cone's altitude up to the return altitude, on a plane's way home from its altitude to the
 return altitude. Not judged: RTL_ALT_TYPE 1 (terrain), RTL_CLIMB_MIN, fences that cap the return, Q_RTL_MODE, missions
-with DO_LAND_START. Versions of PX4 that do not climb near home are judged in `return_pieces` alone.
+with DO_LAND_START. `cone_differs` is judged in `return_pieces` alone.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ class ReturnRule:
     ``parameter``: its name for the return altitude, which counts from home. ``climbs_first``: it climbs on the spot,
     never descends before it is home, and then descends vertically; else it turns, changes its altitude on the way, and
     circles over home with ``loiter_radius_m``. ``cone_slope``: rise over run of the cone around home, below which it
-    climbs no further; 0: no cone. ``cone_differs``: some versions do not climb at all within the cone.
+    climbs no further; 0: no cone. ``cone_differs``: some versions may
+    fly lower near home, so that an RTL item is judged as if it did not climb within the cone.
     """
 
     parameter: str
