@@ -4,20 +4,8 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.mavlink.mission.mission import (
-    DELAY,
-    DO_CHANGE_SPEED,
-    GLOBAL,
-    LAND,
-    NO_POSITION,
-    RELATIVE,
-    TAKEOFF,
-    WAYPOINT,
-    Home,
-    Mission,
-    MissionItem,
-    degrees_e7,
-)
+from gcsplan.mavlink.mission.commands import DELAY, DO_CHANGE_SPEED, LAND, TAKEOFF, WAYPOINT
+from gcsplan.mavlink.mission.mission import GLOBAL, NO_POSITION, RELATIVE, Home, Mission, MissionItem, degrees_e7
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from gcsplan.check.judge import judge
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.sim import sitl as flown
@@ -40,10 +41,10 @@ def test_a_real_arducopter_flies_splines_and_jumps_as_they_are_judged(monkeypatc
         return MissionItem(command, m.RELATIVE, (hold, 0, 0, 0), m.degrees_e7(lat), m.degrees_e7(lon), z)
 
     items = (
-        at(m.TAKEOFF, 0, 0, 40), at(m.WAYPOINT, 0, 120, 40), at(m.SPLINE_WAYPOINT, 120, 180, 50),
-        at(m.SPLINE_WAYPOINT, 240, 60, 40), at(m.WAYPOINT, 120, 0, 45), at(m.WAYPOINT, 60, -60, 45),
-        at(m.SPLINE_WAYPOINT, 120, -120, 45, 2.0), at(m.WAYPOINT, 0, -120, 45),
-        MissionItem(m.DO_JUMP, m.NO_POSITION, (6, 1, 0, 0)), at(m.LAND, 0, -120, 0),
+        at(cmd.TAKEOFF, 0, 0, 40), at(cmd.WAYPOINT, 0, 120, 40), at(cmd.SPLINE_WAYPOINT, 120, 180, 50),
+        at(cmd.SPLINE_WAYPOINT, 240, 60, 40), at(cmd.WAYPOINT, 120, 0, 45), at(cmd.WAYPOINT, 60, -60, 45),
+        at(cmd.SPLINE_WAYPOINT, 120, -120, 45, 2.0), at(cmd.WAYPOINT, 0, -120, 45),
+        MissionItem(cmd.DO_JUMP, m.NO_POSITION, (6, 1, 0, 0)), at(cmd.LAND, 0, -120, 0),
     )  # fmt: skip
     home_amsl_m = where.ground_amsl(36.6, -84.3)
     mission = Mission(Autopilot.ARDUCOPTER, m.Home.at(36.6, -84.3, home_amsl_m), items, "uav1")

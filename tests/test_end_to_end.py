@@ -18,6 +18,7 @@ from gcsplan.app.outputs import outputs_of
 from gcsplan.app.pipeline import plan
 from gcsplan.check.judge import judge
 from gcsplan.mavlink.files.formats import write_waypoints
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import load_mission
@@ -104,7 +105,7 @@ def test_the_lowest_point_is_the_same_for_both() -> None:
 def tampered(mission: Mission, rng: np.random.Generator) -> Mission:
     """One way point lower, higher, aside, or in a zone's middle."""
     items = list(mission.items)
-    which = int(rng.choice([i for i, item in enumerate(items) if item.command in (m.WAYPOINT, m.LOITER_UNLIM)]))
+    which = int(rng.choice([i for i, item in enumerate(items) if item.command in (cmd.WAYPOINT, cmd.LOITER_UNLIM)]))
     item = items[which]
     match rng.integers(5):
         case 0:

@@ -230,7 +230,7 @@ def test_own_modules_are_told_from_names_and_from_others() -> None:
     assert own("gcsplan.__version__") is None
     assert own("numpy.typing") is None
     assert package_of("gcsplan.mavlink.link.url") == "mavlink.link"
-    assert package_of("gcsplan.check.rtl.rules") == "check"
+    assert package_of("gcsplan.check.rtl.model") == "check"
 
 
 def test_degrees_are_seen_in_every_kind_of_name() -> None:

@@ -18,16 +18,8 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, InputError, Problem, UsageError
 from gcsplan.mavlink.files.file_items import HAS_PLACE, MissionFileRead
 from gcsplan.mavlink.files.formats import read_mission_file
-from gcsplan.mavlink.mission.mission import (
-    LOITER_TIME,
-    LOITER_TURNS,
-    LOITER_UNLIM,
-    NO_POSITION,
-    SPLINE_WAYPOINT,
-    Home,
-    Mission,
-    MissionItem,
-)
+from gcsplan.mavlink.mission.commands import LOITER_TIME, LOITER_TO_ALT, LOITER_TURNS, LOITER_UNLIM, SPLINE_WAYPOINT
+from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
 from gcsplan.mission_file import MissionFile, VehicleRequest, load_mission
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -38,7 +30,7 @@ SAME_PLACE_M = 1.0
 """A home row within this of the vehicle's start is the start."""
 
 
-CIRCLES = frozenset({LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, 31})
+CIRCLES = frozenset({LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALT})
 DEFAULT_CIRCLE_M = 150.0
 """More than a plane's own circle takes at any altitude."""
 
@@ -268,7 +260,7 @@ def _judged(
         notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")
     home: WayHome | None = None
     if returns:
-        from gcsplan.check.rtl.everywhere import way_home
+        from gcsplan.check.rtl.way_home import way_home
 
         rtl_m = request.rtl_rel_home_m
         home = way_home(verdict, vehicle, world, rtl_rel_home_m=rtl_m, terrain_error_m=terrain_error_m)

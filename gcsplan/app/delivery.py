@@ -26,7 +26,7 @@ from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers,
 from gcsplan.export.outdir import write_whole
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan, write_waypoints
 from gcsplan.mavlink.link.url import parse_url
-from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Mission
 from gcsplan.mission_file import MissionFile
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -132,7 +132,7 @@ def _autopilot_of(link: Link, sysid: int) -> Autopilot:
 
     state = session.discover(link, sysid, listen_s=LISTEN_S)
     for autopilot in Autopilot:
-        table = manner(autopilot)
+        table = profile_of(autopilot)
         if state.mav_autopilot == table.mav_autopilot and state.mav_type in table.mav_types:
             return autopilot
     raise VehicleRefused(

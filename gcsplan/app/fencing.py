@@ -22,7 +22,7 @@ from gcsplan.check.plane_legs import legs_in_plane
 from gcsplan.check.verdict import Finding, Verdict
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
 from gcsplan.mavlink.build.fence import Area, Fence, areas_of, fence_of
-from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
@@ -50,7 +50,7 @@ def fence_for(
     """
     fence = fence_of(world.airspace.zones, world.frame, mission.autopilot, infinite=infinite)
     try:
-        areas = areas_of([manner(mission.autopilot).stored(item) for item in fence.items], world.frame)
+        areas = areas_of([profile_of(mission.autopilot).stored(item) for item in fence.items], world.frame)
     except InputError as error:  # as it is stored, to centimetres
         raise InputError(
             f"the fence would not be stored as it was made ({error.message}): a zone is too thin for it; widen the "
@@ -101,7 +101,7 @@ def _outside(
     areas: Sequence[Area], mission: Mission, vehicle: Vehicle, world: World, rtl_rel_home_m: float | None
 ) -> list[Finding]:
     """For each of the inclusion areas where the flight, as `judge` follows it, first comes out of it."""
-    stored = replace(mission, items=tuple(manner(mission.autopilot).stored(i) for i in mission.items))
+    stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(i) for i in mission.items))
     flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
     round_corners(flight, stored, vehicle, world.frame)
     flown = [*flight.stretches, *flight.instead]
@@ -188,7 +188,7 @@ def with_fences(jobs: Sequence[Job], *, infinite: bool = False) -> tuple[list[Jo
 
 
 def _notes(name: str, fence: Fence) -> list[tuple[str, str]]:
-    notes = [(name, words) for words in fence.told]
+    notes = [(name, words) for words in fence.notes]
     if not fence.items:
         notes.append((name, "no zone can be told as a fence: the fence on board is left as it is"))
     return notes

@@ -21,7 +21,7 @@ from gcsplan.export.rows import ItemRow, Track
 from gcsplan.export.summary import write_summary
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
-from gcsplan.mavlink.mission.compare import command_name
+from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
 
 def homes_of(plan: Plan) -> dict[str, WayHome]:
     """The way home of every vehicle, from everywhere on its mission: about a second for 20 km."""
-    from gcsplan.check.rtl.everywhere import way_home
+    from gcsplan.check.rtl.way_home import way_home
 
     return {
         v.name: way_home(

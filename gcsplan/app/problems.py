@@ -14,7 +14,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import build_mission, corner_m
 from gcsplan.mavlink.build.order import LONGEST_LEG_M, MARGINS, Margins, Order
-from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
@@ -81,7 +81,7 @@ def built(brief: Brief, request: VehicleRequest, solution: Solution, order: Orde
 
 
 def _require_room(mission: Mission, vehicle: Vehicle) -> None:
-    limit, count = manner(vehicle.autopilot).max_items, len(mission.wire_items())
+    limit, count = profile_of(vehicle.autopilot).max_items, len(mission.wire_items())
     if count > limit:
         raise NoMission(
             f"{vehicle.name}: the mission has {count} items and {vehicle.autopilot} takes {limit}: put the goal "

@@ -9,7 +9,7 @@ import numpy as np
 
 from gcsplan.app.model import VehiclePlan
 from gcsplan.arrays import Floats
-from gcsplan.check.rtl.returning import PLANE_LOITER_RADIUS_M, circle_growth
+from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.verdict import LegFigures
 from gcsplan.world.world import World
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from gcsplan.app.problems import lowest_amsl
 from gcsplan.arrays import Floats
-from gcsplan.check.climb_out import REACHED_M, above_slant, circle_missing_m, flared, slant_room
-from gcsplan.check.rtl.returning import circle_growth
+from gcsplan.check.circles import circle_growth
+from gcsplan.check.climb_out import REACHED_M, above_slant, circle_missing_m, flared, slant_shortage
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import pitch_deg
 from gcsplan.mavlink.build.order import MARGINS
@@ -188,7 +188,7 @@ def _slant_clear(ground: Floats, top: Floats, limits: Limits, air: Airspace, lan
     ):
         return False
     return all(
-        _column_clear(line[0], line[1], 0.0, limits, air) and slant_room(line, ground, 0.0, limits, air) is None
+        _column_clear(line[0], line[1], 0.0, limits, air) and slant_shortage(line, ground, 0.0, limits, air) is None
         for line in lines
     )
 

@@ -20,12 +20,12 @@ from gcsplan.app.problems import built, looked_over, make_problem, run_planner, 
 from gcsplan.app.wing_ends import FlightEnd, circle_m, goals, starts
 from gcsplan.arrays import Floats
 from gcsplan.check.arcs import UNFITTING
-from gcsplan.check.rtl.returning import circle_growth
+from gcsplan.check.circles import circle_growth
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
 from gcsplan.mavlink.build.order import MARGINS, Margins, Order, Wing
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.world.path import Path
@@ -119,7 +119,7 @@ def _pairs(problem: Problem, asked: VehicleRequest, sharp: Floats) -> Iterator[t
 def _mendable(plan: VehiclePlan) -> bool:
     """Whether more room may help: what the ends or the battery break, it does not."""
     items, first = plan.mission.items, plan.mission.first_seq
-    mended = {i + first for i, item in enumerate(items) if item.command in (m.WAYPOINT, m.LOITER_UNLIM)}
+    mended = {i + first for i, item in enumerate(items) if item.command in (cmd.WAYPOINT, cmd.LOITER_UNLIM)}
     return any(f.seq in mended for f in plan.verdict.findings if f.kind != "battery")
 
 

@@ -21,7 +21,8 @@ from gcsplan.errors import InputError, LinkError
 from gcsplan.mavlink.link.drive import drive
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.link import run as run_steps
-from gcsplan.mavlink.mission.mission import RELATIVE, WAYPOINT, MissionItem
+from gcsplan.mavlink.mission.commands import WAYPOINT
+from gcsplan.mavlink.mission.mission import RELATIVE, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.mavlink.protocol.transfer import Accepted, Upload, VerifiedUpload
 from gcsplan.sim.server import SimServer
@@ -34,7 +35,7 @@ PEER_WAIT_S = 180.0
 
 
 def items_of(count: int) -> tuple[MissionItem, ...]:
-    """A mission of ``count`` way points, PX4's manner (no home item)."""
+    """A mission of ``count`` way points, as PX4 has them (no home item)."""
     return tuple(
         MissionItem(WAYPOINT, RELATIVE, x=366_000_000 + 900 * i, y=-843_000_000 + 700 * (i % 7), z=60.0 + i % 40)
         for i in range(count)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from gcsplan.check.pace import Pace
 from gcsplan.check.spline import Vector
 from gcsplan.check.stretch import Flight, Place, Stretch, StretchKind
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -48,25 +49,25 @@ class Aboard:
         self.airborne = False
         self.known = True
         self.landed = self.stopped = False
-        self.low_m, self.around_m = 0.0, 0.0  # so far below `at`, and aside, it may begin its next leg
+        self.low_m, self.around_m = 0.0, 0.0  # how far below `at`, and to the side, the next leg may begin
 
     def note(self, words: str) -> None:
-        """Say ``words`` once: a round may be flown more than once."""
+        """Note ``words``, once only: a round may be flown more than once."""
         if words not in self.flight.notes:
             self.flight.notes.append(words)
 
     def instead(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
-        """A stretch that some versions fly in place of another one."""
+        """Add a stretch that some versions fly in place of another one."""
         self.flight.instead.append(self.stretch(seq, kind, start, end, more))
 
     def add(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
-        """The next stretch; ``more`` are `Stretch`'s own fields."""
+        """Add the next stretch; ``more`` are fields of `Stretch`."""
         self.flight.stretches.append(self.stretch(seq, kind, start, end, more))
 
     def stretch(self, seq: int, kind: StretchKind, start: Place, end: Place, more: dict[str, object]) -> Stretch:
         """One stretch at the pace that holds now."""
-        given: dict[str, object] = {"rates_m_s": self.pace.rates_m_s, "jumped_from": self.jumped_from} | more
-        return Stretch(seq, kind, start, end, self.pace.speed_m_s, **given)  # type: ignore[arg-type]
+        fields: dict[str, object] = {"rates_m_s": self.pace.rates_m_s, "jumped_from": self.jumped_from} | more
+        return Stretch(seq, kind, start, end, self.pace.speed_m_s, **fields)  # type: ignore[arg-type]
 
     def has_place(self, item: MissionItem) -> bool:
         """Whether the item says where; latitude = longitude = 0 is 'here'."""
@@ -74,7 +75,7 @@ class Aboard:
 
     def off_africa(self, item: MissionItem) -> bool:
         """A way point at latitude = longitude = 0, for an autopilot to which that is a place like any other."""
-        moves = (m.WAYPOINT, m.LOITER_UNLIM, m.LOITER_TIME, m.LAND, m.VTOL_LAND)
+        moves = (cmd.WAYPOINT, cmd.LOITER_UNLIM, cmd.LOITER_TIME, cmd.LAND, cmd.VTOL_LAND)
         return item.command in moves and item.x == 0 and item.y == 0
 
     def target(self, item: MissionItem) -> Place | None:
@@ -90,7 +91,7 @@ class Aboard:
         frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
         if not math.isfinite(item.z):
             return None
-        keeps = self.autopilot is Autopilot.ARDUCOPTER and item.command != m.TAKEOFF
+        keeps = self.autopilot is Autopilot.ARDUCOPTER and item.command != cmd.TAKEOFF
         keeps = keeps or (self.autopilot is Autopilot.ARDUPLANE and not self.has_place(item))
         if item.z == 0.0 and keeps:
             if not self.known:
@@ -116,7 +117,7 @@ class Aboard:
 
     def loiter_s(self, item: MissionItem) -> float:
         """Seconds of a loiter in one place."""
-        if item.command != m.LOITER_TIME:
+        if item.command != cmd.LOITER_TIME:
             return math.inf
         return max(0.0, item.params[0]) if math.isfinite(item.params[0]) else math.inf
 

@@ -4,12 +4,12 @@ What is assumed of ArduPlane (commands_logic.cpp, `verify_nav_wp`; AP_L1_Control
 
 - A way point counts as reached at its own acceptance radius (param2), else at `turn_distance`: the smaller of
   WP_RADIUS and the L1 distance, times turn/90°. There the turn begins, on an arc of ``turn_radius_m``.
-- Where that is not the tangent length of the corner, the arc is moved along the leg before it by the difference, and
-  the leg behind it aside by its sine: both are widened by that.
-- Nor does it fly the arc itself (`tracking`): what it is off it in calm air beyond ``track_error_m`` widens both too.
-- Altitude runs evenly along what is flown, from the middle of one arc to that of the next. ArduPlane reckons along
-  the straight line between way points instead, and from where a turn begins it is after the altitude of the way point:
-  what lies between all of these is judged besides (``Flight.instead``).
+- Where that is not the tangent length of the corner, the arc moves along the leg before it by the difference, and the
+  leg behind it to the side by its sine: both are widened by that.
+- It leaves the arc in calm air too (`tracking`): by what exceeds ``track_error_m`` both legs are widened as well.
+- Altitude changes evenly along what is flown, from the middle of one arc to that of the next. ArduPlane computes it
+  along the straight line between way points instead, and aims at the altitude of the way point once a turn begins: all
+  altitudes between these are judged too (``Flight.instead``).
 - Behind a circle a leg may begin anywhere on it.
 
 Corners whose arcs do not fit between their way points are named as not judged, and left sharp.
@@ -25,11 +25,11 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.check.rtl.returning import circle_growth
+from gcsplan.check.circles import circle_growth
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
@@ -41,13 +41,13 @@ SAG_M = 0.2
 """How far an arc may lie outside its chords, which are widened by that."""
 
 FIT_M = 0.25
-"""By so much arcs of neighbours may overlap: what the wire's rounding makes of arcs that just touch."""
+"""Arcs of neighbouring corners may overlap by this: rounding on the wire moves arcs that just touch."""
 
 UNFITTING = "what is flown there is not judged"
 
 LEAST_TURN = math.radians(0.02)
 ABOUT = math.radians(170.0)
-"""A corner that turns by less is none; one that turns by more is a turn about, whose way point lies far off."""
+"""Below `LEAST_TURN` a leg goes on straight; above `ABOUT` it turns about, on an arc that begins far before its end."""
 
 MOST_BANK_DEG = 45.0
 """ArduPlane's ROLL_LIMIT_DEG, default."""
@@ -89,7 +89,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
     flight.not_judged += [
         f"item {k}: flies {item.params[2]:.0f} m past its way point before it turns (param3): that is not judged"
         for k, item in enumerate(mission.items, mission.first_seq)
-        if item.command == m.WAYPOINT and item.params[2] >= 1.0
+        if item.command == cmd.WAYPOINT and item.params[2] >= 1.0
     ]
     wander_m = 0.0
     for first, last in _runs(flight.stretches):
@@ -155,7 +155,7 @@ class _Run:
         half = np.array([0.5 * self.radius * abs(c.turn) for c in self.corners])
         tangent = np.array([c.tangent for c in self.corners])
         self.straight_m = self.long_m - tangent[:-1] - tangent[1:]
-        # Arcs may overlap by `FIT_M`: what lies back from one to the next is not climbed on.
+        # Arcs may overlap by `FIT_M`: a straight part of negative length has no climb.
         self.flown_m = half[:-1] + np.maximum(self.straight_m, 0.0) + half[1:]
         self.half_m = half
 
@@ -194,9 +194,9 @@ class _Run:
             flight.not_judged.append(
                 f"item {seqs}: {takes} of the leg to item {s.seq}, which is {self.long_m[k]:.0f} m long: {UNFITTING}"
             )
-            # Left sharp, so that what is judged of the rest makes sense.
+            # Left sharp, so that the rest can be judged.
             found[k], found[k + 1] = _Corner(off_m=a.off_m), _Corner(off_m=b.off_m)
-        for k, s in enumerate(self.run[:-1]):  # what a leg is too short to settle on stays for the next turn
+        for k, s in enumerate(self.run[:-1]):  # on a leg too short to settle, the offset stays for the next turn
             if self.long_m[k] - found[k].tangent - found[k + 1].tangent < SETTLES_S * s.speed_m_s:
                 found[k + 1] = replace(found[k + 1], off_m=found[k + 1].off_m + found[k].off_m)
         return found
@@ -204,7 +204,7 @@ class _Run:
     def _begins_m(self, mission: Mission, s: Stretch, turn: float, flight: Flight) -> tuple[float, float]:
         """How far before the end of ``s`` the turn behind it begins, at least and at most."""
         item = _item(mission, s.seq)
-        if item is None or item.command != m.WAYPOINT:
+        if item is None or item.command != cmd.WAYPOINT:
             return 0.0, 0.0  # a take-off ends where its height is reached, not before
         if math.isfinite(item.params[1]) and item.params[1] > 0.0:
             return item.params[1], item.params[1]
@@ -220,7 +220,7 @@ class _Run:
         return least, most
 
     def _widen_m(self, k: int) -> float:
-        """What a leg is widened by: how late or early the turn before it began, the circle that it leaves."""
+        """How much a leg is widened: by a turn before it that began late or early, and by a circle that it leaves."""
         c = self.corners[k]
         return c.off_m + (self.behind_m if k == 0 else 0.0)
 
@@ -275,7 +275,7 @@ class _Run:
             kept.append(track[-1])
         places = [self._place(p, z) for p, z, _ in kept]
         if not self.corners[k].turn:
-            places[0] = s.start  # the very same numbers as before
+            places[0] = s.start  # exactly the same numbers
         if not self.corners[k + 1].turn:
             places[-1] = s.end
         for i, (a, b) in enumerate(pairwise(places)):
@@ -303,7 +303,7 @@ class _Run:
             )
 
     def instead(self, k: int) -> Iterator[Stretch]:
-        """What ArduPlane's own reckoning of altitude makes of leg ``k``: along the line between the way points."""
+        """Leg ``k`` at the altitudes that ArduPlane computes: along the line between the way points."""
         s = self.run[k]
         a, b = self.corners[k], self.corners[k + 1]
         z0, z1 = self.points[k, 2], self.points[k + 1, 2]
@@ -313,7 +313,7 @@ class _Run:
         whole = max(float(self.flown_m[k]), 1e-9)
         leaves, reaches = z0 + slope * a.tangent, z1 - slope * b.tangent
         first, last = self.half_m[k] / whole, 1.0 - self.half_m[k + 1] / whole
-        # Over half an arc: all between the way point's altitude and both ways to reckon that of its other end.
+        # Over half an arc: all between the way point's altitude and both altitudes computed for its other end.
         for corner, at, other, even in (
             (a, z0, leaves, z0 + (z1 - z0) * first), (b, z1, reaches, z0 + (z1 - z0) * last),
         ):  # fmt: skip
@@ -344,7 +344,7 @@ def _chord(radius: float, heading: float, turn: float) -> Floats:
 
 
 def _moves(s: Stretch) -> bool:
-    """A stretch along which the aircraft gets on, and at whose ends it turns by arcs."""
+    """True for a stretch that leads to another place, and at whose ends the aircraft turns on arcs."""
     north = (s.end[0] - s.start[0]) * 111_195.0
     east = (s.end[1] - s.start[1]) * 111_195.0 * math.cos(math.radians(s.start[0]))
     circles = s.reach_m > 0.0  # a climb in circles, which turns as it is

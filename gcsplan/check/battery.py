@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from itertools import groupby, repeat
 from typing import Any
 
-from gcsplan.check.rtl.returning import flat_m
+from gcsplan.check.geodesy import flat_m
+from gcsplan.check.rtl.model import RULES
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.vehicle import Vehicle
@@ -38,7 +39,7 @@ class LegBattery:
 
 @dataclass(frozen=True, slots=True)
 class BatteryHome:
-    """Whether the battery reaches for the return, from everywhere.
+    """Whether the battery reaches for the return, from every point.
 
     ``usable_j``: the battery less its reserve. ``most_j``: the most that spent and return come to, anywhere, at
     ``most_at`` (``most_m`` along the mission). ``point_of_no_return``: the first place beyond which the return is not
@@ -90,20 +91,15 @@ class BatteryHome:
         )
 
 
-def battery_home(
-    verdict: Verdict, vehicle: Vehicle, home: Place, level_amsl_m: float, *, climbs_first: bool
-) -> BatteryHome | None:
-    """Spent so far plus the return, from everywhere on a flight; None where the capacity is not given.
-
-    ``climbs_first``: a return never descends below where it begins before it is home; a plane's does.
-    """
-    energy = vehicle.energy
+def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m: float) -> BatteryHome | None:
+    """Spent so far plus the return, from every point of a flight; None where the capacity is not given."""
+    energy, rule = vehicle.energy, RULES[vehicle.autopilot]
     if energy.battery_j is None or not verdict.legs:
         return None
     usable = (1.0 - energy.reserve) * energy.battery_j
 
     def back_j(at: Place) -> float:
-        level = max(level_amsl_m, at[2]) if climbs_first else level_amsl_m
+        level = rule.level_amsl_m(return_amsl_m, at[2])
         vertical = abs(level - at[2]) + max(level - home[2], 0.0)
         return energy.vertical_j_per_m * vertical + energy.horizontal_j_per_m * flat_m(at, home)
 

@@ -2,17 +2,17 @@
 
 What ArduPlane does (commands_logic.cpp, `do_takeoff`, `verify_takeoff`; takeoff.cpp): it notes the course over ground
 on which it was launched, once it is fast, and keeps its nose there, so that a cross wind carries it aside. It climbs
-with the pitch of param1 (4° where that is 0), which is a least one where it has an airspeed sensor: with power to
-spare it climbs up to PTCH_LIM_MAX_DEG, so what lies between the slant and the item's altitude is judged too. As high
-as the item says it makes straight for the next item. The mission holds no heading, so the place of the item is read as
-it is drawn on maps: where the climb-out leads to; without one it leads towards the next item.
+with the pitch of param1 (4° where that is 0). With an airspeed sensor that is the least pitch: with power to spare it
+climbs at up to PTCH_LIM_MAX_DEG, so what lies between the slant and the item's altitude is judged too. At the item's
+altitude it turns towards the next item. The mission holds no heading, so the climb-out leads to the place of the item,
+as maps draw it; without a place it leads towards the next item.
 
 A NAV_LAND glides straight from the way point before it (AP_Landing_Slope.cpp), towards a point before and above its
 place from which the flare is flat: a few metres below the line between both.
 
 Both are exempt from min AGL, climb angle and terrain clearance, as columns are; never from zones, their clearance and
-ceilings. What they must keep is `room_m` over bare ground: the altitude error, and near the ends, where the aircraft
-has just left the ground, half of what it has risen.
+ceilings. They must keep a clearance over bare ground: the altitude error, and near the ends, where the aircraft has
+just left the ground, half of its height above the touch point.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.aboard import Aboard
-from gcsplan.check.rtl.returning import circle_growth, flat_m
+from gcsplan.check.circles import circle_growth
+from gcsplan.check.geodesy import flat_m
 from gcsplan.check.spline import towards
 from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding
@@ -38,7 +39,7 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.world import World
 
 LEAST_PITCH_DEG = 4.0
-"""ArduPlane's where the item gives none."""
+"""ArduPlane's where the item has none."""
 
 NEAR_M = 1.0
 """An item this near to home does not say where a climb-out leads."""
@@ -50,7 +51,7 @@ SPARED = 0.5
 
 
 MOST_PARTS = 24
-"""Of what lies above a climb-out."""
+"""Level bands into which the space above a climb-out is divided."""
 
 REACHED_M = 5.0
 """LOITER_TO_ALT counts an altitude as reached this near to it (navigation.cpp, `loiter_angle_update`)."""
@@ -62,8 +63,8 @@ CHORD_M = 2.0
 """How far the chords of a circle that is climbed in may lie inside it."""
 
 BOUND_M = 0.05
-"""The exact check bounds the ground beside a line, and so calls it a few centimetres too high at times; where the
-aircraft stands on it, that is no violation."""
+"""The exact check bounds the ground beside a line, at times a few centimetres too high; where the aircraft stands on
+it, that is no violation."""
 
 
 def is_wing(vehicle: Vehicle) -> bool:
@@ -111,7 +112,7 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
 def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, Place, float]]:
     """What lies between a climb-out and the altitude of its end, as level lines and half their heights.
 
-    Any three numbers do for a place. What is left out between them and the slant, both altitude errors cover.
+    A place may be any three numbers. The altitude errors cover the gaps between the bands and the slant.
     """
     rise = top[2] - ground[2]
     parts = min(max(1, math.ceil(0.5 * rise / max(limits.altitude_error_m, 0.1))), MOST_PARTS)
@@ -126,9 +127,9 @@ def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, 
 
 
 def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bool:
-    """LOITER_TO_ALT right behind a climb-out that ends on its circle: the take-off goes on in circles; False if not.
+    """LOITER_TO_ALT right behind a climb-out that ends on its circle: the take-off goes on in circles. Else False.
 
-    The aircraft may be anywhere within the circle, on whose edge it was, as low as the climb-out left it.
+    The aircraft may be anywhere within the circle, as low as the climb-out ended.
     """
     before = pilot.flight.stretches[-1] if pilot.flight.stretches else None
     target = pilot.target(item) if pilot.has_place(item) else None
@@ -143,7 +144,8 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
         pilot.add(seq, "takeoff", a, b, column=True, reach_m=reach_m - radius_m + CHORD_M)
     pilot.add(seq, "takeoff", target, target, reach_m=reach_m)
     pilot.instead(seq, "takeoff", low, target, column=True, reach_m=reach_m)
-    middle, half = 0.5 * (low[2] + target[2]), 0.5 * (target[2] - low[2])  # steeper than judged, it climbs on the way
+    # A climb that is steeper than judged reaches these altitudes before the circle.
+    middle, half = 0.5 * (low[2] + target[2]), 0.5 * (target[2] - low[2])
     start, end = ((*place[:2], middle) for place in (before.start, before.end))
     pilot.instead(seq, "takeoff", start, end, column=True, band_m=half)
     pilot.note(f"item {seq}: the take-off goes on in circles, judged as {reach_m:.0f} m wide all the way up")
@@ -198,7 +200,7 @@ def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
 def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Place]:
     """The second half of a glide as it is flown below its line: towards where the flare begins, then to the ground.
 
-    Any three numbers do for a place; empty where the line is not undercut. AP_Landing_Slope.cpp,
+    A place may be any three numbers. Empty where the glide stays on its line. AP_Landing_Slope.cpp,
     `type_slope_setup_landing_glide_slope`, with the defaults.
     """
     fall = top[2] - ground[2]
@@ -217,7 +219,7 @@ def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Pl
 
 
 def slants(stretches: Sequence[Stretch]) -> list[Stretch]:
-    """Those stretches that leave the ground, or come down to it, on a slant; their ends on the ground are ends."""
+    """The stretches that leave the ground, or come down to it, on a slant."""
     return [s for s in stretches if s.column and s.kind in ("takeoff", "land") and flat_m(s.start, s.end) > SAME_M]
 
 
@@ -238,7 +240,7 @@ def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World)
         touch = mine[home[kind]]
         point = touch.start if kind == "takeoff" else touch.end
         for s in mine:
-            worst = slant_room(_in_plane(s, world), _one(point, world), s.reach_m, vehicle.limits, world.airspace)
+            worst = slant_shortage(_in_plane(s, world), _one(point, world), s.reach_m, vehicle.limits, world.airspace)
             if worst is not None:
                 found.append(_low(s, *worst, world))
             steep = math.degrees(math.atan2(s.start[2] - s.end[2], max(flat_m(s.start, s.end), 1e-9)))
@@ -249,13 +251,13 @@ def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World)
     return found
 
 
-def slant_room(
+def slant_shortage(
     line: Floats, touch: Floats, reach_m: float, limits: Limits, air: Airspace
 ) -> tuple[float, float, float, float] | None:
     """The worst place where ``line`` (2, 3), rising from ``touch`` (3,) or falling to it, is too near to bare ground.
 
-    (east, north, amsl, metres missing), or None where it has its room all along. The room that is wanted rises evenly
-    from 0 at ``touch`` to the altitude error, so both parts of the line are straight lines below it.
+    (east, north, amsl, metres missing), or None where it is high enough all along. The clearance that is needed rises
+    evenly from 0 at ``touch`` to the altitude error, so both parts of the line are straight lines below it.
     """
     a, b = (line[0], line[1]) if line[0, 2] <= line[1, 2] else (line[1], line[0])
     rise = float(b[2] - a[2])
@@ -264,7 +266,7 @@ def slant_room(
     error = limits.altitude_error_m
     begun = float(a[2] - touch[2])
 
-    def room(z: float) -> float:
+    def clearance(z: float) -> float:
         return min(error, SPARED * max(z - float(touch[2]), 0.0))
 
     split = min(max((error / SPARED - begun) / rise, 0.0), 1.0)
@@ -273,10 +275,11 @@ def slant_room(
     for p, q in ((a, middle), (middle, b)):
         if float(np.linalg.norm(q - p)) <= 1e-6:
             continue
-        starts.append(p - [0.0, 0.0, room(p[2])])
-        ends.append(q - [0.0, 0.0, room(q[2])])
+        starts.append(p - [0.0, 0.0, clearance(p[2])])
+        ends.append(q - [0.0, 0.0, clearance(q[2])])
         low = p[2] - touch[2] < error / SPARED - 1e-9
-        track.append(reach_m if low else limits.track_error_m + reach_m)  # on the strip it is where the strip is
+        # On the strip there is no track error.
+        track.append(reach_m if low else limits.track_error_m + reach_m)
         height.append(0.0)
     plain = Limits(min_agl_m=0.0)
     legs = Legs(np.array(starts), np.array(ends), np.zeros(len(starts), bool), np.array(track), np.array(height))
@@ -296,7 +299,7 @@ def circle_missing_m(low: Floats, reach_m: float, limits: Limits, air: Airspace)
 
 
 def bare(air: Airspace) -> Airspace:
-    """The airspace over bare ground: what stands beside the strip is not on it."""
+    """The airspace over bare ground, without what stands beside the strip."""
     surface = air.surface
     if surface.top_m is surface.ground_m:
         return air

@@ -1,24 +1,30 @@
-"""Commands that a flight passes over, because they move nothing; and params that make another flight of a command.
+"""Commands that move nothing, and params with which a command is flown in another way.
 
-The whole table, command by autopilot by param, stands in docs/safety.md.
+The whole table, by command, autopilot and param, is in docs/safety.md.
 """
 
 from __future__ import annotations
 
 import math
 
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot
 
-PARACHUTE, RELEASE = 208, 2.0
-LOITER_TO_ALT = 31
+RELEASE = 2.0  # PARACHUTE_ACTION
 
 UNMOVED = frozenset(
     {
-        m.CONDITION_DELAY, 114, 115, m.DO_CHANGE_SPEED, 181, 182, 183, 184, 188, 189,
-        195, 196, 197, 200, 201, 202, 203, 204, 205, 206, 207, 211, 214, 215, 216, 217,
-        530, 531, 532, 534, 600, 1000, 1001, 2000, 2001, 2003, 2500, 2501,
+        cmd.CONDITION_DELAY, cmd.CONDITION_DISTANCE, cmd.CONDITION_YAW, cmd.DO_CHANGE_SPEED, cmd.DO_SET_RELAY,
+        cmd.DO_REPEAT_RELAY, cmd.DO_SET_SERVO, cmd.DO_REPEAT_SERVO, cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START,
+        cmd.DO_SET_ROI_LOCATION, cmd.DO_SET_ROI_WPNEXT_OFFSET, cmd.DO_SET_ROI_NONE, cmd.DO_CONTROL_VIDEO,
+        cmd.DO_SET_ROI, cmd.DO_DIGICAM_CONFIGURE, cmd.DO_DIGICAM_CONTROL, cmd.DO_MOUNT_CONFIGURE,
+        cmd.DO_MOUNT_CONTROL, cmd.DO_SET_CAM_TRIGG_DIST, cmd.DO_FENCE_ENABLE, cmd.DO_GRIPPER,
+        cmd.DO_SET_CAM_TRIGG_INTERVAL, cmd.DO_SET_RESUME_REPEAT_DIST, cmd.DO_SPRAYER,
+        cmd.DO_SEND_SCRIPT_MESSAGE, cmd.SET_CAMERA_MODE, cmd.SET_CAMERA_ZOOM, cmd.SET_CAMERA_FOCUS,
+        cmd.SET_CAMERA_SOURCE, cmd.JUMP_TAG, cmd.DO_GIMBAL_MANAGER_PITCHYAW, cmd.DO_GIMBAL_MANAGER_CONFIGURE,
+        cmd.IMAGE_START_CAPTURE, cmd.IMAGE_STOP_CAPTURE, cmd.DO_TRIGGER_CONTROL, cmd.VIDEO_START_CAPTURE,
+        cmd.VIDEO_STOP_CAPTURE,
     }
 )  # fmt: skip
 """Commands that move nothing but cameras, servos, speeds and clocks (CONDITION_* delay only the next DO_ command).
@@ -30,17 +36,16 @@ Not among them, though they go nowhere themselves: DO_SET_PARAMETER 180, DO_AUTO
 
 def moves_nothing(command: int, first: float) -> bool:
     """True for a command (``first`` is its param1) after which the flight goes on as if it were not there."""
-    return command in UNMOVED or (command == PARACHUTE and first != RELEASE)
+    return command in UNMOVED or (command == cmd.DO_PARACHUTE and first != RELEASE)
 
 
-LAND_STARTS = (188, 189)
-"""DO_RETURN_PATH_START, DO_LAND_START."""
+LAND_STARTS = (cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START)
 
 FW_DESCENT = 1.0  # NAV_VTOL_LAND_OPTIONS
 
 
 def flown_otherwise(item: MissionItem, mission: Mission) -> str:
-    """Why what ``item`` (as stored) makes its autopilot fly is not what its command says; empty where it is.
+    """Why the autopilot flies ``item`` (as stored) in another way than its command says; empty if it does not.
 
     PX4: a precision landing looks for its beacon (navigator/precland.cpp); a hold that is no number has no known end.
     ArduPlane: a VTOL landing may begin as a fixed wing's spiral (quadplane.cpp, `landing_with_fixed_wing_spiral_
@@ -48,13 +53,13 @@ def flown_otherwise(item: MissionItem, mission: Mission) -> str:
     """
     first, second = item.params[:2]
     if mission.autopilot is Autopilot.PX4:
-        if item.command == m.LAND and second >= 1.0:
+        if item.command == cmd.LAND and second >= 1.0:
             return "a precision landing (param2) looks for its beacon, and where is not known"
-        if item.command in (m.WAYPOINT, m.LOITER_TIME, m.DELAY) and not math.isfinite(first):
+        if item.command in (cmd.WAYPOINT, cmd.LOITER_TIME, cmd.DELAY) and not math.isfinite(first):
             return f"a hold of {first} s (param1) has no end that is known"
     if mission.autopilot is Autopilot.ARDUPLANE:
-        if item.command == m.VTOL_LAND and first == FW_DESCENT:
+        if item.command == cmd.VTOL_LAND and first == FW_DESCENT:
             return "a descent as a fixed wing (param1) is flown as the autopilot likes"
-        if item.command == m.RTL and any(i.command in LAND_STARTS for i in mission.items):
+        if item.command == cmd.RTL and any(i.command in LAND_STARTS for i in mission.items):
             return "a return leads on to DO_LAND_START, by RTL_AUTOLAND"
     return ""

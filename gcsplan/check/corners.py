@@ -1,4 +1,4 @@
-"""Corners as autopilots cut them: where a vehicle turns before it is there, and what that widens.
+"""Corners as autopilots cut them: where a vehicle turns before the way point, and how much that widens its legs.
 
 A way point counts as reached within a radius. There the vehicle turns, and flies to where the next leg ends. Facts:
 
@@ -8,16 +8,16 @@ A way point counts as reached within a radius. There the vehicle turns, and flie
 - ArduCopter (SCurve.cpp, `advance_target_along_track`): it begins the next leg while it still brakes on this one, where
   the middle of the turn lies within WPNAV_RADIUS (2 m), and not in the first half of either leg. The item's own radius
   is not stored. It stops at a hold, before a landing, a return or a circle.
-- ArduPlane (commands_logic.cpp, `verify_nav_wp`): param2 in whole metres, or `turn_distance` where that is 0. What
-  turns with a radius is `arcs`'; here is what flies as a VTOL.
+- ArduPlane (commands_logic.cpp, `verify_nav_wp`): param2 in whole metres, or `turn_distance` where that is 0. Fixed
+  wings, which turn with a radius, are in `arcs`; this is the VTOL.
 - Behind a circle the next leg begins anywhere on it.
 
-Nothing is assumed of how a vehicle gets onto its next leg, but that it stays between that leg and the straight line
+The only assumption on how a vehicle gets onto its next leg is that it stays between that leg and the straight line
 from where it turned to the leg's end. With the turn begun R before a corner of angle A, that line is R·sin(A) off the
 next leg at its beginning and on it at its end, and no more than R·sin(A)·cos(A) off the leg before.
 
-What lies within ``track_error_m`` and ``altitude_error_m`` is in them by their definition (corners are named there).
-What lies beyond widens the legs, and is flown instead of them. A vehicle whose ``corner_accel_m_s2`` is not bounded
+``track_error_m`` and ``altitude_error_m`` include corners by definition, so what lies within them widens nothing. What
+lies beyond widens the legs, and is flown instead of them. A vehicle whose ``corner_accel_m_s2`` is not bounded
 turns on the spot by definition.
 """
 
@@ -29,11 +29,12 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from gcsplan.check.arcs import bend
-from gcsplan.check.rtl.returning import circle_growth, flat_m
+from gcsplan.check.circles import circle_growth
+from gcsplan.check.geodesy import flat_m
 from gcsplan.check.spline import Vector, towards
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
@@ -41,14 +42,14 @@ from gcsplan.world.frame import Frame
 __all__ = ["round_corners"]
 
 PARTS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
-"""Of a leg, each widened by what its beginning needs."""
+"""Parts of a leg, each widened by what its beginning needs."""
 
 SAME_M = 0.02
 UNJUDGED = "that is not judged"
 
 
 def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tuning: Tuning = DEFAULTS) -> None:
-    """Put into ``flight`` what is flown at the corners of ``mission`` (as stored): arcs, or legs that are widened."""
+    """Add to ``flight`` what is flown at the corners of ``mission`` (as stored): arcs, or widened legs."""
     if vehicle.turn_radius_m > 0.0:
         bend(flight, mission, vehicle, frame, tuning)
         return
@@ -64,7 +65,7 @@ def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Fra
 class _Off:
     """How far from the beginning of a leg a vehicle may begin it: to the side, and in height.
 
-    ``meant``: it is where the mission has it, on a circle; what the vehicle may be off comes on top of that.
+    ``meant``: the mission itself puts it there, on a circle; the vehicle's error comes on top.
     """
 
     aside_m: float = 0.0
@@ -73,7 +74,7 @@ class _Off:
 
 
 class _Cutter:
-    """Goes along a flight from leg to leg, with what it may be off at the beginning of each."""
+    """Goes along a flight from leg to leg, with how far it may be off at the beginning of each."""
 
     def __init__(self, flight: Flight, mission: Mission, vehicle: Vehicle, tuning: Tuning) -> None:
         self.mission, self.tuning, self.limits = mission, tuning, vehicle.limits
@@ -97,11 +98,11 @@ class _Cutter:
             begun = off if last is None else self._leave(last, s, off, stops)
             if s.column:
                 if last is None and s.kind == "land" and self._has_place(s.seq):
-                    begun = _Off()  # off the circle it flies to its place first
+                    begun = _Off()  # from the circle it flies to its place first
                 found += self._parts(s, (0.0, 1.0), self._beyond(replace(begun, height_m=0.0), s), fading=False)
                 climbed = s.kind == "takeoff" and self.mission.autopilot is Autopilot.PX4
                 off = _Off(0.0, self.tuning.px4_height_m if climbed else 0.0)
-                if s.kind == "rtl":  # it goes on from where it climbed, or as low as it came; else that ends here
+                if s.kind == "rtl":  # a climb ends any offset in height
                     off = replace(begun, height_m=0.0) if s.end[2] > s.start[2] else begun
                 last, stops = None, False
                 continue
@@ -113,7 +114,7 @@ class _Cutter:
         return found
 
     def _leave(self, s: Stretch, after: Stretch, off: _Off, stops: bool) -> _Off:
-        """How far off the beginning of ``after`` it may be when it sets out on it; ``off``: of that of ``s``."""
+        """How far from the beginning of ``after`` it may begin it; ``off``: the same of ``s``."""
         turn, long_m = _turn(s, after), flat_m(s.start, s.end)
         sine = 1.0 if after.column else math.sin(min(turn, 0.5 * math.pi))
         rise_m = abs(s.end[2] - s.start[2])
@@ -141,13 +142,13 @@ class _Cutter:
             return 0.0
         if self.copter:
             nearby = self._item(after.seq)
-            curves = nearby is not None and nearby.command == m.SPLINE_WAYPOINT
-            fast = item.command == m.WAYPOINT and after.kind == "cruise" and not (stops or curves)
+            curves = nearby is not None and nearby.command == cmd.SPLINE_WAYPOINT
+            fast = item.command == cmd.WAYPOINT and after.kind == "cruise" and not (stops or curves)
             if fast and self.tuning.copter_radius_m > self.limits.track_error_m:
                 self._say(f"corners are cut within {self.tuning.says('WPNAV_RADIUS', self.tuning.copter_radius_m)}")
             return self.tuning.copter_radius_m if fast else 0.0
         if self.mission.autopilot is Autopilot.PX4:
-            own = item.params[1] if item.command == m.WAYPOINT else 0.0
+            own = item.params[1] if item.command == cmd.WAYPOINT else 0.0
             if math.isfinite(own) and own > 1e-7:
                 return own
             if self.tuning.px4_radius_m > self.limits.track_error_m:
@@ -157,7 +158,7 @@ class _Cutter:
         return self._plane_radius_m(s, item, turn)
 
     def _plane_radius_m(self, s: Stretch, item: MissionItem, turn: float) -> float:
-        if item.command != m.WAYPOINT:
+        if item.command != cmd.WAYPOINT:
             return 0.0
         if item.params[2] >= 1.0:
             words = (
@@ -174,7 +175,7 @@ class _Cutter:
     # -- what is flown -------------------------------------------------------------------------------------------
 
     def _before(self, s: Stretch, after: Stretch, begun: _Off, stops: bool) -> Iterator[Stretch]:
-        """The end of ``s``, from where it turns on: what is flown from there may not yet lie beside ``after``."""
+        """The end of ``s`` from where it turns: what is flown from there need not lie beside ``after``."""
         radius_m, long_m = self._radius_m(s, after, turn := _turn(s, after), stops), flat_m(s.start, s.end)
         aside_m, height_m = self._beyond(begun, after)
         if self.copter or radius_m >= long_m:
@@ -186,12 +187,12 @@ class _Cutter:
     def _parts(
         self, s: Stretch, cuts: Sequence[float], off_m: tuple[float, float], *, fading: bool
     ) -> Iterator[Stretch]:
-        """``s`` between ``cuts``, and what flies its way instead, wider and higher by ``off_m``, in the end by none."""
+        """``s`` between ``cuts``, and its wider and higher form by ``off_m``, which falls to 0 at the end."""
         aside_m, height_m = off_m
         if aside_m <= 1e-9 and height_m <= 0.0:
             return
         for one in (s, *self.twins.get(_way(s), ())):
-            # In the terrain frame height runs over the ground: such a leg is not cut.
+            # In the terrain frame height follows the ground: such a leg is not cut.
             for a, b in [(0.0, 1.0)] if one.terrain else pairwise(cuts):
                 left = 1.0 - a if fading else 1.0
                 band_m = height_m if one.kind == "rtl" else left * height_m
@@ -201,7 +202,7 @@ class _Cutter:
                 )  # fmt: skip
 
     def _beyond(self, off: _Off, s: Stretch) -> tuple[float, float]:
-        """What is off on ``s``; 0 where the vehicle's own errors hold it.
+        """The offset on ``s``; 0 where the vehicle's own errors include it.
 
         A return is flown at the altitude at which it began: the error of that altitude comes on top.
         """

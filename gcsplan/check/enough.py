@@ -1,7 +1,7 @@
-"""By how much a limit is broken, so that who moves by that much keeps it.
+"""By how much a limit is broken: a leg that is moved by that much keeps it.
 
-The exact check resolves the ground beside a leg as finely as it needs to say yes or no; how deep it is broken it gives
-to a tenth. What is told is what was tried: the leg, moved by it, passes.
+The exact check resolves the ground beside a leg only as finely as a yes or no needs, so its depth of a violation is
+good to a tenth. The depth that is reported was tried: the leg, moved by it, passes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ UPWARD = {"min_agl": 1.0, "terrain_clearance": 1.0, "max_agl": -1.0}
 TRIES = 8
 FINER = 7
 LEAST_PART = 0.8
-"""Of what the kernel gives, from which on it is looked for what is enough."""
+"""The search for the depth begins at this part of what the kernel reports."""
 
 CENTIMETRE = 0.01
 

@@ -1,7 +1,7 @@
 """What an autopilot does with a mission: its items as the straight stretches that are flown.
 
 Only motion is read here, judging is `judge`'s. A command whose motion we do not know is named in ``not_judged``,
-never passed over in silence. Facts about the autopilots: ArduPilot's and PX4's sources and a flown ArduCopter.
+and so is never lost. Facts about the autopilots: ArduPilot's and PX4's sources and a flown ArduCopter.
 
 - Frame-3 altitudes count from where the vehicle arms: the ground at home.
 - The frame of the *target* decides how altitude runs along a leg: to a terrain-frame item it is interpolated above
@@ -17,8 +17,8 @@ never passed over in silence. Facts about the autopilots: ArduPilot's and PX4's 
 - A circle's radius is param3's of LOITER_TURNS, of ArduPlane's LOITER_UNLIM and param2's of its LOITER_TO_ALT; its
   LOITER_TIME takes WP_LOITER_RAD whatever the item says, and so does a radius of 1 m or less (commands_logic.cpp).
 - LAND with a place flies there level (in terrain frame at its height above ground), then descends. ArduCopter before
-  4.6 holds its height above ground wherever it has terrain data: that way is judged besides.
-- RTL: `returning`. Jumps: `route`. Splines: `spline`.
+  4.6 holds its height above ground wherever it has terrain data: that is judged too.
+- RTL: `rtl.model`. Jumps: `route`. Splines: `spline`.
 """
 
 from __future__ import annotations
@@ -30,12 +30,15 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.check.aboard import Aboard
+from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
-from gcsplan.check.commands import LOITER_TO_ALT, flown_otherwise, moves_nothing
-from gcsplan.check.route import DO_JUMP_TAG, fly_in_order
-from gcsplan.check.rtl.returning import PLANE_LOITER_RADIUS_M, circle_growth, flat_m, return_home
+from gcsplan.check.commands import flown_otherwise, moves_nothing
+from gcsplan.check.geodesy import flat_m
+from gcsplan.check.route import fly_in_order
+from gcsplan.check.rtl.model import RULES, about_turn_m, return_pieces
 from gcsplan.check.spline import chords, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -100,25 +103,25 @@ class _Pilot(Aboard):
         command = item.command
         if self.autopilot is Autopilot.PX4 and self.off_africa(item):
             self._lose(seq, item)
-        elif command in (m.TAKEOFF, m.VTOL_TAKEOFF):
+        elif command in (cmd.TAKEOFF, cmd.VTOL_TAKEOFF):
             self._take_off(seq, item)
-        elif command == m.WAYPOINT:
+        elif command == cmd.WAYPOINT:
             self._go(seq, item, hold_s=self.hold(item))
-        elif command == m.SPLINE_WAYPOINT:
+        elif command == cmd.SPLINE_WAYPOINT:
             self._curve(seq, item)
-        elif command in (m.LOITER_UNLIM, m.LOITER_TIME, m.LOITER_TURNS):
+        elif command in (cmd.LOITER_UNLIM, cmd.LOITER_TIME, cmd.LOITER_TURNS):
             self._loiter(seq, item)
-        elif command == LOITER_TO_ALT:
+        elif command == cmd.LOITER_TO_ALT:
             self._change_altitude(seq, item)
-        elif command in (m.LAND, m.VTOL_LAND):
+        elif command in (cmd.LAND, cmd.VTOL_LAND):
             self._land(seq, item)
-        elif command == m.RTL:
+        elif command == cmd.RTL:
             self._return_home(seq)
-        elif command == m.DO_CHANGE_SPEED:
-            self.pace, told = self.pace.changed(item, self.vehicle)
-            if told:
-                self.note(f"item {seq}: {told}")
-        elif command == m.DELAY:
+        elif command == cmd.DO_CHANGE_SPEED:
+            self.pace, note = self.pace.changed(item, self.vehicle)
+            if note:
+                self.note(f"item {seq}: {note}")
+        elif command == cmd.DELAY:
             self._wait(seq, item)
         elif not moves_nothing(command, item.params[0]):
             self._lose(seq, item)
@@ -139,7 +142,7 @@ class _Pilot(Aboard):
         if self.airborne:
             self._lose(seq, item)
             return
-        if item.command == m.TAKEOFF and self.autopilot is Autopilot.ARDUPLANE:
+        if item.command == cmd.TAKEOFF and self.autopilot is Autopilot.ARDUPLANE:
             if is_wing(self.vehicle):
                 climb_out(self, seq, item, self._next(seq))
                 return
@@ -149,7 +152,7 @@ class _Pilot(Aboard):
             )
             self.airborne, self.known = True, False
             return
-        if item.command == m.VTOL_TAKEOFF and self.autopilot is not Autopilot.ARDUPLANE:
+        if item.command == cmd.VTOL_TAKEOFF and self.autopilot is not Autopilot.ARDUPLANE:
             self._lose(seq, item)
             return
         lat, lon, ground = self.home
@@ -202,7 +205,7 @@ class _Pilot(Aboard):
         self._leg(seq, "cruise", target, terrain=terrain, hold_s=hold_s)
 
     def _curve(self, seq: int, item: MissionItem) -> None:
-        """A spline, as ArduCopter flies it from where it passes or stands; what it leaves open is judged both ways."""
+        """A spline as ArduCopter flies it; passing or standing at its beginning are both judged."""
         target, after = self.target(item), self._next(seq)
         terrain = any(i is not None and i.frame in (m.TERRAIN, 11) for i in (item, after))
         copter = self.autopilot is Autopilot.ARDUCOPTER
@@ -214,7 +217,7 @@ class _Pilot(Aboard):
         beyond = self.target(after) if self.has_place(after) else None
         self.at = here
         if beyond is not None and self.hold(item) == 0.0:
-            arrives = towards(here if after.command == m.SPLINE_WAYPOINT else target, beyond)
+            arrives = towards(here if after.command == cmd.SPLINE_WAYPOINT else target, beyond)
         before = self.direction if self.direction is not None else np.zeros(3)
         for leaves, fly in ((before, self.add), (np.zeros(3), self.instead)):
             if fly == self.instead and not before.any():
@@ -228,13 +231,13 @@ class _Pilot(Aboard):
         self.note("splines are judged as ArduCopter 4.1 and later fly them")
 
     def _next(self, seq: int) -> MissionItem | None:
-        """The item that is flown to after ``seq``; None where a jump decides, or nothing comes."""
+        """The item that is flown to after ``seq``, the return where none is left; None where a jump decides."""
         for item in self.items[seq + 1 - self.first_seq :]:
-            if item.command in (m.DO_JUMP, DO_JUMP_TAG):
+            if item.command in (cmd.DO_JUMP, cmd.DO_JUMP_TAG):
                 return None
-            if item.command < 95:
+            if cmd.is_nav(item.command):
                 return item
-        return MissionItem(m.RTL, m.NO_POSITION)
+        return MissionItem(cmd.RTL, m.NO_POSITION)
 
     def _leg(self, seq: int, kind: StretchKind, target: Place, *, terrain: bool, hold_s: float = 0.0) -> None:
         """From here to ``target``, in whatever way the autopilot changes its altitude on the way."""
@@ -244,7 +247,7 @@ class _Pilot(Aboard):
         self.direction = None if hold_s else towards(here, target)
         if self.autopilot is not Autopilot.ARDUPLANE:
             return
-        if self.low_m and not terrain:  # it regains that soon: within half the leg
+        if self.low_m and not terrain:  # it makes up for that within half the leg
             half = tuple(0.5 * (a + b) for a, b in zip(here, target, strict=True))
             low, on = (*here[:2], here[2] - self.low_m), (half[0], half[1], half[2] - self.low_m)
             self.instead(seq, kind, low, on, reach_m=self.around_m)
@@ -257,16 +260,16 @@ class _Pilot(Aboard):
             self.instead(seq, kind, low, high, terrain=terrain, band_m=abs(middle))
 
     def _loiter(self, seq: int, item: MissionItem) -> None:
-        turns = item.command == m.LOITER_TURNS
+        turns = item.command == cmd.LOITER_TURNS
         if turns and self.autopilot is Autopilot.PX4:  # refused on upload
             self._lose(seq, item)
             return
         plane = self.autopilot is Autopilot.ARDUPLANE
         reach_m = 0.0
         if turns or plane:
-            reach_m = self._circle(seq, 0.0 if item.command == m.LOITER_TIME else item.params[2])
+            reach_m = self._circle(seq, 0.0 if item.command == cmd.LOITER_TIME else item.params[2])
         if turns and not plane:
-            self.circle_m = reach_m  # a radius once given holds for later circles that give none
+            self.circle_m = reach_m  # holds for later circles without a radius
         self._go(seq, item, short_m=0.0 if plane else reach_m)
         if not self.known:
             return
@@ -276,10 +279,10 @@ class _Pilot(Aboard):
         self.add(seq, "loiter", self.at, self.at, reach_m=reach_m, hold_s=hold_s)
         self.direction = None
 
-    def _circle(self, seq: int, given_m: float) -> float:
-        """Radius of a circle for which an item gives ``given_m`` (the sign is the direction)."""
+    def _circle(self, seq: int, radius_m: float) -> float:
+        """Radius of a circle whose item says ``radius_m`` (the sign is the direction)."""
         plane = self.autopilot is Autopilot.ARDUPLANE
-        radius_m = abs(given_m) if math.isfinite(given_m) else 0.0
+        radius_m = abs(radius_m) if math.isfinite(radius_m) else 0.0
         if radius_m > (1.0 if plane else 0.0):
             return max(radius_m, self.vehicle.turn_radius_m)
         parameter, default_m = (
@@ -314,7 +317,7 @@ class _Pilot(Aboard):
         if not self.known or not self.airborne:
             self._lose(seq, item)
             return
-        if item.command == m.LAND and self.autopilot is Autopilot.ARDUPLANE:
+        if item.command == cmd.LAND and self.autopilot is Autopilot.ARDUPLANE:
             if is_wing(self.vehicle):
                 glide(self, seq, item)
                 return
@@ -353,10 +356,9 @@ class _Pilot(Aboard):
             self.flight.not_judged.append(f"item {seq}: the return home is not judged: {why}")
             self.landed = True
             return
-        # Without a turn radius the track error holds it: to turn about takes twice as much.
-        pieces = return_home(
-            self.autopilot, self.at, self.home, self.home[2] + self.rtl_rel_home_m,
-            about_m=2.0 * max(self.vehicle.limits.track_error_m, self.vehicle.turn_radius_m),
+        pieces = return_pieces(
+            RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
+            about_m=about_turn_m(self.vehicle),
         )  # fmt: skip
         for piece in pieces:
             fly = self.instead if piece.instead else self.add
@@ -380,7 +382,7 @@ class _Pilot(Aboard):
             f"item {seq}: what {self.autopilot} flies for command {item.command} is not judged"
         )
         target = self.target(item) if self.has_place(item) else None
-        if target is not None and item.command < 95:
+        if target is not None and cmd.is_nav(item.command):
             self.at, self.known, self.airborne = target, True, True
-        elif item.command < 95 or item.command in (m.DO_JUMP, m.DO_SET_HOME):
+        elif cmd.is_nav(item.command) or item.command in (cmd.DO_JUMP, cmd.DO_SET_HOME):
             self.known = False

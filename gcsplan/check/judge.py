@@ -22,7 +22,7 @@ from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
-from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Violation
@@ -34,7 +34,7 @@ TERRAIN_ERROR_M = 30.0
 """ArduPilot shifts all terrain by up to this when it arms; terrain-frame legs are judged with it."""
 
 HIGHEST_M = 20_000.0
-"""No aircraft that is planned for here gets there; keeps absurd numbers out of the exact check."""
+"""Above any aircraft that gcsplan plans for; keeps absurd numbers out of the exact check."""
 
 
 def judge(
@@ -49,10 +49,10 @@ def judge(
 ) -> Verdict:
     """Judge ``mission`` for ``vehicle`` in ``world``; never raises for a mission that is merely unsafe.
 
-    ``misses``: look too how near it comes to each limit (half as much work again). ``tuning``: the parameters that
+    ``misses``: report too how near it comes to each limit (half as much work again). ``tuning``: the parameters that
     decide where the autopilot turns, where they were read from the vehicle.
     """
-    table = manner(mission.autopilot)
+    table = profile_of(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
     flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
     findings: list[Finding] = []
@@ -69,7 +69,7 @@ def judge(
         flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle")
         return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
     far = [_too_far(s) for s in (*flight.stretches, *flight.instead) if _is_too_far(s, world)]
-    if far:  # the plane does not reach there, and neither does any terrain model that could be loaded
+    if far:  # beyond the projected plane and any terrain model that could be loaded
         return Verdict(mission, (), tuple(findings + far), tuple(flight.not_judged), tuple(flight.notes))
     round_corners(flight, stored, vehicle, world.frame, tuning)
     if vehicle.turn_radius_m > 0.0:
@@ -93,7 +93,7 @@ def judge(
 
 def _refused(mission: Mission) -> list[Finding]:
     """The items that the autopilot will not take: the upload would end there."""
-    refuses, found = manner(mission.autopilot).refuses, []
+    refuses, found = profile_of(mission.autopilot).refuses, []
     for seq, item in enumerate(mission.items, mission.first_seq):
         if why := refuses(item):
             words = f"item {seq}: would be refused on upload: {why}"
@@ -261,7 +261,7 @@ def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict
 
 
 def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None:
-    """What it takes, J/s, to go on without end where the mission does; None where it ends."""
+    """The power, J/s, of a mission's last hold or round, which has no end; None where the mission ends."""
     if flight.loop_seq is not None:
         begun = max((i for i, leg in enumerate(verdict.legs) if leg.jumped_from == flight.loop_seq), default=0)
         round_ = verdict.legs[begun:]

@@ -57,7 +57,7 @@ WORDS = {
     "climb": "steepest climb", "descent": "steepest descent",
 }  # fmt: skip
 LIFT_M = 50_000.0
-"""An altitude error that breaks every limit of height everywhere, and so tells how much room there is to each."""
+"""An altitude error that breaks every limit of height on every leg: by less where there is more room to the limit."""
 
 
 def nearest_misses(
@@ -65,8 +65,8 @@ def nearest_misses(
 ) -> tuple[Miss, ...]:
     """A `Miss` for each limit that the vehicle has, and for the zones that it comes nearest to.
 
-    ``owner`` (N,): the stretch of each leg. Heights are those of the exact check, what lies beside the track within
-    its error included.
+    ``owner`` (N,): the stretch of each leg. Heights are those of the exact check: the lowest or highest within the
+    track error.
     """
     limits = vehicle.limits
     run = np.hypot(*(legs.end - legs.start)[:, :2].T)
@@ -108,12 +108,12 @@ def _heights(
     for v in world.airspace.examine(lifted, limits).violations:
         if v.kind in WORDS and v.kind not in ("zone", "climb", "descent"):
             worst[v.kind] = max(worst.get(v.kind, v), v, key=lambda w: w.by)
-    asked = {"min_agl": limits.min_agl_m, "max_agl": limits.max_agl_m or 0.0, "max_amsl": limits.max_amsl_m or 0.0}
+    limits_m = {"min_agl": limits.min_agl_m, "max_agl": limits.max_agl_m or 0.0, "max_amsl": limits.max_amsl_m or 0.0}
     found = []
     for kind in WORDS:
         if (found_one := worst.get(kind)) is None or abs(found_one.by) > 1.5 * LIFT_M:
             continue
-        room, limit = LIFT_M - found_one.by, asked.get(kind, 0.0)
+        room, limit = LIFT_M - found_one.by, limits_m.get(kind, 0.0)
         value = limit - room if kind in ("max_agl", "max_amsl") else limit + room
         lat, lon = (float(x) for x in world.frame.to_degrees(found_one.east_m, found_one.north_m))
         seq = stretches[int(owner[found_one.leg])].seq

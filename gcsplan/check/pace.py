@@ -10,7 +10,7 @@ from gcsplan.vehicle import Autopilot, Vehicle
 
 AIRSPEED, GROUND_SPEED, CLIMB, DESCENT = 0.0, 1.0, 2.0, 3.0  # SPEED_TYPE
 DEFAULT = -2.0
-"""What puts a speed back to its default; -1 leaves it as it is."""
+"""Sets a speed back to its default; -1 leaves it as it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Pace:
         return cls(vehicle.speed_max_m_s, (vehicle.climb_m_s, vehicle.descent_m_s))
 
     def changed(self, item: MissionItem, vehicle: Vehicle) -> tuple[Pace, str]:
-        """The pace after a DO_CHANGE_SPEED, and what is to be said of it (mostly nothing).
+        """The pace after a DO_CHANGE_SPEED, and a note on it (mostly empty).
 
         On ArduPlane a ground speed is a lower bound, not a target (commands_logic.cpp, `do_change_speed`).
         """

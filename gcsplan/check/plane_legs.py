@@ -48,7 +48,7 @@ class PlaneLegs:
 
 
 def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> PlaneLegs:
-    """The stretches as straight legs of the plane, with all that widens them; terrain-frame ones in many pieces."""
+    """The stretches as straight legs of the plane, with their errors; terrain-frame stretches in many pieces."""
     places = np.array([(s.start, s.end) for s in stretches])
     plane = np.empty_like(places)
     plane[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
@@ -104,7 +104,7 @@ def follow_ground(ends: Floats, surface: Surface) -> tuple[Floats, Floats, Float
     begun = np.concatenate([[0], np.cumsum(parts)[:-1]])
     share = (np.arange(len(piece)) - begun[piece]) / parts[piece]
     f = np.append(t[:-1][piece] + np.diff(t)[piece] * share, 1.0)
-    # The quadratic itself, so that neighbours meet: its chord, and four times its sag at the middle.
+    # The quadratic itself, so that neighbouring pieces meet: its chord, and four times its sag at the middle.
     z = np.append(z[:-1][piece] + (np.diff(z)[piece] + 4.0 * sag[piece] * (1.0 - share)) * share, z[-1])
     en = ends[0, :2] + f[:, None] * (ends[1, :2] - ends[0, :2])
     points = np.column_stack([en, z])
@@ -139,7 +139,7 @@ def _cell_cuts(ends: Floats, surface: Surface, run_m: float) -> Floats:
 
 
 def steep_report(plane: PlaneLegs, report: LegReport, limits: Limits) -> LegReport:
-    """``report`` with the angles of pieces that follow the ground: those of their steepest metre, not of chords."""
+    """``report``, where a piece that follows the ground has the angle of its steepest metre, not of its chord."""
     mine = np.flatnonzero(~np.isnan(plane.steep[:, 0]) & ~plane.legs.column)
     if not len(mine):
         return report

@@ -1,6 +1,6 @@
 """In which order the items of a mission are flown: jumps with their counts, as the autopilots count them.
 
-- A jump's count belongs to the jump and is never given back: reached again after it is used up, it is passed
+- A jump's count belongs to the jump and is never reset: once it is used up, the jump is passed
   (ArduPilot's `AP_Mission::get_next_cmd`, PX4's `getNonJumpItem`). 0 never jumps; −1 is without end on ArduPilot, and
   65,535 rounds on PX4, which keeps 16 bits.
 - ArduPilot counts `MOST_JUMPS` jumps of one mission and takes the rest for used up. Jump tags are ArduPilot's alone.
@@ -17,10 +17,9 @@ from typing import Protocol
 
 from gcsplan.check.commands import LAND_STARTS
 from gcsplan.check.stretch import Flight, Unreached
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 
-JUMP_TAG, DO_JUMP_TAG = 600, 601
 MOST_JUMPS = 15  # AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS on small boards, 100 on large ones; the rest count as used up
 MOST_STEPS = 100_000
 """Items flown one after the other, rounds that repeat others aside, before a mission is given up as endless."""
@@ -113,12 +112,12 @@ def _jumps(mission: Mission) -> dict[int, _Jump]:
     tags: dict[float, int] = {}
     if mission.autopilot.is_ardupilot:
         for index, item in enumerate(items):
-            if item.command == JUMP_TAG:
+            if item.command == cmd.JUMP_TAG:
                 tags.setdefault(item.params[0], index)
     jumps: dict[int, _Jump] = {}
     for index, item in enumerate(items):
-        tagged = item.command == DO_JUMP_TAG and mission.autopilot.is_ardupilot
-        if item.command != m.DO_JUMP and not tagged:
+        tagged = item.command == cmd.DO_JUMP_TAG and mission.autopilot.is_ardupilot
+        if item.command != cmd.DO_JUMP and not tagged:
             continue
         where, count = item.params[0], item.params[1]
         numbered = int(where) - first if first <= where < first + len(items) else None
@@ -146,7 +145,7 @@ def _never(mission: Mission, flight: Flight, seq: int, index: int, *, loop: bool
         landing = next((i for i in range(index, len(items)) if items[i].command in LAND_STARTS), len(items))
     never = [
         i for i in range(index, landing)
-        if not ardupilot or items[i].command < 95 or items[i].command in (m.DO_JUMP, DO_JUMP_TAG)
+        if not ardupilot or cmd.is_nav(items[i].command) or items[i].command in (cmd.DO_JUMP, cmd.DO_JUMP_TAG)
     ]  # fmt: skip
     if never:
         flight.unreached.append(Unreached(seq, first + never[0], first + never[-1], loop))

@@ -4,7 +4,7 @@ A cubic Hermite curve between two way points with a direction at either end, of 
 together exceed `LONGEST` times the distance (ArduCopter 4.1 and later: SplineCurve.cpp, `set_origin_and_destination`;
 AC_WPNav.cpp, `set_spline_destination`). It leaves along the leg before it, or with no direction where the aircraft
 stopped, and arrives parallel to the leg after it, or, if that is a spline too, to the line from its own beginning to
-that one's end. A flown ArduCopter 4.6.0 kept within 1.2 m of these chords, 57 m beside the straight line.
+that one's end. In simulation ArduCopter 4.6.0 flew within 1.2 m of these chords, 57 m beside the straight line.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ Slopes = list[tuple[float, float]]
 
 
 def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[list[Place], float, Slopes]:
-    """The curve's points from ``start`` to ``end`` (both given back exactly), and its bulge beyond their chords.
+    """The curve's points from ``start`` to ``end`` (both returned exactly), and its bulge beyond their chords.
 
     ``leaves``, ``arrives``: (3,) directions with their lengths, metres. Last, for each chord, the steepest rise over
     run of the curve over it, up and down (negative).
     """
     way = towards(start, end)
     both = float(np.linalg.norm(leaves) + np.linalg.norm(arrives))
-    room = LONGEST * float(np.linalg.norm(way))
-    if both > room:
-        leaves, arrives = leaves * (room / both), arrives * (room / both)
+    most = LONGEST * float(np.linalg.norm(way))
+    if both > most:
+        leaves, arrives = leaves * (most / both), arrives * (most / both)
     square = 3.0 * way - 2.0 * leaves - arrives
     cube = leaves + arrives - 2.0 * way
     bend = max(float(np.linalg.norm(2.0 * square)), float(np.linalg.norm(2.0 * square + 6.0 * cube)))
@@ -56,7 +56,7 @@ def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[l
 
 
 def _slopes(leaves: Vector, square: Vector, cube: Vector, pieces: int) -> Slopes:
-    """Steepest slopes of each piece, up and down, looked at in `LOOKS` places and given a part of their spread more."""
+    """Steepest slopes of each piece, up and down, sampled in `LOOKS` places and raised by a part of their spread."""
     t = np.linspace(0.0, 1.0, pieces * LOOKS + 1)[:, None]
     speed = leaves + 2.0 * square * t + 3.0 * cube * t**2
     run = np.hypot(speed[:, 0], speed[:, 1])
@@ -65,7 +65,7 @@ def _slopes(leaves: Vector, square: Vector, cube: Vector, pieces: int) -> Slopes
     known = np.flatnonzero(moves)
     if not len(known):
         return [(np.inf, -np.inf)] * pieces
-    slope = np.interp(np.arange(len(run)), known, slope[known])  # standing still it has none of its own
+    slope = np.interp(np.arange(len(run)), known, slope[known])  # standing still it has no direction
     by_piece = np.column_stack([slope[k : len(slope) - LOOKS + k : LOOKS] for k in range(LOOKS + 1)])
     up, down = by_piece.max(axis=1), by_piece.min(axis=1)
     more = SPREAD * (up - down)

@@ -1,10 +1,10 @@
 """How far from the arc at its corner ArduPlane flies, in calm air.
 
-ArduPlane knows no arcs: where a turn begins it takes the next leg for its course, and closes in on that at 45° at
+ArduPlane has no arcs: where a turn begins it steers for the next leg, and approaches it at 45° at
 most (AP_L1_Control.cpp, `update_waypoint`). A turn begun at the tangent length comes near to the arc, as long as the
 turn is not much more than a right angle and the tangent not much longer than the L1 distance; else it cuts the corner
-or swings wide. `l1_off_m` flies that law. Besides, the aircraft banks late: `late_m` holds what ArduPlane 4.6.0's own
-simulated plane (NAVL1_PERIOD 17) was off at corners of 3° to 120°, on arcs of 100 m at 15 and 21 m/s and of 180 m at
+or swings wide. `l1_off_m` flies that law. The aircraft also banks late: `late_m` is the offset of ArduPlane 4.6.0's own
+simulated plane (NAVL1_PERIOD 17) at corners of 3° to 120°, on arcs of 100 m at 15 and 21 m/s and of 180 m at
 28 m/s: 4 m at 6°, 6 m at 15°, 10 to 16 m from 30° on.
 """
 
@@ -25,7 +25,7 @@ MOST_BANK_DEG, BANK_S = 45.0, 0.5
 """ROLL_LIMIT_DEG, default, and the time in which a simulated aircraft banks."""
 
 STEP_S, CALM_S = 0.1, 30.0
-"""ArduPlane steers ten times a second; what is flown is looked at for so long behind the turn."""
+"""ArduPlane steers ten times a second; the flight is followed for this long behind the turn."""
 
 CAPTURE_SINE = math.sqrt(0.5)
 GRAVITY_M_S2 = 9.80665

@@ -23,7 +23,7 @@ class Tuning:
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> Tuning:
-        """What ``values`` (parameters by name, in their own units) say; defaults for what they do not hold.
+        """What ``values`` (parameters by name, in their own units) say; defaults for the others.
 
         Numbers that are not finite or not positive are left aside.
         """

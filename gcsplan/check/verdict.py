@@ -63,7 +63,7 @@ class LegFigures:
 class Verdict:
     """``mission`` is the one that was judged, as sent; the judgement is of what the autopilot stores of it.
 
-    ``misses``: how near it comes to each limit, where that was asked. ``until_reserve_s``: of a mission that ends in a
+    ``misses``: how near it comes to each limit, on request. ``until_reserve_s``: of a mission that ends in a
     hold or a round without end, how long that may last.
     """
 

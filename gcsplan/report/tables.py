@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gcsplan.check.verdict import LegFigures
-from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.report.markup import THIN, esc, least, minutes, num, place, table
 from gcsplan.report.plan_view import zone_heights
 from gcsplan.report.profile_view import passed
@@ -122,7 +122,7 @@ def _limits(subject: Subject, line: Line | None) -> list[Row]:
         rows.append(("battery", f"{num(may, 1)} ({num(100 * energy.reserve, 0)} kept)",
                      num(verdict.battery_used_percent, 1, "%"), may - verdict.battery_used_percent, "%", "whole flight",
                      5.0))  # fmt: skip
-    items, most = len(verdict.mission.wire_items()), manner(verdict.mission.autopilot).max_items
+    items, most = len(verdict.mission.wire_items()), profile_of(verdict.mission.autopilot).max_items
     if most is not None:
         rows.append(
             ("mission items", num(most), num(items), float(most - items), "", str(verdict.mission.autopilot), 0.0)

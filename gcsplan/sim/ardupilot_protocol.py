@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Home, MissionItem
 from gcsplan.mavlink.protocol.messages import (
     Ack,
@@ -176,7 +177,7 @@ class _ArduPilotList:
         if self._type == RALLY:
             return storage.keep_rally_item(message.item)
         kept = storage.keep_mission_item(message.item, plane=self._plane)
-        if kept.command == storage.DO_JUMP:
+        if kept.command == cmd.DO_JUMP:
             target, known = kept.params[0], max(len(self._board.lists[MISSION]), self._count)
             if target == 0 or target >= known:
                 raise Refused(ERROR)

@@ -10,19 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from gcsplan.mavlink.mission.mission import (
-    FENCE,
-    GLOBAL,
-    LOITER_TURNS,
-    MISSION,
-    RALLY,
-    RELATIVE,
-    TERRAIN,
-    WAYPOINT,
-    Home,
-    MissionItem,
-    float32,
-)
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MISSION, RALLY, RELATIVE, TERRAIN, Home, MissionItem, float32
 from gcsplan.sim.board import (
     INVALID,
     INVALID_PARAM1,
@@ -96,60 +85,62 @@ _FIRST_U16 = (_u16, _zero, _zero, _zero)
 
 # Commands with a place: latitude, longitude, altitude and frame are kept, and of the params what is said here.
 _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
-    16: _FIRST_U16,  # waypoint: hold
-    17: (_zero, _zero, _signed_u16, _zero),  # loiter unlimited: radius
-    18: _NOTHING,  # loiter turns: `_loiter_turns`
-    19: (_u16, _zero, _sign, _positive),  # loiter time
-    21: (_u16, _zero, _zero, _land_sign),  # land: the yaw reads back as 1
-    22: _FIRST_U16,  # take-off
-    30: _FIRST_U16,
-    31: (_zero, _signed_u16, _zero, _positive),
-    82: _FIRST_U16,  # spline waypoint
-    84: _NOTHING,
-    85: _FIRST_U16,
-    92: _FIRST_U16,
-    94: (lambda p: float32(float32(0.01) * _u16(float32(p * 100.0))), _zero, _zero, _zero),
-    179: _FIRST_U16,  # set home
-    188: _NOTHING,
-    189: _NOTHING,
-    191: _NOTHING,
-    195: _FIRST_U16,
-    201: _FIRST_U16,
+    cmd.WAYPOINT: _FIRST_U16,  # waypoint: hold
+    cmd.LOITER_UNLIM: (_zero, _zero, _signed_u16, _zero),  # loiter unlimited: radius
+    cmd.LOITER_TURNS: _NOTHING,  # loiter turns: `_loiter_turns`
+    cmd.LOITER_TIME: (_u16, _zero, _sign, _positive),  # loiter time
+    cmd.LAND: (_u16, _zero, _zero, _land_sign),  # land: the yaw reads back as 1
+    cmd.TAKEOFF: _FIRST_U16,  # take-off
+    cmd.CONTINUE_AND_CHANGE_ALT: _FIRST_U16,
+    cmd.LOITER_TO_ALT: (_zero, _signed_u16, _zero, _positive),
+    cmd.SPLINE_WAYPOINT: _FIRST_U16,  # spline waypoint
+    cmd.VTOL_TAKEOFF: _NOTHING,
+    cmd.VTOL_LAND: _FIRST_U16,
+    cmd.GUIDED_ENABLE: _FIRST_U16,
+    cmd.PAYLOAD_PLACE: (lambda p: float32(float32(0.01) * _u16(float32(p * 100.0))), _zero, _zero, _zero),
+    cmd.DO_SET_HOME: _FIRST_U16,  # set home
+    cmd.DO_RETURN_PATH_START: _NOTHING,
+    cmd.DO_LAND_START: _NOTHING,
+    cmd.DO_GO_AROUND: _NOTHING,
+    cmd.DO_SET_ROI_LOCATION: _FIRST_U16,
+    cmd.DO_SET_ROI: _FIRST_U16,
 }
 
 # Commands without one: they read back in frame 0 at 0, 0, 0.
 _PLACELESS: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
-    20: _NOTHING,  # return to launch
-    83: (_same, _same, _u8, _zero),
-    93: (_same, _i8, _i8, _i8),  # delay: seconds, or hours, minutes, seconds UTC
-    112: (_same, _zero, _zero, _zero),
-    114: (_same, _zero, _zero, _zero),
-    115: (_same, _same, _i8, _u8),
-    177: (_u16, _i16, _zero, _zero),  # jump
-    178: (_u8, _same, _same, _zero),  # change speed
-    181: (_u8, _u8, _zero, _zero),
-    182: (_u8, _i16, _same, _zero),
-    183: (_u8, _u16, _zero, _zero),
-    184: (_u8, _u16, _i16, _same),
-    197: _FIRST_U16,
-    206: (_same, _zero, _u8, _zero),
-    207: _FIRST_U16,
-    208: _FIRST_U16,
-    210: _FIRST_U16,
-    211: (_u8, _u8, _zero, _zero),
-    212: _FIRST_U16,
-    215: _FIRST_U16,
-    216: _FIRST_U16,
-    218: (_u16, _u8, _zero, _zero),
-    222: (_u16, _same, _same, _same),
-    600: (_u16, _zero, _zero, _zero),
-    601: (_u16, _i16, _zero, _zero),
+    cmd.RTL: _NOTHING,  # return to launch
+    cmd.ALTITUDE_WAIT: (_same, _same, _u8, _zero),
+    cmd.DELAY: (_same, _i8, _i8, _i8),  # delay: seconds, or hours, minutes, seconds UTC
+    cmd.CONDITION_DELAY: (_same, _zero, _zero, _zero),
+    cmd.CONDITION_DISTANCE: (_same, _zero, _zero, _zero),
+    cmd.CONDITION_YAW: (_same, _same, _i8, _u8),
+    cmd.DO_JUMP: (_u16, _i16, _zero, _zero),  # jump
+    cmd.DO_CHANGE_SPEED: (_u8, _same, _same, _zero),  # change speed
+    cmd.DO_SET_RELAY: (_u8, _u8, _zero, _zero),
+    cmd.DO_REPEAT_RELAY: (_u8, _i16, _same, _zero),
+    cmd.DO_SET_SERVO: (_u8, _u16, _zero, _zero),
+    cmd.DO_REPEAT_SERVO: (_u8, _u16, _i16, _same),
+    cmd.DO_SET_ROI_NONE: _FIRST_U16,
+    cmd.DO_SET_CAM_TRIGG_DIST: (_same, _zero, _u8, _zero),
+    cmd.DO_FENCE_ENABLE: _FIRST_U16,
+    cmd.DO_PARACHUTE: _FIRST_U16,
+    cmd.DO_INVERTED_FLIGHT: _FIRST_U16,
+    cmd.DO_GRIPPER: (_u8, _u8, _zero, _zero),
+    cmd.DO_AUTOTUNE_ENABLE: _FIRST_U16,
+    cmd.DO_SET_RESUME_REPEAT_DIST: _FIRST_U16,
+    cmd.DO_SPRAYER: _FIRST_U16,
+    cmd.DO_AUX_FUNCTION: (_u16, _u8, _zero, _zero),
+    cmd.DO_GUIDED_LIMITS: (_u16, _same, _same, _same),
+    cmd.JUMP_TAG: (_u16, _zero, _zero, _zero),
+    cmd.DO_JUMP_TAG: (_u16, _i16, _zero, _zero),
 }
 
-_NAN_ALLOWED = {16: {3}, 17: {3}, 21: {3}, 22: {3}, 84: {3}, 85: {2, 3}}  # command: indices of params that may be NaN
+_NAN_ALLOWED = {  # indices of params that may be NaN
+    cmd.WAYPOINT: {3}, cmd.LOITER_UNLIM: {3}, cmd.LAND: {3}, cmd.TAKEOFF: {3}, cmd.VTOL_TAKEOFF: {3},
+    cmd.VTOL_LAND: {2, 3},
+}  # fmt: skip
 _FRAMES = {0: GLOBAL, 2: GLOBAL, 5: GLOBAL, 3: RELATIVE, 6: RELATIVE, 10: TERRAIN, 11: TERRAIN}
 _ALT_LIMIT_M = 83_000.0
-DO_JUMP = 177
 
 
 def keep_mission_item(item: MissionItem, *, plane: bool) -> MissionItem:
@@ -160,7 +151,7 @@ def keep_mission_item(item: MissionItem, *, plane: bool) -> MissionItem:
             raise Refused(INVALID_PARAM1 + index)
     if item.command in (0, 1):
         raise Refused(INVALID)
-    if plane and item.command == 82:
+    if plane and item.command == cmd.SPLINE_WAYPOINT:
         raise Refused(UNSUPPORTED)
     if item.command in _PLACELESS:
         keeps = _PLACELESS[item.command]
@@ -168,7 +159,7 @@ def keep_mission_item(item: MissionItem, *, plane: bool) -> MissionItem:
     if item.command not in _LOCATED:
         raise Refused(UNSUPPORTED)
     keeps = _LOCATED[item.command]
-    if plane and item.command == WAYPOINT:
+    if plane and item.command == cmd.WAYPOINT:
         keeps = (_zero, _byte_capped, _byte_capped, _zero)
     _need_place(item)
     if math.isnan(item.z) or abs(item.z) >= _ALT_LIMIT_M:
@@ -181,7 +172,7 @@ def keep_mission_item(item: MissionItem, *, plane: bool) -> MissionItem:
 
 
 def _kept_params(keeps: tuple[Keep, Keep, Keep, Keep], item: MissionItem) -> tuple[float, float, float, float]:
-    if item.command == LOITER_TURNS:
+    if item.command == cmd.LOITER_TURNS:
         return _loiter_turns(item.params)
     first, second, third, fourth = (keep(value) for keep, value in zip(keeps, item.params, strict=True))
     return first, second, third, fourth
@@ -216,14 +207,13 @@ def in_whole_centimetres(altitude_m: float) -> float:
 
 def home_item(home: Home) -> MissionItem:
     """Item 0 as it reads back: the vehicle's home, whatever was sent."""
-    return MissionItem(WAYPOINT, GLOBAL, x=home.lat_e7, y=home.lon_e7, z=in_whole_centimetres(home.amsl_m))
+    return MissionItem(cmd.WAYPOINT, GLOBAL, x=home.lat_e7, y=home.lon_e7, z=in_whole_centimetres(home.amsl_m))
 
 
 # ── fences ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-_VERTEX = {5001, 5002}
-_CIRCLE = {5003, 5004}
-_RETURN_POINT = 5000
+_VERTEX = {cmd.POLYGON_IN, cmd.POLYGON_OUT}
+_CIRCLE = {cmd.CIRCLE_IN, cmd.CIRCLE_OUT}
 
 
 def keep_fence_item(item: MissionItem) -> MissionItem:
@@ -241,7 +231,7 @@ def keep_fence_item(item: MissionItem) -> MissionItem:
     elif item.command in _CIRCLE:
         # A radius within a millimetre above whole metres is kept as an integer.
         kept = float(int(first)) if 0 < first < 2**31 and first - int(first) < 0.001 else first
-    elif item.command == _RETURN_POINT:
+    elif item.command == cmd.FENCE_RETURN_POINT:
         kept = 0.0
     else:
         raise Refused(UNSUPPORTED)
@@ -262,7 +252,7 @@ def fence_is_valid(items: Sequence[MissionItem], storage_bytes: int) -> bool:
             left -= 1
             needed += 8
         else:
-            returns += item.command == _RETURN_POINT
+            returns += item.command == cmd.FENCE_RETURN_POINT
             circle = item.command in _CIRCLE
             # A NaN radius fails here too (it has crashed a build with floating point traps).
             if left or returns > 1 or (circle and not first >= FLT_EPSILON):
@@ -278,7 +268,7 @@ def fence_is_valid(items: Sequence[MissionItem], storage_bytes: int) -> bool:
 
 def keep_rally_item(item: MissionItem) -> MissionItem:
     """A rally point as it will read back: whole metres, no params, autocontinue 0. Raises `Refused`."""
-    if item.command != 5100:
+    if item.command != cmd.RALLY_POINT:
         raise Refused(UNSUPPORTED)
     _need_place(item)
     if item.z < -32768 or item.z > 32767:

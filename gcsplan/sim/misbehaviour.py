@@ -13,6 +13,7 @@ import random
 from dataclasses import dataclass
 
 from gcsplan.errors import Problem, UsageError
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import MISSION, MissionItem, float32
 from gcsplan.mavlink.protocol.messages import Packet
 from gcsplan.sim.board import Refused
@@ -169,7 +170,7 @@ def spoilt(item: MissionItem, field: str) -> MissionItem:
     if field == "z":
         return dataclasses.replace(item, z=_another(item.z))
     if field == "command":
-        return dataclasses.replace(item, command=17 if item.command == 16 else 16)
+        return dataclasses.replace(item, command=cmd.LOITER_UNLIM if item.command == cmd.WAYPOINT else cmd.WAYPOINT)
     if field == "frame":
         return dataclasses.replace(item, frame={0: 3, 3: 0, 5: 6, 6: 5}.get(item.frame, 0))
     if field == "autocontinue":

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, NO_POSITION, RALLY, MissionItem, float32
 from gcsplan.sim.board import ERROR, INVALID_PARAM1, UNSUPPORTED, UNSUPPORTED_FRAME, Refused
 
@@ -54,33 +55,39 @@ _HEADING_ONLY = (_zero, _zero, _zero, _heading)
 
 # Commands with a place, in frames 0, 3, 5, 6: the params that come back.
 _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
-    16: (_same, _same, _zero, _heading),  # waypoint: hold, acceptance radius
-    17: (_zero, _zero, _same, _heading),  # loiter unlimited
-    19: (_same, _positive, _same, _positive),  # loiter time
-    21: (_zero, _u16, _zero, _heading),  # land: precision
-    22: _HEADING_ONLY,  # take-off
-    31: (_positive, _same, _zero, _positive),
-    84: _HEADING_ONLY,
-    85: _HEADING_ONLY,
-    195: _NOTHING,
-    4501: _NOTHING,
-    5000: _NOTHING,
-    5001: (_vertices, _zero, _zero, _zero),
-    5002: (_vertices, _zero, _zero, _zero),
-    5003: (_same, _zero, _zero, _zero),
-    5004: (_same, _zero, _zero, _zero),
-    5100: _NOTHING,
+    cmd.WAYPOINT: (_same, _same, _zero, _heading),  # waypoint: hold, acceptance radius
+    cmd.LOITER_UNLIM: (_zero, _zero, _same, _heading),  # loiter unlimited
+    cmd.LOITER_TIME: (_same, _positive, _same, _positive),  # loiter time
+    cmd.LAND: (_zero, _u16, _zero, _heading),  # land: precision
+    cmd.TAKEOFF: _HEADING_ONLY,  # take-off
+    cmd.LOITER_TO_ALT: (_positive, _same, _zero, _positive),
+    cmd.VTOL_TAKEOFF: _HEADING_ONLY,
+    cmd.VTOL_LAND: _HEADING_ONLY,
+    cmd.DO_SET_ROI_LOCATION: _NOTHING,
+    cmd.CONDITION_GATE: _NOTHING,
+    cmd.FENCE_RETURN_POINT: _NOTHING,
+    cmd.POLYGON_IN: (_vertices, _zero, _zero, _zero),
+    cmd.POLYGON_OUT: (_vertices, _zero, _zero, _zero),
+    cmd.CIRCLE_IN: (_same, _zero, _zero, _zero),
+    cmd.CIRCLE_OUT: (_same, _zero, _zero, _zero),
+    cmd.RALLY_POINT: _NOTHING,
 }
 
 # Commands that PX4 takes in frame 2 alone.
 _PLACELESS = frozenset({
-    20, 93, 112, 114, 177, 178, 179, 183, 187, 189, 197, 200, 201, 203, 204, 205, 206, 211, 212, 214, 260, 400,
-    530, 532, 534, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 42600,
-})  # fmt: skip
+        cmd.RTL, cmd.DELAY, cmd.CONDITION_DELAY, cmd.CONDITION_DISTANCE, cmd.DO_JUMP, cmd.DO_CHANGE_SPEED,
+        cmd.DO_SET_HOME, cmd.DO_SET_SERVO, cmd.DO_SET_ACTUATOR, cmd.DO_LAND_START, cmd.DO_SET_ROI_NONE,
+        cmd.DO_CONTROL_VIDEO, cmd.DO_SET_ROI, cmd.DO_DIGICAM_CONTROL, cmd.DO_MOUNT_CONFIGURE,
+        cmd.DO_MOUNT_CONTROL, cmd.DO_SET_CAM_TRIGG_DIST, cmd.DO_GRIPPER, cmd.DO_AUTOTUNE_ENABLE,
+        cmd.DO_SET_CAM_TRIGG_INTERVAL, cmd.OBLIQUE_SURVEY, cmd.COMPONENT_ARM_DISARM, cmd.SET_CAMERA_MODE,
+        cmd.SET_CAMERA_FOCUS, cmd.SET_CAMERA_SOURCE, cmd.DO_GIMBAL_MANAGER_PITCHYAW,
+        cmd.DO_GIMBAL_MANAGER_CONFIGURE, cmd.IMAGE_START_CAPTURE, cmd.IMAGE_STOP_CAPTURE,
+        cmd.DO_TRIGGER_CONTROL, cmd.VIDEO_START_CAPTURE, cmd.VIDEO_STOP_CAPTURE, cmd.DO_VTOL_TRANSITION,
+        cmd.DO_WINCH,
+    })  # fmt: skip
 
-_FENCE_AND_RALLY = frozenset({5001, 5002, 5003, 5004, 5100})
+_FENCE_AND_RALLY = frozenset({cmd.POLYGON_IN, cmd.POLYGON_OUT, cmd.CIRCLE_IN, cmd.CIRCLE_OUT, cmd.RALLY_POINT})
 _IN_INT_MODE = {0: 5, 5: 5, 3: 6, 6: 6}
-DO_JUMP, DO_SET_ROI = 177, 201
 
 
 def keep_item(item: MissionItem, mission_type: int) -> MissionItem:
@@ -89,7 +96,7 @@ def keep_item(item: MissionItem, mission_type: int) -> MissionItem:
     if mission_type == MISSION and item.command in _FENCE_AND_RALLY:
         raise Refused(ERROR)
     if mission_type == FENCE:
-        if item.command in (5001, 5002) and kept.params[0] < 3:
+        if item.command in (cmd.POLYGON_IN, cmd.POLYGON_OUT) and kept.params[0] < 3:
             raise Refused(ERROR)
         if kept.frame != NO_POSITION:
             # A fence point has no room for "relative to home", nor for autocontinue.
@@ -101,10 +108,10 @@ def _kept(item: MissionItem) -> MissionItem:
     if item.frame == NO_POSITION:
         if item.command not in _PLACELESS:
             raise Refused(UNSUPPORTED)
-        if item.command == DO_SET_ROI and item.params[0] not in (0.0, 1.0, 2.0):
+        if item.command == cmd.DO_SET_ROI and item.params[0] not in (0.0, 1.0, 2.0):
             raise Refused(INVALID_PARAM1)
         params = item.params
-        if item.command == DO_JUMP:
+        if item.command == cmd.DO_JUMP:
             params = (_i16(params[0]), _u16(params[1]), params[2], params[3])
         # x and y pass through float32 here.
         return MissionItem(

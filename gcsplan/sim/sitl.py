@@ -26,7 +26,7 @@ from gcsplan.mavlink.link.session import Options, Order, upload_fleet
 from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.link.watch import VehicleState, Watch
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.sim.outcome import Part, Rehearsal, Tally, Terms, energy_of
 from gcsplan.sim.trace import Trace
@@ -211,10 +211,14 @@ def _fly(
             return log
         if not log.places:
             continue
-        if last == m.LAND and item == landing and log.places[-1][2] <= ground + 0.3:
+        if last == cmd.LAND and item == landing and log.places[-1][2] <= ground + 0.3:
             log.down = True  # SITL's ground is level at the height of home: it would sink on through a higher one
             return log
-        if last not in (m.LAND, m.RTL) and _apart_m(log.places[-1], goal) <= _NEAR_M and log.speeds[-1] <= _STILL_M_S:
+        if (
+            last not in (cmd.LAND, cmd.RTL)
+            and _apart_m(log.places[-1], goal) <= _NEAR_M
+            and log.speeds[-1] <= _STILL_M_S
+        ):
             return log
 
 
@@ -333,11 +337,11 @@ def _trace(log: _Log, part: Part, world: World) -> Trace:
     begin = max(0, up - 1)
     command = {part.mission.first_seq + i: item.command for i, item in enumerate(part.mission.items)}
     moved = np.hypot(*np.diff(points[:, :2], axis=0).T) < np.abs(np.diff(points[:, 2])) + 0.05
-    vertical = np.array([command.get(int(i)) in (m.TAKEOFF, m.LAND, m.RTL) for i in items[:-1]])
+    vertical = np.array([command.get(int(i)) in (cmd.TAKEOFF, cmd.LAND, cmd.RTL) for i in items[:-1]])
     before = items[:-1] < part.mission.first_seq  # not yet said: it is taking off
     last = part.mission.items[-1].command
     return Trace(
         name, times[begin:], points[begin:], ((vertical & moved) | before)[begin:], items[:-1][begin:].astype(np.intp),
         arrive_s, _SLACK_M, np.full(len(times) - begin - 1, _SLACK_M),
-        not log.down and last not in (m.LAND, m.RTL) and not part.leaves, part.leaves,
+        not log.down and last not in (cmd.LAND, cmd.RTL) and not part.leaves, part.leaves,
     )  # fmt: skip

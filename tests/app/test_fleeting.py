@@ -18,7 +18,7 @@ from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of, summary_of
 from gcsplan.app.pipeline import plan
 from gcsplan.errors import InputError, NoMission
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import load_mission
 from tests.support.paths import MISSIONS
 
@@ -73,7 +73,7 @@ def nearest_m(done: Plan, step_s: float = 0.01) -> float:
 
 def speeds_of(done: Plan) -> list[float]:
     """What each mission commands, off its wire."""
-    commanded = [i for v in done.vehicles for i in v.mission.items if i.command == m.DO_CHANGE_SPEED]
+    commanded = [i for v in done.vehicles for i in v.mission.items if i.command == cmd.DO_CHANGE_SPEED]
     return [item.params[1] for item in commanded]
 
 
@@ -192,9 +192,9 @@ def test_a_hold_at_the_gate_stands_in_the_mission_before_the_speed_and_costs_hov
     done = planned(sequence(60, hold="gate"), {}, slow)
     south = done.vehicles[1]
     commands = [item.command for item in south.mission.items]
-    gate = commands.index(m.DELAY)
-    assert commands[gate - 1] == m.TAKEOFF
-    assert commands[gate + 1] == m.DO_CHANGE_SPEED
+    gate = commands.index(cmd.DELAY)
+    assert commands[gate - 1] == cmd.TAKEOFF
+    assert commands[gate + 1] == cmd.DO_CHANGE_SPEED
     told = summary_of(done)["vehicles"][1]
     assert told["hold_s"] > 0
     assert south.mission.items[gate].params[0] == told["hold_s"] == int(told["hold_s"])
@@ -214,7 +214,7 @@ def test_what_cannot_hold_in_the_air_leaves_later_instead() -> None:
     told = summary_of(done)["vehicles"][1]
     assert told["depart_s"] > 10.0
     assert told["hold_s"] == 0.0
-    assert m.DELAY not in [item.command for item in done.vehicles[1].mission.items]
+    assert cmd.DELAY not in [item.command for item in done.vehicles[1].mission.items]
 
 
 def test_where_nobody_may_wait_a_longer_path_makes_up_for_the_time() -> None:
@@ -241,9 +241,9 @@ def test_a_route_is_what_the_mission_flies_in_metres() -> None:
     assert route.length_m == pytest.approx(done.vehicles[0].verdict.length_m, rel=1e-9)
     assert route.items is not None
     wire = done.vehicles[0].mission.wire_items()
-    assert wire[route.items[0]].command == m.TAKEOFF
-    assert wire[route.items[-1]].command == m.LAND
-    assert all(wire[k].command == m.WAYPOINT for k in route.items[1:-1])
+    assert wire[route.items[0]].command == cmd.TAKEOFF
+    assert wire[route.items[-1]].command == cmd.LAND
+    assert all(wire[k].command == cmd.WAYPOINT for k in route.items[1:-1])
 
 
 def test_in_the_terrain_frame_a_vehicle_is_where_the_ground_has_it() -> None:

@@ -12,7 +12,7 @@ from gcsplan.app.model import Plan
 from gcsplan.app.outputs import summary_of
 from gcsplan.app.pipeline import plan
 from gcsplan.errors import InputError, UsageError
-from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import load_mission
 from tests.app.test_fleeting import CROSS
 
@@ -63,7 +63,7 @@ def test_every_gate_opens_at_the_planned_second_and_its_vehicle_is_there_early()
     done = planned()
     assert done.fleet is not None
     for v, slot, motion in zip(done.vehicles, done.fleet.slots, done.fleet.motions, strict=True):
-        gate = next(i for i in v.mission.items if i.command == m.DELAY)
+        gate = next(i for i in v.mission.items if i.command == cmd.DELAY)
         assert gate.params[0] == -1.0
         hour, minute, second = (int(x) for x in gate.params[1:])
         opens = datetime(2026, 3, 1, hour, minute, second, tzinfo=UTC)

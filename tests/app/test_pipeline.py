@@ -13,6 +13,7 @@ from gcsplan.app.outputs import outputs_of, summary_of
 from gcsplan.app.pipeline import plan, require_passing
 from gcsplan.errors import CheckFailed, InputError, NoMission
 from gcsplan.mavlink.files.formats import read_plan, read_waypoints
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mission_file import load_mission
 from gcsplan.vehicle import Autopilot
@@ -68,7 +69,7 @@ def test_every_altitude_frame_is_planned_with_its_own_errors(frame: str) -> None
     (v,) = done.vehicles
     assert v.verdict.safe is True
     wanted = {"relative": m.RELATIVE, "amsl": m.GLOBAL, "terrain": m.TERRAIN}[frame]
-    assert {i.frame for i in v.mission.items if i.command == m.WAYPOINT} == {wanted}
+    assert {i.frame for i in v.mission.items if i.command == cmd.WAYPOINT} == {wanted}
     assert v.verdict.lowest is not None
     assert v.verdict.lowest.min_agl_m >= (95 if frame == "terrain" else 65)
 
@@ -77,7 +78,7 @@ def test_every_altitude_frame_is_planned_with_its_own_errors(frame: str) -> None
 def test_every_end_is_planned(end: str) -> None:
     done = planned({"end": end})
     assert done.vehicles[0].verdict.safe is True
-    assert commands(done)[-1] == {"land": m.LAND, "loiter": m.LOITER_UNLIM, "none": m.WAYPOINT}[end]
+    assert commands(done)[-1] == {"land": cmd.LAND, "loiter": cmd.LOITER_UNLIM, "none": cmd.WAYPOINT}[end]
 
 
 @pytest.mark.slow

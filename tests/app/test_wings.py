@@ -21,7 +21,7 @@ from gcsplan.app.outputs import outputs_of
 from gcsplan.app.pipeline import plan
 from gcsplan.app.wing_ends import starts
 from gcsplan.check.arcs import SAG_M, bend
-from gcsplan.check.climb_out import above_slant, flared, slant_room
+from gcsplan.check.climb_out import above_slant, flared, slant_shortage
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
 from gcsplan.check.stretch import Flight, Stretch
@@ -31,6 +31,7 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.timing import Course
 from gcsplan.mavlink.build.fixed_wing import build_wing, flown_m, parted, tangents_m, thinned
 from gcsplan.mavlink.build.order import Order, Wing
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import stored
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
@@ -69,15 +70,15 @@ def mission(*items: MissionItem) -> Mission:
 
 
 def take_off(up: float = 80.0, east: float = 600.0, north: float = 0.0) -> MissionItem:
-    return at(m.TAKEOFF, east, north, up, 8.0)
+    return at(cmd.TAKEOFF, east, north, up, 8.0)
 
 
 def through(points: list[tuple[float, float, float]], accept: list[float] | None = None) -> Mission:
     """A take-off to the east, way points whose acceptance is the tangent length, and a circle at the last."""
     whole = np.array([(0.0, 0.0, 80.0), *points])
     radii = np.ceil(tangents_m(whole, RADIUS_M)[1:]) if accept is None else np.array(accept)
-    items = [at(m.WAYPOINT, *p, 0.0, max(1.0, r)) for p, r in zip(points[:-1], radii, strict=False)]
-    return mission(take_off(), *items, at(m.LOITER_UNLIM, *points[-1], 0.0, 0.0, 100.0))
+    items = [at(cmd.WAYPOINT, *p, 0.0, max(1.0, r)) for p, r in zip(points[:-1], radii, strict=False)]
+    return mission(take_off(), *items, at(cmd.LOITER_UNLIM, *points[-1], 0.0, 0.0, 100.0))
 
 
 def bent(flown: Mission, craft: Vehicle, where: World = FLAT) -> Flight:
@@ -298,21 +299,21 @@ def hill(east_m: float, north_m: float, high_m: float, wide_m: float = 150.0) ->
 
 
 def test_a_climb_out_goes_to_where_its_item_lies_as_steeply_as_its_pitch_and_the_limit_allow() -> None:
-    flight = bent(mission(take_off(80.0, 300.0, 300.0), at(m.LOITER_UNLIM, 2000, 2000, 80, 0, 0, 100)), wing())
+    flight = bent(mission(take_off(80.0, 300.0, 300.0), at(cmd.LOITER_UNLIM, 2000, 2000, 80, 0, 0, 100)), wing())
     first = flight.stretches[0]
     east, north = FLAT.frame.to_plane(*first.end[:2])
     assert (first.kind, first.column) == ("takeoff", True)
     assert math.degrees(math.atan2(80.0, math.hypot(east, north))) == pytest.approx(8.0, abs=0.03)
     assert east == pytest.approx(north, rel=1e-3)
     shallow = replace(take_off(), params=(5.0, 0.0, 0.0, 0.0))
-    far = bent(mission(shallow, at(m.LOITER_UNLIM, 3000, 0, 80, 0, 0, 100)), wing()).stretches[0]
+    far = bent(mission(shallow, at(cmd.LOITER_UNLIM, 3000, 0, 80, 0, 0, 100)), wing()).stretches[0]
     run_m = FLAT.frame.to_plane(*far.end[:2])[0]
     assert math.degrees(math.atan2(80.0, run_m)) == pytest.approx(5.0, abs=0.03)
 
 
 def test_a_take_off_without_a_place_leads_towards_the_next_item_and_says_so() -> None:
     placeless = replace(take_off(), x=0, y=0)
-    flight = bent(mission(placeless, at(m.LOITER_UNLIM, 0, 2000, 80, 0, 0, 100)), wing())
+    flight = bent(mission(placeless, at(cmd.LOITER_UNLIM, 0, 2000, 80, 0, 0, 100)), wing())
     assert FLAT.frame.to_plane(*flight.stretches[0].end[:2])[1] > 500.0
     assert any("towards the item after it" in n for n in flight.notes)
 
@@ -322,7 +323,7 @@ def test_a_take_off_without_a_place_leads_towards_the_next_item_and_says_so() ->
 )
 def test_a_climb_out_is_held_against_the_ground_below_it(place: tuple[int, int], high_m: float, safe: bool) -> None:
     where = hill(*place, high_m)
-    items = (at(m.TAKEOFF, 600, 0, 160, 8, where=where), at(m.LOITER_UNLIM, 3000, 0, 160, 0, 0, 100, where=where))
+    items = (at(cmd.TAKEOFF, 600, 0, 160, 8, where=where), at(cmd.LOITER_UNLIM, 3000, 0, 160, 0, 0, 100, where=where))
     verdict = judge(mission(*items), wing(), where)
     assert verdict.safe is safe, verdict.describe()
     if not safe:
@@ -331,17 +332,17 @@ def test_a_climb_out_is_held_against_the_ground_below_it(place: tuple[int, int],
 
 def test_a_zone_in_the_climb_out_is_a_violation_though_min_agl_is_not() -> None:
     where = world(GROUND_M, [Zone("mast", Circle(300.0, 0.0, 20.0))])
-    verdict = judge(mission(take_off(), at(m.LOITER_UNLIM, 3000, 0, 80, 0, 0, 100)), wing(), where)
+    verdict = judge(mission(take_off(), at(cmd.LOITER_UNLIM, 3000, 0, 80, 0, 0, 100)), wing(), where)
     assert [(f.seq, f.kind) for f in verdict.findings] == [(1, "zone")]
 
 
 def test_a_glide_is_judged_straight_and_one_that_is_too_steep_is_named() -> None:
-    good = judge(mission(take_off(), at(m.WAYPOINT, 2000, 0, 80, 0, 1), at(m.LAND, 2700, 0, 0)), wing(), FLAT)
+    good = judge(mission(take_off(), at(cmd.WAYPOINT, 2000, 0, 80, 0, 1), at(cmd.LAND, 2700, 0, 0)), wing(), FLAT)
     assert good.safe is True, good.describe()
     assert [leg.kind for leg in good.legs][-1] == "land"
-    steep = judge(mission(take_off(), at(m.WAYPOINT, 2000, 0, 80, 0, 1), at(m.LAND, 2400, 0, 0)), wing(), FLAT)
+    steep = judge(mission(take_off(), at(cmd.WAYPOINT, 2000, 0, 80, 0, 1), at(cmd.LAND, 2400, 0, 0)), wing(), FLAT)
     assert [f.kind for f in steep.findings] == ["descent"]
-    high = judge(mission(take_off(), at(m.WAYPOINT, 2000, 0, 80, 0, 1), at(m.LAND, 2700, 0, 30)), wing(), FLAT)
+    high = judge(mission(take_off(), at(cmd.WAYPOINT, 2000, 0, 80, 0, 1), at(cmd.LAND, 2700, 0, 30)), wing(), FLAT)
     assert high.safe is None
     assert any("30.0 m below" in n for n in high.not_judged)
 
@@ -361,7 +362,7 @@ def test_the_room_below_a_climb_out_is_what_sampling_finds(high: float, east: fl
         beside = np.where(room < limits.altitude_error_m - 1e-6, 0.0, side)
         spare = points[:, 2] - room - where.airspace.surface.ground_at(points[:, 0], points[:, 1] + beside)
         least = min(least, float(spare.min()))
-    found = slant_room(line, line[0], 0.0, limits, where.airspace)
+    found = slant_shortage(line, line[0], 0.0, limits, where.airspace)
     if least < -0.06:
         assert found is not None
         assert found[3] >= -least - 0.2  # that it is too low is told exactly, by how much to a decimetre or two
@@ -407,7 +408,7 @@ def test_a_pass_by_distance_is_not_judged() -> None:
 
 def test_a_zone_above_the_slant_is_hit_by_one_that_climbs_steeper() -> None:
     where = world(GROUND_M, [Zone("kite", Circle(200.0, 0.0, 20.0), floor=Level(60.0, "agl"))])
-    verdict = judge(mission(take_off(), at(m.LOITER_UNLIM, 3000, 0, 80, 0, 0, 100)), wing(), where)
+    verdict = judge(mission(take_off(), at(cmd.LOITER_UNLIM, 3000, 0, 80, 0, 0, 100)), wing(), where)
     assert {(f.seq, f.kind) for f in verdict.findings} == {(1, "zone")}
 
 
@@ -435,7 +436,7 @@ def test_a_glide_is_flown_below_its_line_before_the_flare() -> None:
 
 def test_circles_are_left_as_low_as_arduplane_calls_it_high_enough() -> None:
     items = (
-        at(m.TAKEOFF, 213, 0, 30, 8), at(31, 213, 100, 100, 0, -100), at(m.LOITER_UNLIM, 1500, 100, 100, 0, 0, 100),
+        at(cmd.TAKEOFF, 213, 0, 30, 8), at(31, 213, 100, 100, 0, -100), at(cmd.LOITER_UNLIM, 1500, 100, 100, 0, 0, 100),
     )  # fmt: skip
     flight = bent(mission(*items), wing())
     leg = next(s for s in flight.stretches if s.seq == 3)
@@ -452,10 +453,10 @@ def test_circles_are_left_as_low_as_arduplane_calls_it_high_enough() -> None:
 def circling_up(where: World) -> Verdict:
     """A climb-out to 30 m, an anticlockwise circle to its left up to 100 m, and on."""
     items = (
-        at(m.TAKEOFF, 213, 0, 30, 8, where=where),
+        at(cmd.TAKEOFF, 213, 0, 30, 8, where=where),
         at(31, 213, 100, 100, 0, -100, where=where),
-        at(m.WAYPOINT, 1500, 100, 100, 0, 42, where=where),
-        at(m.LOITER_UNLIM, 2500, 1100, 100, 0, 0, 100, where=where),
+        at(cmd.WAYPOINT, 1500, 100, 100, 0, 42, where=where),
+        at(cmd.LOITER_UNLIM, 2500, 1100, 100, 0, 0, 100, where=where),
     )
     return judge(mission(*items), wing(), where)
 
@@ -618,8 +619,8 @@ def test_the_example_plans_to_a_safe_mission_near_its_bound(circling: Plan) -> N
     assert v.verdict.safe is True
     assert v.gap_percent is not None
     assert v.gap_percent < 1.0
-    assert v.mission.items[0].command == m.TAKEOFF
-    assert v.mission.items[-1].command == m.LOITER_UNLIM
+    assert v.mission.items[0].command == cmd.TAKEOFF
+    assert v.mission.items[-1].command == cmd.LOITER_UNLIM
     assert any("launch it on a heading of" in n for n in v.notes)
     assert not any("QuadPlane" in n for n in v.notes)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
@@ -135,7 +136,7 @@ def make_case(rng: np.random.Generator, family: str) -> Case | None:
 
 def corner_zones(rng: np.random.Generator, case: Case) -> list[Zone]:
     """Small circles on the inside of corners, where a vehicle that turns early comes by."""
-    places = [case.frame.to_plane(i.lat_deg, i.lon_deg) for i in case.mission.items if i.command == m.WAYPOINT]
+    places = [case.frame.to_plane(i.lat_deg, i.lon_deg) for i in case.mission.items if i.command == cmd.WAYPOINT]
     found = []
     for a, b, c in zip(places, places[1:], places[2:], strict=False):
         ways = [(p - b) / max(float(np.hypot(*(p - b))), 1e-6) for p in (a, c)]
@@ -174,30 +175,32 @@ def make_mission(
             return 0.0
         return float(rng.choice([1.0, 2.0, 5.0, 12.0, 40.0, 120.0]))
 
-    up = m.VTOL_TAKEOFF if autopilot is PLANE else m.TAKEOFF
+    up = cmd.VTOL_TAKEOFF if autopilot is PLANE else cmd.TAKEOFF
     first = np.array([*at_home, points[0, 2]])
     items = [item(up, first, m.RELATIVE)]
-    way = [item(m.WAYPOINT, p, kind, float(rng.choice([0.0, 0.0, 3.0])), accept()) for p in points[1:]]
-    land = item(m.VTOL_LAND if autopilot is PLANE else m.LAND, points[-1], m.RELATIVE)
+    way = [item(cmd.WAYPOINT, p, kind, float(rng.choice([0.0, 0.0, 3.0])), accept()) for p in points[1:]]
+    land = item(cmd.VTOL_LAND if autopilot is PLANE else cmd.LAND, points[-1], m.RELATIVE)
     items += way
     if family == "return":
-        items.append(MissionItem(m.RTL, m.NO_POSITION))
+        items.append(MissionItem(cmd.RTL, m.NO_POSITION))
     elif family == "spline":
-        items.insert(-1, replace(way[-2], command=m.SPLINE_WAYPOINT, params=(float(rng.choice([0, 2])), 0, 0, 0)))
+        items.insert(-1, replace(way[-2], command=cmd.SPLINE_WAYPOINT, params=(float(rng.choice([0, 2])), 0, 0, 0)))
         items.pop(-3 if len(way) > 2 else -1)
-        items.append(item(m.WAYPOINT, points[1] + [1.0, 1.0, 0.0], kind))
+        items.append(item(cmd.WAYPOINT, points[1] + [1.0, 1.0, 0.0], kind))
     elif family == "circle":
         middle = 0.5 * (points[0] + points[-1])
         circle = (2.0, 0.0, float(rng.choice([0.0, 20.0, -35.0, 80.0])), 0.0)
-        items.insert(2, item(m.LOITER_TURNS, middle, kind, *circle))
+        items.insert(2, item(cmd.LOITER_TURNS, middle, kind, *circle))
     elif family == "wing":
         items = _wing_items(points, item, ground)
     elif family == "battery":
-        items.append(MissionItem(m.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(20, 2500)), 0, 0)))
+        items.append(MissionItem(cmd.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(20, 2500)), 0, 0)))
     elif family == "jump":
-        items.insert(-1, MissionItem(m.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(0, 4)), 0, 0)))
+        items.insert(-1, MissionItem(cmd.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(0, 4)), 0, 0)))
     if family not in ("return", "wing"):
-        items.append(replace(land, z=0.0) if rng.random() < 0.6 else item(m.LOITER_UNLIM, points[-1], kind, 0, 0, 25.0))
+        items.append(
+            replace(land, z=0.0) if rng.random() < 0.6 else item(cmd.LOITER_UNLIM, points[-1], kind, 0, 0, 25.0)
+        )
     home = Home(home_e7[0], home_e7[1], round(datum, 2))
     return Mission(autopilot, home, tuple(items), "uav1")
 
@@ -218,9 +221,9 @@ def _wing_items(points: Floats, item: Callable[..., MissionItem], ground: Ground
     turn = np.abs((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi)
     radii = np.maximum(1.0, np.ceil(WING_RADIUS_M * np.tan(0.5 * turn)))
     ahead = points[0] + 0.9 * (points[1] - points[0])
-    items = [item(m.TAKEOFF, np.array([*ahead[:2], points[0, 2]]), m.RELATIVE, 20.0)]
-    items += [item(m.WAYPOINT, p, m.RELATIVE, 0.0, float(r)) for p, r in zip(points[1:-1], radii, strict=True)]
-    return [*items, item(m.LOITER_UNLIM, points[-1], m.RELATIVE, 0.0, 0.0, WING_RADIUS_M)]
+    items = [item(cmd.TAKEOFF, np.array([*ahead[:2], points[0, 2]]), m.RELATIVE, 20.0)]
+    items += [item(cmd.WAYPOINT, p, m.RELATIVE, 0.0, float(r)) for p, r in zip(points[1:-1], radii, strict=True)]
+    return [*items, item(cmd.LOITER_UNLIM, points[-1], m.RELATIVE, 0.0, 0.0, WING_RADIUS_M)]
 
 
 # -- knobs: (name, how a case looks at a value, where it is loose, where it is tight) --------------------------------
@@ -261,7 +264,7 @@ def knobs(rng: np.random.Generator, case: Case) -> list[Knob]:
 
 def lifted(case: Case, by_m: float) -> Case:
     def item(i: MissionItem) -> MissionItem:
-        keeps = i.command in (m.LAND, m.VTOL_LAND, m.RTL, m.DO_JUMP)
+        keeps = i.command in (cmd.LAND, cmd.VTOL_LAND, cmd.RTL, cmd.DO_JUMP)
         return i if keeps else replace(i, z=i.z + round(by_m, 2))
 
     return replace(case, mission=replace(case.mission, items=tuple(map(item, case.mission.items))))
@@ -269,7 +272,9 @@ def lifted(case: Case, by_m: float) -> Case:
 
 def accepted(case: Case, radius_m: float) -> Case:
     def item(i: MissionItem) -> MissionItem:
-        return replace(i, params=(i.params[0], float(math.ceil(radius_m)), 0.0, 0.0)) if i.command == m.WAYPOINT else i
+        return (
+            replace(i, params=(i.params[0], float(math.ceil(radius_m)), 0.0, 0.0)) if i.command == cmd.WAYPOINT else i
+        )
 
     return replace(case, mission=replace(case.mission, items=tuple(map(item, case.mission.items))))
 

@@ -13,17 +13,8 @@ from hypothesis import strategies as st
 from gcsplan.check.battery import BatteryHome, battery_home, flown
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import LegFigures, Verdict
-from gcsplan.mavlink.mission.mission import (
-    LAND,
-    LOITER_TIME,
-    RELATIVE,
-    RTL,
-    TAKEOFF,
-    WAYPOINT,
-    Home,
-    Mission,
-    MissionItem,
-)
+from gcsplan.mavlink.mission.commands import LAND, LOITER_TIME, RTL, TAKEOFF, WAYPOINT
+from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.world import World
 from tests.support.worlds import vehicle, world
@@ -52,7 +43,7 @@ def out(w: World, *places: tuple[float, float, float], hold_s: float = 0.0, last
 def home_of(v: Verdict, craft: Vehicle, level_rel_home_m: float = 15.0) -> BatteryHome:
     h = v.mission.home
     place = (h.lat_e7 / 1e7, h.lon_e7 / 1e7, h.amsl_m)
-    found = battery_home(v, craft, place, h.amsl_m + level_rel_home_m, climbs_first=True)
+    found = battery_home(v, craft, place, h.amsl_m + level_rel_home_m)
     assert found is not None
     return found
 
@@ -122,7 +113,7 @@ def test_a_return_of_the_mission_itself_is_not_counted_twice() -> None:
 def test_without_a_capacity_nothing_is_said() -> None:
     v = craft(None)
     verdict = judge(out(FLAT, (2000.0, 0.0, 80.0)), v, FLAT)
-    assert battery_home(verdict, v, (36.6, -84.3, 300.0), 315.0, climbs_first=True) is None
+    assert battery_home(verdict, v, (36.6, -84.3, 300.0), 315.0) is None
 
 
 def test_rounds_are_flown_as_often_as_they_are() -> None:
@@ -145,7 +136,8 @@ def test_what_is_short_is_what_sampling_finds(
     verdict = judge(out(FLAT, *places), v, FLAT)
     h = verdict.mission.home
     place = (h.lat_e7 / 1e7, h.lon_e7 / 1e7, h.amsl_m)
-    found = battery_home(verdict, v, place, 300.0 + level, climbs_first=climbs_first)
+    autopilot = Autopilot.ARDUCOPTER if climbs_first else Autopilot.ARDUPLANE  # a plane returns lower than it is
+    found = battery_home(verdict, replace(v, autopilot=autopilot), place, 300.0 + level)
     assert found is not None
     spent = along = most = 0.0
     for leg in verdict.legs:

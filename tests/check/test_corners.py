@@ -15,6 +15,7 @@ from gcsplan.check.judge import judge
 from gcsplan.check.tuning import Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.multirotor import corner_m
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import load_mission
@@ -37,15 +38,17 @@ def at(command: int, east: float, north: float, up: float, *params: float) -> Mi
 
 
 def mission(autopilot: Autopilot, *items: MissionItem) -> Mission:
-    up = at(m.VTOL_TAKEOFF if autopilot is PLANE else m.TAKEOFF, 0, 0, 100)
-    return Mission(autopilot, HOME, (up, *items, at(m.LOITER_UNLIM, 2000, 2000, 100)), "uav1")
+    up = at(cmd.VTOL_TAKEOFF if autopilot is PLANE else cmd.TAKEOFF, 0, 0, 100)
+    return Mission(autopilot, HOME, (up, *items, at(cmd.LOITER_UNLIM, 2000, 2000, 100)), "uav1")
 
 
 def around(
     autopilot: Autopilot, radius_m: float, *, hold_s: float = 0.0, corner: tuple[float, float] = (1000, 0)
 ) -> Mission:
     """East, then north round a corner, with an acceptance radius there."""
-    return mission(autopilot, at(m.WAYPOINT, *corner, 100, hold_s, radius_m), at(m.WAYPOINT, 1000, 1000, 100, 0, 1.0))
+    return mission(
+        autopilot, at(cmd.WAYPOINT, *corner, 100, hold_s, radius_m), at(cmd.WAYPOINT, 1000, 1000, 100, 0, 1.0)
+    )
 
 
 def inside(east: float, north: float, radius_m: float, *ceiling: float) -> World:
@@ -89,7 +92,7 @@ def test_arduplane_turns_by_its_own_parameters_where_the_item_gives_no_radius() 
 
 
 def test_arduplane_flying_past_its_way_point_is_not_judged() -> None:
-    one = mission(PLANE, at(m.WAYPOINT, 1000, 0, 100, 0, 5.0, 40.0), at(m.WAYPOINT, 1000, 1000, 100, 0, 5.0))
+    one = mission(PLANE, at(cmd.WAYPOINT, 1000, 0, 100, 0, 5.0, 40.0), at(cmd.WAYPOINT, 1000, 1000, 100, 0, 5.0))
     found = verdict(one, FLAT)
     assert found.safe is None
     assert any(words.startswith("item 2: flies 40 m past") for words in found.not_judged)
@@ -115,9 +118,9 @@ def test_a_hold_of_px4_begins_within_the_radius_too() -> None:
 def test_a_leg_that_is_left_before_its_end_is_judged_in_height_too() -> None:
     # Down into a dip over 400 m: who turns 200 m before the end of the descent is 25 m higher beside the next leg.
     items = (
-        at(m.WAYPOINT, 600, 0, 150, 0, 2.0),
-        at(m.WAYPOINT, 1000, 0, 100, 0, 200.0),
-        at(m.WAYPOINT, 1000, 900, 100, 0, 2.0),
+        at(cmd.WAYPOINT, 600, 0, 150, 0, 2.0),
+        at(cmd.WAYPOINT, 1000, 0, 100, 0, 200.0),
+        at(cmd.WAYPOINT, 1000, 900, 100, 0, 2.0),
     )
     low = inside(1000.0, 30.0, 20.0)
     above = World(
@@ -130,8 +133,8 @@ def test_a_leg_that_is_left_before_its_end_is_judged_in_height_too() -> None:
 
 
 def test_a_landing_of_px4_begins_beside_its_place() -> None:
-    items = (at(m.WAYPOINT, 1000, 0, 100, 0, 2.0), at(m.LAND, 1000, 500, 0))
-    flown = Mission(PX4, HOME, (at(m.TAKEOFF, 0, 0, 100), *items), "uav1")
+    items = (at(cmd.WAYPOINT, 1000, 0, 100, 0, 2.0), at(cmd.LAND, 1000, 500, 0))
+    flown = Mission(PX4, HOME, (at(cmd.TAKEOFF, 0, 0, 100), *items), "uav1")
     beside = inside(1008.0, 500.0, 2.0, 40.0)
     assert verdict(flown, beside).safe is False
     assert verdict(flown, beside, tuning=Tuning.of({"NAV_ACC_RAD": 2.0})).safe is True
@@ -140,8 +143,8 @@ def test_a_landing_of_px4_begins_beside_its_place() -> None:
 @pytest.mark.parametrize("autopilot", [COPTER, PLANE])
 def test_a_circle_may_be_left_anywhere(autopilot: Autopilot) -> None:
     # The leg from the circle's northern edge to the east passes the zone, the one from its middle does not.
-    circle = at(m.LOITER_TURNS, 0, 1000, 100, 2.0, 0, 200.0)
-    one = mission(autopilot, circle, at(m.WAYPOINT, 1500, 1000, 100, 0, 2.0))
+    circle = at(cmd.LOITER_TURNS, 0, 1000, 100, 2.0, 0, 200.0)
+    one = mission(autopilot, circle, at(cmd.WAYPOINT, 1500, 1000, 100, 0, 2.0))
     beside = inside(450.0, 1140.0, 30.0)
     assert verdict(one, beside).safe is False
     assert verdict(one, inside(1000.0, 1060.0, 5.0)).safe is False  # 67 m beside the leg when two thirds are flown
@@ -150,10 +153,10 @@ def test_a_circle_may_be_left_anywhere(autopilot: Autopilot) -> None:
 
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
 def test_a_return_begins_where_the_vehicle_is_and_not_where_its_way_point_is(autopilot: Autopilot) -> None:
-    items = (at(m.LOITER_TURNS, 0, 2000, 100, 2.0, 0, 200.0),) if autopilot is COPTER else (
-        at(m.WAYPOINT, 1000, 1000, 100, 0, 2.0), at(m.WAYPOINT, 0, 2000, 100, 0, 200.0),
+    items = (at(cmd.LOITER_TURNS, 0, 2000, 100, 2.0, 0, 200.0),) if autopilot is COPTER else (
+        at(cmd.WAYPOINT, 1000, 1000, 100, 0, 2.0), at(cmd.WAYPOINT, 0, 2000, 100, 0, 200.0),
     )  # fmt: skip
-    flown = Mission(autopilot, HOME, (at(m.TAKEOFF, 0, 0, 100), *items, MissionItem(m.RTL, m.NO_POSITION)), "uav1")
+    flown = Mission(autopilot, HOME, (at(cmd.TAKEOFF, 0, 0, 100), *items, MissionItem(cmd.RTL, m.NO_POSITION)), "uav1")
     craft = vehicle(autopilot, horizontal_clearance_m=0.0)
     post = Zone("post", Circle(70.0, 1000.0, 10.0), Level(150.0, "agl"))  # beside the middle of the way home
     where = World(FLAT.frame, Airspace(FLAT.airspace.surface, [post]))
@@ -162,10 +165,10 @@ def test_a_return_begins_where_the_vehicle_is_and_not_where_its_way_point_is(aut
 
 
 def test_a_landing_behind_a_circle_is_on_the_circle_where_it_gives_no_place() -> None:
-    circle = at(m.LOITER_TURNS, 0, 1000, 100, 2.0, 0, 100.0)
+    circle = at(cmd.LOITER_TURNS, 0, 1000, 100, 2.0, 0, 100.0)
     ways = {}
-    for name, land in (("here", MissionItem(m.LAND, m.RELATIVE)), ("there", at(m.LAND, 0, 1000, 0))):
-        flown = Mission(COPTER, HOME, (at(m.TAKEOFF, 0, 0, 100), circle, land), "uav1")
+    for name, land in (("here", MissionItem(cmd.LAND, m.RELATIVE)), ("there", at(cmd.LAND, 0, 1000, 0))):
+        flown = Mission(COPTER, HOME, (at(cmd.TAKEOFF, 0, 0, 100), circle, land), "uav1")
         ways[name] = verdict(flown, inside(90.0, 1000.0, 5.0, 60.0)).safe
     assert ways == {"here": False, "there": True}
 
@@ -173,8 +176,8 @@ def test_a_landing_behind_a_circle_is_on_the_circle_where_it_gives_no_place() ->
 @pytest.mark.parametrize("autopilot", [PX4, PLANE])
 def test_a_radius_longer_than_the_leg_skips_way_points(autopilot: Autopilot) -> None:
     # From the first of three near points it may fly straight on: along the hypotenuse.
-    near = [at(m.WAYPOINT, 1000 + 20 * k, 20.0 * (k % 2), 100, 0, 100.0) for k in range(3)]
-    one = mission(autopilot, *near, at(m.WAYPOINT, 1040, 1000, 100, 0, 2.0))
+    near = [at(cmd.WAYPOINT, 1000 + 20 * k, 20.0 * (k % 2), 100, 0, 100.0) for k in range(3)]
+    one = mission(autopilot, *near, at(cmd.WAYPOINT, 1040, 1000, 100, 0, 2.0))
     assert verdict(one, inside(985.0, 400.0, 15.0)).safe is False
 
 
@@ -188,7 +191,7 @@ def test_no_straight_line_from_where_it_turns_leaves_what_is_judged(autopilot: A
         count = int(rng.integers(3, 6))
         points = np.column_stack([rng.uniform(-600, 600, (count, 2)), np.full(count, 100.0)])
         radii = np.floor(rng.choice([2.0, 20.0, 80.0, 250.0], count))
-        items = [at(m.WAYPOINT, *p, 0.0, r) for p, r in zip(points, radii, strict=True)]
+        items = [at(cmd.WAYPOINT, *p, 0.0, r) for p, r in zip(points, radii, strict=True)]
         flown, here = [np.zeros(2)], np.zeros(2)
         for p, r in zip(points[:, :2], radii, strict=True):
             far = float(np.hypot(*(p - here)))

@@ -7,6 +7,7 @@ import math
 import pytest
 
 from gcsplan.check.flight import Flight, follow
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -35,11 +36,11 @@ def at(command: int, north: float, east: float, z: float, frame: int = m.RELATIV
     return MissionItem(command, frame, (p1, 0, 0, 0), m.degrees_e7(36.6 + north), m.degrees_e7(-84.3 + east), z)
 
 
-TAKEOFF = at(m.TAKEOFF, 0, 0, 65)
+TAKEOFF = at(cmd.TAKEOFF, 0, 0, 65)
 
 
 def test_a_whole_mission_is_followed_from_the_ground_to_the_ground() -> None:
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 80), at(m.WAYPOINT, 0.02, 0, 70), at(m.LAND, 0.02, 0, 0))
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.WAYPOINT, 0.02, 0, 70), at(cmd.LAND, 0.02, 0, 0))
     assert flight.not_judged == []
     assert [(s.kind, s.column, s.on_path) for s in flight.stretches] == [
         ("takeoff", True, False), ("cruise", False, True), ("cruise", False, True), ("land", True, False),
@@ -61,31 +62,31 @@ def test_relative_altitudes_count_from_the_ground_where_the_vehicle_arms_not_fro
     ("frame", "z", "amsl"), [(m.GLOBAL, 500, 500), (m.RELATIVE, 80, 380), (m.TERRAIN, 90, 390), (6, 80, 380)]
 )
 def test_each_frame_gives_its_altitude(frame: int, z: float, amsl: float) -> None:
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, z, frame))
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, z, frame))
     assert flight.stretches[-1].end[2] == amsl
     assert flight.stretches[-1].terrain == (frame == m.TERRAIN)
 
 
 def test_copter_keeps_its_altitude_at_zero_and_its_place_at_zero_zero() -> None:
-    stay = MissionItem(m.WAYPOINT, m.RELATIVE, z=90.0)
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 80), at(m.WAYPOINT, 0.02, 0, 0), stay)
+    stay = MissionItem(cmd.WAYPOINT, m.RELATIVE, z=90.0)
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.WAYPOINT, 0.02, 0, 0), stay)
     assert flight.stretches[2].end[2] == GROUND_M + 80
     assert flight.stretches[3].end == (*flight.stretches[2].end[:2], GROUND_M + 90)
 
 
 def test_px4_flies_to_altitude_zero() -> None:
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 0), autopilot=Autopilot.PX4)
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0), autopilot=Autopilot.PX4)
     assert flight.stretches[1].end[2] == GROUND_M
 
 
 def test_speed_changes_hold_from_there_on() -> None:
-    slow = MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (1, 4.5, -1, 0))
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 80), slow, at(m.WAYPOINT, 0.02, 0, 80))
+    slow = MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (1, 4.5, -1, 0))
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), slow, at(cmd.WAYPOINT, 0.02, 0, 80))
     assert [s.speed_m_s for s in flight.stretches] == [15, 15, 4.5]
 
 
 def test_a_landing_elsewhere_flies_there_level_first() -> None:
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 80), at(m.LAND, 0.02, 0, 0))
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.LAND, 0.02, 0, 0))
     level, down = flight.stretches[-2:]
     assert not level.column
     assert level.end[2] == GROUND_M + 80
@@ -93,7 +94,7 @@ def test_a_landing_elsewhere_flies_there_level_first() -> None:
 
 
 def test_rtl_climbs_returns_straight_and_lands_at_home() -> None:
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 80), MissionItem(m.RTL, 2), rtl_rel_home_m=120)
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2), rtl_rel_home_m=120)
     up, back, down = flight.stretches[-3:]
     assert (up.column, back.column, down.column) == (True, False, True)
     assert up.end[2] == GROUND_M + 120 == back.end[2]
@@ -101,13 +102,13 @@ def test_rtl_climbs_returns_straight_and_lands_at_home() -> None:
 
 
 def test_rtl_does_not_descend_before_it_is_home() -> None:
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 200), MissionItem(m.RTL, 2), rtl_rel_home_m=120)
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 200), MissionItem(cmd.RTL, 2), rtl_rel_home_m=120)
     assert flight.stretches[-2].end[2] == GROUND_M + 200
 
 
 def test_an_arduplane_return_is_judged_over_the_whole_band_of_altitudes() -> None:
     flight = fly(
-        at(m.VTOL_TAKEOFF, 0, 0, 65), at(m.WAYPOINT, 0.01, 0, 80), MissionItem(m.RTL, 2),
+        at(cmd.VTOL_TAKEOFF, 0, 0, 65), at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2),
         autopilot=Autopilot.ARDUPLANE, rtl_rel_home_m=120,
     )  # fmt: skip
     back, circle = flight.stretches[-2:]
@@ -117,19 +118,19 @@ def test_an_arduplane_return_is_judged_over_the_whole_band_of_altitudes() -> Non
 
 
 def test_rtl_at_an_unknown_altitude_is_not_judged() -> None:
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 80), MissionItem(m.RTL, 2))
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2))
     assert any("rtl_rel_home_m" in what for what in flight.not_judged)
 
 
 @pytest.mark.parametrize(
     "item",
     [
-        MissionItem(m.DO_SET_HOME, 0, (0, 0, 0, 0), 366000000, -843000000, 10),
+        MissionItem(cmd.DO_SET_HOME, 0, (0, 0, 0, 0), 366000000, -843000000, 10),
         at(31000, 0.02, 0, 80),
     ],
 )
 def test_a_command_whose_motion_is_unknown_is_named(item: MissionItem) -> None:
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 80), item, at(m.WAYPOINT, 0.03, 0, 80))
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), item, at(cmd.WAYPOINT, 0.03, 0, 80))
     assert any(f"command {item.command}" in what and "item 3" in what for what in flight.not_judged)
 
 
@@ -140,27 +141,27 @@ def test_servo_and_camera_commands_move_nothing() -> None:
 
 
 def test_a_mission_without_take_off_is_not_judged_up_to_its_first_way_point() -> None:
-    flight = fly(at(m.WAYPOINT, 0.01, 0, 80), at(m.WAYPOINT, 0.02, 0, 80))
+    flight = fly(at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.WAYPOINT, 0.02, 0, 80))
     assert any("no take-off" in what for what in flight.not_judged)
 
 
 def test_items_after_the_landing_are_named() -> None:
-    flight = fly(TAKEOFF, at(m.LAND, 0, 0, 0), at(m.WAYPOINT, 0.01, 0, 80))
+    flight = fly(TAKEOFF, at(cmd.LAND, 0, 0, 0), at(cmd.WAYPOINT, 0.01, 0, 80))
     assert any("after the landing" in what for what in flight.not_judged)
 
 
 def test_a_fixed_wings_loiter_is_a_circle_and_a_copters_is_a_point() -> None:
-    plane = fly(at(m.VTOL_TAKEOFF, 0, 0, 65), at(m.LOITER_UNLIM, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE)
+    plane = fly(at(cmd.VTOL_TAKEOFF, 0, 0, 65), at(cmd.LOITER_UNLIM, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE)
     assert 60 < plane.stretches[-1].reach_m < 75
-    assert fly(TAKEOFF, at(m.LOITER_UNLIM, 0.01, 0, 80)).stretches[-1].reach_m == 0
-    turns = MissionItem(m.LOITER_TURNS, m.RELATIVE, (3, 0, -40, 0), m.degrees_e7(36.61), m.degrees_e7(-84.3), 80)
+    assert fly(TAKEOFF, at(cmd.LOITER_UNLIM, 0.01, 0, 80)).stretches[-1].reach_m == 0
+    turns = MissionItem(cmd.LOITER_TURNS, m.RELATIVE, (3, 0, -40, 0), m.degrees_e7(36.61), m.degrees_e7(-84.3), 80)
     circle = fly(TAKEOFF, turns).stretches[-1]
     assert circle.reach_m == 40
     assert circle.hold_s == pytest.approx(3 * 2 * math.pi * 40 / 15)
 
 
 def test_an_arduplane_mission_that_ends_in_the_air_goes_home_unjudged() -> None:
-    flight = fly(at(m.VTOL_TAKEOFF, 0, 0, 65), at(m.WAYPOINT, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE)
+    flight = fly(at(cmd.VTOL_TAKEOFF, 0, 0, 65), at(cmd.WAYPOINT, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE)
     assert any("RTL" in what for what in flight.not_judged)
 
 
@@ -169,9 +170,9 @@ def test_unknown_ground_at_home_is_named() -> None:
 
 
 def test_a_hold_counts_on_copter_and_not_on_plane() -> None:
-    hold = at(m.WAYPOINT, 0.01, 0, 80, p1=12)
+    hold = at(cmd.WAYPOINT, 0.01, 0, 80, p1=12)
     assert fly(TAKEOFF, hold).stretches[-1].hold_s == 12
-    plane = fly(at(m.VTOL_TAKEOFF, 0, 0, 65), hold, autopilot=Autopilot.ARDUPLANE)
+    plane = fly(at(cmd.VTOL_TAKEOFF, 0, 0, 65), hold, autopilot=Autopilot.ARDUPLANE)
     assert plane.stretches[-1].hold_s == 0
 
 
@@ -188,12 +189,12 @@ def fly_over_a_slope(
     )  # fmt: skip
 
 
-VTOL_TAKEOFF = at(m.VTOL_TAKEOFF, 0, 0, 65)
+VTOL_TAKEOFF = at(cmd.VTOL_TAKEOFF, 0, 0, 65)
 
 
 @pytest.mark.parametrize(("z", "at_once"), [(79.9, True), (51, True), (80.1, False), (49, False)])
 def test_arduplane_changes_height_by_less_than_its_glide_slope_minimum_at_once(z: float, at_once: bool) -> None:
-    flight = fly(VTOL_TAKEOFF, at(m.WAYPOINT, 0.01, 0, z), autopilot=Autopilot.ARDUPLANE)
+    flight = fly(VTOL_TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, z), autopilot=Autopilot.ARDUPLANE)
     assert bool(flight.instead) == at_once
     for band in flight.instead:
         assert band.start[2] == band.end[2] == pytest.approx(GROUND_M + 0.5 * (65 + z))
@@ -201,19 +202,19 @@ def test_arduplane_changes_height_by_less_than_its_glide_slope_minimum_at_once(z
 
 
 def test_arduplane_climbs_at_once_from_below_twenty_metres() -> None:
-    low = at(m.WAYPOINT, 0.01, 0, 15)
-    flight = fly(VTOL_TAKEOFF, low, at(m.WAYPOINT, 0.02, 0, 200), autopilot=Autopilot.ARDUPLANE)
+    low = at(cmd.WAYPOINT, 0.01, 0, 15)
+    flight = fly(VTOL_TAKEOFF, low, at(cmd.WAYPOINT, 0.02, 0, 200), autopilot=Autopilot.ARDUPLANE)
     assert [s.seq for s in flight.instead] == [3]
     assert flight.instead[0].band_m == pytest.approx(92.5)
 
 
 def test_copter_and_px4_change_height_along_the_leg() -> None:
-    assert fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 70)).instead == []
-    assert fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 70), autopilot=Autopilot.PX4).instead == []
+    assert fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 70)).instead == []
+    assert fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 70), autopilot=Autopilot.PX4).instead == []
 
 
 def test_arduplanes_glide_slope_minimum_counts_above_ground_in_terrain_frame() -> None:
-    level = at(m.WAYPOINT, 0.01, 0, 65, m.TERRAIN)  # 200 m higher above sea, the same above ground
+    level = at(cmd.WAYPOINT, 0.01, 0, 65, m.TERRAIN)  # 200 m higher above sea, the same above ground
     flight = fly_over_a_slope(VTOL_TAKEOFF, level, autopilot=Autopilot.ARDUPLANE)
     (band,) = flight.instead
     assert band.terrain
@@ -222,7 +223,9 @@ def test_arduplanes_glide_slope_minimum_counts_above_ground_in_terrain_frame() -
 
 @pytest.mark.parametrize("frame", [m.GLOBAL, m.TERRAIN])
 def test_arduplanes_vtol_take_off_in_another_frame_is_not_judged(frame: int) -> None:
-    flight = fly(at(m.VTOL_TAKEOFF, 0, 0, 400, frame), at(m.LOITER_UNLIM, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE)
+    flight = fly(
+        at(cmd.VTOL_TAKEOFF, 0, 0, 400, frame), at(cmd.LOITER_UNLIM, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE
+    )
     assert any("VTOL take-off" in what for what in flight.not_judged)
     assert flight.stretches[0].end[2] == GROUND_M + 400  # by its altitude
 
@@ -233,31 +236,31 @@ def test_a_vtol_take_off_of_anything_but_arduplane_is_not_judged(autopilot: Auto
 
 
 def test_a_take_off_to_less_than_the_least_climb_ends_there() -> None:
-    assert fly(at(m.TAKEOFF, 0, 0, -20)).stretches[0].end[2] == GROUND_M + 1.0
-    assert fly(at(m.TAKEOFF, 0, 0, 0), autopilot=Autopilot.PX4).stretches[0].end[2] == GROUND_M + 2.5
+    assert fly(at(cmd.TAKEOFF, 0, 0, -20)).stretches[0].end[2] == GROUND_M + 1.0
+    assert fly(at(cmd.TAKEOFF, 0, 0, 0), autopilot=Autopilot.PX4).stretches[0].end[2] == GROUND_M + 2.5
 
 
 def test_copter_keeps_its_height_in_the_frame_of_the_item() -> None:
-    flight = fly_over_a_slope(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 0, m.TERRAIN))
+    flight = fly_over_a_slope(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0, m.TERRAIN))
     assert flight.stretches[-1].end[2] == pytest.approx(GROUND_M + 200 + 65)
-    flight = fly_over_a_slope(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 0, m.GLOBAL))
+    flight = fly_over_a_slope(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0, m.GLOBAL))
     assert flight.stretches[-1].end[2] == pytest.approx(GROUND_M + 65)
 
 
 def test_arduplane_keeps_its_altitude_only_where_there_is_no_place_either() -> None:
-    flight = fly(VTOL_TAKEOFF, at(m.WAYPOINT, 0.01, 0, 0), autopilot=Autopilot.ARDUPLANE)
+    flight = fly(VTOL_TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0), autopilot=Autopilot.ARDUPLANE)
     assert flight.stretches[-1].end[2] == GROUND_M
-    flight = fly(VTOL_TAKEOFF, MissionItem(m.LOITER_TIME, m.RELATIVE, (10, 0, 0, 0)), autopilot=Autopilot.ARDUPLANE)
+    flight = fly(VTOL_TAKEOFF, MissionItem(cmd.LOITER_TIME, m.RELATIVE, (10, 0, 0, 0)), autopilot=Autopilot.ARDUPLANE)
     assert flight.stretches[-1].end[2] == GROUND_M + 65
 
 
 def test_px4_knows_no_here() -> None:
-    flight = fly(TAKEOFF, MissionItem(m.WAYPOINT, m.RELATIVE, z=90.0), autopilot=Autopilot.PX4)
+    flight = fly(TAKEOFF, MissionItem(cmd.WAYPOINT, m.RELATIVE, z=90.0), autopilot=Autopilot.PX4)
     assert any("command 16" in what for what in flight.not_judged)
 
 
 def test_a_landing_elsewhere_in_terrain_frame_keeps_its_height_above_ground() -> None:
-    flight = fly_over_a_slope(TAKEOFF, at(m.LAND, 0.01, 0, 0, m.TERRAIN))
+    flight = fly_over_a_slope(TAKEOFF, at(cmd.LAND, 0.01, 0, 0, m.TERRAIN))
     over, down = flight.stretches[-2:]
     assert over.terrain
     assert over.end[2] == pytest.approx(GROUND_M + 200 + 65)
@@ -265,28 +268,28 @@ def test_a_landing_elsewhere_in_terrain_frame_keeps_its_height_above_ground() ->
 
 
 def test_a_landing_elsewhere_is_judged_both_level_and_along_the_ground() -> None:
-    flight = fly_over_a_slope(TAKEOFF, at(m.LAND, -0.01, 0, 0))
+    flight = fly_over_a_slope(TAKEOFF, at(cmd.LAND, -0.01, 0, 0))
     over, down = flight.instead  # ArduCopter before 4.6, with terrain data
     assert over.terrain
     assert over.end[2] == pytest.approx(GROUND_M - 200 + 65)
     assert down.column
     assert flight.stretches[-2].end[2] == GROUND_M + 65
-    assert fly_over_a_slope(TAKEOFF, at(m.LAND, -0.01, 0, 0), autopilot=Autopilot.PX4).instead == []
+    assert fly_over_a_slope(TAKEOFF, at(cmd.LAND, -0.01, 0, 0), autopilot=Autopilot.PX4).instead == []
 
 
 def test_rtl_from_near_home_climbs_less_than_its_altitude() -> None:
-    near = at(m.WAYPOINT, 0.0002, 0, 40)  # 22.194 m off
-    copter = fly(TAKEOFF, near, MissionItem(m.RTL, 2), rtl_rel_home_m=120)
+    near = at(cmd.WAYPOINT, 0.0002, 0, 40)  # 22.194 m off
+    copter = fly(TAKEOFF, near, MissionItem(cmd.RTL, 2), rtl_rel_home_m=120)
     (band,) = copter.instead
     assert band.start[2] - band.band_m == pytest.approx(GROUND_M + 3 * 22.194, abs=0.05)  # RTL_CONE_SLOPE 3
     assert band.start[2] + band.band_m == pytest.approx(GROUND_M + 120)
-    px4 = fly(TAKEOFF, near, MissionItem(m.RTL, 2), rtl_rel_home_m=120, autopilot=Autopilot.PX4)
+    px4 = fly(TAKEOFF, near, MissionItem(cmd.RTL, 2), rtl_rel_home_m=120, autopilot=Autopilot.PX4)
     assert px4.instead[0].start[2] - px4.instead[0].band_m == pytest.approx(GROUND_M + 40)
-    assert fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 40), MissionItem(m.RTL, 2), rtl_rel_home_m=120).instead == []
+    assert fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 40), MissionItem(cmd.RTL, 2), rtl_rel_home_m=120).instead == []
 
 
 def test_copter_reaches_a_circles_altitude_at_its_edge() -> None:
-    turns = MissionItem(m.LOITER_TURNS, m.RELATIVE, (1, 0, 200, 0), m.degrees_e7(36.61), m.degrees_e7(-84.3), 165)
+    turns = MissionItem(cmd.LOITER_TURNS, m.RELATIVE, (1, 0, 200, 0), m.degrees_e7(36.61), m.degrees_e7(-84.3), 165)
     edge = fly(TAKEOFF, turns).stretches[1]
     assert edge.end[2] == GROUND_M + 165
     assert (36.61 - edge.end[0]) * 110_971 == pytest.approx(200, rel=1e-4)  # metres of a degree at 36.6° N
@@ -295,7 +298,7 @@ def test_copter_reaches_a_circles_altitude_at_its_edge() -> None:
 def test_a_circles_radius_holds_for_the_next_one_without() -> None:
     def circle(radius: float) -> MissionItem:
         place = m.degrees_e7(36.61), m.degrees_e7(-84.3)
-        return MissionItem(m.LOITER_TURNS, m.RELATIVE, (1, 0, radius, 0), *place, 65)
+        return MissionItem(cmd.LOITER_TURNS, m.RELATIVE, (1, 0, radius, 0), *place, 65)
 
     assert fly(TAKEOFF, circle(0)).stretches[-1].reach_m == 10
     assert fly(TAKEOFF, circle(80), circle(0)).stretches[-1].reach_m == 80
@@ -303,8 +306,8 @@ def test_a_circles_radius_holds_for_the_next_one_without() -> None:
 
 def test_an_arduplanes_endless_loiter_takes_the_items_radius_and_a_timed_one_its_own() -> None:
     place = m.degrees_e7(36.61), m.degrees_e7(-84.3)
-    wide = MissionItem(m.LOITER_UNLIM, m.RELATIVE, (0, 0, -200, 0), *place, 65)
-    timed = MissionItem(m.LOITER_TIME, m.RELATIVE, (30, 0, 200, 0), *place, 65)
+    wide = MissionItem(cmd.LOITER_UNLIM, m.RELATIVE, (0, 0, -200, 0), *place, 65)
+    timed = MissionItem(cmd.LOITER_TIME, m.RELATIVE, (30, 0, 200, 0), *place, 65)
     assert 200 < fly(VTOL_TAKEOFF, wide, autopilot=Autopilot.ARDUPLANE).stretches[-1].reach_m < 250
     assert 60 < fly(VTOL_TAKEOFF, timed, autopilot=Autopilot.ARDUPLANE).stretches[-1].reach_m < 75
 
@@ -323,14 +326,14 @@ def test_a_loiter_to_an_altitude_circles_through_the_whole_band_on_arduplane_and
 
 
 def test_rates_of_climb_and_descent_hold_from_there_on() -> None:
-    rates = [MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (kind, value, -1, 0)) for kind, value in ((2, 5), (3, 4))]
-    flight = fly(TAKEOFF, *rates, at(m.WAYPOINT, 0.01, 0, 80))
+    rates = [MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (kind, value, -1, 0)) for kind, value in ((2, 5), (3, 4))]
+    flight = fly(TAKEOFF, *rates, at(cmd.WAYPOINT, 0.01, 0, 80))
     assert [s.rates_m_s for s in flight.stretches] == [(2.5, 1.5), (5, 4)]
 
 
 def test_a_spline_is_flown_as_a_curve_and_judged_from_a_standstill_too() -> None:
-    spline, after = at(m.SPLINE_WAYPOINT, 0.01, 0.01, 80), at(m.WAYPOINT, 0.0, 0.02, 80)
-    flight = fly(TAKEOFF, at(m.WAYPOINT, 0.01, 0, 80), spline, after)
+    spline, after = at(cmd.SPLINE_WAYPOINT, 0.01, 0.01, 80), at(cmd.WAYPOINT, 0.0, 0.02, 80)
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), spline, after)
     assert flight.not_judged == []
     curve = [s for s in flight.stretches if s.seq == 3]
     assert curve[0].start == flight.stretches[1].end
@@ -343,28 +346,28 @@ def test_a_spline_is_flown_as_a_curve_and_judged_from_a_standstill_too() -> None
 @pytest.mark.parametrize("autopilot", [Autopilot.PX4, Autopilot.ARDUPLANE])
 def test_a_spline_of_anything_but_arducopter_is_not_judged(autopilot: Autopilot) -> None:
     up = VTOL_TAKEOFF if autopilot is Autopilot.ARDUPLANE else TAKEOFF
-    flight = fly(up, at(m.WAYPOINT, 0.01, 0, 80), at(m.SPLINE_WAYPOINT, 0.01, 0.01, 80), autopilot=autopilot)
+    flight = fly(up, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.SPLINE_WAYPOINT, 0.01, 0.01, 80), autopilot=autopilot)
     assert any("command 82" in what for what in flight.not_judged)
 
 
 def test_a_take_off_written_elsewhere_is_remarked_on_copter() -> None:
-    assert any("takes off where it stands" in n for n in fly(at(m.TAKEOFF, 0.01, 0, 65)).notes)
+    assert any("takes off where it stands" in n for n in fly(at(cmd.TAKEOFF, 0.01, 0, 65)).notes)
 
 
 def test_px4_takes_no_turns() -> None:
-    flight = fly(TAKEOFF, at(m.LOITER_TURNS, 0.01, 0, 80), autopilot=Autopilot.PX4)
+    flight = fly(TAKEOFF, at(cmd.LOITER_TURNS, 0.01, 0, 80), autopilot=Autopilot.PX4)
     assert any("command 18" in what for what in flight.not_judged)
 
 
 def test_a_ground_speed_is_no_target_on_arduplane() -> None:
-    ground, air = (MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (kind, 9, -1, 0)) for kind in (1, 0))
-    to = at(m.WAYPOINT, 0.01, 0, 80)
+    ground, air = (MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (kind, 9, -1, 0)) for kind in (1, 0))
+    to = at(cmd.WAYPOINT, 0.01, 0, 80)
     flight = fly(VTOL_TAKEOFF, ground, to, air, to, autopilot=Autopilot.ARDUPLANE)
     assert [s.speed_m_s for s in flight.stretches] == [15, 15, 9]
 
 
 def test_arduplane_does_not_wait_in_the_air() -> None:
-    wait = MissionItem(m.DELAY, m.NO_POSITION, (60, 0, 0, 0))
+    wait = MissionItem(cmd.DELAY, m.NO_POSITION, (60, 0, 0, 0))
     assert fly(VTOL_TAKEOFF, wait, autopilot=Autopilot.ARDUPLANE).stretches[-1].hold_s == 0
     assert fly(TAKEOFF, wait).stretches[-1].hold_s == 60
 

@@ -13,6 +13,7 @@ from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import Order
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
@@ -114,7 +115,7 @@ def test_what_ardupilot_stores_is_judged_not_what_was_meant() -> None:
     flat = replace(craft, limits=replace(craft.limits, track_error_m=0.0))
 
     def flying_at(z: float) -> Verdict:
-        items = [replace(i, z=z) if i.command in (m.WAYPOINT, m.TAKEOFF) else i for i in mission.items]
+        items = [replace(i, z=z) if i.command in (cmd.WAYPOINT, cmd.TAKEOFF) else i for i in mission.items]
         return judge(replace(mission, items=tuple(items)), flat, world())
 
     assert flying_at(65.008).safe is True
@@ -174,7 +175,7 @@ def test_a_jump_back_is_judged_and_each_of_its_rounds_counts() -> None:
     once = judge(mission, craft, world())
 
     def with_jump(rounds: int) -> Verdict:
-        jump = MissionItem(m.DO_JUMP, m.NO_POSITION, (3, rounds, 0, 0))
+        jump = MissionItem(cmd.DO_JUMP, m.NO_POSITION, (3, rounds, 0, 0))
         items = (*mission.items[:4], jump, *mission.items[4:])
         return judge(replace(mission, items=items), craft, world())
 
@@ -257,7 +258,7 @@ def test_who_moves_by_what_a_violation_tells_keeps_the_limit(frame: str) -> None
         assert all(f.by == round(f.by, 2) and f"by {f.by:.2f} m" in f.message for f in worst)
 
         def raised(m_: float, mission: Mission = mission) -> Mission:
-            up = [replace(i, z=i.z + m_) if i.command in (m.WAYPOINT, m.TAKEOFF) else i for i in mission.items]
+            up = [replace(i, z=i.z + m_) if i.command in (cmd.WAYPOINT, cmd.TAKEOFF) else i for i in mission.items]
             return replace(mission, items=tuple(up))
 
         # A centimetre is cut away in storage.

@@ -11,21 +11,22 @@ from hypothesis import strategies as st
 
 from gcsplan.check.flight import Flight, follow
 from gcsplan.check.spline import chords, towards
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 
 HOME = Home.at(36.6, -84.3, 300.0)
-TAKEOFF = MissionItem(m.TAKEOFF, m.RELATIVE, z=65.0)
+TAKEOFF = MissionItem(cmd.TAKEOFF, m.RELATIVE, z=65.0)
 
 
 def way_point(number: int) -> MissionItem:
-    return MissionItem(m.WAYPOINT, m.RELATIVE, (0, 0, 0, 0), 366_000_000 + 10_000 * number, -843_000_000, 80.0)
+    return MissionItem(cmd.WAYPOINT, m.RELATIVE, (0, 0, 0, 0), 366_000_000 + 10_000 * number, -843_000_000, 80.0)
 
 
 def jump(target: int, rounds: int) -> MissionItem:
-    return MissionItem(m.DO_JUMP, m.NO_POSITION, (target, rounds, 0, 0))
+    return MissionItem(cmd.DO_JUMP, m.NO_POSITION, (target, rounds, 0, 0))
 
 
 def fly(*items: MissionItem, autopilot: Autopilot = Autopilot.ARDUCOPTER) -> Flight:
@@ -50,14 +51,14 @@ def flown_one_by_one(items: tuple[MissionItem, ...], first: int, most: int = 20_
         if index >= len(items):
             break
         item = items[index]
-        if item.command == m.DO_JUMP:
+        if item.command == cmd.DO_JUMP:
             if done[index] < item.params[1]:
                 done[index] += 1
                 index = int(item.params[0]) - first
             else:
                 index += 1
             continue
-        if item.command == m.WAYPOINT:
+        if item.command == cmd.WAYPOINT:
             count[here, item.lat_deg] += 1
             here = item.lat_deg
         index += 1

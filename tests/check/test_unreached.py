@@ -9,6 +9,7 @@ import pytest
 
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
@@ -34,13 +35,13 @@ def do(command: int, *params: float) -> MissionItem:
 def flown(
     autopilot: Autopilot, *items: MissionItem, craft: Vehicle | None = None, rtl_m: float | None = None
 ) -> Verdict:
-    up = at(m.VTOL_TAKEOFF if autopilot is PLANE else m.TAKEOFF, 0)
+    up = at(cmd.VTOL_TAKEOFF if autopilot is PLANE else cmd.TAKEOFF, 0)
     craft = craft or vehicle(autopilot)
     return judge(Mission(autopilot, HOME, (up, *items), "uav1"), craft, FLAT, rtl_rel_home_m=rtl_m)
 
 
-A, B = at(m.WAYPOINT, 1000, 0, 100, 0, 2.0), at(m.WAYPOINT, 2000, 0, 100, 0, 2.0)
-WAIT, DOWN = at(m.LOITER_UNLIM, 1500), at(m.LAND, 2000, 0, 0)
+A, B = at(cmd.WAYPOINT, 1000, 0, 100, 0, 2.0), at(cmd.WAYPOINT, 2000, 0, 100, 0, 2.0)
+WAIT, DOWN = at(cmd.LOITER_UNLIM, 1500), at(cmd.LAND, 2000, 0, 0)
 
 
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
@@ -68,7 +69,7 @@ def test_a_hold_without_end_that_ends_the_mission_is_none() -> None:
 
 def test_a_plane_that_circles_without_end_takes_what_its_way_takes() -> None:
     craft = replace(vehicle(PLANE), energy=Energy(120.0, 20.0, battery_j=1e6, reserve=0.0))
-    verdict = flown(PLANE, A, at(m.LOITER_UNLIM, 2000, 0, 100, 0, 0, 80.0), craft=craft)
+    verdict = flown(PLANE, A, at(cmd.LOITER_UNLIM, 2000, 0, 100, 0, 0, 80.0), craft=craft)
     left_j = 1e6 - verdict.energy_j
     assert verdict.until_reserve_s == pytest.approx(left_j / (20.0 * craft.speed_max_m_s), rel=1e-6)
 
@@ -87,7 +88,7 @@ def test_a_landing_that_a_return_leads_to_is_not_judged() -> None:
 
 def test_what_stands_behind_a_loop_without_end_is_a_finding_and_how_long_it_lasts_is_told() -> None:
     craft = replace(vehicle(COPTER), energy=Energy(120.0, 100.0, battery_j=1e6, reserve=0.0))
-    back = do(m.DO_JUMP, 2, -1)
+    back = do(cmd.DO_JUMP, 2, -1)
     verdict = flown(COPTER, A, B, back, DOWN, craft=craft)
     assert [(f.kind, f.seq) for f in verdict.findings] == [("unreachable", 5)]
     alone = flown(COPTER, A, B, back, craft=craft)
@@ -103,7 +104,7 @@ def test_px4_goes_on_with_nothing_behind_an_item_without_autocontinue() -> None:
     assert flown(PX4, A, B, replace(DOWN, autocontinue=False)).safe is True
 
 
-@pytest.mark.parametrize("item", [at(m.WAYPOINT, 1000, 0, 130, frame=10), at(m.WAYPOINT, 1000, 0, 130, frame=11)])
+@pytest.mark.parametrize("item", [at(cmd.WAYPOINT, 1000, 0, 130, frame=10), at(cmd.WAYPOINT, 1000, 0, 130, frame=11)])
 def test_px4_takes_no_terrain_frame(item: MissionItem) -> None:
     verdict = flown(PX4, item, DOWN)
     assert [(f.kind, f.seq) for f in verdict.findings] == [("refused", 1)]
@@ -114,22 +115,23 @@ def test_px4_takes_no_terrain_frame(item: MissionItem) -> None:
 @pytest.mark.parametrize(
     ("autopilot", "item"),
     [
-        (PX4, at(m.LOITER_TURNS, 1500, 0, 100, 2, 0, 30)), (PX4, at(m.DO_CHANGE_SPEED, 0)), (PX4, do(m.WAYPOINT)),
-        (PLANE, at(m.SPLINE_WAYPOINT, 1500)), (COPTER, at(m.WAYPOINT, 1500, frame=1)),
-        (COPTER, at(m.WAYPOINT, 1500, 0, 100, math.inf)), (COPTER, at(m.LOITER_TIME, 1500, 0, 100, 5, 0, 0, math.nan)),
+        (PX4, at(cmd.LOITER_TURNS, 1500, 0, 100, 2, 0, 30)), (PX4, at(cmd.DO_CHANGE_SPEED, 0)), (PX4, do(cmd.WAYPOINT)),
+        (PLANE, at(cmd.SPLINE_WAYPOINT, 1500)), (COPTER, at(cmd.WAYPOINT, 1500, frame=1)),
+        (COPTER, at(cmd.WAYPOINT, 1500, 0, 100, math.inf)),
+        (COPTER, at(cmd.LOITER_TIME, 1500, 0, 100, 5, 0, 0, math.nan)),
     ],
 )  # fmt: skip
 def test_what_the_autopilot_will_not_take_is_a_finding(autopilot: Autopilot, item: MissionItem) -> None:
-    end = at(m.LOITER_UNLIM, 2000)
+    end = at(cmd.LOITER_UNLIM, 2000)
     assert "refused" in {f.kind for f in flown(autopilot, A, item, end).findings}
 
 
 @pytest.mark.parametrize(
     ("autopilot", "item", "words"),
     [
-        (PX4, at(m.LAND, 2000, 0, 0, 0, 2.0), "precision landing"),
-        (PX4, at(m.WAYPOINT, 1500, 0, 100, math.nan), "a hold of nan s"),
-        (PLANE, at(m.VTOL_LAND, 2000, 0, 0, 1.0), "a descent as a fixed wing"),
+        (PX4, at(cmd.LAND, 2000, 0, 0, 0, 2.0), "precision landing"),
+        (PX4, at(cmd.WAYPOINT, 1500, 0, 100, math.nan), "a hold of nan s"),
+        (PLANE, at(cmd.VTOL_LAND, 2000, 0, 0, 1.0), "a descent as a fixed wing"),
     ],
 )
 def test_params_that_make_another_flight_of_a_command_are_named(
@@ -141,7 +143,7 @@ def test_params_that_make_another_flight_of_a_command_are_named(
 
 
 def test_a_planes_return_that_leads_on_to_a_landing_is_not_judged() -> None:
-    assert flown(PLANE, A, do(m.RTL), rtl_m=120.0).safe is True
-    verdict = flown(PLANE, A, do(m.RTL), do(LAND_START), rtl_m=120.0)
+    assert flown(PLANE, A, do(cmd.RTL), rtl_m=120.0).safe is True
+    verdict = flown(PLANE, A, do(cmd.RTL), do(LAND_START), rtl_m=120.0)
     assert verdict.safe is None
     assert any("RTL_AUTOLAND" in line for line in verdict.not_judged)

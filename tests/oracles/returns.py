@@ -8,17 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.mavlink.mission.mission import (
-    LAND,
-    RELATIVE,
-    TAKEOFF,
-    VTOL_LAND,
-    VTOL_TAKEOFF,
-    WAYPOINT,
-    Home,
-    Mission,
-    MissionItem,
-)
+from gcsplan.mavlink.mission.commands import LAND, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT
+from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gcsplan.check.rtl.everywhere import way_home
+from gcsplan.check.rtl.way_home import way_home
 from gcsplan.report.page import render_page
 from tests.report.test_page import HOSTILE, fleet_page, small_page
 from tests.support import browser as chromium

@@ -22,7 +22,7 @@ from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import load_mission, plan
 from gcsplan.app.report_page import render
 from gcsplan.check.judge import judge
-from gcsplan.check.rtl.everywhere import way_home
+from gcsplan.check.rtl.way_home import way_home
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Rules, separation

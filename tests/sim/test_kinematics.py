@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.sim.kinematics import Kinematics
@@ -31,11 +32,11 @@ def at(command: int, east_m: float, north_m: float, z: float, p1: float = 0.0, f
 
 
 def speed(m_s: float) -> MissionItem:
-    return MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (1.0, m_s, -1.0, 0.0))
+    return MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (1.0, m_s, -1.0, 0.0))
 
 
 def delay(seconds: float) -> MissionItem:
-    return MissionItem(m.DELAY, m.NO_POSITION, (seconds, -1.0, -1.0, -1.0))
+    return MissionItem(cmd.DELAY, m.NO_POSITION, (seconds, -1.0, -1.0, -1.0))
 
 
 def track(
@@ -53,7 +54,7 @@ def speed_at(flown: Flown, along_m: float) -> float:
     return float((s[j + 1] - s[j - 1]) / (flown.times_s[j + 1] - flown.times_s[j - 1]))
 
 
-TAKEOFF = at(m.TAKEOFF, 0, 0, 50)
+TAKEOFF = at(cmd.TAKEOFF, 0, 0, 50)
 CLIMB_S = 50 / 2.5 + 2.5 / 1.0
 """To 50 m: 2.5 m/s reached and lost again at 1 m/s²."""
 
@@ -63,8 +64,8 @@ def test_a_lower_speed_commanded_on_the_move_takes_hold_as_slowly_as_on_a_real_a
     leg_m: float, measured_m_s: float
 ) -> None:
     way = track(
-        TAKEOFF, speed(10), at(m.WAYPOINT, 0, 300, 50), speed(3), at(m.WAYPOINT, 0, 300 + leg_m, 50),
-        at(m.WAYPOINT, 0, 900, 50),
+        TAKEOFF, speed(10), at(cmd.WAYPOINT, 0, 300, 50), speed(3), at(cmd.WAYPOINT, 0, 300 + leg_m, 50),
+        at(cmd.WAYPOINT, 0, 900, 50),
     )  # fmt: skip
     flown = fly([way], [0.0])
     assert speed_at(flown, 50 + 295) == pytest.approx(10.0, rel=0.01)
@@ -73,8 +74,8 @@ def test_a_lower_speed_commanded_on_the_move_takes_hold_as_slowly_as_on_a_real_a
 
 def test_a_speed_commanded_at_a_standstill_holds_from_the_start() -> None:
     way = track(
-        TAKEOFF, speed(10), at(m.WAYPOINT, 0, 300, 50, p1=4), speed(3), at(m.WAYPOINT, 0, 400, 50),
-        at(m.WAYPOINT, 0, 900, 50),
+        TAKEOFF, speed(10), at(cmd.WAYPOINT, 0, 300, 50, p1=4), speed(3), at(cmd.WAYPOINT, 0, 400, 50),
+        at(cmd.WAYPOINT, 0, 900, 50),
     )  # fmt: skip
     flown = fly([way], [0.0])
     first_s = 300 / 10 + 10 / 1.5
@@ -84,7 +85,7 @@ def test_a_speed_commanded_at_a_standstill_holds_from_the_start() -> None:
 
 
 def test_a_straight_flight_takes_the_time_of_its_trapezoids() -> None:
-    way = track(TAKEOFF, at(m.WAYPOINT, 0, 800, 50), at(m.LAND, 0, 800, 0))
+    way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 800, 50), at(cmd.LAND, 0, 800, 0))
     flown = fly([way], [7.0])
     assert flown.begin_s[0] == 7.0
     assert flown.arrive_s[0] == pytest.approx(7 + CLIMB_S + 800 / 10 + 10 / 1.5, abs=0.03)
@@ -95,13 +96,13 @@ def test_a_straight_flight_takes_the_time_of_its_trapezoids() -> None:
 
 
 def test_a_leg_too_short_for_its_speed_is_a_triangle() -> None:
-    flown = fly([track(TAKEOFF, at(m.WAYPOINT, 0, 20, 50))], [0.0])
+    flown = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 20, 50))], [0.0])
     assert flown.arrive_s[0] == pytest.approx(CLIMB_S + 2 * math.sqrt(20 / 1.5), abs=0.03)
 
 
 @pytest.mark.parametrize(("rise_m", "rate_m_s"), [(200.0, 2.5), (-200.0, 1.5)])
 def test_a_steep_leg_is_flown_as_slowly_as_climb_and_descent_demand(rise_m: float, rate_m_s: float) -> None:
-    way = track(at(m.TAKEOFF, 0, 0, 300), at(m.WAYPOINT, 0, 400, 300 + rise_m))
+    way = track(at(cmd.TAKEOFF, 0, 0, 300), at(cmd.WAYPOINT, 0, 400, 300 + rise_m))
     flown = fly([way], [0.0])
     length_m = math.hypot(400, 200)
     v = rate_m_s * length_m / 200
@@ -110,7 +111,7 @@ def test_a_steep_leg_is_flown_as_slowly_as_climb_and_descent_demand(rise_m: floa
 
 
 def test_a_right_angle_is_rounded_two_metres_from_its_way_point_at_the_speed_of_the_arc() -> None:
-    way = track(TAKEOFF, at(m.WAYPOINT, 0, 500, 50), at(m.WAYPOINT, 500, 500, 50))
+    way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 500, 50), at(cmd.WAYPOINT, 500, 500, 50))
     nearest_m = np.linalg.norm(way.points - [0, 500, GROUND_M + 50], axis=1).min()
     assert nearest_m == pytest.approx(2.0, abs=0.05)
     radius_m = 2 / (math.sqrt(2) - 1)
@@ -130,7 +131,7 @@ def test_a_right_angle_is_rounded_two_metres_from_its_way_point_at_the_speed_of_
 def test_a_short_leg_is_flown_as_slowly_as_a_real_arducopter_flew_it(leg_m: float, measured_m_s: float) -> None:
     kinematics = replace(Kinematics.of(replace(COPTER, speed_max_m_s=15.0)), leg_jerk_m_s3=1.0)
     lat, lon = (float(x) for x in FLAT.frame.to_degrees(0.0, 0.0))
-    items = [TAKEOFF, speed(15), *(at(m.WAYPOINT, 0, y, 50) for y in (600, 600 + leg_m, 1200))]
+    items = [TAKEOFF, speed(15), *(at(cmd.WAYPOINT, 0, y, 50) for y in (600, 600 + leg_m, 1200))]
     mission = Mission(Autopilot.ARDUCOPTER, Home.at(lat, lon, GROUND_M), tuple(items))
     flown = fly([make_track(mission, COPTER, FLAT, kinematics)], [0.0])
     assert speed_at(flown, 50 + 600 + leg_m / 2) == pytest.approx(measured_m_s, rel=0.04)
@@ -150,9 +151,9 @@ def test_a_speed_counts_in_the_metres_of_the_autopilot(lat_deg: float, autopilot
     for way, degree_m in (((2000.0, 0.0), along_parallel), ((0.0, 2000.0), along_meridian)):
         place = world.frame.to_degrees(*way)
         goal = MissionItem(
-            m.WAYPOINT, m.RELATIVE, (0, 0, 0, 0), m.degrees_e7(float(place[0])), m.degrees_e7(float(place[1])), 50
+            cmd.WAYPOINT, m.RELATIVE, (0, 0, 0, 0), m.degrees_e7(float(place[0])), m.degrees_e7(float(place[1])), 50
         )
-        top = MissionItem(m.TAKEOFF, m.RELATIVE, (0, 0, 0, 0), m.degrees_e7(lat), m.degrees_e7(lon), 50)
+        top = MissionItem(cmd.TAKEOFF, m.RELATIVE, (0, 0, 0, 0), m.degrees_e7(lat), m.degrees_e7(lon), 50)
         mission = Mission(vehicle.autopilot, Home.at(lat, lon, GROUND_M), (top, speed(8), goal))
         flown = make_track(mission, vehicle, world, Kinematics.of(vehicle))
         ratio = degree_m / 111318.845 if vehicle.lays_curves else 1.0
@@ -165,27 +166,27 @@ def test_short_legs_cost_nothing_where_no_curve_is_laid_out_for_each() -> None:
 
 
 def test_a_change_of_pitch_alone_costs_nothing_and_a_way_point_on_a_straight_line_neither() -> None:
-    straight = fly([track(TAKEOFF, at(m.WAYPOINT, 0, 800, 50))], [0.0])
-    cut = fly([track(TAKEOFF, at(m.WAYPOINT, 0, 300, 50), at(m.WAYPOINT, 0, 800, 50))], [0.0])
+    straight = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 800, 50))], [0.0])
+    cut = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 300, 50), at(cmd.WAYPOINT, 0, 800, 50))], [0.0])
     assert cut.arrive_s[0] == pytest.approx(straight.arrive_s[0], abs=0.05)
-    bent = fly([track(TAKEOFF, at(m.WAYPOINT, 0, 400, 60), at(m.WAYPOINT, 0, 800, 50))], [0.0])
+    bent = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 400, 60), at(cmd.WAYPOINT, 0, 800, 50))], [0.0])
     assert bent.arrive_s[0] == pytest.approx(straight.arrive_s[0], abs=0.1)
 
 
 def test_waits_in_the_air_and_on_the_ground_last_as_long_as_they_say() -> None:
-    plain = fly([track(TAKEOFF, at(m.WAYPOINT, 0, 200, 50), at(m.WAYPOINT, 0, 400, 50))], [0.0])
-    waits = track(delay(12), TAKEOFF, delay(7.5), at(m.WAYPOINT, 0, 200, 50), at(m.WAYPOINT, 0, 400, 50))
+    plain = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 200, 50), at(cmd.WAYPOINT, 0, 400, 50))], [0.0])
+    waits = track(delay(12), TAKEOFF, delay(7.5), at(cmd.WAYPOINT, 0, 200, 50), at(cmd.WAYPOINT, 0, 400, 50))
     flown = fly([waits], [3.0])
     assert flown.begin_s[0] == 15.0
     assert flown.arrive_s[0] == pytest.approx(plain.arrive_s[0] + 3 + 12 + 7.5, abs=0.01)
-    held = track(TAKEOFF, at(m.WAYPOINT, 0, 200, 50), at(m.LOITER_TIME, 0, 400, 50, p1=30), at(m.LAND, 0, 400, 0))
-    landed = track(TAKEOFF, at(m.WAYPOINT, 0, 200, 50), at(m.WAYPOINT, 0, 400, 50), at(m.LAND, 0, 400, 0))
+    held = track(TAKEOFF, at(cmd.WAYPOINT, 0, 200, 50), at(cmd.LOITER_TIME, 0, 400, 50, p1=30), at(cmd.LAND, 0, 400, 0))
+    landed = track(TAKEOFF, at(cmd.WAYPOINT, 0, 200, 50), at(cmd.WAYPOINT, 0, 400, 50), at(cmd.LAND, 0, 400, 0))
     assert fly([held], [0.0]).end_s[0] == pytest.approx(fly([landed], [0.0]).end_s[0] + 30, abs=0.02)
     assert fly([held], [0.0]).hold_s[0] == 30.0
 
 
 def test_a_return_climbs_flies_straight_home_and_comes_down_there() -> None:
-    way = track(TAKEOFF, at(m.WAYPOINT, 300, 400, 50), MissionItem(m.RTL, m.NO_POSITION), rtl_rel_home_m=80)
+    way = track(TAKEOFF, at(cmd.WAYPOINT, 300, 400, 50), MissionItem(cmd.RTL, m.NO_POSITION), rtl_rel_home_m=80)
     flown = fly([way], [0.0])
     points = flown.points(0)
     assert points[:, 2].max() == pytest.approx(GROUND_M + 80, abs=0.01)
@@ -195,7 +196,7 @@ def test_a_return_climbs_flies_straight_home_and_comes_down_there() -> None:
 
 
 def test_a_loiter_without_end_ends_in_the_air_and_what_follows_is_never_flown() -> None:
-    way = track(TAKEOFF, at(m.LOITER_UNLIM, 0, 400, 50), at(m.LAND, 0, 400, 0))
+    way = track(TAKEOFF, at(cmd.LOITER_UNLIM, 0, 400, 50), at(cmd.LAND, 0, 400, 0))
     flown = fly([way], [0.0])
     assert way.ends_in_air
     assert flown.end_s[0] == flown.arrive_s[0]
@@ -207,7 +208,7 @@ def test_a_terrain_leg_follows_the_ground() -> None:
         return GROUND_M + 40 * np.exp(-((north - 600) ** 2) / 200**2) + 0 * east
 
     ground = worlds.world(hill)
-    way = track(TAKEOFF, at(m.WAYPOINT, 0, 100, 50, frame=10), at(m.WAYPOINT, 0, 1200, 50, frame=10), world=ground)
+    way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 100, 50, frame=10), at(cmd.WAYPOINT, 0, 1200, 50, frame=10), world=ground)
     flown = fly([way], [0.0])
     points = flown.points(0)
     far = points[points[:, 1] > 100]
@@ -221,7 +222,7 @@ def test_the_ideal_vehicle_of_the_papers_flies_length_over_speed() -> None:
         COPTER, accel_m_s2=math.inf, corner_accel_m_s2=math.inf, vertical_accel_m_s2=math.inf, climb_m_s=math.inf,
         descent_m_s=math.inf,
     )  # fmt: skip
-    way = track(TAKEOFF, speed(8), at(m.WAYPOINT, 0, 300, 90), at(m.WAYPOINT, 400, 300, 50), vehicle=ideal)
+    way = track(TAKEOFF, speed(8), at(cmd.WAYPOINT, 0, 300, 90), at(cmd.WAYPOINT, 400, 300, 50), vehicle=ideal)
     length_m = 50 / 10 * 8 + math.hypot(300, 40) + math.hypot(400, 40)  # the climb is flown at 10
     assert fly([way], [0.0]).arrive_s[0] == pytest.approx(length_m / 8, abs=0.1)
 
@@ -236,7 +237,7 @@ def test_no_limit_of_motion_is_ever_broken(
     legs: list[tuple[float, float, float]], cruise: float, depart: float
 ) -> None:
     vehicle = replace(COPTER, speed_max_m_s=20.0)
-    way = track(TAKEOFF, speed(cruise), *(at(m.WAYPOINT, *place) for place in legs), vehicle=vehicle)
+    way = track(TAKEOFF, speed(cruise), *(at(cmd.WAYPOINT, *place) for place in legs), vehicle=vehicle)
     flown = fly([way], [depart])
     t, points, s = flown.times_s, flown.points(0), flown.along_m[:, 0]
     assert math.isfinite(flown.arrive_s[0])
@@ -256,8 +257,8 @@ def test_no_limit_of_motion_is_ever_broken(
 
 def test_a_quarter_of_the_step_flies_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     way = track(
-        TAKEOFF, speed(9), at(m.WAYPOINT, 0, 200, 60), at(m.WAYPOINT, 150, 250, 40), at(m.WAYPOINT, 160, 100, 70),
-        speed(4), at(m.WAYPOINT, 500, 0, 50), at(m.LAND, 500, 0, 0),
+        TAKEOFF, speed(9), at(cmd.WAYPOINT, 0, 200, 60), at(cmd.WAYPOINT, 150, 250, 40), at(cmd.WAYPOINT, 160, 100, 70),
+        speed(4), at(cmd.WAYPOINT, 500, 0, 50), at(cmd.LAND, 500, 0, 0),
     )  # fmt: skip
     coarse = fly([way], [0.0])
     monkeypatch.setattr("gcsplan.sim.mission_flight.STEP_S", STEP_S / 4)
@@ -270,7 +271,7 @@ def test_a_quarter_of_the_step_flies_the_same(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_wind_within_the_airspeed_costs_no_time_and_beyond_it_costs_what_is_missing() -> None:
-    way = track(TAKEOFF, at(m.WAYPOINT, 0, 1000, 50))
+    way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 1000, 50))
     calm = fly([way], [0.0]).arrive_s[0]
     assert fly([way], [0.0], weather=Weather(2.0, 0.0)).arrive_s[0] == pytest.approx(calm, abs=1e-6)  # 12 - 2 = 10
     ahead = fly([way], [0.0], weather=Weather(6.0, 0.0)).arrive_s[0]  # 12 - 6 = 6 m/s over ground
@@ -283,7 +284,7 @@ def test_wind_within_the_airspeed_costs_no_time_and_beyond_it_costs_what_is_miss
 
 
 def test_a_run_is_the_same_whether_it_is_flown_alone_or_among_others() -> None:
-    ways = [track(TAKEOFF, at(m.WAYPOINT, 0, 600, 50)), track(TAKEOFF, at(m.WAYPOINT, 600, 0, 50))]
+    ways = [track(TAKEOFF, at(cmd.WAYPOINT, 0, 600, 50)), track(TAKEOFF, at(cmd.WAYPOINT, 600, 0, 50))]
     weather = Weather(5.0, None, 2.0, 1.0)
     together = fly(ways, [0.0, 5.0], weather=weather, runs=4, seed=7)
     alone = fly(ways, [0.0, 5.0], weather=weather, runs=1, seed=7, first_run=2)
@@ -293,7 +294,7 @@ def test_a_run_is_the_same_whether_it_is_flown_alone_or_among_others() -> None:
 
 
 def test_noise_and_gusts_have_the_size_that_was_asked_for() -> None:
-    way = track(TAKEOFF, at(m.WAYPOINT, 0, 1500, 50))
+    way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 1500, 50))
     noisy = fly([way], [0.0], weather=Weather(noise_m=2.0), runs=40, seed=3)
     assert noisy.offset_m is not None
     assert noisy.offset_m.std(axis=(0, 1)) == pytest.approx([2.0, 2.0, 2.0], rel=0.15)
@@ -304,13 +305,13 @@ def test_noise_and_gusts_have_the_size_that_was_asked_for() -> None:
 
 
 def test_one_that_cannot_make_way_never_arrives_and_the_flight_still_ends() -> None:
-    way = track(TAKEOFF, at(m.WAYPOINT, 0, 600, 50))
+    way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 600, 50))
     flown = fly([way], [0.0], weather=Weather(30.0, 0.0))
     assert math.isnan(flown.arrive_s[0])
 
 
 def test_planes_and_px4_are_flown_too() -> None:
-    for autopilot, takeoff in ((Autopilot.PX4, m.TAKEOFF), (Autopilot.ARDUPLANE, m.VTOL_TAKEOFF)):
+    for autopilot, takeoff in ((Autopilot.PX4, cmd.TAKEOFF), (Autopilot.ARDUPLANE, cmd.VTOL_TAKEOFF)):
         vehicle = replace(COPTER, autopilot=autopilot)
-        flown = fly([track(at(takeoff, 0, 0, 50), at(m.WAYPOINT, 0, 800, 50), vehicle=vehicle)], [0.0])
+        flown = fly([track(at(takeoff, 0, 0, 50), at(cmd.WAYPOINT, 0, 800, 50), vehicle=vehicle)], [0.0])
         assert flown.arrive_s[0] == pytest.approx(CLIMB_S + 800 / 10 + 10 / 1.5, abs=0.05)

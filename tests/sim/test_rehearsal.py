@@ -15,6 +15,7 @@ from gcsplan.app.pipeline import plan
 from gcsplan.app.rehearsing import parts_of, terms_of
 from gcsplan.check.judge import judge
 from gcsplan.errors import CheckFailed, InputError
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import load_mission
@@ -56,11 +57,12 @@ def a_part(
     lat, lon = (float(x) for x in world.frame.to_degrees(*way[0]))
     home = Home.at(lat, lon, world.ground_amsl(lat, lon))
     items = [
-        at(m.TAKEOFF, *way[0], height_m), MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (1.0, CRUISE_M_S, -1.0, 0.0)),
-        *(at(m.WAYPOINT, *place, height_m) for place in way[1:]),
+        at(cmd.TAKEOFF, *way[0], height_m),
+        MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (1.0, CRUISE_M_S, -1.0, 0.0)),
+        *(at(cmd.WAYPOINT, *place, height_m) for place in way[1:]),
     ]  # fmt: skip
     if land:
-        items.append(at(m.LAND, *way[-1], 0))
+        items.append(at(cmd.LAND, *way[-1], 0))
     mission = Mission(vehicle.autopilot, home, tuple(items), vehicle.name, number)
     return Part(vehicle, mission, judge(mission, vehicle, world), depart_s, arrive_s)
 
@@ -117,7 +119,7 @@ def test_a_mission_that_breaks_a_limit_is_not_even_sent() -> None:
 
 def test_what_is_not_understood_is_named_and_is_no_pass() -> None:
     part = a_part(1, (0, 0), (500, 0))
-    unknown = MissionItem(m.DELAY, m.NO_POSITION, (-1.0, 12.0, 0.0, 0.0))
+    unknown = MissionItem(cmd.DELAY, m.NO_POSITION, (-1.0, 12.0, 0.0, 0.0))
     mission = replace(part.mission, items=(*part.mission.items[:2], unknown, *part.mission.items[2:]))
     part = replace(part, mission=mission, verdict=judge(mission, part.vehicle, FLAT))
     result = rehearse([part], FLAT, Terms())

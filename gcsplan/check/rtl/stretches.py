@@ -7,97 +7,107 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.check.rtl.rules import Target
-from gcsplan.check.rtl.study import CLEAR, Study
-from gcsplan.check.rtl.trail import Trail
+from gcsplan.check.rtl.obstacles import GROUND, MAX_AGL, MAX_AMSL, Obstacles
+from gcsplan.check.rtl.refinement import CLEAR, Refinement
+from gcsplan.check.rtl.sweep import Target
+from gcsplan.check.rtl.trace import MissionTrace
 from gcsplan.check.rtl.verdict import UnsafeStretch
-from gcsplan.check.rtl.walls import GROUND, MAX_AGL, MAX_AMSL, Walls
 from gcsplan.check.stretch import Place
 
 Ints = NDArray[np.intp]
 ROUND_M = 0.1
 LOOKED_AT = 500
-"""Points on a way home, of which the highest is named; for words alone."""
+"""Points on a way home, of which the highest is named in messages."""
 
 
-def rel_home(walls: Walls, level: float, home_amsl_m: float, returns: NDArray[np.bool_] | None = None) -> float | None:
+def rel_home(
+    obstacles: Obstacles, level: float, home_amsl_m: float, returns: NDArray[np.bool_] | None = None
+) -> float | None:
     """A level as metres above home, rounded up where the rounded one passes too; None for none."""
     if math.isinf(level):
         return None
-    mine = np.ones(len(walls), np.bool_) if returns is None else returns
+    mine = np.ones(len(obstacles), np.bool_) if returns is None else returns
     rounded = math.ceil((level - home_amsl_m) / ROUND_M - 1e-9) * ROUND_M
-    passes = bool(walls.passes(home_amsl_m + rounded)[mine].all())
+    passes = bool(obstacles.passes(home_amsl_m + rounded)[mine].all())
     return round(rounded, 1) if passes else level - home_amsl_m
 
 
 def stretches_of(
-    trail: Trail, study: Study, grade: int, level: float, target: Target | None, *, but: int | None = None
+    trace: MissionTrace,
+    refinement: Refinement,
+    grade: int,
+    level: float,
+    target: Target | None,
+    *,
+    but: int | None = None,
 ) -> tuple[UnsafeStretch, ...]:
     """What fails ``grade`` at ``level``, in the order flown; not what fails the grade ``but`` already.
 
-    ``target``: where they lead, for the place of the obstacle; None: no place and no altitude is told.
+    ``target``: where they lead, for the place of the obstacle; None: neither the place nor an altitude is given.
     """
-    bad = study.bad(grade, level)
+    bad = refinement.bad(grade, level)
     if but is not None:
-        bad &= ~study.bad(but, level)
-    found = [_stretch(trail, study, grade, level, group, target) for group in _groups(study, bad)]
+        bad &= ~refinement.bad(but, level)
+    found = [_stretch(trace, refinement, grade, level, group, target) for group in _groups(refinement, bad)]
     return _without_doubles(found)
 
 
-def _groups(study: Study, bad: NDArray[np.bool_]) -> list[Ints]:
-    """Runs of bad parts, one after the other on the trail."""
+def _groups(refinement: Refinement, bad: NDArray[np.bool_]) -> list[Ints]:
+    """Runs of bad parts, one after the other on the trace."""
     where = np.flatnonzero(bad)
     if not len(where):
         return []
     return np.split(where, np.flatnonzero(np.diff(where) > 1) + 1)
 
 
-def _stretch(trail: Trail, study: Study, grade: int, level: float, group: Ints, target: Target | None) -> UnsafeStretch:
-    walls, cuts = study.strict[grade], study.cuts
-    mine = np.zeros(len(walls), np.bool_)
+def _stretch(
+    trace: MissionTrace, refinement: Refinement, grade: int, level: float, group: Ints, target: Target | None
+) -> UnsafeStretch:
+    obstacles, parts = refinement.strict[grade], refinement.parts
+    mine = np.zeros(len(obstacles), np.bool_)
     mine[group] = True
-    own = walls.take(mine)
+    own = obstacles.take(mine)
     home = math.nan if target is None else target.ground_amsl_m
-    each = own.lowest(study.start)
+    each = own.lowest(refinement.start)
     k = int(each.argmax())
     row = own.worst(k, level)
     assert row is not None
     first, last = int(group[0]), int(group[-1])
-    a, b = float(cuts.start[first]), float(cuts.end[last])
-    from_m, to_m = (float(np.interp(u, trail.u, trail.along)) for u in (a, b))
+    a, b = float(parts.start[first]), float(parts.end[last])
+    from_m, to_m = (float(np.interp(u, trace.u, trace.along)) for u in (a, b))
     zone = int(own.what[row])
-    name = trail.world.airspace.zones[zone].name if zone >= 0 else ""
+    name = trace.world.airspace.zones[zone].name if zone >= 0 else ""
     obstacle = None
     if target is not None and zone == GROUND and math.isfinite(own.top[row]):
-        obstacle = _obstacle(trail, float(cuts.middle[group[k]]), target)
+        obstacle = _obstacle(trace, float(parts.middle[group[k]]), target)
     return UnsafeStretch(
-        from_seq=int(trail.seq[cuts.stretch[first]]),
-        to_seq=int(trail.seq[cuts.stretch[last]]),
-        start=trail.place(a),
-        end=trail.place(b),
+        from_seq=int(trace.seq[parts.stretch[first]]),
+        to_seq=int(trace.seq[parts.stretch[last]]),
+        start=trace.place(a),
+        end=trace.place(b),
         from_m=from_m,
         to_m=to_m,
         why=_why(own, row, name, grade, obstacle),
         zone=name,
         obstacle=obstacle,
-        lowest_rel_home_m=None if target is None else rel_home(own, own.together(study.start), home),
+        lowest_rel_home_m=None if target is None else rel_home(own, own.together(refinement.start), home),
     )
 
 
-def _obstacle(trail: Trail, u: float, target: Target) -> Place | None:
-    """The highest ground, obstacles on it included, straight on the way from a place on the trail."""
-    start = trail.points(np.array([u]))[0, :2]
+def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
+    """The highest ground, obstacles on it included, straight on the way from a place on the trace."""
+    start = trace.points(np.array([u]))[0, :2]
     places = start + np.linspace(0.0, 1.0, LOOKED_AT)[:, None] * (target.en - start)
-    top = trail.world.airspace.surface.top_at(*places.T)
+    top = trace.world.airspace.surface.top_at(*places.T)
     if np.isnan(top).all():
         return None
     k = int(np.nanargmax(top))
-    lat, lon = trail.world.frame.to_degrees(*places[k]).tolist()
+    lat, lon = trace.world.frame.to_degrees(*places[k]).tolist()
     return lat, lon, float(top[k])
 
 
-def _why(walls: Walls, row: int, name: str, grade: int, obstacle: Place | None) -> str:
-    what, top, bottom = int(walls.what[row]), float(walls.top[row]), float(walls.bottom[row])
+def _why(obstacles: Obstacles, row: int, name: str, grade: int, obstacle: Place | None) -> str:
+    what, top, bottom = int(obstacles.what[row]), float(obstacles.top[row]), float(obstacles.bottom[row])
     if what == MAX_AMSL:
         return "the return rises above max_amsl_m"
     if what == MAX_AGL:

@@ -1,4 +1,4 @@
-"""`WayHome`: what is said of the way home from every point of a mission, in numbers, in words and as plain values."""
+"""`WayHome`: the result of judging the way home, in numbers, in words and as plain values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gcsplan.check.stretch import Place
 
 @dataclass(frozen=True, slots=True)
 class UnsafeStretch:
-    """A part of the mission from which the return is not safe at the altitude that was asked for.
+    """A part of the mission from which the return is not safe at the altitude that was judged.
 
     ``from_seq``, ``to_seq``: wire items being flown to at its ends; ``start``, ``end``: where the vehicle is there;
     ``from_m``, ``to_m``: horizontal metres along the mission (equal for a column). ``why`` in words; ``obstacle`` the
@@ -105,16 +105,16 @@ class ProfilePoint:
 
 @dataclass(frozen=True, slots=True)
 class WayHome:
-    """The way home from everywhere on one mission.
+    """The way home from every point of one mission.
 
     Two grades. *Clear*: the return, within track and altitude error, meets no ground or obstacle, keeps the horizontal
     clearance and enters no zone or its clearance. *Legal*: it keeps min AGL, max AGL and max AMSL besides.
 
     ``parameter`` is the autopilot's name for the return altitude; ``rtl_rel_home_m`` what was judged, ``assumed``
-    where nobody gave it and the autopilot's default was taken. ``lowest_rel_home_m`` … ``highest_rel_home_m``: return
-    altitudes that are clear from everywhere (None: none is; highest None: no limit from above);
+    where it was not set and the autopilot's default was taken. ``lowest_rel_home_m`` … ``highest_rel_home_m``: return
+    altitudes that are clear from every point (None: none is; highest None: no limit from above);
     ``lowest_legal_rel_home_m`` likewise for legal. ``unsafe``: where the return is not clear; ``irregular``: where it
-    is clear but not legal. ``advised_rel_home_m``: the lowest clear altitude, or where none is clear from everywhere,
+    is clear but not legal. ``advised_rel_home_m``: the lowest clear altitude, or where none is clear from every point,
     one that leaves little unsafe; ``rally``: points proposed for that case, to be judged with it; ``left``: what stays
     unsafe even so. ``profile`` in the order flown.
     """
@@ -139,7 +139,7 @@ class WayHome:
 
     @property
     def safe(self) -> bool | None:
-        """True where the return is clear from everywhere and the battery reaches; None where not all was judged."""
+        """True where the return is clear from every point and the battery reaches; None where not all was judged."""
         if self.unsafe or (self.battery is not None and self.battery.short):
             return False
         return None if self.not_judged else True
@@ -150,7 +150,7 @@ class WayHome:
         return math.fsum(s.to_m - s.from_m for s in self.unsafe)
 
     def as_dict(self, *, profile: bool = False) -> dict[str, Any]:
-        """Plain values for ``summary.json``; the profile only if asked for."""
+        """Plain values for ``summary.json``; the profile on request."""
         out: dict[str, Any] = {
             "parameter": self.parameter,
             "rtl_rel_home_m": self.rtl_rel_home_m,

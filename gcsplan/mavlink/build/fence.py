@@ -1,7 +1,7 @@
 """No-fly zones as the items of a MAVLink fence, and back.
 
-A fence item is a circle or one corner of a polygon and has **no height**: a zone with a floor or a ceiling cannot be
-told. It is left out, or becomes a fence from the ground to the sky where that is asked for. A circle keeps its radius,
+A fence item is a circle or one corner of a polygon and has **no height**: a zone with a floor or a ceiling does not
+fit. It is left out, or on request becomes a fence from the ground to the sky. A circle keeps its radius,
 rounded up to whole centimetres; a polygon's corners lie within `STRAIGHT_M` of its outline. Items are in frame 0:
 ArduPilot refuses frame 2, and no autopilot keeps the altitude.
 """
@@ -17,8 +17,8 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.mavlink.files.plan_fence import CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, POLYGON_OUT
-from gcsplan.mavlink.mission.autopilots import manner, max_items
+from gcsplan.mavlink.mission.autopilots import max_items, profile_of
+from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT
 from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of
@@ -31,15 +31,15 @@ STRAIGHT_M = 0.1
 """A corner of the outline that lies this near to the line between its neighbours is left out."""
 
 MOST_CORNERS = 255  # of one polygon on ArduPilot: the number is kept in a byte (AC_PolyFence_loader.cpp)
-ROOM_BYTES = {Autopilot.ARDUCOPTER: 560, Autopilot.ARDUPLANE: 672}  # StorageManager.cpp, StorageFence
+STORAGE_BYTES = {Autopilot.ARDUCOPTER: 560, Autopilot.ARDUPLANE: 672}  # StorageManager.cpp, StorageFence
 HEAD_BYTES, CIRCLE_BYTES, POLYGON_BYTES, CORNER_BYTES = 5, 13, 2, 8  # AC_PolyFence_loader.cpp; 42 circles fit a copter
 
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """One area of a fence in the plane; ``inclusion``: to be stayed inside of.
+    """One area of a fence in the plane; ``inclusion``: the vehicle must stay inside.
 
-    ``shapes``: what of it is near the frame: none of an area far away, several where it comes near in several parts.
+    ``shapes``: its parts near the frame: none of an area far away, several where several parts are near.
     """
 
     name: str
@@ -49,57 +49,57 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """A fence for one autopilot: its items in wire order, the zones in it, and what is to be said (``told``).
+    """A fence for one autopilot: its items in wire order, the zones in it, and what a user should know (``notes``).
 
-    ``left_out`` names the zones that a fence has no words for.
+    ``left_out`` names the zones that a fence cannot express.
     """
 
     items: tuple[MissionItem, ...]
     zones: tuple[Zone, ...]
     left_out: tuple[str, ...] = ()
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infinite: bool = False) -> Fence:
     """The fence that keeps an aircraft out of ``zones``.
 
-    Zones with a floor or a ceiling are left out and named, or with ``infinite`` taken as if they had neither. A circle
+    Zones with a floor or a ceiling are left out and named; with ``infinite`` they count as if without. A circle
     inside another one is dropped. Raises InputError where the autopilot cannot keep so much.
     """
-    told: list[str] = []
+    notes: list[str] = []
     bounded = [z for z in zones if z.floor is not None or z.ceiling is not None]
     taken = list(zones) if infinite else [z for z in zones if z.floor is None and z.ceiling is None]
     if bounded and infinite:
-        told.append(f"a fence has no height: {_names(bounded)} would be forbidden from the ground to the sky on board")
+        notes.append(f"a fence has no height: {_names(bounded)} would be forbidden from the ground to the sky on board")
     elif bounded:
-        told.append(
+        notes.append(
             f"a fence has no height: {_names(bounded)} {'is' if len(bounded) == 1 else 'are'} left out of it, having a "
             f"floor or a ceiling"
         )
     inside = [z for k, z in enumerate(taken) if any(_holds(o, z, j < k) for j, o in enumerate(taken) if j != k)]
     if inside:
-        told.append(f"{_names(inside)} {'lies' if len(inside) == 1 else 'lie'} inside another circle of the fence")
+        notes.append(f"{_names(inside)} {'lies' if len(inside) == 1 else 'lie'} inside another circle of the fence")
     taken = [z for z in taken if z not in inside]
     items: list[MissionItem] = []
     for zone in taken:
         items += _circle(zone.shape, frame) if isinstance(zone.shape, Circle) else _corners(zone, frame)
-    _require_room(taken, items, autopilot)
+    _require_storage(taken, items, autopilot)
     left_out = () if infinite else tuple(z.name for z in bounded)
-    return Fence(tuple(items), tuple(taken), left_out, tuple(told))
+    return Fence(tuple(items), tuple(taken), left_out, tuple(notes))
 
 
 def areas_of(items: Sequence[MissionItem], frame: Frame) -> list[Area]:
     """The areas of a fence from its wire items; return points (5000) are passed over.
 
-    Raises InputError for a polygon that is not whole or not simple, a radius that is none or beyond
-    `LARGEST_RADIUS_M`, places that are none, and other commands.
+    Raises InputError for a polygon that is not whole or not simple, a radius that is not positive or beyond
+    `LARGEST_RADIUS_M`, places off the globe, and other commands.
     """
     areas: list[Area] = []
     index = 0
     while index < len(items):
         item = items[index]
         shapes: tuple[Circle | Polygon, ...]
-        if item.command == 5000:
+        if item.command == FENCE_RETURN_POINT:
             index += 1
             continue
         if item.command in (CIRCLE_IN, CIRCLE_OUT):
@@ -127,7 +127,7 @@ def _circle_of(item: MissionItem, index: int, frame: Frame) -> tuple[Circle, ...
 
 
 def _polygon_of(items: Sequence[MissionItem], index: int, frame: Frame) -> tuple[int, tuple[Polygon, ...]]:
-    """How many items the polygon that begins there has, and what of it is near."""
+    """How many items the polygon that begins there has, and its parts near the frame."""
     first = items[index]
     count = first.params[0]
     corners = items[index : index + int(count)] if math.isfinite(count) and count >= 3 else []
@@ -150,7 +150,7 @@ def _corner(item: MissionItem, index: int) -> tuple[float, float]:
 def _circle(circle: Circle, frame: Frame) -> list[MissionItem]:
     lat, lon = (float(x) for x in frame.to_degrees(circle.east_m, circle.north_m))
     cm = circle.radius_m * 100.0
-    radius_m = math.ceil(cm - max(1e-6, 1.2e-7 * cm)) / 100.0  # what comes back as float32 is the same again
+    radius_m = math.ceil(cm - max(1e-6, 1.2e-7 * cm)) / 100.0  # its float32 is the same number
     return [MissionItem(CIRCLE_OUT, GLOBAL, (radius_m, 0.0, 0.0, 0.0), degrees_e7(lat), degrees_e7(lon))]
 
 
@@ -189,8 +189,8 @@ def _straightened(ring: Floats) -> Floats:
     return points[chosen] if len(chosen) >= 3 else ring
 
 
-def _require_room(zones: Sequence[Zone], items: Sequence[MissionItem], autopilot: Autopilot) -> None:
-    label = manner(autopilot).label
+def _require_storage(zones: Sequence[Zone], items: Sequence[MissionItem], autopilot: Autopilot) -> None:
+    label = profile_of(autopilot).label
     cure = "leave zones out, or join them into fewer and simpler ones"
     for zone in zones:
         if isinstance(zone.shape, Polygon) and autopilot.is_ardupilot:
@@ -204,10 +204,10 @@ def _require_room(zones: Sequence[Zone], items: Sequence[MissionItem], autopilot
     most = max_items(autopilot, FENCE)
     if len(items) > most:
         raise InputError(f"the fence has {len(items)} items ({what}) and {label} keeps {most}: {cure}")
-    room = ROOM_BYTES.get(autopilot)
+    storage = STORAGE_BYTES.get(autopilot)
     needed = HEAD_BYTES + CIRCLE_BYTES * circles + POLYGON_BYTES * polygons + CORNER_BYTES * corners
-    if room is not None and needed > room:
-        fits = (room - HEAD_BYTES) // CIRCLE_BYTES
+    if storage is not None and needed > storage:
+        fits = (storage - HEAD_BYTES) // CIRCLE_BYTES
         raise InputError(f"the fence of {what} does not fit: {label} has room for {fits} circles, or so: {cure}")
 
 

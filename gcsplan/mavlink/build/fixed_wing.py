@@ -1,9 +1,9 @@
 """A fixed wing's mission on the wire: take-off straight ahead, way points that are flown by, and how it ends.
 
 - NAV_TAKEOFF: param1 is the least pitch in whole degrees; ArduPlane holds the heading it is launched on. The place of
-  the item is where the climb-out leads to, for whoever launches it, and for whoever checks the file.
+  the item is where the climb-out leads to: it tells the launching person and the check the heading.
 - NAV_WAYPOINT: param2, the acceptance radius, is the tangent length of the corner, rounded up to whole metres: there
-  the turn begins. ArduPlane keeps a byte of it, so a corner that needs more is given two way points, on one arc.
+  the turn begins. ArduPlane keeps a byte of it, so a corner that needs more becomes two way points on one arc.
 - No DO_LAND_START before a landing: with it ArduPlane does not arm unless RTL_AUTOLAND is set.
 """
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.mavlink.build.order import Order, split_legs
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
@@ -30,14 +31,13 @@ FARTHEST_ACCEPTED_M = 255.0
 """What ArduPlane keeps of an acceptance radius at most."""
 
 ROUNDED_M = 1e-3
-"""A tangent this little beyond whole metres is not rounded up: the turn begins so much late."""
+"""A tangent less than this beyond whole metres is not rounded up: the turn then begins this late at most."""
 
 LEAST_ACCEPTED_M = 1.0
 
-LOITER_TO_ALT = 31
 
 NEAREST_M, SLIGHT_M = 3.0, 0.5
-"""Way points nearer than the first are one, if the arc at one of them begins within the second."""
+"""Way points nearer to each other than the first are joined, if the arc at one of them begins within the second."""
 
 
 def pitch_deg(vehicle: Vehicle) -> int:
@@ -46,7 +46,7 @@ def pitch_deg(vehicle: Vehicle) -> int:
 
 
 def turns_of(points: Floats) -> Floats:
-    """(N - 2,) turn at each inner point, radians, left positive; 0 where the way does not go on."""
+    """(N - 2,) turn at each inner point, radians, left positive; 0 where the path ends."""
     way = np.diff(points[:, :2], axis=0)
     heading = np.arctan2(way[:, 1], way[:, 0])
     turn = (np.diff(heading) + math.pi) % (2.0 * math.pi) - math.pi
@@ -136,24 +136,24 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
     speed = vehicle.speed_max_m_s if order.speed_m_s is None else order.speed_m_s
     items = [
         item(
-            m.TAKEOFF, top, m.RELATIVE, round((wing.top[2] - datum) * 100), (float(pitch_deg(vehicle)), 0.0, 0.0, 0.0)
+            cmd.TAKEOFF, top, m.RELATIVE, round((wing.top[2] - datum) * 100), (float(pitch_deg(vehicle)), 0.0, 0.0, 0.0)
         ),
-        MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (0.0, speed, -1.0, 0.0)),
+        MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (0.0, speed, -1.0, 0.0)),
     ]
     if wing.up is not None:
         place, up_cm = world.frame.to_degrees(wing.up[0], wing.up[1]), round((wing.up[2] - datum) * 100)
-        items.insert(1, item(LOITER_TO_ALT, place, m.RELATIVE, up_cm, (0.0, wing.up_m, 0.0, 0.0)))
+        items.insert(1, item(cmd.LOITER_TO_ALT, place, m.RELATIVE, up_cm, (0.0, wing.up_m, 0.0, 0.0)))
     for i in range(len(points)):
         if i == len(points) - 1 and order.end == "loiter":
-            items.append(item(m.LOITER_UNLIM, places[i], frame, int(cm[i]), (0.0, 0.0, wing.circle_m, 0.0)))
+            items.append(item(cmd.LOITER_UNLIM, places[i], frame, int(cm[i]), (0.0, 0.0, wing.circle_m, 0.0)))
             continue
         accepted = min(max(LEAST_ACCEPTED_M, math.ceil(float(tangent[i]) - ROUNDED_M)), FARTHEST_ACCEPTED_M)
-        items.append(item(m.WAYPOINT, places[i], frame, int(cm[i]), (0.0, accepted, 0.0, 0.0)))
+        items.append(item(cmd.WAYPOINT, places[i], frame, int(cm[i]), (0.0, accepted, 0.0, 0.0)))
     if wing.touch is not None:
         touch = world.frame.to_degrees(wing.touch[0], wing.touch[1])
-        items.append(item(m.LAND, touch, m.RELATIVE, round((wing.touch[2] - datum) * 100), (0.0, 0.0, 0.0, 0.0)))
+        items.append(item(cmd.LAND, touch, m.RELATIVE, round((wing.touch[2] - datum) * 100), (0.0, 0.0, 0.0, 0.0)))
     elif order.end == "rtl":
-        items.append(MissionItem(m.RTL, m.NO_POSITION))
+        items.append(MissionItem(cmd.RTL, m.NO_POSITION))
     return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)
 
 

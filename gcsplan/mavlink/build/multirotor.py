@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gcsplan.mavlink.build.fixed_wing import build_wing
 from gcsplan.mavlink.build.order import Order, split_legs
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
@@ -25,14 +26,14 @@ COPTER_ACCEPTANCE_M = 2.0  # ArduCopter WPNAV_RADIUS, default
 
 
 def acceptance_radius_m(vehicle: Vehicle) -> float:
-    """How near counts as reached: ArduCopter's own parameter; elsewhere the track error, sent with each item."""
+    """The acceptance radius: ArduCopter's own parameter; elsewhere the track error, sent with each item."""
     if vehicle.autopilot is Autopilot.ARDUCOPTER:
         return COPTER_ACCEPTANCE_M
     return min(max(1.0, math.floor(vehicle.limits.track_error_m)), 255.0)
 
 
 def corner_m(vehicle: Vehicle) -> float:
-    """What a planner keeps beside its track for corners that are cut by more than ``track_error_m`` holds; mostly 0."""
+    """The margin that a planner keeps for corners that are cut by more than ``track_error_m``; mostly 0."""
     if vehicle.turn_radius_m > 0.0 or math.isinf(vehicle.corner_accel_m_s2):
         return 0.0
     radius_m = acceptance_radius_m(vehicle)
@@ -70,28 +71,28 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
 
     def item(command: int, i: int, frame: int, cm: int, *, radius_m: float = 0.0) -> MissionItem:
         yaw = round(float(bearings[max(i - 1, 0)]), 1) if px4 else 0.0
-        z = 0.0 if command in (m.LAND, m.VTOL_LAND) else altitude_of_cm(cm, vehicle.autopilot)
+        z = 0.0 if command in (cmd.LAND, cmd.VTOL_LAND) else altitude_of_cm(cm, vehicle.autopilot)
         return MissionItem(command, frame, (0.0, radius_m, 0.0, yaw), int(lat_e7[i]), int(lon_e7[i]), z)
 
     radius = 0.0 if vehicle.autopilot is Autopilot.ARDUCOPTER else acceptance_radius_m(vehicle)
     speed_kind = 0.0 if plane else 1.0
     speed = vehicle.speed_max_m_s if order.speed_m_s is None else order.speed_m_s
     items = [
-        item(m.VTOL_TAKEOFF if plane else m.TAKEOFF, 0, m.RELATIVE, top_cm),
-        MissionItem(m.DO_CHANGE_SPEED, m.NO_POSITION, (speed_kind, speed, -1.0, 0.0)),
+        item(cmd.VTOL_TAKEOFF if plane else cmd.TAKEOFF, 0, m.RELATIVE, top_cm),
+        MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (speed_kind, speed, -1.0, 0.0)),
     ]
-    if order.hold_s > 0 or order.gate_utc is not None:  # before the speed, which is exact from a standstill
+    if order.hold_s > 0 or order.gate_utc is not None:  # before the speed change: a gate is exact from a standstill
         items.insert(1, _gate(order, vehicle))
     last = len(points) - 1
-    items += [item(m.WAYPOINT, i, frame, int(cm[i]), radius_m=radius) for i in range(1, last)]
+    items += [item(cmd.WAYPOINT, i, frame, int(cm[i]), radius_m=radius) for i in range(1, last)]
     if order.end == "loiter":
-        items.append(item(m.LOITER_UNLIM, last, frame, int(cm[last])))
+        items.append(item(cmd.LOITER_UNLIM, last, frame, int(cm[last])))
     else:
-        items.append(item(m.WAYPOINT, last, frame, int(cm[last]), radius_m=radius))
+        items.append(item(cmd.WAYPOINT, last, frame, int(cm[last]), radius_m=radius))
     if order.end == "land":
-        items.append(item(m.VTOL_LAND if plane else m.LAND, last, m.RELATIVE, 0))
+        items.append(item(cmd.VTOL_LAND if plane else cmd.LAND, last, m.RELATIVE, 0))
     elif order.end == "rtl":
-        items.append(MissionItem(m.RTL, m.NO_POSITION))
+        items.append(MissionItem(cmd.RTL, m.NO_POSITION))
     return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)
 
 
@@ -99,9 +100,9 @@ def _gate(order: Order, vehicle: Vehicle) -> MissionItem:
     if not vehicle.can_hold or (order.gate_utc is not None and vehicle.autopilot is not Autopilot.ARDUCOPTER):
         raise ValueError(f"{vehicle.name} cannot wait so in the air: {vehicle.autopilot} goes on at once")
     if order.gate_utc is None:
-        return MissionItem(m.DELAY, m.NO_POSITION, (float(order.hold_s), -1.0, -1.0, -1.0))
+        return MissionItem(cmd.DELAY, m.NO_POSITION, (float(order.hold_s), -1.0, -1.0, -1.0))
     hour, minute, second = order.gate_utc
-    return MissionItem(m.DELAY, m.NO_POSITION, (-1.0, float(hour), float(minute), float(second)))
+    return MissionItem(cmd.DELAY, m.NO_POSITION, (-1.0, float(hour), float(minute), float(second)))
 
 
 def _spaced(points: NDArray[np.float64], apart_m: float) -> NDArray[np.float64]:

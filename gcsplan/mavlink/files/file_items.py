@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from decimal import ROUND_HALF_EVEN, Decimal
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import (
-    DO_JUMP,
     FRAME_SYNONYMS,
     GLOBAL,
     NO_POSITION,
@@ -32,12 +32,25 @@ MAX_ITEMS = 10_000
 
 FRAMES = (GLOBAL, NO_POSITION, RELATIVE, TERRAIN)
 
-PLAIN_XY = frozenset({196, 202, 203, 1000, 31010, 31011, 31012, 31013, 31014, 42702, 42703})
+PLAIN_XY = frozenset(
+    {
+        cmd.DO_SET_ROI_WPNEXT_OFFSET, cmd.DO_DIGICAM_CONFIGURE, cmd.DO_DIGICAM_CONTROL,
+        cmd.DO_GIMBAL_MANAGER_PITCHYAW, cmd.USER_1, cmd.USER_2, cmd.USER_3, cmd.USER_4, cmd.USER_5,
+        cmd.SCRIPT_TIME, cmd.ATTITUDE_TIME,
+    }
+)  # fmt: skip
 """Commands whose param5 and param6 are numbers, whatever their frame (common.xml, ArduPilot's AP_Mission): region of
 interest offset, camera, gimbal flags, user commands, scripts, attitude."""
 
 
-HAS_PLACE = frozenset({16, 17, 18, 19, 21, 22, 31, 36, 80, 82, 84, 85, 94, 179, 188, 189, 192, 195, 201})
+HAS_PLACE = frozenset(
+    {
+        cmd.WAYPOINT, cmd.LOITER_UNLIM, cmd.LOITER_TURNS, cmd.LOITER_TIME, cmd.LAND, cmd.TAKEOFF,
+        cmd.LOITER_TO_ALT, cmd.ARC_WAYPOINT, cmd.ROI, cmd.SPLINE_WAYPOINT, cmd.VTOL_TAKEOFF, cmd.VTOL_LAND,
+        cmd.PAYLOAD_PLACE, cmd.DO_SET_HOME, cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START, cmd.DO_REPOSITION,
+        cmd.DO_SET_ROI_LOCATION, cmd.DO_SET_ROI,
+    }
+)  # fmt: skip
 """Mission commands that common.xml gives a location, so that an unset one means something."""
 
 
@@ -146,8 +159,8 @@ def _xy(command: int, frame: int, raw: RawItem, bad: Callable[[str], None]) -> t
             return degrees_e7_of(raw.x), degrees_e7_of(raw.y)
         return None, None
     x, y = whole(raw.x, -(2**31), 2**31 - 1), whole(raw.y, -(2**31), 2**31 - 1)
-    for number, given, value in ((5, x, raw.x), (6, y, raw.y)):
-        if given is None:
+    for number, read, value in ((5, x, raw.x), (6, y, raw.y)):
+        if read is None:
             bad(f"param{number} of command {command} in frame {frame} must be a whole 32-bit number, given {value:g}")
     return x, y
 
@@ -181,7 +194,7 @@ def check_writable(mission: Mission, *, nan: bool) -> None:
 
 
 def jumps_to_file(mission: Mission) -> tuple[MissionItem, ...]:
-    """The items with DO_JUMP targets as files count them: home is 0, the first item 1, for every autopilot.
+    """The items with cmd.DO_JUMP targets as files count them: home is 0, the first item 1, for every autopilot.
 
     On the wire ArduPilot counts so too; PX4 has no home item and counts from 0. InputError for a jump to nowhere.
     """
@@ -193,7 +206,7 @@ def jumps_to_file(mission: Mission) -> tuple[MissionItem, ...]:
 def jumps_from_file(
     items: Sequence[MissionItem], index_of: Mapping[int, int], first_seq: int, where: str
 ) -> tuple[MissionItem, ...]:
-    """The items with DO_JUMP targets as wire seq; ``index_of``: the file's number of an item to its index."""
+    """The items with cmd.DO_JUMP targets as wire seq; ``index_of``: the file's number of an item to its index."""
     return _jumps(items, {number: index + first_seq for number, index in index_of.items()}, first_seq, where)
 
 
@@ -203,7 +216,7 @@ def _jumps(
     out: list[MissionItem] = []
     problems: list[Problem] = []
     for seq, item in enumerate(items, start=first_seq):
-        if item.command != DO_JUMP:
+        if item.command != cmd.DO_JUMP:
             out.append(item)
             continue
         target = whole(item.params[0], 0, 2**24)

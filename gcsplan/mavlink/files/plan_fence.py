@@ -13,9 +13,9 @@ from typing import Any
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mavlink.files.file_items import MAX_ITEMS, degrees_e7_of, float32_text, whole
+from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, POLYGON_OUT, RALLY_POINT
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, MissionItem
 
-POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT, RALLY_POINT = 5001, 5002, 5003, 5004, 5100
 MAX_PROBLEMS = 20
 
 
@@ -132,8 +132,8 @@ def _circle(value: object, inside: bool, where: str, problems: list[Problem]) ->
     place = _place(circle.get("center"), f"{where}.circle.center", problems)
     radius_m = json_float(circle.get("radius"))
     if radius_m is None or not 0.0 < radius_m <= 1e7:
-        given = str(circle.get("radius"))[:40]
-        problems.append(Problem(f"{where}.circle.radius", f"must be metres above 0, given {given}"))
+        text = str(circle.get("radius"))[:40]
+        problems.append(Problem(f"{where}.circle.radius", f"must be metres above 0, given {text}"))
         return []
     command = CIRCLE_IN if inside else CIRCLE_OUT
     return [MissionItem(command, GLOBAL, (radius_m, 0.0, 0.0, 0.0), *place)] if place is not None else []

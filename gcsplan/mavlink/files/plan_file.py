@@ -29,17 +29,8 @@ from gcsplan.mavlink.files.file_items import (
 )
 from gcsplan.mavlink.files.plan_fence import fence_items, fence_json, json_float, json_number, rally_items, rally_json
 from gcsplan.mavlink.files.plan_landing import LANDINGS, landing_entries
-from gcsplan.mavlink.mission.mission import (
-    DO_CHANGE_SPEED,
-    DO_JUMP,
-    FRAME_SYNONYMS,
-    GLOBAL,
-    RELATIVE,
-    TERRAIN,
-    Home,
-    Mission,
-    MissionItem,
-)
+from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP
+from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, RELATIVE, TERRAIN, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
 ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT
@@ -137,10 +128,10 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     mission = plan.get("mission")
     if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
         raise InputError("there must be a mission with a list of items", where=f"{where}: mission.items")
-    for key, given, want in (("version", plan.get("version"), 1), ("mission.version", mission.get("version"), 2)):
-        if given != want and not (theirs and given in (0, None)):
+    for key, found, want in (("version", plan.get("version"), 1), ("mission.version", mission.get("version"), 2)):
+        if found != want and not (theirs and found in (0, None)):
             raise InputError(
-                f"must be {want}, given {str(given)[:40]}; open the file in QGroundControl and save it again",
+                f"must be {want}, given {str(found)[:40]}; open the file in QGroundControl and save it again",
                 where=f"{where}: {key}",
             )
     notes: list[str] = []
@@ -180,7 +171,7 @@ def _json(text: str, where: str) -> Any:
         raise InputError("not JSON that a mission can have: a number is too long", where=where) from None
 
 
-def _autopilot(mission: dict[str, Any], given: Autopilot | None, where: str, notes: list[str]) -> Autopilot:
+def _autopilot(mission: dict[str, Any], requested: Autopilot | None, where: str, notes: list[str]) -> Autopilot:
     firmware, kind = mission.get("firmwareType"), mission.get("vehicleType")
     if firmware == PX4:
         stated: Autopilot | None = Autopilot.PX4
@@ -188,8 +179,8 @@ def _autopilot(mission: dict[str, Any], given: Autopilot | None, where: str, not
         stated = Autopilot.ARDUPLANE
     elif firmware == ARDUPILOT and (kind in (None, 0) or (isinstance(kind, int) and kind in ROTARY_WINGS)):
         stated = Autopilot.ARDUCOPTER
-        if kind in (None, 0) and given is Autopilot.ARDUPLANE:
-            stated = given
+        if kind in (None, 0) and requested is Autopilot.ARDUPLANE:
+            stated = requested
     elif firmware in (None, 0):
         stated = None
     else:
@@ -198,16 +189,16 @@ def _autopilot(mission: dict[str, Any], given: Autopilot | None, where: str, not
             f"(3 ArduPilot with a copter or plane, 12 PX4)",
             where=f"{where}: mission.firmwareType",
         )
-    if stated is None and given is None:
+    if stated is None and requested is None:
         raise InputError("the file does not say for which autopilot it is", where=f"{where}: mission.firmwareType")
     if stated is None:
-        notes.append(f"the file does not say for which autopilot it is: it was read for {given}")
-    elif given is not None and given is not stated:
+        notes.append(f"the file does not say for which autopilot it is: it was read for {requested}")
+    elif requested is not None and requested is not stated:
         raise InputError(
-            f"the file is for {stated}, and {given} was wanted; use the file made for it, or change the vehicle",
+            f"the file is for {stated}, and {requested} was wanted; use the file made for it, or change the vehicle",
             where=f"{where}: mission.firmwareType",
         )
-    return given or stated  # type: ignore[return-value]  # one of them is there
+    return requested or stated  # type: ignore[return-value]  # one of them is there
 
 
 def _home(value: object, hint: Home | None, place: str, notes: list[str]) -> Home:
@@ -293,8 +284,8 @@ class _Items:
         if self.count > MAX_ITEMS:
             self._bad(key, f"a mission of more than {MAX_ITEMS} items is not read")
             self._raise()
-        given = entry.get("params")
-        params = [json_float(p) for p in given] if isinstance(given, list) and len(given) == 7 else []
+        values = entry.get("params")
+        params = [json_float(p) for p in values] if isinstance(values, list) and len(values) == 7 else []
         command, frame = json_float(entry.get("command")), json_float(entry.get("frame"))
         goes_on = entry.get("autoContinue")
         if len(params) != 7 or None in params:

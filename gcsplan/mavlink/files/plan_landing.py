@@ -8,18 +8,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from gcsplan.mavlink.mission.mission import (
+from gcsplan.mavlink.mission.commands import (
     DO_CHANGE_SPEED,
-    GLOBAL,
+    DO_LAND_START,
+    DO_SET_CAM_TRIGG_DIST,
+    IMAGE_STOP_CAPTURE,
     LAND,
-    NO_POSITION,
-    RELATIVE,
+    LOITER_TO_ALT,
+    VIDEO_STOP_CAPTURE,
     VTOL_LAND,
     WAYPOINT,
 )
+from gcsplan.mavlink.mission.mission import GLOBAL, NO_POSITION, RELATIVE
 
 LANDINGS = {"fwLandingPattern": LAND, "vtolLandingPattern": VTOL_LAND}
-DO_LAND_START, LOITER_TO_ALT, CAMERA_TRIGGER, STOP_PHOTOS, STOP_VIDEO = 189, 31, 206, 2001, 2501
 
 
 def landing_entries(entry: dict[str, Any]) -> list[dict[str, Any]] | None:
@@ -39,9 +41,9 @@ def landing_entries(entry: dict[str, Any]) -> list[dict[str, Any]] | None:
     if entry.get("useDoChangeSpeed"):
         items.append(_entry(DO_CHANGE_SPEED, NO_POSITION, 1, entry.get("finalApproachSpeed", 0), -1))
     if entry.get("stopTakingPhotos"):
-        items += [_entry(CAMERA_TRIGGER, NO_POSITION), _entry(STOP_PHOTOS, NO_POSITION)]
+        items += [_entry(DO_SET_CAM_TRIGG_DIST, NO_POSITION), _entry(IMAGE_STOP_CAPTURE, NO_POSITION)]
     if entry.get("stopVideoPhotos"):
-        items.append(_entry(STOP_VIDEO, NO_POSITION))
+        items.append(_entry(VIDEO_STOP_CAPTURE, NO_POSITION))
     if entry.get("useLoiterToAlt", True):
         items.append(_entry(LOITER_TO_ALT, frames[0], 1, turn, 0, 1, at=approach))
     else:

@@ -1,4 +1,4 @@
-"""`.waypoints` files ("QGC WPL 110"): written for the strictest reader, read in every writer's manner.
+"""`.waypoints` files ("QGC WPL 110"): written for the strictest reader, read as any program writes them.
 
 Written: TABs, LF, home as row 0 for every autopilot, exact numbers, no comments. Read besides: spaces and commas,
 CRLF, a byte order mark, blank lines and ``#`` comments (Mission Planner), six decimals and ``nan`` params
@@ -30,7 +30,8 @@ from gcsplan.mavlink.files.file_items import (
     read_item,
     whole,
 )
-from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, WAYPOINT, Home, Mission, MissionItem
+from gcsplan.mavlink.mission.commands import WAYPOINT
+from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot
 
 HEADER = "QGC WPL 110"

@@ -12,7 +12,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.mavlink.link.numbers import finite, whole
 from gcsplan.mavlink.link.preflight import distance_m
-from gcsplan.mavlink.mission.autopilots import PX4, manner
+from gcsplan.mavlink.mission.autopilots import PX4, profile_of
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
 from gcsplan.vehicle import Autopilot
 
@@ -92,7 +92,7 @@ def judge_parameters(
     ``rtl_rel_home_m``: the return altitude that the mission was checked with. ``expected``: what the user wants
     parameters to be, by name.
     """
-    label = manner(mission.autopilot).label
+    label = profile_of(mission.autopilot).label
     if not values:
         return [f"no parameters could be read: failsafe, return and fence settings of {label} were not compared"]
     values, odd = _numbers(values)

@@ -19,7 +19,7 @@ from gcsplan.mavlink.link.watch import (
     UNINIT,
     VehicleState,
 )
-from gcsplan.mavlink.mission.autopilots import is_generic, manner, max_items, type_name
+from gcsplan.mavlink.mission.autopilots import is_generic, max_items, profile_of, type_name
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, TERRAIN, Home, MissionItem
 from gcsplan.vehicle import Autopilot
 
@@ -82,7 +82,7 @@ def objections(
 def _identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnings: list[str]) -> None:
     if state.sources > 1:
         against.append(("ambiguous", rivals_words(state)))
-    row = manner(autopilot)
+    row = profile_of(autopilot)
     if is_generic(state.mav_autopilot):
         warnings.append(
             f"the vehicle calls itself {state.what}; the mission is written for {row.label}, which could not be checked"

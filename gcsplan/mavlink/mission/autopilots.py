@@ -1,4 +1,4 @@
-"""Each autopilot's manners in one table: what it calls itself, what it takes, and what it keeps of what it takes.
+"""Autopilot profiles, one table: what each calls itself, what it accepts, and what it stores of what it accepts.
 
 Facts and their sources stand beside the numbers; `stored_ardupilot` and `stored_px4` hold the rules for items.
 """
@@ -40,8 +40,8 @@ ALTITUDE_LIMIT_M = 83_000.0
 
 
 @dataclass(frozen=True, slots=True)
-class Manner:
-    """One autopilot's manners.
+class AutopilotProfile:
+    """What one autopilot accepts and stores.
 
     ``max_items`` counts wire items, home included where it is one. ``stored(item)`` is what reads back;
     ``refuses(item)`` says why it is not taken, empty where it is. ``atomic``: a mission is swapped in whole at the end
@@ -60,8 +60,8 @@ class Manner:
     refuses: Callable[[Item], str]
 
 
-_TABLE: dict[Autopilot, Manner] = {
-    Autopilot.ARDUCOPTER: Manner(
+_TABLE: dict[Autopilot, AutopilotProfile] = {
+    Autopilot.ARDUCOPTER: AutopilotProfile(
         Autopilot.ARDUCOPTER,
         "ArduCopter",
         ARDUPILOTMEGA,
@@ -72,18 +72,18 @@ _TABLE: dict[Autopilot, Manner] = {
         stored=stored_by_copter,
         refuses=refused_by_copter,
     ),
-    Autopilot.ARDUPLANE: Manner(
+    Autopilot.ARDUPLANE: AutopilotProfile(
         Autopilot.ARDUPLANE,
         "ArduPlane",
         ARDUPILOTMEGA,
         _PLANES,
-        max_items=650,  # ArduPlane's own layout has room for 655; one figure for both keeps the smaller
+        max_items=650,  # ArduPlane's own layout holds 655; one figure for both keeps the smaller
         atomic=False,
         holds_s=8.0,
         stored=stored_by_plane,
         refuses=refused_by_plane,
     ),
-    Autopilot.PX4: Manner(
+    Autopilot.PX4: AutopilotProfile(
         Autopilot.PX4,
         "PX4",
         PX4,
@@ -99,8 +99,8 @@ _TABLE: dict[Autopilot, Manner] = {
 }
 
 
-def manner(autopilot: Autopilot) -> Manner:
-    """The table's row for ``autopilot``."""
+def profile_of(autopilot: Autopilot) -> AutopilotProfile:
+    """The profile of ``autopilot``."""
     return _TABLE[autopilot]
 
 
@@ -113,7 +113,7 @@ def max_items(autopilot: Autopilot, mission_type: int = MISSION) -> int:
     """The longest list of that kind: of fence points 70 (84 on ArduPlane, 64 on PX4), of rally points 32."""
     if mission_type == MISSION:
         return _TABLE[autopilot].max_items
-    if mission_type == FENCE:  # polygon vertices; circles take more room on ArduPilot: 42 of them
+    if mission_type == FENCE:  # polygon vertices; circles take more storage on ArduPilot: 42 of them
         return {Autopilot.ARDUCOPTER: 70, Autopilot.ARDUPLANE: 84, Autopilot.PX4: 64}[autopilot]
     return 32
 

@@ -1,7 +1,7 @@
-"""Is what was read back what was sent? Item by item, by wire integers and float32, with the autopilot's own rounding.
+"""Compares what was read back with what was sent: by wire integers and float32, with the autopilot's own rounding.
 
 A number is right if it equals what the autopilot is known to keep (`autopilots.stored`) or what was sent (peers that
-keep everything). All else is a `Difference`, a command that we do not know included. ArduPilot's item 0 is the
+keep everything). Anything else is a `Difference`, for unknown commands too. ArduPilot's item 0 is the
 vehicle's own home: it is reported, but excused.
 """
 
@@ -11,29 +11,14 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import profile_of
+from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, MISSION, MissionItem
 from gcsplan.mavlink.mission.stored_ardupilot import read_back_altitudes, stored_cm
 from gcsplan.mavlink.mission.stored_px4 import YAW_COMMANDS
 from gcsplan.vehicle import Autopilot
 
 YAW_TOLERANCE_DEG = 1e-3
-
-_NAMES = {
-    16: "waypoint", 17: "loiter", 18: "loiter turns", 19: "loiter time", 20: "return to launch", 21: "land",
-    22: "take-off", 31: "loiter to altitude", 82: "spline waypoint", 84: "VTOL take-off", 85: "VTOL land",
-    92: "guided enable", 93: "delay", 112: "condition delay", 113: "condition altitude", 114: "condition distance",
-    115: "condition yaw", 177: "jump", 178: "change speed", 179: "set home", 181: "relay", 183: "servo",
-    189: "land start", 195: "region of interest", 197: "no region of interest", 201: "region of interest",
-    206: "camera trigger", 211: "gripper", 5000: "fence return point", 5001: "fence vertex, inclusion",
-    5002: "fence vertex, exclusion", 5003: "fence circle, inclusion", 5004: "fence circle, exclusion",
-    5100: "rally point",
-}  # fmt: skip
-
-
-def command_name(command: int) -> str:
-    """A MAV_CMD in words."""
-    return _NAMES.get(command, f"command {command}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +78,7 @@ def _item(
     if ours.command != theirs.command:
         names = [f"{item.command} ({command_name(item.command)})" for item in (ours, theirs)]
         return [Difference(seq, "command", names[0], names[0], names[1], command_name(ours.command))]
-    kept = manner(autopilot).stored(ours)
+    kept = profile_of(autopilot).stored(ours)
     found: list[Difference] = []
 
     def differ(field: str, sent: str, expected: str, got: str) -> None:

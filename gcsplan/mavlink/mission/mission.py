@@ -1,4 +1,4 @@
-"""`Mission`: decoded wire items, the autopilot's manner, and home. The one thing that is checked, written and sent.
+"""`Mission`: decoded wire items, the autopilot, and home. It is what is checked, written and sent.
 
 Numbers are those of the wire: degrees times 1e7 as int32, everything else float32. Home is not among the items;
 `Mission.wire_items` puts it in front where the autopilot keeps it as item 0 (ArduPilot).
@@ -12,12 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gcsplan.errors import InputError
+from gcsplan.mavlink.mission.commands import WAYPOINT
 from gcsplan.vehicle import Autopilot
-
-# Commands (MAV_CMD, common.xml) that gcsplan knows by name.
-WAYPOINT, LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, RTL, LAND, TAKEOFF = 16, 17, 18, 19, 20, 21, 22
-SPLINE_WAYPOINT, VTOL_TAKEOFF, VTOL_LAND, DELAY = 82, 84, 85, 93
-CONDITION_DELAY, DO_JUMP, DO_CHANGE_SPEED, DO_SET_HOME = 112, 177, 178, 179
 
 # Frames (MAV_FRAME). The _INT twins 5, 6, 11 are synonyms: written as 0, 3, 10, both are read.
 GLOBAL, NO_POSITION, RELATIVE, TERRAIN = 0, 2, 3, 10

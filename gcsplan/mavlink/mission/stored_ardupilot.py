@@ -1,4 +1,4 @@
-"""What ArduPilot makes of a mission item: 15 bytes of storage each, so numbers come back other than they were sent.
+"""What ArduPilot stores of a mission item: 15 bytes each, so some numbers read back differently.
 
 Source: ArduPilot 4.6, ``AP_Mission.cpp`` (`mavlink_int_to_mission_cmd`, `mission_cmd_to_mavlink_int`, the packed
 structs of ``AP_Mission.h``), ``MissionItemProtocol_Fence.cpp`` and ``MissionItemProtocol_Rally.cpp``; the common
@@ -11,15 +11,8 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from gcsplan.mavlink.mission.mission import (
-    FRAME_SYNONYMS,
-    GLOBAL,
-    LOITER_TURNS,
-    NO_POSITION,
-    WAYPOINT,
-    MissionItem,
-    float32,
-)
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, MissionItem, float32
 
 Keep = Callable[[float], float]
 Params = tuple[float, float, float, float]
@@ -32,7 +25,7 @@ _M_PER_CM = float32(0.01)
 
 
 def _whole(value: float) -> int:
-    """``(int32_t)value``: towards zero. Beyond int32 C leaves it open; x86 gives INT_MIN, as here."""
+    """``(int32_t)value``: towards zero. Beyond int32 C does not define it; x86 gives INT_MIN, as here."""
     return int(value) if abs(value) < 2**31 else -(2**31)  # NaN compares False
 
 
@@ -135,74 +128,76 @@ def _do(p1: Keep = _lost, p2: Keep = _lost, p3: Keep = _lost, p4: Keep = _lost) 
 
 
 RULES: dict[int, Rule] = {
-    16: _at(_u16),  # NAV_WAYPOINT: hold (ArduPlane: below)
-    17: _at(p3=_radius_u16),  # NAV_LOITER_UNLIM
-    18: _at(),  # NAV_LOITER_TURNS: `_loiter_turns`
-    19: _at(_u16, p3=_direction, p4=_flag),  # NAV_LOITER_TIME
-    20: _do(),  # NAV_RETURN_TO_LAUNCH
-    21: _at(_u16, p4=_land_direction),  # NAV_LAND
-    22: _at(_u16),  # NAV_TAKEOFF
-    30: _at(_u16),  # NAV_CONTINUE_AND_CHANGE_ALT
-    31: _at(p2=_radius_u16, p4=_flag),  # NAV_LOITER_TO_ALT
-    82: _at(_u16),  # NAV_SPLINE_WAYPOINT (ArduPlane refuses it)
-    83: _do(_f32, _f32, _u8),  # NAV_ALTITUDE_WAIT
-    84: _at(),  # NAV_VTOL_TAKEOFF
-    85: _at(_u16),  # NAV_VTOL_LAND
-    92: _at(_u16),  # NAV_GUIDED_ENABLE
-    93: _do(_f32, _i8, _i8, _i8),  # NAV_DELAY
-    94: _at(_payload_descent),  # NAV_PAYLOAD_PLACE
-    112: _do(_f32),  # CONDITION_DELAY
-    114: _do(_f32),  # CONDITION_DISTANCE
-    115: _do(_f32, _f32, _i8, _u8),  # CONDITION_YAW
-    177: _do(_u16, _i16),  # DO_JUMP
-    178: _do(_u8, _f32, _f32),  # DO_CHANGE_SPEED
-    179: _at(_u16),  # DO_SET_HOME
-    181: _do(_u8, _u8),  # DO_SET_RELAY
-    182: _do(_u8, _i16, _f32),  # DO_REPEAT_RELAY
-    183: _do(_u8, _u16),  # DO_SET_SERVO
-    184: _do(_u8, _u16, _i16, _f32),  # DO_REPEAT_SERVO
-    188: _at(),  # DO_RETURN_PATH_START
-    189: _at(),  # DO_LAND_START
-    191: _at(),  # DO_GO_AROUND
-    193: _do(_u16),  # DO_PAUSE_CONTINUE
-    194: _do(_u16),  # DO_SET_REVERSE
-    195: _at(_u16),  # DO_SET_ROI_LOCATION
-    197: _do(_u16),  # DO_SET_ROI_NONE
-    201: _at(_u16),  # DO_SET_ROI
-    206: _do(_f32, p3=_u8),  # DO_SET_CAM_TRIGG_DIST
-    207: _do(_u16),  # DO_FENCE_ENABLE
-    208: _do(_u16),  # DO_PARACHUTE
-    210: _do(_u16),  # DO_INVERTED_FLIGHT
-    211: _do(_u8, _u8),  # DO_GRIPPER
-    212: _do(_u16),  # DO_AUTOTUNE_ENABLE
-    213: _do(_f32, _f32, _u8),  # NAV_SET_YAW_SPEED
-    215: _do(_u16),  # DO_SET_RESUME_REPEAT_DIST
-    216: _do(_u16),  # DO_SPRAYER
-    217: _do(_u16, _f32, _f32, _f32),  # DO_SEND_SCRIPT_MESSAGE
-    218: _do(_u16, _u8),  # DO_AUX_FUNCTION
-    222: _do(_u16, _f32, _f32, _f32),  # DO_GUIDED_LIMITS
-    531: _do(_u8, _f32),  # SET_CAMERA_ZOOM
-    532: _do(_u8, _f32),  # SET_CAMERA_FOCUS
-    534: _do(_u8, _u8, _u8),  # SET_CAMERA_SOURCE
-    600: _do(_u16),  # JUMP_TAG
-    601: _do(_u16, _i16),  # DO_JUMP_TAG
-    2000: _do(_u8, _f32, _u16, _u16),  # IMAGE_START_CAPTURE
-    2001: _do(_u16),  # IMAGE_STOP_CAPTURE
-    2500: _do(_u8),  # VIDEO_START_CAPTURE
-    2501: _do(_u8),  # VIDEO_STOP_CAPTURE
-    3000: _do(_u8),  # DO_VTOL_TRANSITION
-    42600: _do(_u8, _u8, _f32, _f32),  # DO_WINCH
+    cmd.WAYPOINT: _at(_u16),  # hold (ArduPlane: below)
+    cmd.LOITER_UNLIM: _at(p3=_radius_u16),
+    cmd.LOITER_TURNS: _at(),  # `_loiter_turns`
+    cmd.LOITER_TIME: _at(_u16, p3=_direction, p4=_flag),
+    cmd.RTL: _do(),
+    cmd.LAND: _at(_u16, p4=_land_direction),
+    cmd.TAKEOFF: _at(_u16),
+    cmd.CONTINUE_AND_CHANGE_ALT: _at(_u16),
+    cmd.LOITER_TO_ALT: _at(p2=_radius_u16, p4=_flag),
+    cmd.SPLINE_WAYPOINT: _at(_u16),  # ArduPlane refuses it
+    cmd.ALTITUDE_WAIT: _do(_f32, _f32, _u8),
+    cmd.VTOL_TAKEOFF: _at(),
+    cmd.VTOL_LAND: _at(_u16),
+    cmd.GUIDED_ENABLE: _at(_u16),
+    cmd.DELAY: _do(_f32, _i8, _i8, _i8),
+    cmd.PAYLOAD_PLACE: _at(_payload_descent),
+    cmd.CONDITION_DELAY: _do(_f32),
+    cmd.CONDITION_DISTANCE: _do(_f32),
+    cmd.CONDITION_YAW: _do(_f32, _f32, _i8, _u8),
+    cmd.DO_JUMP: _do(_u16, _i16),
+    cmd.DO_CHANGE_SPEED: _do(_u8, _f32, _f32),
+    cmd.DO_SET_HOME: _at(_u16),
+    cmd.DO_SET_RELAY: _do(_u8, _u8),
+    cmd.DO_REPEAT_RELAY: _do(_u8, _i16, _f32),
+    cmd.DO_SET_SERVO: _do(_u8, _u16),
+    cmd.DO_REPEAT_SERVO: _do(_u8, _u16, _i16, _f32),
+    cmd.DO_RETURN_PATH_START: _at(),
+    cmd.DO_LAND_START: _at(),
+    cmd.DO_GO_AROUND: _at(),
+    cmd.DO_PAUSE_CONTINUE: _do(_u16),
+    cmd.DO_SET_REVERSE: _do(_u16),
+    cmd.DO_SET_ROI_LOCATION: _at(_u16),
+    cmd.DO_SET_ROI_NONE: _do(_u16),
+    cmd.DO_SET_ROI: _at(_u16),
+    cmd.DO_SET_CAM_TRIGG_DIST: _do(_f32, p3=_u8),
+    cmd.DO_FENCE_ENABLE: _do(_u16),
+    cmd.DO_PARACHUTE: _do(_u16),
+    cmd.DO_INVERTED_FLIGHT: _do(_u16),
+    cmd.DO_GRIPPER: _do(_u8, _u8),
+    cmd.DO_AUTOTUNE_ENABLE: _do(_u16),
+    cmd.SET_YAW_SPEED: _do(_f32, _f32, _u8),
+    cmd.DO_SET_RESUME_REPEAT_DIST: _do(_u16),
+    cmd.DO_SPRAYER: _do(_u16),
+    cmd.DO_SEND_SCRIPT_MESSAGE: _do(_u16, _f32, _f32, _f32),
+    cmd.DO_AUX_FUNCTION: _do(_u16, _u8),
+    cmd.DO_GUIDED_LIMITS: _do(_u16, _f32, _f32, _f32),
+    cmd.SET_CAMERA_ZOOM: _do(_u8, _f32),
+    cmd.SET_CAMERA_FOCUS: _do(_u8, _f32),
+    cmd.SET_CAMERA_SOURCE: _do(_u8, _u8, _u8),
+    cmd.JUMP_TAG: _do(_u16),
+    cmd.DO_JUMP_TAG: _do(_u16, _i16),
+    cmd.IMAGE_START_CAPTURE: _do(_u8, _f32, _u16, _u16),
+    cmd.IMAGE_STOP_CAPTURE: _do(_u16),
+    cmd.VIDEO_START_CAPTURE: _do(_u8),
+    cmd.VIDEO_STOP_CAPTURE: _do(_u8),
+    cmd.DO_VTOL_TRANSITION: _do(_u8),
+    cmd.DO_WINCH: _do(_u8, _u8, _f32, _f32),
 }
 _PLANE_WAYPOINT = _at(p2=_byte, p3=_byte)
 
-_FENCE_VERTEX, _FENCE_CIRCLE, _FENCE_RETURN, _RALLY = (5001, 5002), (5003, 5004), 5000, 5100
+_FENCE_VERTEX, _FENCE_CIRCLE = (cmd.POLYGON_IN, cmd.POLYGON_OUT), (cmd.CIRCLE_IN, cmd.CIRCLE_OUT)
 
 
-NAN_TAKEN = {16: (3,), 17: (3,), 21: (3,), 22: (3,), 84: (3,), 85: (2, 3)}
+NAN_TAKEN = {
+    cmd.WAYPOINT: (3,), cmd.LOITER_UNLIM: (3,), cmd.LAND: (3,), cmd.TAKEOFF: (3,), cmd.VTOL_TAKEOFF: (3,),
+    cmd.VTOL_LAND: (2, 3),
+}  # fmt: skip
 """Commands of which a param (by index) may be NaN (`mavlink_int_to_mission_cmd`, `sanity_check_params`)."""
 
 _FRAMES = (0, 2, 3, 5, 6, 10, 11)
-SPLINE_WAYPOINT = 82
 
 
 def refused_by_copter(item: MissionItem) -> str:
@@ -220,7 +215,7 @@ def refused_by_copter(item: MissionItem) -> str:
 
 def refused_by_plane(item: MissionItem) -> str:
     """Why ArduPlane refuses ``item`` on upload; empty where it takes it, or is not known to refuse it."""
-    if item.command == SPLINE_WAYPOINT:
+    if item.command == cmd.SPLINE_WAYPOINT:
         return "ArduPlane takes no splines (command 82)"
     return refused_by_copter(item)
 
@@ -232,14 +227,14 @@ def stored_by_copter(item: MissionItem) -> MissionItem:
 
 def stored_by_plane(item: MissionItem) -> MissionItem:
     """``item`` as ArduPlane reads it back."""
-    return _stored(item, _PLANE_WAYPOINT if item.command == WAYPOINT else RULES.get(item.command))
+    return _stored(item, _PLANE_WAYPOINT if item.command == cmd.WAYPOINT else RULES.get(item.command))
 
 
 def _stored(item: MissionItem, rule: Rule | None) -> MissionItem:
     frame = FRAME_SYNONYMS.get(item.frame, item.frame)
-    if item.command in _FENCE_VERTEX or item.command in _FENCE_CIRCLE or item.command == _FENCE_RETURN:
+    if item.command in _FENCE_VERTEX or item.command in _FENCE_CIRCLE or item.command == cmd.FENCE_RETURN_POINT:
         return _stored_fence(item)
-    if item.command == _RALLY:
+    if item.command == cmd.RALLY_POINT:
         return MissionItem(item.command, frame, (0.0, 0.0, 0.0, 0.0), item.x, item.y, _i16(item.z), False)
     located = MissionItem(
         item.command,
@@ -249,10 +244,10 @@ def _stored(item: MissionItem, rule: Rule | None) -> MissionItem:
         item.y,
         read_back_altitudes(stored_cm(item.z))[0],
     )
-    if rule is None:  # not a command that we know: the numbers are expected back, and a difference is named
+    if rule is None:  # an unknown command: the same numbers are expected back, and a difference is reported
         return located
     p1, p2, p3, p4 = (keep(value) for keep, value in zip(rule.params, item.params, strict=True))
-    if item.command == LOITER_TURNS:
+    if item.command == cmd.LOITER_TURNS:
         p1, p2, p3, p4 = _loiter_turns(item.params)
     if not rule.located:
         return MissionItem(item.command, GLOBAL, (p1, p2, p3, p4))
@@ -266,6 +261,6 @@ def _stored_fence(item: MissionItem) -> MissionItem:
         first = _u8(first)
     elif item.command in _FENCE_CIRCLE and 0 < first < 2**31 and first - int(first) < 0.001:
         first = float32(float(int(first)))  # whole metres, to the millimetre, are kept as an integer
-    elif item.command == _FENCE_RETURN:
+    elif item.command == cmd.FENCE_RETURN_POINT:
         first = 0.0
     return MissionItem(item.command, GLOBAL, (first, 0.0, 0.0, 0.0), item.x, item.y, 0.0, False)

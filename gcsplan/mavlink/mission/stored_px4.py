@@ -1,4 +1,4 @@
-"""What PX4 makes of a mission item: floats as they are, but only the params that a command uses; yaw in radians.
+"""What PX4 stores of a mission item: floats as they are, but only the params that a command uses; yaw in radians.
 
 Source: PX4 1.15, ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavlink_mission_item`),
 ``navigation.h``, ``Limits.hpp`` (`radians`, `degrees`) and ``helper_functions.hpp`` (`wrap_2pi`).
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, RELATIVE, TERRAIN, MissionItem, float32
 
 Keep = Callable[[float], float]
@@ -58,40 +59,46 @@ _NOTHING: _Rule = (_lost, _lost, _lost, _lost)
 _YAW: _Rule = (_lost, _lost, _lost, yaw)
 
 LOCATED: dict[int, _Rule] = {
-    16: (_f32, _f32, _lost, yaw),  # NAV_WAYPOINT: hold, acceptance radius
-    17: (_lost, _lost, _f32, yaw),  # NAV_LOITER_UNLIM: radius
-    19: (_f32, _flag, _f32, _flag),  # NAV_LOITER_TIME
-    21: (_lost, _u16, _lost, yaw),  # NAV_LAND: precision
-    22: _YAW,  # NAV_TAKEOFF
-    31: (_flag, _f32, _lost, _flag),  # NAV_LOITER_TO_ALT
-    80: _NOTHING,  # NAV_ROI
-    84: _YAW,  # NAV_VTOL_TAKEOFF
-    85: _YAW,  # NAV_VTOL_LAND
-    195: _NOTHING,  # DO_SET_ROI_LOCATION
-    201: _NOTHING,  # DO_SET_ROI at a place
-    212: _NOTHING,  # DO_AUTOTUNE_ENABLE
-    400: _NOTHING,  # COMPONENT_ARM_DISARM
-    4501: _NOTHING,  # CONDITION_GATE
-    5000: _NOTHING,  # fence: return point
-    5001: (_vertices, _lost, _lost, _lost),  # fence: polygon vertex, inclusion
-    5002: (_vertices, _lost, _lost, _lost),  # fence: polygon vertex, exclusion
-    5003: (_f32, _lost, _lost, _lost),  # fence: circle, inclusion
-    5004: (_f32, _lost, _lost, _lost),  # fence: circle, exclusion
-    5100: _NOTHING,  # rally point
+    cmd.WAYPOINT: (_f32, _f32, _lost, yaw),  # hold, acceptance radius
+    cmd.LOITER_UNLIM: (_lost, _lost, _f32, yaw),  # radius
+    cmd.LOITER_TIME: (_f32, _flag, _f32, _flag),
+    cmd.LAND: (_lost, _u16, _lost, yaw),  # precision
+    cmd.TAKEOFF: _YAW,
+    cmd.LOITER_TO_ALT: (_flag, _f32, _lost, _flag),
+    cmd.ROI: _NOTHING,
+    cmd.VTOL_TAKEOFF: _YAW,
+    cmd.VTOL_LAND: _YAW,
+    cmd.DO_SET_ROI_LOCATION: _NOTHING,
+    cmd.DO_SET_ROI: _NOTHING,  # at a place
+    cmd.DO_AUTOTUNE_ENABLE: _NOTHING,
+    cmd.COMPONENT_ARM_DISARM: _NOTHING,
+    cmd.CONDITION_GATE: _NOTHING,
+    cmd.FENCE_RETURN_POINT: _NOTHING,
+    cmd.POLYGON_IN: (_vertices, _lost, _lost, _lost),
+    cmd.POLYGON_OUT: (_vertices, _lost, _lost, _lost),
+    cmd.CIRCLE_IN: (_f32, _lost, _lost, _lost),
+    cmd.CIRCLE_OUT: (_f32, _lost, _lost, _lost),
+    cmd.RALLY_POINT: _NOTHING,
 }
 """What is kept of param1 … param4 of commands with a place (frames 0, 3 and their twins)."""
 
 PLACELESS = frozenset(
     {
-        20, 80, 93, 112, 114, 177, 178, 179, 183, 187, 189, 197, 200, 201, 203, 204, 205, 206, 211, 212, 214, 260, 400,
-        530, 531, 532, 534, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 42600,
+        cmd.RTL, cmd.ROI, cmd.DELAY, cmd.CONDITION_DELAY, cmd.CONDITION_DISTANCE, cmd.DO_JUMP,
+        cmd.DO_CHANGE_SPEED, cmd.DO_SET_HOME, cmd.DO_SET_SERVO, cmd.DO_SET_ACTUATOR, cmd.DO_LAND_START,
+        cmd.DO_SET_ROI_NONE, cmd.DO_CONTROL_VIDEO, cmd.DO_SET_ROI, cmd.DO_DIGICAM_CONTROL,
+        cmd.DO_MOUNT_CONFIGURE, cmd.DO_MOUNT_CONTROL, cmd.DO_SET_CAM_TRIGG_DIST, cmd.DO_GRIPPER,
+        cmd.DO_AUTOTUNE_ENABLE, cmd.DO_SET_CAM_TRIGG_INTERVAL, cmd.OBLIQUE_SURVEY, cmd.COMPONENT_ARM_DISARM,
+        cmd.SET_CAMERA_MODE, cmd.SET_CAMERA_ZOOM, cmd.SET_CAMERA_FOCUS, cmd.SET_CAMERA_SOURCE,
+        cmd.DO_GIMBAL_MANAGER_PITCHYAW, cmd.DO_GIMBAL_MANAGER_CONFIGURE, cmd.IMAGE_START_CAPTURE,
+        cmd.IMAGE_STOP_CAPTURE, cmd.DO_TRIGGER_CONTROL, cmd.VIDEO_START_CAPTURE, cmd.VIDEO_STOP_CAPTURE,
+        cmd.DO_VTOL_TRANSITION, cmd.DO_WINCH,
     }
 )  # fmt: skip
 """Commands that are taken in MAV_FRAME_MISSION (2) alone."""
 
-FENCE_AND_RALLY = frozenset({5001, 5002, 5003, 5004, 5100})
-_FENCE = range(5000, 5005)
-_DO_JUMP = 177
+FENCE_AND_RALLY = frozenset({cmd.POLYGON_IN, cmd.POLYGON_OUT, cmd.CIRCLE_IN, cmd.CIRCLE_OUT, cmd.RALLY_POINT})
+_FENCE = range(cmd.FENCE_RETURN_POINT, cmd.CIRCLE_OUT + 1)
 
 YAW_COMMANDS = frozenset(command for command, rule in LOCATED.items() if rule[3] is yaw)
 """Commands whose param4 goes through radians: a compiler may contract that product, so it is compared as an angle."""
@@ -107,7 +114,7 @@ def refused_by_px4(item: MissionItem) -> str:
     known = PLACELESS if frame == NO_POSITION else LOCATED
     if item.command in known:
         modes = (0.0, 1.0, 2.0) if frame == NO_POSITION else (0.0, 3.0)
-        refused = item.command in (80, 201) and (
+        refused = item.command in (cmd.ROI, cmd.DO_SET_ROI) and (
             not math.isfinite(item.params[0]) or math.trunc(item.params[0]) not in modes
         )
         return (
@@ -125,12 +132,12 @@ def stored_by_px4(item: MissionItem) -> MissionItem:
     frame = FRAME_SYNONYMS.get(item.frame, item.frame)
     if frame == NO_POSITION:
         params = item.params
-        if item.command == _DO_JUMP:
+        if item.command == cmd.DO_JUMP:
             params = (_i16(params[0]), _u16(params[1]), params[2], params[3])
         x, y = (max(-(2**31), min(2**31 - 1, round(float32(v)))) for v in (item.x, item.y))
         return MissionItem(item.command, frame, params, x, y, item.z, item.autocontinue)
     rule = LOCATED.get(item.command, (_f32, _f32, _f32, _f32))
     p1, p2, p3, p4 = (keep(value) for keep, value in zip(rule, item.params, strict=True))
-    if item.command in _FENCE:  # neither "relative" nor autocontinue is stored with a fence point
+    if item.command in _FENCE:  # a fence point is stored without "relative" and autocontinue
         return MissionItem(item.command, GLOBAL, (p1, p2, p3, p4), item.x, item.y, item.z, False)
     return MissionItem(item.command, frame, (p1, p2, p3, p4), item.x, item.y, item.z, item.autocontinue)

@@ -1,1 +1,1 @@
-"""The mission protocol: who says what when, without sockets and without a clock."""
+"""The mission protocol: which message follows which, without sockets and without a clock."""

@@ -235,9 +235,9 @@ class Download(Machine):
     def _measure(self, now: float, late_question: bool = False) -> None:
         """The slowest round trip, slowly forgotten, and the quickest.
 
-        What was asked more than once tells nothing (Karn's rule), unless its answer comes sooner after the repeated
-        question than any did before: it belongs to the first one, and the repeated one is still on its way. PX4 ends
-        a download when it arrives after the next.
+        A repeated question is not measured (Karn's rule), unless its answer comes sooner than any before: then it
+        answers the first question, and the second is still on its way. PX4 ends a download when that arrives after the
+        next.
         """
         took = now - self._first_asked_at
         if self._tries == 0:

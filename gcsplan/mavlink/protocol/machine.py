@@ -4,8 +4,8 @@ Time is an argument and packets are values: ``start(now)``, ``receive(packet, no
 is to be sent, ``deadline`` is when `on_timer` wants to be called next. Nothing here opens a socket or reads a clock.
 
 Two rules, after h11's state machine. (1) A state changes only through the machine's ``TABLE``, (state, event) → state.
-(2) What the vehicle sends is never an error: what does not count now is another event, or none. An event that we
-bring about ourselves and that is not in the table (a second ``start``) is a bug, `ImpossibleTransition`.
+(2) What the vehicle sends is never an error: a packet that does not count now is another event, or none. An event of
+our own that is not in the table (a second ``start``) is a bug, `ImpossibleTransition`.
 """
 
 from __future__ import annotations
@@ -70,20 +70,20 @@ Gate = Callable[[float], "Wait | Outcome | None"]
 
 
 def always(now: float) -> None:
-    """The gate that is never shut."""
+    """A gate that lets everything pass."""
 
 
 CANCELLED_BY_US = "cancelled by us"
 
 
 class Label(Enum):
-    """A state or an event: one of its kind, so that identity will do for a hash, and it is a quick one."""
+    """A state or an event; each exists once, so that its identity is its hash, which is quick."""
 
     __hash__ = object.__hash__
 
 
 class ImpossibleTransition(GcsplanError, RuntimeError):
-    """A machine was used in a way that its table does not know: a bug in the caller."""
+    """A machine was used in a way that its table does not allow: a bug in the caller."""
 
 
 class Machine:
@@ -152,7 +152,7 @@ class Machine:
         raise NotImplementedError
 
     def stop(self, outcome: Outcome) -> None:
-        """End with ``outcome`` and without a word to the vehicle: it may be another one by now."""
+        """End with ``outcome`` and send nothing: the vehicle may be another one by now."""
         raise NotImplementedError
 
     def _step(self, event: Label) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
 INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
 OURS = -1
-"""No code of the vehicle's: it is we who do not take what it says."""
+"""Not a code of the vehicle: we refuse what it says."""
 
 _CODES: dict[int, tuple[str, str]] = {
     ACCEPTED: ("accepted", ""),
@@ -57,7 +57,7 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """The vehicle said no: MAV_MISSION_RESULT ``code``, and the item at fault where it can be told."""
+    """The vehicle said no: MAV_MISSION_RESULT ``code``, and the item at fault where it is known."""
 
     code: int
     seq: int | None = None
@@ -78,7 +78,7 @@ class Refused:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """Nobody can say from here: only reading back settles it. ``silent``: the vehicle did not answer at all."""
+    """The outcome is unknown until the list is read back. ``silent``: the vehicle did not answer at all."""
 
     why: str
     silent: bool = False

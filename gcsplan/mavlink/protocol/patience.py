@@ -1,4 +1,4 @@
-"""How long a conversation may take: the user's patience is the longest time without progress, and bounds the whole."""
+"""How long a conversation may take: the user's timeout is the longest time without progress, and bounds the whole."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.mission.autopilots import manner
+from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.compare import Difference, compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, MissionItem
 from gcsplan.mavlink.protocol.download import Download
@@ -86,7 +86,7 @@ class VerifiedUpload:
     """Upload ``items`` (wire order) to ``vehicle``, read them back and compare, at most ``attempts`` times.
 
     Used like the machines that it is made of; ``result`` is None until it has ended. ``gate``: of `machine`.
-    ``most``: a longer list is none that the vehicle can hold, and is not read.
+    ``most``: the vehicle cannot hold a longer list; one that it announces is not read.
     """
 
     def __init__(
@@ -321,7 +321,7 @@ def on_board(
     name = _LIST[mission_type]
     if read is None:
         if not began:
-            cut = "" if manner(autopilot).atomic else ", or cut short if the announcement reached it"
+            cut = "" if profile_of(autopilot).atomic else ", or cut short if the announcement reached it"
             return f"the vehicle asked for nothing: its former {name} should be untouched{cut}"
         return f"what the vehicle holds is not known: do not fly it; upload again or clear its {name}"
     if not read:
@@ -331,9 +331,9 @@ def on_board(
     wrong = [d.seq for d in faults(compare(sent[:common], read[:common], autopilot, mission_type))]
     same = min(wrong, default=common) - start
     if same <= 0 and common > start:
-        whose = "still holds another" if manner(autopilot).atomic or not began else "holds another"
+        whose = "still holds another" if profile_of(autopilot).atomic or not began else "holds another"
         return f"the vehicle {whose} {name} of {len(read)} items: do not take it for the one that was sent"
-    if len(read) == len(sent) and len(set(wrong)) < common - start and not manner(autopilot).atomic:
+    if len(read) == len(sent) and len(set(wrong)) < common - start and not profile_of(autopilot).atomic:
         unlike = ", ".join(map(str, sorted(set(wrong))[:8]))
         return (
             f"the vehicle now holds {len(read)} items, of which {len(set(wrong))} are not as sent (item {unlike}); "

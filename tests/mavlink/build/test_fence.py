@@ -130,11 +130,11 @@ def test_zones_with_a_floor_or_a_ceiling_are_left_out_and_named_or_taken_to_the_
     fence = fence_of([mast, shelf, yard], FRAME, COPTER)
     assert [z.name for z in fence.zones] == ["yard"]
     assert fence.left_out == ("mast", "shelf")
-    assert any("mast" in words and "shelf" in words and "left out" in words for words in fence.told)
+    assert any("mast" in words and "shelf" in words and "left out" in words for words in fence.notes)
     whole = fence_of([mast, shelf, yard], FRAME, COPTER, infinite=True)
     assert len(whole.items) == 1 + 4 + 1
     assert whole.left_out == ()
-    assert any("to the sky" in words for words in whole.told)
+    assert any("to the sky" in words for words in whole.notes)
 
 
 def circles(count: int) -> list[Zone]:
@@ -151,7 +151,7 @@ def test_more_circles_than_arducopter_keeps_are_refused_and_circles_in_circles_a
     inside = [Zone("big", Circle(0, 0, 9000)), *circles(60), Zone("big too", Circle(0, 0, 9000))]
     fence = fence_of(inside, FRAME, COPTER)
     assert [z.name for z in fence.zones] == ["big"]
-    assert "inside another circle" in fence.told[0]
+    assert "inside another circle" in fence.notes[0]
     ring = np.array([[1000 * math.cos(a), 1000 * math.sin(a)] for a in np.linspace(0, 2 * math.pi, 71)[:-1]])
     with pytest.raises(InputError, match="70 corners"):
         fence_of([Zone("round", Polygon(ring))], FRAME, COPTER)

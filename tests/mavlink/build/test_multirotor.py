@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import BOW_M, LONGEST_LEG_M, MARGINS, Order, split_legs
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import stored
 from gcsplan.vehicle import Autopilot
@@ -25,18 +26,18 @@ def commands(mission: m.Mission) -> list[int]:
 
 
 @pytest.mark.parametrize(
-    ("end", "last"), [("land", [m.WAYPOINT, m.LAND]), ("loiter", [m.LOITER_UNLIM]),
-                      ("rtl", [m.WAYPOINT, m.RTL]), ("none", [m.WAYPOINT])],
+    ("end", "last"), [("land", [cmd.WAYPOINT, cmd.LAND]), ("loiter", [cmd.LOITER_UNLIM]),
+                      ("rtl", [cmd.WAYPOINT, cmd.RTL]), ("none", [cmd.WAYPOINT])],
 )  # fmt: skip
 def test_each_end_has_its_items(end: str, last: list[int]) -> None:
     mission = build_mission(PATH, WORLD, vehicle(), HOME_DEG, Order(end=end))  # type: ignore[arg-type]
-    assert commands(mission) == [m.TAKEOFF, m.DO_CHANGE_SPEED, m.WAYPOINT, m.WAYPOINT, *last]
+    assert commands(mission) == [cmd.TAKEOFF, cmd.DO_CHANGE_SPEED, cmd.WAYPOINT, cmd.WAYPOINT, *last]
 
 
 def test_arduplane_takes_off_and_lands_as_a_vtol_and_sends_an_acceptance_radius() -> None:
     mission = build_mission(PATH, WORLD, vehicle(Autopilot.ARDUPLANE, track_error_m=40.7), HOME_DEG, Order())
-    assert commands(mission)[0] == m.VTOL_TAKEOFF
-    assert commands(mission)[-1] == m.VTOL_LAND
+    assert commands(mission)[0] == cmd.VTOL_TAKEOFF
+    assert commands(mission)[-1] == cmd.VTOL_LAND
     assert mission.items[2].params[1] == 40.0
 
 
@@ -66,7 +67,7 @@ def test_what_is_stored_lies_within_the_planners_margins(
     craft = vehicle(autopilot)
     mission = build_mission(path, WORLD, craft, HOME_DEG, Order(end="none", altitude_frame=frame))  # type: ignore[arg-type]
     base = 300.0 if frame == "relative" else 0.0
-    places = [stored(item, autopilot) for item in mission.items if item.command == m.WAYPOINT]
+    places = [stored(item, autopilot) for item in mission.items if item.command == cmd.WAYPOINT]
     flown = np.array([(i.lat_deg, i.lon_deg, i.z + base) for i in places])
     flown[:, :2] = WORLD.frame.to_plane(flown[:, 0], flown[:, 1])
     wanted = split_legs(path.points, WORLD)[1:]
@@ -90,7 +91,7 @@ def test_a_leg_at_the_climb_limit_does_not_grow_steeper_by_rounding() -> None:
     run = np.arange(0, 3000, 61.7)
     path = Path(np.column_stack([run, 0 * run, 366.0 + slope * run]))
     mission = build_mission(path, WORLD, craft, HOME_DEG, Order(end="none"))
-    flown = [stored(i, craft.autopilot) for i in mission.items if i.command != m.DO_CHANGE_SPEED]
+    flown = [stored(i, craft.autopilot) for i in mission.items if i.command != cmd.DO_CHANGE_SPEED]
     z = np.array([i.z for i in flown])
     en = WORLD.frame.to_plane([i.lat_deg for i in flown], [i.lon_deg for i in flown])
     rise = np.degrees(np.arctan2(np.diff(z), np.hypot(*np.diff(en, axis=0).T)))
@@ -100,7 +101,7 @@ def test_a_leg_at_the_climb_limit_does_not_grow_steeper_by_rounding() -> None:
 def test_points_nearer_than_two_acceptance_radii_are_dropped() -> None:
     path = Path(np.array([[0.0, 0, 366], [1000, 0, 370], [1003, 0, 370.1], [2000, 0, 366]]))
     mission = build_mission(path, WORLD, vehicle(), HOME_DEG, Order(end="none"))
-    assert commands(mission).count(m.WAYPOINT) == 2
+    assert commands(mission).count(cmd.WAYPOINT) == 2
 
 
 def test_terrain_frame_heights_count_from_the_ground_under_each_point() -> None:

@@ -21,22 +21,8 @@ from gcsplan.mavlink.files.file_items import MAX_BYTES, PLAIN_XY, degrees_e7_of,
 from gcsplan.mavlink.files.formats import read_mission_file, read_plan, read_waypoints, write_plan, write_waypoints
 from gcsplan.mavlink.files.plan_file import parse_plan
 from gcsplan.mavlink.files.waypoints_file import parse_waypoints
-from gcsplan.mavlink.mission.mission import (
-    DO_CHANGE_SPEED,
-    DO_JUMP,
-    GLOBAL,
-    LAND,
-    NO_POSITION,
-    RELATIVE,
-    RTL,
-    TAKEOFF,
-    TERRAIN,
-    WAYPOINT,
-    Home,
-    Mission,
-    MissionItem,
-    float32,
-)
+from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP, LAND, RTL, TAKEOFF, WAYPOINT
+from gcsplan.mavlink.mission.mission import GLOBAL, NO_POSITION, RELATIVE, TERRAIN, Home, Mission, MissionItem, float32
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.mission.autopilots import altitude_of_cm, encode_altitude, manner, max_items, stored
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm, encode_altitude, max_items, profile_of, stored
 from gcsplan.mavlink.mission.mission import FENCE, FRAME_SYNONYMS, GLOBAL, RALLY, MissionItem, float32
 from gcsplan.mavlink.mission.stored_ardupilot import RULES, read_back_altitudes, stored_cm
 from gcsplan.mavlink.mission.stored_px4 import LOCATED, yaw
@@ -260,13 +260,13 @@ def test_px4s_rules_agree_with_an_independent_reading_of_its_source(shape: Missi
 
 def test_the_table_knows_every_autopilot() -> None:
     for autopilot in Autopilot:
-        row = manner(autopilot)
+        row = profile_of(autopilot)
         assert row.autopilot is autopilot
         assert row.max_items >= 650
         assert row.atomic is (autopilot is PX4)
         assert all(0 < max_items(autopilot, kind) <= row.max_items for kind in (0, FENCE, RALLY))
-    assert manner(COPTER).max_items == 650
-    assert not manner(COPTER).mav_types & manner(PLANE).mav_types
+    assert profile_of(COPTER).max_items == 650
+    assert not profile_of(COPTER).mav_types & profile_of(PLANE).mav_types
 
 
 @pytest.mark.parametrize("autopilot", list(Autopilot))
@@ -288,11 +288,11 @@ def test_what_is_refused_is_just_what_the_simulated_vehicle_refuses(autopilot: A
         for frame in (0, 1, 2, 3, 4, 5, 6, 7, 10, 11):
             for params in ((0.0,) * 4, (0.0, 0.0, 0.0, math.nan), (0.0, math.inf, 0.0, 0.0)):
                 one = MissionItem(command, frame, params, X, Y, 60.0)
-                ours, theirs = manner(autopilot).refuses(one), refused_there(one)
+                ours, theirs = profile_of(autopilot).refuses(one), refused_there(one)
                 seen.add((bool(ours), theirs))
                 assert theirs or not ours, (one, ours)
                 if command in known and (autopilot is PX4 or command in ALSO_SIMULATED):
                     assert bool(ours) is theirs, (one, ours)
     assert {(True, True), (False, False)} <= seen
-    assert "above terrain" in manner(PX4).refuses(item(16, frame=10))
-    assert manner(COPTER).refuses(item(16, frame=11)) == ""
+    assert "above terrain" in profile_of(PX4).refuses(item(16, frame=10))
+    assert profile_of(COPTER).refuses(item(16, frame=11)) == ""

@@ -1,4 +1,4 @@
-"""What stands in the way of returns, as walls in height, and the levels at which they are passed.
+"""What stands in the way of returns, as obstacles in height, and the levels at which they are passed.
 
 A return at the level ``h`` is somewhere between a lowest and a highest altitude: *highest* is the greater of the level
 and of where it begins, *lowest* depends on how the autopilot gets to its level. Ground is a wall without a bottom, a
@@ -25,8 +25,8 @@ GROUND, MAX_AMSL, MAX_AGL = -1, -2, -3
 
 
 @dataclass(frozen=True, eq=False)
-class Walls:
-    """R walls in the way of N returns, altitudes AMSL.
+class Obstacles:
+    """R obstacles in the way of N returns, altitudes AMSL.
 
     ``high`` (N,): the highest that each return begins. By wall (R,): the return, bottom and top; the lowest altitude of
     the return there is ``max(base, min(h, limit))``; ``what``: `GROUND`, `MAX_AMSL`, `MAX_AGL` or a zone's index.
@@ -44,7 +44,7 @@ class Walls:
         return len(self.high)
 
     def hit(self, level: Floats | float) -> Bools:
-        """(R,) walls that are hit at a level, or at one for each return (N,)."""
+        """(R,) obstacles that are hit at a level, or at one for each return (N,)."""
         h = np.broadcast_to(np.asarray(level, float), self.high.shape)[self.back]
         lowest = np.maximum(self.base, np.minimum(h, self.limit))
         return np.asarray((np.maximum(self.high[self.back], h) > self.bottom + TOUCH_M) & (lowest < self.top - TOUCH_M))
@@ -82,7 +82,7 @@ class Walls:
         return level
 
     def highest(self, level: float) -> float:
-        """How far ``level``, which passes everywhere, may be raised; inf where nothing bounds it."""
+        """How far ``level``, which passes all returns, may be raised; inf where nothing bounds it."""
         h = np.minimum(level, self.limit)
         under = np.maximum(self.base, h) < self.top - TOUCH_M
         return float(self.bottom[under].min(initial=np.inf))
@@ -95,20 +95,20 @@ class Walls:
         return int(rows[np.lexsort((self.top[rows], self.what[rows] >= 0, np.isinf(self._over(rows))))[-1]])
 
     def _over(self, rows: Ints) -> Floats:
-        """The level that gets over each of the walls."""
+        """The level that gets over each of the obstacles."""
         return np.where(self.top[rows] <= self.limit[rows], self.top[rows], np.inf)
 
-    def take(self, returns: Bools) -> Walls:
+    def take(self, returns: Bools) -> Obstacles:
         """Those of some returns."""
         number = np.cumsum(returns) - 1
         rows = returns[self.back]
-        return Walls(
+        return Obstacles(
             self.high[returns], number[self.back[rows]], self.bottom[rows], self.top[rows], self.base[rows],
             self.limit[rows], self.what[rows],
         )  # fmt: skip
 
     @classmethod
-    def join(cls, parts: Sequence[Walls]) -> Walls:
+    def join(cls, parts: Sequence[Obstacles]) -> Obstacles:
         """Those of all parts, one after the other."""
         offset = np.cumsum([0, *(len(p) for p in parts)])
         back = np.concatenate([p.back + o for p, o in zip(parts, offset[:-1], strict=True)])
@@ -119,8 +119,8 @@ class Walls:
             *(np.concatenate([getattr(p, name) for p in parts]) for name in names),
         )
 
-    def ordered(self, order: Ints) -> Walls:
+    def ordered(self, order: Ints) -> Obstacles:
         """The returns in another order."""
         place = np.empty(len(order), np.intp)
         place[order] = np.arange(len(order))
-        return Walls(self.high[order], place[self.back], self.bottom, self.top, self.base, self.limit, self.what)
+        return Obstacles(self.high[order], place[self.back], self.bottom, self.top, self.base, self.limit, self.what)

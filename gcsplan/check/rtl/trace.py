@@ -1,4 +1,4 @@
-"""Where a vehicle is along its mission: every stretch but the return itself, as points of the plane, to be cut up."""
+"""The mission trace: where a vehicle is along its mission, every stretch except the return itself, in the plane."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.check.plane_legs import legs_in_plane
+from gcsplan.check.rtl.model import RULES
 from gcsplan.check.stretch import Flight, Place, Stretch
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
 Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Trail:
+class MissionTrace:
     """Vertices by a running number ``u`` that grows by horizontal plus vertical metres along each stretch.
 
     ``u``, ``east``, ``north``, ``amsl``, ``along`` (V,); between stretches ``u`` has a gap. ``along`` is the horizontal
@@ -38,44 +39,44 @@ class Trail:
     world: World
     mains: int
 
-    def cut(self, size_m: float) -> Cuts:
-        """The whole trail in parts of about ``size_m`` at most."""
+    def cut(self, size_m: float) -> TraceParts:
+        """The whole trace in parts of about ``size_m`` at most."""
         counts = np.maximum(np.ceil((self.last - self.first) / size_m), 1.0).astype(int)
         stretch = np.repeat(np.arange(len(counts)), counts)
         step = (self.last - self.first) / counts
         number = np.concatenate([np.arange(n) for n in counts])
         start = self.first[stretch] + number * step[stretch]
         end = np.where(number + 1 == counts[stretch], self.last[stretch], start + step[stretch])
-        return Cuts(start, end, stretch)
+        return TraceParts(start, end, stretch)
 
     def points(self, u: Floats) -> Floats:
-        """(N, 4) east, north, amsl, along of places on the trail."""
+        """(N, 4) east, north, amsl, along of places on the trace."""
         return np.stack([np.interp(u, self.u, a) for a in (self.east, self.north, self.amsl, self.along)], axis=-1)
 
-    def heights(self, cuts: Cuts) -> tuple[Floats, Floats]:
+    def heights(self, parts: TraceParts) -> tuple[Floats, Floats]:
         """Lowest and highest that the vehicle may be on each part, AMSL, within the stretch's own band."""
-        ends = np.stack([np.interp(u, self.u, self.amsl) for u in (cuts.start, cuts.end)])
+        ends = np.stack([np.interp(u, self.u, self.amsl) for u in (parts.start, parts.end)])
         low, high = ends.min(axis=0), ends.max(axis=0)
-        a, b = np.searchsorted(self.u, cuts.start, "right"), np.searchsorted(self.u, cuts.end, "left")
+        a, b = np.searchsorted(self.u, parts.start, "right"), np.searchsorted(self.u, parts.end, "left")
         inner = np.flatnonzero(b > a)
         if len(inner):
             padded = np.append(self.amsl, 0.0)
             pairs = np.stack([a[inner], b[inner]], axis=-1).ravel()
             low[inner] = np.minimum(low[inner], np.minimum.reduceat(padded, pairs)[::2])
             high[inner] = np.maximum(high[inner], np.maximum.reduceat(padded, pairs)[::2])
-        band = self.altitude_m[cuts.stretch]
+        band = self.altitude_m[parts.stretch]
         return low - band, high + band
 
     def place(self, u: float) -> Place:
-        """Latitude, longitude, AMSL of a place on the trail."""
+        """Latitude, longitude, AMSL of a place on the trace."""
         east, north, amsl, _ = self.points(np.array([u]))[0].tolist()
         lat, lon = self.world.frame.to_degrees(east, north).tolist()
         return lat, lon, amsl
 
 
 @dataclass(frozen=True, eq=False)
-class Cuts:
-    """N parts of a trail: from ``start`` to ``end`` (N,), on ``stretch`` (N,)."""
+class TraceParts:
+    """N parts of a trace: from ``start`` to ``end`` (N,), on ``stretch`` (N,)."""
 
     start: Floats
     end: Floats
@@ -94,28 +95,28 @@ class Cuts:
         """(N,) the u in the middle."""
         return 0.5 * (self.start + self.end)
 
-    def take(self, which: NDArray[np.bool_] | Ints) -> Cuts:
+    def take(self, which: NDArray[np.bool_] | Ints) -> TraceParts:
         """Some of the parts."""
-        return Cuts(self.start[which], self.end[which], self.stretch[which])
+        return TraceParts(self.start[which], self.end[which], self.stretch[which])
 
-    def split(self, pieces: int) -> Cuts:
+    def split(self, pieces: int) -> TraceParts:
         """Each part in so many of equal size."""
         step = self.size / pieces
         start = (self.start[:, None] + np.arange(pieces) * step[:, None]).ravel()
         end = np.append(start[1:], 0.0)
         end[pieces - 1 :: pieces] = self.end
-        return Cuts(start, end, np.repeat(self.stretch, pieces))
+        return TraceParts(start, end, np.repeat(self.stretch, pieces))
 
 
-def trail_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: float) -> Trail | None:
-    """The trail of a flight, what may be flown instead of its stretches included; None where it goes nowhere.
+def trace_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: float) -> MissionTrace | None:
+    """The trace of a flight, with what may be flown instead of its stretches; None where it goes nowhere.
 
-    A plane's columns and slants are not on it: how it gets from near the ground to a return is its own affair.
+    A plane's columns and slants are not on it: how it returns from near the ground is not known.
     """
     mains = [s for s in flight.stretches if s.kind != "rtl"]
     others = [s for s in flight.instead if s.kind != "rtl"]
     limits = vehicle.limits
-    parts: list[tuple[Stretch, Floats, float, float]] = []
+    flown: list[tuple[Stretch, Floats, float, float]] = []
     for group in (mains, others):
         if not group:
             continue
@@ -125,12 +126,12 @@ def trail_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: fl
             points = np.vstack([plane.legs.start[i : i + 1], plane.legs.end[i:j]])
             track = float(plane.legs.track_error_m[i:j].max()) - limits.track_error_m
             altitude = float(plane.legs.altitude_error_m[i:j].max()) - limits.altitude_error_m
-            parts.append((s, points, max(track, 0.0), max(altitude, 0.0)))
+            flown.append((s, points, max(track, 0.0), max(altitude, 0.0)))
     u, along, first, last = [], [], [], []
     at_u = so_far = 0.0
     kept: list[int] = []
     begun: dict[int, tuple[float, float]] = {}
-    for number, (s, points, _, _) in enumerate(parts):
+    for number, (s, points, _, _) in enumerate(flown):
         run = np.hypot(*np.diff(points[:, :2], axis=0).T)
         rise = np.abs(np.diff(points[:, 2]))
         mine = at_u + np.concatenate([[0.0], np.cumsum(run + rise)])
@@ -144,7 +145,7 @@ def trail_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: fl
             low, high = begun.get(s.seq, (so_far, so_far))
             part = way / way[-1] if way[-1] > 0.0 else way
             mine_along = low + part * (high - low)
-        if s.column and vehicle.autopilot is Autopilot.ARDUPLANE:
+        if s.column and not RULES[vehicle.autopilot].climbs_first:
             continue
         kept.append(number)
         along.append(mine_along)
@@ -155,10 +156,10 @@ def trail_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: fl
     if not kept or kept[0] >= len(mains):
         return None
     count = sum(number < len(mains) for number in kept)
-    parts = [parts[number] for number in kept]
-    points = np.vstack([p for _, p, _, _ in parts])
-    return Trail(
+    flown = [flown[number] for number in kept]
+    points = np.vstack([p for _, p, _, _ in flown])
+    return MissionTrace(
         np.concatenate(u), points[:, 0].copy(), points[:, 1].copy(), points[:, 2].copy(), np.concatenate(along),
-        np.array(first), np.array(last), np.array([s.seq for s, *_ in parts], dtype=np.intp),
-        np.array([t for *_, t, _ in parts]), np.array([a for *_, a in parts]), world, count,
+        np.array(first), np.array(last), np.array([s.seq for s, *_ in flown], dtype=np.intp),
+        np.array([t for *_, t, _ in flown]), np.array([a for *_, a in flown]), world, count,
     )  # fmt: skip

@@ -14,25 +14,16 @@ from numpy.typing import NDArray
 
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
-from gcsplan.check.rtl.everywhere import WayHome, study_of, way_home
+from gcsplan.check.rtl.obstacles import Obstacles
 from gcsplan.check.rtl.rally import rally_items
-from gcsplan.check.rtl.rules import Target, returns
+from gcsplan.check.rtl.refinement import CLEAR, LEGAL
 from gcsplan.check.rtl.stretches import rel_home
-from gcsplan.check.rtl.study import CLEAR, LEGAL
-from gcsplan.check.rtl.trail import trail_of
-from gcsplan.check.rtl.walls import Walls
-from gcsplan.mavlink.mission.autopilots import manner
-from gcsplan.mavlink.mission.mission import (
-    LAND,
-    RELATIVE,
-    RTL,
-    TAKEOFF,
-    VTOL_LAND,
-    VTOL_TAKEOFF,
-    WAYPOINT,
-    Home,
-    Mission,
-)
+from gcsplan.check.rtl.sweep import Target, obstacles_of_returns
+from gcsplan.check.rtl.trace import trace_of
+from gcsplan.check.rtl.way_home import WayHome, refinement_of, way_home
+from gcsplan.mavlink.mission.autopilots import profile_of
+from gcsplan.mavlink.mission.commands import LAND, RTL, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT
+from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission
 from gcsplan.mavlink.mission.mission import MissionItem as Item
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
@@ -377,23 +368,23 @@ def test_never_kinder_than_brute_force_in_rough_random_worlds(autopilot: Autopil
         if case is None:
             continue
         worlds += 1
-        stored = replace(case.mission, items=tuple(manner(autopilot).stored(i) for i in case.mission.items))
+        stored = replace(case.mission, items=tuple(profile_of(autopilot).stored(i) for i in case.mission.items))
         flight = follow(stored, case.vehicle, case.world.ground_amsl, rtl_rel_home_m=case.level_rel_home_m)
-        trail = trail_of(flight, case.vehicle, case.world, 30.0)
-        assert trail is not None
+        trace = trace_of(flight, case.vehicle, case.world, 30.0)
+        assert trace is not None
         east, north, ground = case.corners[0].tolist()
         target, level = Target(east, north, ground, ground), ground + case.level_rel_home_m
-        study = study_of(trail, target, case.vehicle, level)
-        bad = [study.bad(grade, level) for grade in (CLEAR, LEGAL)]
-        lowest = [study.strict[grade].together(study.start) for grade in (CLEAR, LEGAL)]
+        refinement = refinement_of(trace, target, case.vehicle, level)
+        bad = [refinement.bad(grade, level) for grade in (CLEAR, LEGAL)]
+        lowest = [refinement.strict[grade].together(refinement.start) for grade in (CLEAR, LEGAL)]
         first_leg = int(autopilot is PLANE)  # a plane's columns are not judged
-        for i in range(trail.mains):
+        for i in range(trace.mains):
             for f in np.linspace(0.0, 1.0, 4):
-                u = trail.first[i] + f * (trail.last[i] - trail.first[i])
+                u = trace.first[i] + f * (trace.last[i] - trace.first[i])
                 at, to = case.corners[i + first_leg : i + first_leg + 2]
                 at = at + f * (to - at)
-                assert trail.points(np.array([u]))[0, :3] == pytest.approx(at, abs=1e-3)
-                part = (study.cuts.start <= u + 1e-12) & (study.cuts.end >= u - 1e-12)
+                assert trace.points(np.array([u]))[0, :3] == pytest.approx(at, abs=1e-3)
+                part = (refinement.parts.start <= u + 1e-12) & (refinement.parts.end >= u - 1e-12)
                 for grade in (CLEAR, LEGAL):
                     found = breach(case, at, legal=grade == LEGAL)
                     assert not found or bad[grade][part].any(), (seed, i, f, grade, found)
@@ -434,20 +425,20 @@ def test_on_smooth_ground_the_lowest_altitude_is_hardly_higher_than_it_must_be()
         assert top + 5.0 - home - 0.1 <= lowest <= top + 5.0 - home + 3.0
 
 
-def test_walls_go_up_from_top_to_top() -> None:
+def test_the_lowest_level_goes_up_from_top_to_top() -> None:
     back = np.array([0, 0, 0, 1, 2, 2], dtype=np.intp)
-    walls = Walls(
+    obstacles = Obstacles(
         np.array([10.0, 10.0, 10.0]), back,
         np.array([-np.inf, 15.0, 60.0, -np.inf, -np.inf, 25.0]), np.array([20.0, 40.0, np.inf, 50.0, 30.0, np.inf]),
         np.array([10.0] * 6), np.array([np.inf, np.inf, np.inf, np.inf, np.inf, np.inf]),
         np.array([-1, 0, 1, -1, -1, 2], dtype=np.intp),
     )  # fmt: skip
-    each = walls.lowest(0.0)
+    each = obstacles.lowest(0.0)
     assert each.tolist() == [40.0, 50.0, math.inf]  # over the ground it is in the zone; the third has a lid at 25
-    assert walls.together(0.0) == math.inf
+    assert obstacles.together(0.0) == math.inf
     two = np.array([True, True, False])
-    assert walls.together(0.0, two) == 50.0
-    kept = walls.take(two)
+    assert obstacles.together(0.0, two) == 50.0
+    kept = obstacles.take(two)
     assert kept.together(0.0) == 50.0
     assert kept.highest(50.0) == 60.0
     assert kept.passes(50.0).all()
@@ -461,11 +452,11 @@ def test_the_return_from_the_middle_is_never_judged_more_strictly_than_from_the_
     w = world(ridge, [Zone("p", Polygon(np.array([[500.0, 50], [700, 50], [600, 300]])), ceiling=Level(60.0, "agl"))])
     v = replace(vehicle(**BARE), limits=Limits(20.0, 150.0, 480.0, 30.0, 3.0, 5.0))
     m = mission(w, OVER)
-    trail = trail_of(follow(m, v, w.ground_amsl, rtl_rel_home_m=50.0), v, w, 30.0)
-    assert trail is not None
-    cuts = trail.cut(50.0)
+    trace = trace_of(follow(m, v, w.ground_amsl, rtl_rel_home_m=50.0), v, w, 30.0)
+    assert trace is not None
+    parts = trace.cut(50.0)
     target = Target(0.0, 0.0, 300.0, 300.0)
-    whole, middle = (returns(trail, cuts, target, v, whole=x) for x in (True, False))
+    whole, middle = (obstacles_of_returns(trace, parts, target, v, whole=x) for x in (True, False))
     for grade in (CLEAR, LEGAL):
         assert (middle[grade].lowest(300.0) <= whole[grade].lowest(300.0) + 1e-6).all()
         for level in (320.0, 380.0, 430.0):

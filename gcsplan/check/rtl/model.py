@@ -1,0 +1,152 @@
+"""How each autopilot returns: one table of rules, and one return as straight pieces.
+
+ArduCopter (mode_rtl.cpp, ``compute_return_target``): climbs on the spot to the greatest of its altitude and RTL_ALT
+(RTL_ALT_M since 4.7; relative to home), flies straight home at it, descends. Within a cone around home it climbs less:
+to RTL_CONE_SLOPE times the distance, 2.5 m at least. RTL_CLIMB_MIN (0) adds to its own altitude.
+PX4 (rtl.cpp): the same with RTL_RETURN_ALT and RTL_CONE_ANG (45 degrees). Later versions have the cone only within
+RTL_MIN_DIST (10 m) of home and climb fully beyond it; older ones go to RTL_DESCEND_ALT within that distance.
+ArduPlane, a QuadPlane too: turns and flies home at once, climbing to RTL_ALTITUDE (ALT_HOLD_RTL before 4.5; -1 keeps
+its altitude) as it goes, or gliding down to it, and circles over home with WP_LOITER_RAD, grown with altitude.
+
+Two modules read these rules. `return_pieces` is the return of an RTL item, from one place; `sweep` judges the return
+after a failsafe, from every point of a mission. Where an autopilot may fly one of several altitudes, both judge all of
+them: in the cone from the cone's altitude up to the return altitude, on a plane's way home from its altitude to the
+return altitude. Not judged: RTL_ALT_TYPE 1 (terrain), RTL_CLIMB_MIN, fences that cap the return, Q_RTL_MODE, missions
+with DO_LAND_START. `cone_differs` is judged in `return_pieces` alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import TypeVar
+
+from gcsplan.arrays import Floats
+from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
+from gcsplan.check.geodesy import flat_m
+from gcsplan.check.stretch import Place
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.limits import Limits
+
+AT_HOME_M = 5.0
+"""Nearer to home than this, or than the track error, a return is a descent."""
+
+Metres = TypeVar("Metres", float, Floats)
+
+
+class RallyAltitude(Enum):
+    """What the altitude of a rally point does to a return that leads there."""
+
+    GROUND = "the point must lie on the ground, and the return altitude counts from it"
+    RAISES = "the return is no lower than the point's altitude"
+    OWN = "the return is at the point's altitude"
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnRule:
+    """How one autopilot returns; all numbers are the autopilot's defaults.
+
+    ``parameter``: its name for the return altitude, which counts from home. ``climbs_first``: it climbs on the spot,
+    never descends before it is home, and then descends vertically; else it turns, changes its altitude on the way, and
+    circles over home with ``loiter_radius_m``. ``cone_slope``: rise over run of the cone around home, below which it
+    climbs no further; 0: no cone. ``cone_differs``: some versions may
+    fly lower near home, so that an RTL item is judged as if it did not climb within the cone.
+    """
+
+    parameter: str
+    default_rel_home_m: float
+    climbs_first: bool
+    cone_slope: float
+    cone_differs: bool
+    loiter_radius_m: float
+    rally: RallyAltitude
+
+    def level_amsl_m(self, return_amsl_m: float, begins_amsl_m: float) -> float:
+        """The altitude of the way home, for a return altitude and that at which the return begins."""
+        return max(return_amsl_m, begins_amsl_m) if self.climbs_first else return_amsl_m
+
+    def cone_amsl_m(self, base_amsl_m: float, distance_m: Metres) -> Metres:
+        """The least altitude that is climbed to at a distance from home; the cone stands at ``base_amsl_m``."""
+        return base_amsl_m + self.cone_slope * distance_m
+
+    def circle_m(self, amsl_m: float) -> float:
+        """Radius of the circle over home at an altitude."""
+        return self.loiter_radius_m * circle_growth(amsl_m)
+
+
+RULES = {
+    Autopilot.ARDUCOPTER: ReturnRule(
+        "RTL_ALT", 15.0, climbs_first=True,
+        cone_slope=3.0,  # RTL_CONE_SLOPE
+        cone_differs=False, loiter_radius_m=0.0, rally=RallyAltitude.RAISES,
+    ),
+    Autopilot.ARDUPLANE: ReturnRule(
+        "RTL_ALTITUDE", 100.0, climbs_first=False, cone_slope=0.0, cone_differs=False,
+        loiter_radius_m=PLANE_LOITER_RADIUS_M, rally=RallyAltitude.OWN,
+    ),
+    Autopilot.PX4: ReturnRule(
+        "RTL_RETURN_ALT", 60.0, climbs_first=True,
+        cone_slope=1.0,  # RTL_CONE_ANG 45°
+        cone_differs=True, loiter_radius_m=0.0, rally=RallyAltitude.GROUND,
+    ),
+}  # fmt: skip
+
+
+def about_turn_m(vehicle: Vehicle) -> float:
+    """How far from where its return begins a plane may be while it turns about.
+
+    Without a turn radius the track error holds a turn: to turn about takes twice as much.
+    """
+    return 2.0 * max(vehicle.limits.track_error_m, vehicle.turn_radius_m)
+
+
+def at_home_m(limits: Limits) -> float:
+    """The distance from home within which a return is a descent."""
+    return max(AT_HOME_M, limits.track_error_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One straight piece; ``instead``: flown in place of another one by some versions. The rest is `Stretch`'s."""
+
+    start: Place
+    end: Place
+    column: bool = False
+    band_m: float = 0.0
+    reach_m: float = 0.0
+    hold_s: float = 0.0
+    instead: bool = False
+
+
+def return_pieces(rule: ReturnRule, at: Place, home: Place, return_amsl_m: float, *, about_m: float) -> list[Piece]:
+    """The return from ``at`` to ``home`` (a place on the ground); the last piece ends where the return ends.
+
+    ``about_m``: see `about_turn_m`.
+    """
+    lat, lon, ground = home
+    level = rule.level_amsl_m(return_amsl_m, at[2])
+    over = (lat, lon, level)
+    if not rule.climbs_first:
+        return [
+            Piece(at, at, reach_m=about_m, instead=True),
+            _band(at, home, at[2], level),
+            Piece(over, over, reach_m=rule.circle_m(level), hold_s=math.inf),
+        ]
+    cone = rule.cone_amsl_m(ground, flat_m(at, home))
+    if rule.cone_differs and cone < level:
+        cone = -math.inf
+    lowest = max(at[2], min(cone, level))
+    up = (*at[:2], level)
+    return [
+        *([_band(at, home, lowest, level, instead=True)] if lowest < level else []),
+        Piece(at, up, column=True),
+        Piece(up, over),
+        Piece(over, (lat, lon, ground), column=True),
+    ]
+
+
+def _band(at: Place, home: Place, a_amsl_m: float, b_amsl_m: float, *, instead: bool = False) -> Piece:
+    """Level home, at any altitude between two."""
+    middle, half = 0.5 * (a_amsl_m + b_amsl_m), 0.5 * abs(b_amsl_m - a_amsl_m)
+    return Piece((*at[:2], middle), (*home[:2], middle), band_m=half, instead=instead)

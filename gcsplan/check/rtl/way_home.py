@@ -1,0 +1,168 @@
+"""The way home: the autopilot's own return, from every point of every leg of a mission.
+
+Each point of a mission has its own straight way home. Parts of the mission are judged as a whole: every return from a
+part lies within half its length of the one from its middle; the ground is bounded over the line so widened, with the
+kernels and margins of the exact check (`gcsplan.world.ways`), and zones are held against the region that the returns
+sweep. Nothing is sampled, so what is called safe is safe. What is called unsafe is so, except: the ends of a stretch
+(`refinement.SMALLEST_M`), safe gaps shorter than `COARSE_M` (`COARSEST_M` on long missions) within one, and what the
+bounds of the ground beside a line cost: the widening times the slope there. The lowest altitude is beside that at most
+`LEVEL_M` too high.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from gcsplan.check.battery import battery_home
+from gcsplan.check.corners import round_corners
+from gcsplan.check.flight import follow
+from gcsplan.check.judge import TERRAIN_ERROR_M
+from gcsplan.check.rtl.model import RULES
+from gcsplan.check.rtl.rally import propose
+from gcsplan.check.rtl.refinement import CLEAR, LEGAL, Refinement, sizes_m
+from gcsplan.check.rtl.stretches import rel_home, stretches_of
+from gcsplan.check.rtl.sweep import GradedObstacles, Target, obstacles_of_returns
+from gcsplan.check.rtl.trace import MissionTrace, TraceParts, trace_of
+from gcsplan.check.rtl.verdict import ProfilePoint, RallyPoint, UnsafeStretch, WayHome
+from gcsplan.check.stretch import Place
+from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.mission.autopilots import profile_of
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.world import World
+
+__all__ = ["RallyPoint", "UnsafeStretch", "WayHome", "way_home"]
+
+PROFILE_POINTS = 400
+NOISE_M = 1e-3
+"""An altitude that touches what is above it is lowered by this."""
+
+RETURNS_BY_ITSELF = "after the last item ArduPlane returns"
+"""How `flight` begins its note on the return that is judged here."""
+
+
+def way_home(
+    verdict: Verdict,
+    vehicle: Vehicle,
+    world: World,
+    *,
+    rtl_rel_home_m: float | None = None,
+    terrain_error_m: float = TERRAIN_ERROR_M,
+    rally: bool = True,
+) -> WayHome:
+    """Judge the return home from every point of the mission of ``verdict``.
+
+    ``rtl_rel_home_m`` is the vehicle's return altitude above home; None takes the autopilot's default. ``rally``:
+    propose rally points where no altitude is clear from every point. Never raises for a mission that is merely unsafe.
+    """
+    mission, rule = verdict.mission, RULES[vehicle.autopilot]
+    stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
+    lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
+    ground = world.ground_amsl(lat, lon)
+    judged_m = rule.default_rel_home_m if rtl_rel_home_m is None else rtl_rel_home_m
+    flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=judged_m)
+    if verdict.legs:
+        round_corners(flight, stored, vehicle, world.frame)
+    trace = trace_of(flight, vehicle, world, terrain_error_m) if verdict.legs else None
+    if trace is None or math.isnan(ground):
+        why = "the mission could not be followed" if trace is None else "the ground at home is unknown"
+        return _not_judged(vehicle, judged_m, rtl_rel_home_m is None, (lat, lon, mission.home.amsl_m), why)
+    home = (lat, lon, ground)
+    east, north = (float(x) for x in world.frame.to_plane(lat, lon))
+    target = Target(east, north, ground, ground)
+    level = ground + judged_m
+    refinement = refinement_of(trace, target, vehicle, level)
+    lowest, highest = _lowest(refinement, CLEAR, ground)
+    lowest_legal, _ = _lowest(refinement, LEGAL, ground)
+    unsafe = stretches_of(trace, refinement, CLEAR, level, target)
+    proposal = propose(trace, refinement, target, vehicle, judged_m) if rally and lowest is None else None
+    notes = _notes(vehicle, judged_m, rtl_rel_home_m is None)
+    most_amsl = vehicle.limits.max_amsl_m
+    if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:
+        most_m = most_amsl - vehicle.limits.altitude_error_m - ground
+        notes.append(f"a return at {lowest:.0f} m above home rises above max_amsl_m, which leaves {most_m:.0f} m")
+    if refinement.stopped_early:
+        notes.append("the terrain is too fine to look at all of it closely: unsafe stretches may be drawn too long")
+    return WayHome(
+        vehicle=vehicle.name,
+        parameter=rule.parameter,
+        rtl_rel_home_m=judged_m,
+        assumed=rtl_rel_home_m is None,
+        home=home,
+        lowest_rel_home_m=lowest,
+        highest_rel_home_m=highest,
+        lowest_legal_rel_home_m=lowest_legal,
+        unsafe=unsafe,
+        irregular=stretches_of(trace, refinement, LEGAL, level, target, but=CLEAR),
+        battery=battery_home(verdict, vehicle, home, level),
+        advised_rel_home_m=proposal.rel_home_m if proposal else lowest,
+        rally=proposal.points if proposal else (),
+        left=proposal.left if proposal else (),
+        profile=_profile(trace, refinement),
+        not_judged=tuple(w for w in flight.not_judged if not w.startswith(RETURNS_BY_ITSELF)),
+        notes=tuple(notes + list(proposal.notes if proposal else ())),
+    )
+
+
+def refinement_of(trace: MissionTrace, target: Target, vehicle: Vehicle, level: float) -> Refinement:
+    """Returns from all of ``trace`` to ``target``, refined for ``level``."""
+
+    def judged(parts: TraceParts, whole: bool) -> GradedObstacles:
+        return obstacles_of_returns(trace, parts, target, vehicle, whole=whole)
+
+    field = trace.world.airspace._field
+    away_m = float(np.hypot(trace.east - target.east_m, trace.north - target.north_m).mean())
+    sizes = sizes_m(trace, away_m, min(field.step_x, field.step_y))
+    return Refinement(trace, judged, target.ground_amsl_m, (level,), *sizes)
+
+
+def _lowest(refinement: Refinement, grade: int, home_amsl_m: float) -> tuple[float | None, float | None]:
+    """The lowest altitude that is safe from every point, and how high it may be, above home."""
+    obstacles = refinement.strict[grade]
+    level = obstacles.together(refinement.start)
+    top = obstacles.highest(level) if math.isfinite(level) else math.inf
+    return rel_home(obstacles, level, home_amsl_m), None if math.isinf(top) else top - home_amsl_m - NOISE_M
+
+
+def _profile(trace: MissionTrace, refinement: Refinement) -> tuple[ProfilePoint, ...]:
+    """What each part of the mission needs, parts joined so that there are not too many."""
+    parts, mains = refinement.parts, trace.mains
+    own = np.flatnonzero(parts.stretch < mains)
+    if not len(own):
+        return ()
+    a, b = (np.interp(u[own], trace.u, trace.along) for u in (parts.start, parts.end))
+    low, high = trace.heights(parts)
+    needs = [refinement.strict[g].lowest(refinement.start)[own] for g in (CLEAR, LEGAL)]
+    bins = np.minimum((a / max(float(b.max()), 1e-9) * PROFILE_POINTS).astype(int), PROFILE_POINTS - 1)
+    at = np.flatnonzero(np.diff(bins, prepend=-1))
+    columns = [
+        np.minimum.reduceat(a, at), np.maximum.reduceat(b, at),
+        np.minimum.reduceat(low[own], at), np.maximum.reduceat(high[own], at),
+        *(np.maximum.reduceat(need, at) for need in needs),
+    ]  # fmt: skip
+    return tuple(
+        ProfilePoint(*row[:4], *(x if math.isfinite(x) else None for x in row[4:]))
+        for row in zip(*(c.tolist() for c in columns), strict=True)
+    )
+
+
+def _notes(vehicle: Vehicle, judged_m: float, assumed: bool) -> list[str]:
+    rule = RULES[vehicle.autopilot]
+    notes = []
+    if assumed:
+        notes.append(
+            f"the return is judged at {judged_m:g} m above home, the default of {rule.parameter}: give the vehicle's "
+            f"own with rtl_rel_home_m"
+        )
+    if not rule.climbs_first:
+        notes.append("a plane's return is judged from its flight, not from its take-off and landing")
+    return notes
+
+
+def _not_judged(vehicle: Vehicle, judged_m: float, assumed: bool, home: Place, why: str) -> WayHome:
+    return WayHome(
+        vehicle.name, RULES[vehicle.autopilot].parameter, judged_m, assumed, home, None, None, None, (), (), None, None,
+        (), (), (), (why,), tuple(_notes(vehicle, judged_m, assumed)),
+    )  # fmt: skip
