@@ -19,6 +19,8 @@ Size = tuple[float, float]
 LEAST_S = 1e-3
 """No search is taken to cost less."""
 MOST_STEPS = 200
+AGAIN = 0.02
+"""What part of the gap a better path must have closed before a search runs once more."""
 NEARER = 0.45
 """What part of the wanted gap is near enough for searches that are cheap and mostly help."""
 
@@ -40,13 +42,16 @@ class Search:
     again: bool = False
     nearer: bool = False
     """Whether it is worth its cost even where the gap is small enough, see `NEARER`."""
-    seen: int = field(default=-1)
-    """At how many better paths it ran last."""
+    seen: float | None = field(default=None)
+    """What the best path cost when it ran last; None: it has not run yet."""
 
     def is_open(self, incumbent: Incumbent) -> bool:
         """Whether it may run now."""
-        fresh = self.seen < 0 or (self.again and self.seen < incumbent.improved)
-        return fresh and self.applies()
+        if self.seen is not None:
+            better = self.seen - incumbent.cost > AGAIN * (incumbent.cost - incumbent.bound)
+            if not (self.again and better):
+                return False
+        return self.applies()
 
 
 def govern(incumbent: Incumbent, searches: list[Search], without: Collection[str] = ()) -> None:
@@ -69,7 +74,7 @@ def govern(incumbent: Incumbent, searches: list[Search], without: Collection[str
                     chosen, best, size = search, worth, asked
         if chosen is None:
             return
-        chosen.seen = incumbent.improved
+        chosen.seen = incumbent.cost
         if not budget.fits(*size):
             incumbent.steps.append(Step(chosen.name, 0.0, size[1], refused=True))
             budget.ran_out = True

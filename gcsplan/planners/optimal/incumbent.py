@@ -43,8 +43,6 @@ class Incumbent:
         self.first_s = math.inf
         self.proved_shut = False
         """Whether it is proved that there is no path."""
-        self.improved = 0
-        """How often a better path came."""
         self.unsettled: Unsettled | None = None
         """Why the last track that was looked at closely holds no path."""
         self.steps: list[Step] = []
@@ -108,7 +106,6 @@ class Incumbent:
             return False
         self._first()
         self.best, self.cost, self.pinned = points, cost, pinned
-        self.improved += 1
         self.tell("improve")
         return True
 

@@ -20,10 +20,9 @@ from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
 from gcsplan.planners.problem import Problem, Refusal, terminals
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
-FAR, MUCH, SLANTED, NEAR = 5e-3, 5e-2, 1e-2, 5e-2
+FAR, MUCH, NEAR = 5e-3, 5e-2, 5e-2
 """Gaps, as parts: beyond which other ways to find a path are asked for a better one; beyond which small worlds are
-searched before time is spent on a bound; beyond which slopes are climbed aslant for length; and up to which cells are
-cut once more."""
+searched before time is spent on a bound; and up to which cells are cut once more."""
 TWICE = 2.0
 """From so many times the wanted gap on bounds that cost more are asked for."""
 PAST_FINE, ROUNDS = 9, 2
@@ -114,7 +113,7 @@ class Searches:
             Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
             Search("detours", 0.8, far, nodes(2.0), on(lambda plane: plane.past(PAST, fine=False))),
             Search("bound_corridor", 0.2, twice, nodes(3.0), on(follow)),
-            Search("contour_climb", 0.1, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
+            Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
             Search("lattice", 0.02, self._wants_lattice, of(0.5, 0.0), self._search_lattice_again),
             Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
         ]
@@ -237,8 +236,7 @@ class Searches:
 
     def _is_slanted(self) -> bool:
         incumbent = self.incumbent
-        worth = FAR if self.problem.objective == "energy" else SLANTED
-        return incumbent.best is not None and incumbent.gap > worth and incumbent.climbs
+        return incumbent.best is not None and incumbent.gap > FAR and incumbent.climbs
 
     def _climb_aslant(self) -> None:
         incumbent, energy = self.incumbent, self.problem.objective == "energy"
