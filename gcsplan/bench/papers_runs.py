@@ -228,7 +228,7 @@ def _swarm(job: Job, ready: Set) -> Record:
         "yaw_deg": float(np.mean([f.yaw_deg for f in found])),
         "nearest_m": None if None in near else float(np.mean(near)),  # type: ignore[arg-type]
         "history": history,
-        "paths": [np.round(f.curve[fewer(f.curve, f.stops, DRAWN_M * f.length_m)], 2).tolist() for f in found],
+        "paths": [np.round(f.curve[fewer(f.curve, f.terminals, DRAWN_M * f.length_m)], 2).tolist() for f in found],
     }
 
 

@@ -61,7 +61,9 @@ def exit_cost(problem: Problem) -> float:
     lines, bow_m = border(problem)
     terminals = np.array(terminals_of(problem))
     legs = np.hypot(*np.diff(terminals, axis=0).T)
-    more_m = min(_past(a, b, lines) - leg for a, b, leg in zip(terminals[:-1], terminals[1:], legs.tolist(), strict=True))
+    more_m = min(
+        _past(a, b, lines) - leg for a, b, leg in zip(terminals[:-1], terminals[1:], legs.tolist(), strict=True)
+    )
     track_m = float(legs.sum()) + max(more_m - 4.0 * bow_m, 0.0)
     heights = [problem.start[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None), problem.goal[2]]
     rise_m = sum(abs(b - a) for a, b in pairwise(heights))
@@ -84,7 +86,7 @@ def within_m(problem: Problem) -> float:
 
 
 def margin_for(problem: Problem, cost: float) -> float:
-    """How far around the stops a path may lead that costs ``cost``; inf for all costs."""
+    """How far around the terminals a path may lead that costs ``cost``; inf for all costs."""
     if math.isinf(cost):
         return math.inf
     legs = [math.dist(a, b) for a, b in pairwise(terminals_of(problem))]

@@ -53,8 +53,9 @@ class Problem:
     know: the swarms' ``encoding``, ``cost``, ``points``, ``population``, ``iterations``, ``evaluations`` and
     ``parameters``.
 
-    ``widen(margin_m, budget_mb)``: the same question over more terrain, at least so far around all stops (inf: twice as
-    far as here) if memory allows; None where it does not, or where there is no more; `Surface.goes_on` tells which.
+    ``widen(margin_m, budget_mb)``: the same question over more terrain, at least so far around all terminals (inf:
+    twice as far as here) if memory allows; None where it does not, or where there is no more; `Surface.goes_on` tells
+    which.
     """
 
     airspace: Airspace

@@ -51,7 +51,9 @@ def check_ends(problem: Problem) -> None:
     if one_place and not problem.via and abs(problem.start[2] - problem.goal[2]) > 1e-3:
         return  # a climb on the spot, in laps
     if one_place:
-        raise Refusal("start and goal are the same place: there is nothing to fly", reason="infeasible", place=terminals[0])
+        raise Refusal(
+            "start and goal are the same place: there is nothing to fly", reason="infeasible", place=terminals[0]
+        )
     for k, (a, b) in enumerate(pairwise(terminals)):
         z0, z1 = heights[k], heights[k + 1]
         if math.dist(a, b) < 1e-3 and z0 is not None and z1 is not None and abs(z1 - z0) > 1e-3:

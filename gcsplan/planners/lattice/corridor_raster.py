@@ -99,7 +99,12 @@ class Guide:
         capacity = pull_kernels.MOST_POINTS
         if n > capacity - 2:
             return line
-        points, pinned, pin_m, amsl = np.zeros((capacity, 2)), np.zeros(capacity), np.full(capacity, np.nan), np.zeros(capacity)
+        points, pinned, pin_m, amsl = (
+            np.zeros((capacity, 2)),
+            np.zeros(capacity),
+            np.full(capacity, np.nan),
+            np.zeros(capacity),
+        )
         points[:n], pinned[:n], pin_m[:n], amsl[:n] = line.points, line.pinned, line.pin_m, line.amsl_m
         pin_m[[0, n - 1]] = np.nan
         length = float(np.hypot(*np.diff(line.points, axis=0).T).sum())

@@ -21,7 +21,7 @@ from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
 from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m, terminals_of
-from gcsplan.planners.profile.climb_laps import pins_of, climb_tracks, with_climbs
+from gcsplan.planners.profile.climb_laps import climb_tracks, pins_of, with_climbs
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle
 from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, make_track
 from gcsplan.planners.simplify import fewer
@@ -137,7 +137,7 @@ def _solution(
 
 
 def straight_bound(problem: Problem) -> float:
-    """No path costs less: straight from stop to stop, heights free where they are."""
+    """No path costs less: straight from terminal to terminal, heights free where they are."""
     known: list[tuple[float, float]] = [(0.0, problem.start[2])]  # (metres along the track, altitude)
     way, last = 0.0, problem.start[:2]
     for v in problem.via:
@@ -181,7 +181,7 @@ def _on_the_spot(problem: Problem) -> Floats:
 
 
 def straight(problem: Problem, way_m: float) -> Floats | None:
-    """Way points straight from stop to stop, where that is legal."""
+    """Way points straight from terminal to terminal, where that is legal."""
     terminals = np.array(terminals_of(problem))
     pin_m = np.array([math.nan, *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via), math.nan])
     pinned = np.ones(len(terminals), bool)

@@ -1,4 +1,4 @@
-"""Ways over a lattice, from stop to stop, and the tracks that they make."""
+"""Ways over a lattice, from terminal to terminal, and the tracks that they make."""
 
 from __future__ import annotations
 
@@ -90,7 +90,8 @@ class Router:
         return cls(problem, lattice, terminals, links)
 
     def way(self, cap_m: float = math.inf, weight: float = 0.0) -> Floats | None:
-        """(N, 2) places of the best way over the lattice under ``cap_m``, through every stop; None if there is none."""
+        """(N, 2) places of the best way over the lattice under ``cap_m``, through every terminal; None if there is
+        none."""
         direct = not self.problem.via
         found = self.labels(cap_m, weight, FORWARD if direct else MOST)
         if not found and direct and self.opened_last > FORWARD:
@@ -180,7 +181,7 @@ class Router:
         return out[0], out[1]
 
     def track_of(self, way: Floats) -> Track:
-        """The track over ``way``, its stops pinned, its points on straight lines dropped."""
+        """The track over ``way``, its terminals pinned, its points on straight lines dropped."""
         pinned = np.zeros(len(way), bool)
         pin_m = np.full(len(way), np.nan)
         pinned[0] = pinned[-1] = True

@@ -90,7 +90,9 @@ def search(
     ends = np.array(
         [[(p[0] - lattice.west_m) * scale, (p[1] - lattice.south_m) * scale] for p in (start, goal)], np.float64
     )
-    terms = np.array([lattice.step_m, *ends[1], *goal_m, cap_m, climb_slope, descent_slope, weight, spare_m], np.float64)
+    terms = np.array(
+        [lattice.step_m, *ends[1], *goal_m, cap_m, climb_slope, descent_slope, weight, spare_m], np.float64
+    )
     name, value, state, goals = _run(
         lattice,
         labels,

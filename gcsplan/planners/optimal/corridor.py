@@ -1,4 +1,4 @@
-"""What tracks from stop to stop that are short enough may meet of the plane."""
+"""What tracks from terminal to terminal that are short enough may meet of the plane."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PinnedTrack = tuple[Floats, Bools, Floats]
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """A stop: where, and how high; None where its height is free."""
+    """A terminal: where, and how high; None where its height is free."""
 
     east_m: float
     north_m: float
@@ -61,7 +61,7 @@ class Nearby:
 
 
 def joined(ways: list[Floats], heights: list[float | None]) -> PinnedTrack:
-    """One track of those from stop to stop (N, 2), of which the ``heights`` of all but the ends are told."""
+    """One track of those from terminal to terminal (N, 2), of which the ``heights`` of all but the ends are told."""
     points = np.vstack([ways[0], *(w[1:] for w in ways[1:])])
     pinned, pin_m = np.zeros(len(points), np.bool_), np.full(len(points), math.nan)
     pinned[0] = pinned[-1] = True

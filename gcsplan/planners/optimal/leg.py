@@ -1,9 +1,9 @@
-"""The plane between two stops: shortest tracks below an altitude cap, and how long any track must be at least.
+"""The plane between two terminals: shortest tracks below an altitude cap, and how long any track must be at least.
 
-The lattice is cut to an ellipse of detours around the stops, and widened when that is not enough. A flood from the far
-stop, over all that may be free below the highest cap, tells every later search how far it still is: lower caps and
-finer lattices only leave less room. So the fine lattices, too, need to be looked at only along the few tracks that may
-be short enough.
+The lattice is cut to an ellipse of detours around the terminals, and widened when that is not enough. A flood from the
+far terminal, over all that may be free below the highest cap, tells every later search how far it still is: lower caps
+and finer lattices only leave less room. So the fine lattices, too, need to be looked at only along the few tracks that
+may be short enough.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ Lacking = tuple[Floats, float]
 
 
 class Leg:
-    """One leg of a problem, from stop to stop, under caps of at most ``top_m``."""
+    """One leg of a problem, from terminal to terminal, under caps of at most ``top_m``."""
 
     def __init__(self, problem: Problem, start: End, goal: End, top_m: float) -> None:
         self.problem, self.start, self.goal, self.top_m = problem, start, goal, top_m

@@ -90,7 +90,7 @@ def _sharp(problem: Problem, laps: bool = True) -> Solution:
 
 def _turning(problem: Problem) -> Solution:
     """A path with sharp corners, laid on arcs; with more room around it where that is needed."""
-    from gcsplan.planners.turns.planner import with_more_clearance, rounded  # few missions have wings
+    from gcsplan.planners.turns.planner import rounded, with_more_clearance  # few missions have wings
 
     # Laps are short and have sharp corners: what they gain is lost again on the arcs.
     sharp = _sharp(replace(problem, turn_radius_m=0.0), laps=False)

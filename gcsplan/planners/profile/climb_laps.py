@@ -18,7 +18,7 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import ENDS_M, Problem
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
-from gcsplan.planners.profile.track import Flown, Lacking, Closed, Track, distances, fly, lacking
+from gcsplan.planners.profile.track import Closed, Flown, Lacking, Track, distances, fly, lacking
 from gcsplan.planners.simplify import fewer
 from gcsplan.world.path import Path
 

@@ -79,7 +79,7 @@ def search(problem: Problem, settings: Settings) -> Found:
 
 
 def make_layers(scene: Scene, points: tuple[int, ...]) -> list[Floats]:
-    """Nodes (n, 3) of each layer: stops are layers of one node, sections of at most 21 × 21."""
+    """Nodes (n, 3) of each layer: terminals are layers of one node, sections of at most 21 × 21."""
     layers = [scene.terminals[:1]]
     for i, count in enumerate(points):
         a, b = scene.terminals[i], scene.terminals[i + 1]

@@ -1,7 +1,7 @@
-"""Cubic B-splines from stop to stop, and few way points that stay beside the curve.
+"""Cubic B-splines from terminal to terminal, and few way points that stay beside the curve.
 
 E: the krill paper's eq. 11 prints the second numerator as ``u - u_{i+1}``; de Boor's is ``u_{i+k} - u``. The basis is
-clamped, so that a curve begins and ends in its stops; with two or three control points its degree falls.
+clamped, so that a curve begins and ends in its terminals; with two or three control points its degree falls.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ DEGREE = 3
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Control points (N, 3) to samples (S, 3): ``basis`` (N, S); ``terminals`` (M,) samples that are stops.
+    """Control points (N, 3) to samples (S, 3): ``basis`` (N, S); ``terminals`` (M,) samples that are terminals.
 
     ``bands`` (4, S), ``spans`` (n, 3): the same as kernels want it, without its zeros (`curve_kernels.draw`).
     """
@@ -42,7 +42,7 @@ class Curve:
 @lru_cache(maxsize=64)
 def curve(points: tuple[int, ...], legs: tuple[int, ...]) -> Curve:
     """The curve past ``points[i]`` free control points on stage i, sampled by ``legs[i]`` legs there; stages share
-    their stops."""
+    their terminals."""
     controls, samples = sum(points) + len(points) + 1, sum(legs) + 1
     basis = np.zeros((controls, samples))
     row = column = 0

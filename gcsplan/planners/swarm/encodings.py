@@ -1,6 +1,6 @@
 """From a vector of the unit box to the control points of a path: five ways, by name.
 
-Each codes one stage, from a stop to the next; a path with via points is its stages one after the other. Variables
+Each codes one stage, from a terminal to the next; a path with via points is its stages one after the other. Variables
 stand way point by way point, so that a rule may change one way point's together (``group``, `Encoding`).
 """
 
@@ -114,7 +114,7 @@ def get_encoding(name: str) -> Encoding:
 
 @dataclass(frozen=True, eq=False)
 class Code:
-    """An encoding on a scene: ``dim`` variables to control points, the stops among them; ``points`` a stage."""
+    """An encoding on a scene: ``dim`` variables to control points, the terminals among them; ``points`` a stage."""
 
     encoding: Encoding
     scene: Scene
@@ -135,7 +135,7 @@ class Code:
         return self.encoding.variables * sum(self.points)
 
     def controls(self, u: Floats) -> Floats:
-        """(n, dim) in the unit box to (n, N, 3) control points, stops included."""
+        """(n, dim) in the unit box to (n, N, 3) control points, terminals included."""
         terminals, n, v = self.scene.terminals, len(u), self.encoding.variables
         out = np.empty((n, sum(self.points) + len(terminals), 3))
         at = row = 0

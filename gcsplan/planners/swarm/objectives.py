@@ -259,7 +259,7 @@ class Cost:
         return float(s[k.LENGTH] * (1.0 + s[k.HIGH] / self.unit.height_m))
 
     def _straight(self) -> Floats:
-        """(N, 3) control points of the straight line from stop to stop."""
+        """(N, 3) control points of the straight line from terminal to terminal."""
         terminals, rows = self.code.scene.terminals, []
         for i, count in enumerate(self.code.points):
             t = np.arange(count + 1)[:, None] / (count + 1.0)

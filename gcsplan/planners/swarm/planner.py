@@ -162,7 +162,7 @@ def finish(problem: Problem, found: Found, begun: float) -> Solution:
     notes: tuple[str, ...]
     if few is not None:
         points, notes = few, ()
-        if wrong:  # between stops the curve touched a limit that its chords do not
+        if wrong:  # between terminals the curve touched a limit that its chords do not
             notes = (f"the curve that {name} found breaks {summary_of(problem, wrong)}; its way points pass",)
     else:
         mended = repair(problem, found.scene, found.curve, found.terminals)

@@ -115,7 +115,7 @@ def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
 def _push(
     problem: Problem, scene: Scene, flat: Floats, terminals: NDArray[np.intp], half_m: float, margin_m: float
 ) -> tuple[Floats, NDArray[np.intp], float] | None:
-    """The track pushed to open places within ``half_m``, its stops' indices, and how far it went at most.
+    """The track pushed to open places within ``half_m``, its terminals' indices, and how far it went at most.
 
     The cheapest chain of side steps by length; a step is open if no point of it is shut, and if the altitudes that
     can be reached along the cheapest chain so far meet its room.
@@ -167,9 +167,10 @@ def _push(
 
 
 def _ribbon(flat: Floats, terminals: NDArray[np.intp], half_m: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
-    """Stations (n, 2) along a track, unit vectors to the left there (n, 2), and which stations are its stops.
+    """Stations (n, 2) along a track, unit vectors to the left there (n, 2), and which stations are its terminals.
 
-    A ribbon must not fold: the track's own turns within its half-width are smoothed away, between stop and stop.
+    A ribbon must not fold: the track's own turns within its half-width are smoothed away, between terminal and
+    terminal.
     """
     parts, at_terminal = [flat[:1]], [0]
     whole = float(distances(flat)[-1])
@@ -215,8 +216,10 @@ def k_keep(max_agl_m: float | None) -> float:
     return 0.0 if max_agl_m is None else 0.02 * max_agl_m
 
 
-def _pin(problem: Problem, scene: Scene, low: Floats, high: Floats, at_terminal: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """At stops the middle of the ribbon alone is open, at the altitude that is asked for there."""
+def _pin(
+    problem: Problem, scene: Scene, low: Floats, high: Floats, at_terminal: NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """At terminals the middle of the ribbon alone is open, at the altitude that is asked for there."""
     low, high = low.copy(), high.copy()
     heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
     for i, z in zip(at_terminal, heights, strict=True):

@@ -20,8 +20,8 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Level, Zone
 
 GROWN = 0.1
-"""Room around the stops on every side, as a part of the longer side; the shorter is first made as long: a mission due
-east needs as much room to either side."""
+"""Room around the terminals on every side, as a part of the longer side; the shorter is first made as long: a mission
+due east needs as much room to either side."""
 
 KEEP_M = 0.05
 """Kept from floor, ceiling and zones by the sampled cost, for what lies between two samples."""
@@ -40,7 +40,8 @@ class Scene:
     """``heights`` (rows, cols) top of the ground about the volume; ``quadratic`` (2, 6) the plane to (col, row) over 1,
     u, v, u², uv, v²; ``floors`` and ``floor_map`` the same of the lowest legal altitude, terrain clearance and errors
     included; ``numbers``, ``zones`` and ``corners`` as `cost_kernels` names them; ``low``, ``high`` (3,)
-    the flight volume; ``terminals`` (M, 3) start, via points, goal; ``straight_m`` from stop to stop in space."""
+    the flight volume; ``terminals`` (M, 3) start, via points, goal; ``straight_m`` from terminal to terminal in
+    space."""
 
     heights: NDArray[np.float32]
     quadratic: Floats
@@ -56,7 +57,7 @@ class Scene:
 
     @classmethod
     def of(cls, problem: Problem, volume: Mapping[str, float] | None = None, samples: int = 200) -> Scene:
-        """The scene of ``problem``. Raises InputError where ``volume`` (`VOLUME_KEYS`) does not hold the stops."""
+        """The scene of ``problem``. Raises InputError where ``volume`` (`VOLUME_KEYS`) does not hold the terminals."""
         surface, limits = problem.airspace.surface, problem.limits
         flat = np.array([problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]])
         west, south, east, north = _flat_volume(flat, volume or {})
@@ -163,7 +164,7 @@ class Scene:
 
 
 def _flat_volume(terminals: Floats, given: Mapping[str, float]) -> tuple[float, float, float, float]:
-    """West, south, east, north of the square about the stops, grown by `GROWN`."""
+    """West, south, east, north of the square about the terminals, grown by `GROWN`."""
     low, high = terminals.min(axis=0), terminals.max(axis=0)
     longest = float((high - low).max())
     more = 0.5 * (longest - (high - low)) + GROWN * longest

@@ -1,4 +1,4 @@
-"""A track of straight legs and arcs of one radius: a belt around discs, from start to goal.
+"""A track of straight legs and arcs of one radius: an arc path around discs, from start to goal.
 
 Every turn hugs a disc, on its left or on its right, and legs are the tangents between neighbours, so turns never
 overlap however close the discs are, and a turn of any size is one arc. For an autopilot each arc is then cut into
@@ -23,7 +23,7 @@ MOST_DEG = 100.0
 """Largest turn at one way point."""
 
 ROUNDS = 12
-"""Times that discs are laid anew through their contacts, or pushed apart, before the belt is drawn for good."""
+"""Times that discs are laid anew through their contacts, or pushed apart, before the arc path is drawn for good."""
 
 NO_TURN = 1e-9
 """A smaller turn, in radians, is none."""
@@ -35,7 +35,8 @@ class ArcPath:
 
     ``pin`` (K, 2): the point that a disc touches, NaN where free; ``pin_m`` (K,) its altitude, NaN where free.
     ``heading`` (K + 1,) radians of the legs, from east to north; ``turn`` (K,) >= 0 radians. ``gap_m``: how much too
-    close neighbours are for a tangent, in all; where it is not 0 there is no such belt, and the rest is meaningless.
+    close neighbours are for a tangent, in all; where it is not 0 there is no such arc path, and the rest is
+    meaningless.
     """
 
     ends: Floats
@@ -56,7 +57,7 @@ class ArcPath:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Outline:
-    """A belt as chords: ``points`` (N, 2), ``s_m`` (N,) along them.
+    """An arc path as chords: ``points`` (N, 2), ``s_m`` (N,) along them.
 
     ``arcs`` (A, 3): for each turn the indices of its first, middle and last point; ``corners`` (A, 2) its way point;
     ``widen_m`` (N - 1,) how far arcs may lie outside of chords; ``disc`` (A,) whose turn it is; ``pins`` (P,) indices
@@ -77,7 +78,8 @@ class Outline:
 def through(
     ends: Floats, radius_m: float, contact: Floats, sense: Floats, pinned: NDArray[np.bool_], pin_m: Floats
 ) -> ArcPath:
-    """The belt whose turns pass through ``contact`` (K, 2) in the middle; contacts it need not touch are left out."""
+    """The arc path whose turns pass through ``contact`` (K, 2) in the middle; contacts it need not touch are left
+    out."""
     heading = _headings(np.vstack([ends[:1], contact, ends[1:]]))
     sense, centre = sense.copy(), np.zeros_like(contact)
     pin = np.where(pinned[:, None], contact, np.nan)
@@ -93,7 +95,7 @@ def through(
 
 
 def tight(arc_path: ArcPath) -> ArcPath:
-    """The belt drawn around its discs as they lie, those that it need not touch left out, pins touched."""
+    """The arc path drawn around its discs as they lie, those that it need not touch left out, pins touched."""
     arc_path = _drawn(arc_path)
     for _ in range(len(arc_path.sense) + ROUNDS):
         loose = (arc_path.turn <= NO_TURN) & ~arc_path.pinned
@@ -112,14 +114,14 @@ def tight(arc_path: ArcPath) -> ArcPath:
 
 
 def moved(arc_path: ArcPath, disc: int, by: Floats) -> ArcPath:
-    """The belt with one free disc moved by (2,) metres."""
+    """The arc path with one free disc moved by (2,) metres."""
     centre = arc_path.centre.copy()
     centre[disc] += by
     return tight(replace(arc_path, centre=centre))
 
 
 def inserted(arc_path: ArcPath, at: int, contact: Floats, heading: float, sense: float) -> ArcPath:
-    """The belt with a disc more, before disc ``at``, touching ``contact`` where the way there is ``heading``."""
+    """The arc path with a disc more, before disc ``at``, touching ``contact`` where the way there is ``heading``."""
     normal = sense * arc_path.radius_m * np.array([-math.sin(heading), math.cos(heading)])
     return tight(
         replace(
@@ -133,14 +135,14 @@ def inserted(arc_path: ArcPath, at: int, contact: Floats, heading: float, sense:
 
 
 def without(arc_path: ArcPath, disc: int) -> ArcPath:
-    """The belt without one disc."""
+    """The arc path without one disc."""
     gone = np.zeros(len(arc_path.sense), bool)
     gone[disc] = True
     return tight(_without(arc_path, gone))
 
 
 def unlooped(arc_path: ArcPath) -> ArcPath:
-    """The belt without free discs that it goes more than half round, as long as there are any."""
+    """The arc path without free discs that it goes more than half round, as long as there are any."""
     while arc_path.gap_m == 0.0:
         loops = (arc_path.turn > math.pi) & ~arc_path.pinned
         if not loops.any():
@@ -150,7 +152,7 @@ def unlooped(arc_path: ArcPath) -> ArcPath:
 
 
 def outline(arc_path: ArcPath) -> Outline:
-    """The belt as chords, each at most `CHORD_M` inside its arc."""
+    """The arc path as chords, each at most `CHORD_M` inside its arc."""
     size = 2
     step = 2.0 * math.acos(max(1.0 - CHORD_M / arc_path.radius_m, 0.5))
     most = math.radians(MOST_DEG)
@@ -160,8 +162,8 @@ def outline(arc_path: ArcPath) -> Outline:
     arcs, corners = np.empty((size, 3), np.int64), np.empty((size, 2))
     disc, pin_at = np.empty(size, np.int64), np.full(len(arc_path.sense), -1, np.int64)
     n = fill_outline(
-        arc_path.ends, arc_path.radius_m, arc_path.centre, arc_path.sense, arc_path.pin, arc_path.heading, arc_path.turn, step, most,
-        points, true_m, widen, arcs, corners, disc, pin_at,
+        arc_path.ends, arc_path.radius_m, arc_path.centre, arc_path.sense, arc_path.pin, arc_path.heading,
+        arc_path.turn, step, most, points, true_m, widen, arcs, corners, disc, pin_at,
     )  # fmt: skip
     points, turns = points[:n].copy(), int(disc[-1])
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
@@ -185,9 +187,8 @@ def _middles(heading: Floats) -> Floats:
 
 def _without(arc_path: ArcPath, gone: NDArray[np.bool_]) -> ArcPath:
     keep = ~gone
-    return replace(
-        arc_path, centre=arc_path.centre[keep], sense=arc_path.sense[keep], pin=arc_path.pin[keep], pin_m=arc_path.pin_m[keep]
-    )  # fmt: skip
+    centre, sense, pin, pin_m = (a[keep] for a in (arc_path.centre, arc_path.sense, arc_path.pin, arc_path.pin_m))
+    return replace(arc_path, centre=centre, sense=sense, pin=pin, pin_m=pin_m)
 
 
 def _drawn(arc_path: ArcPath, *, parted: bool = False) -> ArcPath:
@@ -212,5 +213,7 @@ def _pins_laid(arc_path: ArcPath) -> ArcPath:
     # A turn of more than half a circle goes on in its own sense, so its middle is not the nearer one.
     middle = arc_path.heading[:-1] + 0.5 * arc_path.sense * arc_path.turn
     normal = np.stack([-np.sin(middle), np.cos(middle)], axis=-1)
-    centre = np.where(arc_path.pinned[:, None], arc_path.pin + arc_path.radius_m * sense[:, None] * normal, arc_path.centre)
+    centre = np.where(
+        arc_path.pinned[:, None], arc_path.pin + arc_path.radius_m * sense[:, None] * normal, arc_path.centre
+    )
     return _drawn(replace(arc_path, centre=centre, sense=sense))

@@ -1,4 +1,4 @@
-"""Kernels of belts, of what a track breaks, and of the room over its arcs."""
+"""Kernels of arc paths, of what a track breaks, and of the room over its arcs."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 """Paths for wings: a path of sharp corners made into legs and arcs of the turn radius, legal as flown.
 
-A fixed wing does not pass its way points: it begins to turn before each and flies an arc, tangent to both legs. So
-the corners that a shortest path has, where it touches obstacles, are laid on the arcs: a belt around discs (`arc_path`)
-that touch the corners from the obstacle's side, which shifts the way points outwards. What is legal is decided on the
-track as flown, arcs as chords widened by what the arc lies outside them; its altitude profile is drawn anew
-(`turns.profile`), and where ground or zones are in the way the discs are moved (`turns.repair`).
+A fixed wing does not pass its way points: it begins to turn before each and flies an arc, tangent to both legs. So the
+corners that a shortest path has, where it touches obstacles, are laid on the arcs: an arc path around discs
+(`arc_path`) that touch the corners from the obstacle's side, which shifts the way points outwards. What is legal is
+decided on the track as flown, arcs as chords widened by what the arc lies outside them; its altitude profile is drawn
+anew (`turns.profile`), and where ground or zones are in the way the discs are moved (`turns.repair`).
 
 - A via is passed exactly: it lies on its arc, and is a way point there, between the two that make the arc.
 - Start and goal have no heading of their own.
@@ -28,7 +28,8 @@ from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, poli
 from gcsplan.world.path import Path
 
 Replan = Callable[[float], tuple[Floats, NDArray[np.bool_]] | None]
-"""A path and its pinned points, planned with so many metres of track error more (`with_more_clearance`); None: there is none."""
+"""A path and its pinned points, planned with so many metres of track error more (`with_more_clearance`); None: there
+is none."""
 
 LEVELS = (0.15, 0.4, 1.0)
 """Room asked for in new plans where a path cannot be rounded, in turn radii."""
@@ -144,7 +145,7 @@ def _arc_paths(problem: Problem, points: Floats, pinned: NDArray[np.bool_]) -> I
 
 
 def arc_path_of(problem: Problem, points: Floats, pinned: NDArray[np.bool_], slack_m: float) -> ArcPath:
-    """The belt around those corners of a path that lie farther than ``slack_m`` from straight; not checked yet."""
+    """The arc path around those corners of a path that lie farther than ``slack_m`` from straight; not checked yet."""
     flat = np.ascontiguousarray(points[:, :2], dtype=np.float64)
     must = np.array(pinned, dtype=bool)
     must[[0, -1]] = True

@@ -1,4 +1,4 @@
-"""Discs of a belt moved until the track is legal: a local search under the exact test of whole tracks.
+"""Discs of an arc path moved until the track is legal: a local search under the exact test of whole tracks.
 
 What a track breaks is one number: metres of floor over ceiling (and over what can be climbed to from start, or flown
 down from to the goal), summed along the track; the way through zones that can be passed neither above nor below; and
@@ -58,7 +58,8 @@ class Patience:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Tried:
-    """A belt and how much it breaks (0: nothing that was seen), and where along ``line``; or ``risen``, its flight."""
+    """An arc path and how much it breaks (0: nothing that was seen), and where along ``line``; or ``risen``, its
+    flight."""
 
     arc_path: ArcPath
     line: Outline | None

@@ -14,7 +14,7 @@ from gcsplan.errors import NoMission
 from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.planner import plan, straight_bound
 from gcsplan.planners.problem import Problem, Progress, Via
-from gcsplan.planners.profile.climb_laps import climb_needed_deg, extend, laps, ways_up
+from gcsplan.planners.profile.climb_laps import climb_needed_deg, climb_tracks, extend, laps
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.taut_string import Profile, taut_string
 from gcsplan.world.airspace import Airspace, Legs
@@ -255,7 +255,7 @@ def test_no_room_to_climb_over_one_place_is_refused_with_its_limit() -> None:
     )
     with pytest.raises(NoMission, match=r"490\.0 m apart in height.*max_climb_deg 2"):
         plan(p)
-    assert ways_up(p, p.start[:2], 10.0, 500.0) is None
+    assert climb_tracks(p, p.start[:2], 10.0, 500.0) is None
 
 
 AROUND = [(math.cos(t), math.sin(t)) for t in np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False)]

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gcsplan.planners.optimal.bounds.climb_bound import _least, climb_bound, rise_bound, rooms
+from gcsplan.planners.optimal.bounds.climb_bound import _least, altitude_ranges, climb_bound, rise_bound
 from gcsplan.planners.optimal.cap_search import MOST_CAPS, Layer, search_caps
 from gcsplan.planners.optimal.corridor import End
 from gcsplan.planners.optimal.leg import Leg
@@ -207,7 +207,7 @@ def test_floors_are_never_above_the_ground_that_a_short_track_sees(seed: int) ->
     compared = binding = 0
     for part in (1.001, 1.02, 1.1):
         limit = least * part
-        at, low, _ = rooms(leg, least, limit)
+        at, low, _ = altitude_ranges(leg, least, limit)
         assert (np.diff(at) > 0.0).all()
         lowest = np.full(len(at), np.inf)
         for track in tracks(problem, rng, 150, 0.1 * math.sqrt(part - 1.0) + 0.02):
@@ -289,7 +289,7 @@ def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb
         problem = replace(problem, via=tuple(via))
         plane = looked(problem)
         below = plane.incumbent
-        assert not below.proved_shut
+        assert not below.proved_infeasible
         if below.best is not None:
             improve(plane)
         assert 0.0 < below.bound <= below.cost

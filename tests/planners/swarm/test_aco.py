@@ -39,7 +39,7 @@ def test_layers_are_stops_and_sections_of_21_by_21() -> None:
         assert (layer >= scene.low - 1e-9).all()
         assert (layer <= scene.high + 1e-9).all()
     across = layers[1] - layers[1].mean(axis=0)
-    ahead = scene.stops[1] - scene.stops[0]
+    ahead = scene.terminals[1] - scene.terminals[0]
     assert np.abs(across[:, :2] @ ahead[:2]).max() < 1e-6 * np.linalg.norm(ahead) ** 2
 
 

@@ -53,8 +53,8 @@ def test_control_points_lie_in_the_volume_and_the_stops_are_among_them(
     assert controls.shape == (5, points + 2, 3)
     assert (controls >= scene.low - 1e-9).all()
     assert (controls <= scene.high + 1e-9).all()
-    assert (controls[:, 0] == scene.stops[0]).all()
-    assert (controls[:, -1] == scene.stops[-1]).all()
+    assert (controls[:, 0] == scene.terminals[0]).all()
+    assert (controls[:, -1] == scene.terminals[-1]).all()
 
 
 SCENE = Scene.of(problem())
@@ -87,7 +87,7 @@ def test_polar_coordinates_are_radii_and_those_beyond_one_lie_on_the_circle(scen
 
 def test_sections_stand_across_the_track_between_floor_and_ceiling(scene: Scene) -> None:
     code = Code.of("sections", scene, 3)
-    a, b = scene.stops[0], scene.stops[-1]
+    a, b = scene.terminals[0], scene.terminals[-1]
     ahead = (b - a)[:2]
     long = math.hypot(*ahead)
     u = np.full((1, 6), 0.5)
@@ -106,14 +106,14 @@ def test_sections_stand_across_the_track_between_floor_and_ceiling(scene: Scene)
 def test_offsets_reach_a_quarter_aside_at_altitudes_of_the_volume(scene: Scene) -> None:
     code = Code.of("offsets", scene, 1)
     point = code.controls(np.array([[1.0, 0.25]]))[0][1]
-    a, b = scene.stops[0], scene.stops[-1]
+    a, b = scene.terminals[0], scene.terminals[-1]
     assert math.isclose(np.hypot(*(point - 0.5 * (a + b))[:2]), OFFSET * np.hypot(*(b - a)[:2]))
     assert math.isclose(point[2], scene.low[2] + 0.25 * (scene.high[2] - scene.low[2]))
 
 
 def test_a_bspline_point_stays_about_its_station(scene: Scene) -> None:
     code = Code.of("bspline", scene, 4)
-    a, b = scene.stops[0], scene.stops[-1]
+    a, b = scene.terminals[0], scene.terminals[-1]
     ahead = (b - a)[:2]
     middle = code.controls(np.full((1, 12), 0.5))[0][1:-1]
     np.testing.assert_allclose((middle[:, :2] - a[:2]) @ ahead / (ahead @ ahead), [0.2, 0.4, 0.6, 0.8])
@@ -126,12 +126,12 @@ def test_via_points_are_stops_of_every_path_and_points_are_shared_by_length() ->
     assert sum(code.points) == 9
     assert code.points[2] == max(code.points)
     controls = code.controls(np.random.default_rng(1).random((3, code.dim)))
-    line = curve(code.points, shares(200, np.linalg.norm(np.diff(scene.stops, axis=0), axis=1)))
+    line = curve(code.points, shares(200, np.linalg.norm(np.diff(scene.terminals, axis=0), axis=1)))
     samples = line.samples(controls)
-    np.testing.assert_allclose(samples[:, line.stops], np.broadcast_to(scene.stops, (3, 4, 3)), atol=1e-9)
-    assert scene.stops[2, 2] == 260.0
-    low, high = scene.room(scene.stops[1:2])
-    assert low[0] <= scene.stops[1, 2] <= high[0]
+    np.testing.assert_allclose(samples[:, line.terminals], np.broadcast_to(scene.terminals, (3, 4, 3)), atol=1e-9)
+    assert scene.terminals[2, 2] == 260.0
+    low, high = scene.room(scene.terminals[1:2])
+    assert low[0] <= scene.terminals[1, 2] <= high[0]
 
 
 def test_an_unknown_encoding_is_refused_by_name() -> None:
@@ -203,8 +203,8 @@ def test_what_kernels_have_of_a_basis_is_the_whole_of_it(points: tuple[int, ...]
     assert (seen == 1).all()
     controls = np.random.default_rng(1).random((5, len(whole), 3))
     np.testing.assert_allclose(line.samples(controls), np.einsum("cs,ncd->nsd", line.basis, controls), atol=1e-12)
-    np.testing.assert_array_equal(line.samples(controls)[:, line.stops[0]], controls[:, 0])
-    np.testing.assert_array_equal(line.samples(controls)[:, line.stops[-1]], controls[:, -1])
+    np.testing.assert_array_equal(line.samples(controls)[:, line.terminals[0]], controls[:, 0])
+    np.testing.assert_array_equal(line.samples(controls)[:, line.terminals[-1]], controls[:, -1])
 
 
 @given(seed=st.integers(0, 2**31), part=st.floats(1e-4, 0.3))
@@ -213,8 +213,8 @@ def test_fewer_points_keep_every_sample_within_the_corridor(seed: int, part: flo
     rng = np.random.default_rng(seed)
     line = curve((4, 3), (40, 30))
     points = line.samples(rng.random((10, 3)))
-    chosen = fewer(points, line.stops, part)
-    assert set(line.stops) <= set(chosen)
+    chosen = fewer(points, line.terminals, part)
+    assert set(line.terminals) <= set(chosen)
     assert (np.diff(chosen) > 0).all()
     for i, j in itertools.pairwise(chosen):
         a, d = points[i], points[j] - points[i]

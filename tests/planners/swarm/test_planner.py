@@ -120,7 +120,7 @@ def test_a_repaired_curve_passes_its_via_points() -> None:
     problem = replace(plain, via=(Via(700.0, 1200.0, z), Via(1350.0, 1250.0)))
     scene = Scene.of(problem)
     t = np.linspace(0.0, 1.0, 41)[:, None]
-    a, b, c, d = scene.stops
+    a, b, c, d = scene.terminals
     line = np.vstack([a + t * (b - a), (b + t * (c - b))[1:], (c + t * (d - c))[1:]])
     mended = repair(problem, scene, line, np.array([0, 40, 80, 120]))
     assert mended is not None
@@ -134,7 +134,7 @@ def test_a_repaired_curve_passes_its_via_points() -> None:
 def test_what_is_repaired_passes_on_real_ground(seed: int) -> None:
     problem = random_mission(seed, replace(FIELD, max_amsl_m=900.0))
     scene = Scene.of(problem)
-    line = np.linspace(scene.stops[0], scene.stops[-1], 187)
+    line = np.linspace(scene.terminals[0], scene.terminals[-1], 187)
     mended = repair(problem, scene, line, np.array([0, 186]))
     if mended is not None:
         assert violations(problem, mended.points) == ()

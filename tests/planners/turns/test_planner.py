@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.turns.arc_path import CHORD_M, MOST_DEG, moved
-from gcsplan.planners.turns.planner import LEVELS, Rounded, belt_of, roomier, rounded
+from gcsplan.planners.turns.planner import LEVELS, Rounded, arc_path_of, rounded, with_more_clearance
 from gcsplan.planners.turns.repair import tried
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -240,7 +240,7 @@ def test_paths_between_hills_are_rounded_with_altitudes_that_climb_no_steeper_th
 def test_what_is_known_of_a_belt_tells_of_one_like_it_exactly_what_looking_anew_would() -> None:
     problem = replace(hills(0, 145.0), turn_radius_m=100.0)
     points = way_below(problem)
-    belt = belt_of(problem, points, no_pins(points), 0.5)
+    belt = arc_path_of(problem, points, no_pins(points), 0.5)
     here = tried(problem, belt)
     for k in range(len(belt.sense)):
         for step in (-40.0, 3.0, 90.0):
@@ -366,7 +366,7 @@ def test_where_a_path_cannot_be_rounded_one_with_more_room_is_asked_for() -> Non
 
 def test_more_room_means_a_wider_track_and_ends_that_are_legal_with_it() -> None:
     problem = replace(hills(0, 400.0), turn_radius_m=200.0)
-    wider = roomier(problem, 80.0)
+    wider = with_more_clearance(problem, 80.0)
     assert wider.limits.track_error_m == problem.limits.track_error_m + 80.0
     assert wider.turn_radius_m == 0.0
     for end, lifted in ((problem.start, wider.start), (problem.goal, wider.goal)):

@@ -208,7 +208,11 @@ class ClearanceGrid:
         count = make_pieces(excess, of, values, diagonal, self._around, span, piece, block)
         capacity, part = 2 * count + 1024, np.empty(2)
         while True:
-            ends, names, joins = np.empty((capacity, 4)), np.empty((capacity, 2), np.int64), np.empty((capacity, 2), np.int32)
+            ends, names, joins = (
+                np.empty((capacity, 4)),
+                np.empty((capacity, 2), np.int64),
+                np.empty((capacity, 2), np.int32),
+            )
             n = make_portals(excess, of, values, diagonal, span, piece, self._x, self._y, ends, names, joins, part)
             if n <= capacity:
                 break

@@ -80,7 +80,11 @@ class Portals:
         remaining, met = (np.zeros(0) if a is None else a for a in (remaining, met))
         while True:
             best, origin = np.zeros(self.named), np.zeros(self.named, np.int64)
-            node, link, name = np.empty((capacity, 8)), np.empty((capacity, 6), np.int32), np.empty((capacity, 3), np.int64)
+            node, link, name = (
+                np.empty((capacity, 8)),
+                np.empty((capacity, 6), np.int32),
+                np.empty((capacity, 3), np.int64),
+            )
             first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
             out = np.empty((MOST_CORNERS, 3))
             n = search(

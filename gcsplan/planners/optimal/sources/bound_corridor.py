@@ -31,7 +31,7 @@ OPEN_M = 8.0
 UNDER_M = 0.5
 """How far below the cap stretches begin and end."""
 REACHED = 0.95
-"""What part of the way from or to a stop is climbed on."""
+"""What part of the way from or to a terminal is climbed on."""
 APART_M = 1e-3
 """Places nearer to each other are one."""
 SLACKS = (0.008, 0.15)

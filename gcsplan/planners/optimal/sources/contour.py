@@ -29,7 +29,7 @@ def traverse(problem: Problem, longest_m: float) -> PinnedTrack | None:
 
 
 def pulled_tight(problem: Problem, points: Floats, level: int, deadline_s: float) -> tuple[Floats, Bools] | None:
-    """Way points of a better line than a path's, and which are stops, if one is found before ``deadline_s``; the lines
-    around it are those of a ``level`` of lattices."""
+    """Way points of a better line than a path's, and which are terminals, if one is found before ``deadline_s``; the
+    lines around it are those of a ``level`` of lattices."""
     found = pulled(problem, points, LEVELS[level], deadline_s)
     return None if found is None else (found, pins_of(problem, found)[0])

@@ -24,7 +24,7 @@ from gcsplan.planners.optimal.corridor import PinnedTrack, Spare
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import sampled_track
-from gcsplan.planners.profile.track import Lacking, Closed, distances, lacking
+from gcsplan.planners.profile.track import Closed, Lacking, distances, lacking
 
 LACKING_M, HAIR_M = 3.0, 0.2
 """So little room is missing because cells are more lenient than the check, about terrain that is kept clear of
@@ -60,8 +60,8 @@ is known; and that track, where a path over it is to be looked for."""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DetourSearch:
-    """Tracks past what is in the way. ``terminals``: the shortest track of a choice's zones and most metres, from terminal
-    to terminal; ``fine``: whether that is of a fine lattice. What is found goes to the ``incumbent``."""
+    """Tracks past what is in the way. ``terminals``: the shortest track of a choice's zones and most metres, from
+    terminal to terminal; ``fine``: whether that is of a fine lattice. What is found goes to the ``incumbent``."""
 
     incumbent: Incumbent
     terminals: Callable[[Choice], PinnedTrack | None]

@@ -32,7 +32,7 @@ SPOKES = 12
 MOST_RIMS, MOST_SLITS = 600, 60
 """Places on rims, and slits, at most."""
 WIDEST, WIDEST_CELLS = 2.0, 30.0
-"""Widest margin around two stops: parts of their distance, or cells of the terrain model where that is more."""
+"""Widest margin around two terminals: parts of their distance, or cells of the terrain model where that is more."""
 HAIR_M = 1e-3
 """How far outside of what they pass places lie."""
 SLIT = 0.5
@@ -44,7 +44,7 @@ WORTH = 0.03
 
 
 def small_path(problem: Problem, known: Floats | None, in_time: Callable[[], bool]) -> tuple[Floats, Bools] | None:
-    """(N, 3) a path whose legs the exact check passes, and (N,) its stops; None where none cheaper was found.
+    """(N, 3) a path whose legs the exact check passes, and (N,) its terminals; None where none cheaper was found.
 
     ``known`` (M, 3): the best path so far, None where there is none. Deterministic but for ``in_time``, which ends it
     early.
@@ -64,7 +64,7 @@ def small_path(problem: Problem, known: Floats | None, in_time: Callable[[], boo
 
 
 def _straight(problem: Problem) -> Floats:
-    """(K, 3) the stops, heights that are free in between those that are not, but not below the floor."""
+    """(K, 3) the terminals, heights that are free in between those that are not, but not below the floor."""
     flat = np.array(terminals_of(problem))
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])
     heights = np.array([problem.start[2], *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via),

@@ -32,11 +32,11 @@ NODES, BOX_NODES = 6000, 400_000
 WINDING = 1.06
 """A way along the lattice may be longer than the best path by so much: it goes in a few directions only."""
 WIDEST = 0.5
-"""Widest margin of the box around two stops, as a part of their distance."""
+"""Widest margin of the box around two terminals, as a part of their distance."""
 NEAR = 2.3
 """PinnedTrack are linked to nodes within so many steps."""
 WAYS, APART = 10, 3.0
-"""Most ways between two stops, and how many steps from all ways before one must somewhere be."""
+"""Most ways between two terminals, and how many steps from all ways before one must somewhere be."""
 DRAWN = 8
 """Of those, the cheapest are drawn together."""
 HOPE = 1.004
@@ -59,7 +59,7 @@ def is_steep(problem: Problem, points: Floats) -> bool:
 
 
 def steep_path(problem: Problem, known: Floats, in_time: Callable[[], bool]) -> tuple[Floats, Bools] | None:
-    """(N, 3) a path that the exact check passes leg by leg, and (N,) its stops; None where none was found that
+    """(N, 3) a path that the exact check passes leg by leg, and (N,) its terminals; None where none was found that
     is cheaper.
 
     ``known`` (M, 3): the best path so far. Deterministic but for ``in_time``,
@@ -78,11 +78,11 @@ def path_of(
     lattice: Callable[[Problem, Floats, Floats, float], Lattice],
     hope: float = HOPE,
 ) -> tuple[Floats, Bools] | None:
-    """The same over lattices of any kind: ``lattice(problem, starts, goals, limit)`` makes that between two stops.
+    """The same over lattices of any kind: ``lattice(problem, starts, goals, limit)`` makes that between two terminals.
 
-    ``terminals`` (K, 3) as of `stops_of`; ``best``: the cost to beat, inf where there is no path. ``known`` (M, 3) is drawn
-    together, too, where it is given. A path drawn together coarsely that costs ``hope`` times ``best`` is not worth
-    more.
+    ``terminals`` (K, 3) as of `terminals_by_leg`; ``best``: the cost to beat, inf where there is no path. ``known``
+    (M, 3) is drawn together, too, where it is given. A path drawn together coarsely that costs ``hope`` times ``best``
+    is not worth more.
     """
     straight = problem.leg_costs(terminals[:-1], terminals[1:])
     spare = WINDING * best - float(straight.sum())
@@ -95,7 +95,7 @@ def path_of(
         reached.append(lattices[k].beyond(reached[k]))
     tried = [] if known is None else [(known, _kinds_of(problem, known))]
     if np.isfinite(reached[-1]).any():
-        # The heights over the vias, from the last stop back, then the ways between those.
+        # The heights over the vias, from the last terminal back, then the ways between those.
         at, parts = 0, []
         for k in range(len(lattices) - 1, -1, -1):
             before, ways = lattices[k].ways(reached[k], at)
@@ -142,7 +142,7 @@ def terminals_by_leg(problem: Problem, points: Floats) -> Floats:
 
 
 def _heights(problem: Problem, k: int, terminals: Floats) -> Floats:
-    """(K, 3) where the stop ``k`` may be passed."""
+    """(K, 3) where the terminal ``k`` may be passed."""
     if problem.via[k - 1].amsl_m is not None:
         return terminals[k : k + 1]
     low = float(problem.airspace.floor_amsl(terminals[k, 0], terminals[k, 1], problem.limits))
@@ -153,7 +153,7 @@ def _heights(problem: Problem, k: int, terminals: Floats) -> Floats:
 
 
 def _best(problem: Problem, ways: list[Floats], step_m: float, in_time: Callable[[], bool]) -> Floats:
-    """The cheapest of some ways between two stops, each drawn together."""
+    """The cheapest of some ways between two terminals, each drawn together."""
     pulled = []
     for way in ways:
         kinds = np.full(len(way), FREE)
@@ -170,7 +170,7 @@ def _best(problem: Problem, ways: list[Floats], step_m: float, in_time: Callable
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Lattice:
-    """Nodes (N, 3), the places of the one stop first and then those of the other; legal edges with their costs."""
+    """Nodes (N, 3), the places of the one terminal first and then those of the other; legal edges with their costs."""
 
     problem: Problem
     nodes: Floats
@@ -192,7 +192,7 @@ class Lattice:
         return cls(problem, nodes, starts, goals, step_m, graph)
 
     def beyond(self, cost: Floats) -> Floats:
-        """The least cost of being at each place of the second stop, given that at those of the first."""
+        """The least cost of being at each place of the second terminal, given that at those of the first."""
         out = np.full(self.goals, np.inf)
         for k in np.flatnonzero(np.isfinite(cost)).tolist():
             away, _ = _reached(self.graph, k)
@@ -200,7 +200,7 @@ class Lattice:
         return out
 
     def ways(self, cost: Floats, goal: int) -> tuple[int, list[Floats]]:
-        """The place of the first stop from which one of the second is reached best, and ways from it, far apart."""
+        """The place of the first terminal from which one of the second is reached best, and ways from it, far apart."""
         left, after = _reached(self.graph.T.tocsr(), self.starts + goal)
         start = int(np.argmin(cost + left[: self.starts]))
         away, before = _reached(self.graph, start)

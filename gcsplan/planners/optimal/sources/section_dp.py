@@ -58,7 +58,8 @@ def drawn(
 
 
 def cheapest(problem: Problem, points: Floats, kinds: Ints) -> tuple[Floats, Ints]:
-    """The cheapest path over some points of a legal one, in order: all of its stops, and of the others what helps."""
+    """The cheapest path over some points of a legal one, in order: all of its terminals, and of the others what
+    helps."""
     n = len(points)
     first, last = np.triu_indices(n, 1)
     terminals = np.concatenate([[0], np.cumsum(kinds != FREE)])

@@ -21,7 +21,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.climb_laps import extend
 from gcsplan.planners.profile.exact import sampled_track
 from gcsplan.planners.profile.taut_string import Blocked, taut_string
-from gcsplan.planners.profile.track import Flown, Lacking, Shut, _rooms, fly, lacking
+from gcsplan.planners.profile.track import Closed, Flown, Lacking, _sections, fly, lacking
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
@@ -126,7 +126,7 @@ def test_zones_that_leave_no_room_between_them_are_named() -> None:
         box(950.0, 0.0, 1200.0, 2000.0, 40.0, None),
     )
     shut = lacking(p, sampled_track(p, *straight(p)))
-    assert isinstance(shut, Shut)
+    assert isinstance(shut, Closed)
     assert sorted(shut.zones) == [1, 2]
     assert shut.by == pytest.approx(20.0, abs=0.1)
 
@@ -143,7 +143,7 @@ def test_no_choice_of_sides_costs_less_than_what_is_lacking_tells(seed: int) -> 
     p = crossing(*zones, limits=replace(TENTH, max_amsl_m=150.0))
     track = sampled_track(p, *straight(p))
     costs = []
-    room = _rooms(p, track, ())
+    room = _sections(p, track, ())
     for sides in product((True, False), repeat=len(track.tube.bands)):
         low_m, high_m = room.between(sides)
         string = taut_string(room.s_m, low_m, high_m, 10.0, 10.0)
