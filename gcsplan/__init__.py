@@ -1,37 +1,65 @@
-"""gcsplan: plans, proves, uploads and verifies MAVLink missions over real terrain.
+"""gcsplan plans, checks, uploads and verifies MAVLink missions over real terrain.
 
-    from gcsplan import load_mission, plan, rehearse, upload
+    from gcsplan import load_mission, plan, rehearse, upload, write
 
     planned = plan(load_mission("missions/jacksboro.yaml"))
     for vehicle in planned.vehicles:
         print(vehicle.name, vehicle.verdict.length_m, vehicle.verdict.safe)
+    write(planned, "jacksboro", report=True)
     print(rehearse(planned).safe)
     for delivery in upload(planned, to="sim"):
         print(delivery.vehicle, delivery.outcome, delivery.verified)
 
-All of it is plain blocking calls; errors are those of `gcsplan.errors`.
+Every function blocks until it is done; errors are those of `gcsplan.errors`.
 """
 
 from __future__ import annotations
 
+import importlib
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from gcsplan.app.pipeline import load_mission, plan
-    from gcsplan.app.scripting import rehearse, upload
+    from gcsplan.app.scripting import check, rehearse, report, upload, write
 
-__all__ = ["__version__", "load_mission", "plan", "rehearse", "upload"]
+__all__ = ["__version__", "check", "load_mission", "plan", "rehearse", "report", "upload", "write"]
 __version__ = "0.1.0"
+
+_MODULE_OF = {
+    "load_mission": "gcsplan.app.pipeline",
+    "plan": "gcsplan.app.pipeline",
+    "check": "gcsplan.app.scripting",
+    "rehearse": "gcsplan.app.scripting",
+    "report": "gcsplan.app.scripting",
+    "upload": "gcsplan.app.scripting",
+    "write": "gcsplan.app.scripting",
+}
+"""Each function is imported at its first use, so that the command line starts fast."""
 
 
 def __getattr__(name: str) -> object:
-    """The functions for scripts, imported when they are asked for: the command line must start fast."""
-    if name in ("load_mission", "plan"):
-        from gcsplan.app import pipeline
-
-        return getattr(pipeline, name)
-    if name in ("rehearse", "upload"):
-        from gcsplan.app import scripting
-
-        return getattr(scripting, name)
+    if name in _MODULE_OF:
+        return getattr(importlib.import_module(_MODULE_OF[name]), name)
     raise AttributeError(f"module 'gcsplan' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
+class _Package(ModuleType):
+    """This package, where `check` and `report` always mean the functions.
+
+    The packages `gcsplan.check` and `gcsplan.report` have the same names, and Python would put them in the place of
+    the functions as soon as one of their modules is imported. They are reached by import alone: ``from gcsplan.check
+    import judge``, ``from gcsplan.check.verdict import Verdict``.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name not in _MODULE_OF or not isinstance(value, ModuleType):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

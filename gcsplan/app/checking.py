@@ -20,7 +20,7 @@ from gcsplan.mavlink.files.file_items import HAS_PLACE, MissionFileRead
 from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.mavlink.mission.commands import LOITER_TIME, LOITER_TO_ALT, LOITER_TURNS, LOITER_UNLIM, SPLINE_WAYPOINT
 from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
-from gcsplan.mission_file import MissionFile, VehicleRequest, load_mission
+from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import FARTHEST_M
@@ -126,6 +126,19 @@ def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: bool 
     return Batch(source.name, tuple(checked), tuple(unreadable), source.inputs, source.notes)
 
 
+def check_mission(source: MissionFile, mission: Mission, vehicle: str | None = None) -> Checked:
+    """Judge mission items in the world of ``source``, for the vehicle of that name, else of the mission's own.
+
+    Raises UsageError where that is none of the file's vehicles.
+    """
+    request, file = match(source, mission.name if vehicle is None else f"{vehicle}={mission.name}")
+    start = Home.at(*request.start_deg, request.start[2])
+    read = _at_start(MissionFileRead(mission), start, request.vehicle)
+    source = _reaching(source, places_of(read.mission))
+    error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
+    return _judged(request, file, read, world_of(source), error_m, returns=False)
+
+
 def _at_start(read: MissionFileRead, start: Home, vehicle: Vehicle) -> MissionFileRead:
     """The mission as ``vehicle`` flies it from its start: no autopilot flies from a file's home row."""
     from gcsplan.mavlink.link.preflight import distance_m  # with the dialect behind it, which planning can do without
@@ -173,9 +186,7 @@ def _reaching(source: MissionFile, places: Sequence[tuple[float, float]]) -> Mis
     world = world_of(source)
     on_earth = [p for p in places if abs(p[0]) <= 90.0 and abs(p[1]) <= 180.0]
     unknown = [p for p in on_earth if math.isnan(world.ground_amsl(*p))]
-    if not unknown or not source.path.is_file():
-        return source
-    return load_mission(source.path, around=unknown)
+    return source.reaching(unknown) if unknown and source.reaching is not None else source
 
 
 def check_with_options(

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from datetime import datetime
-from pathlib import Path as FilePath
+from os import PathLike
+from typing import Any
 
 from gcsplan.app.fleeting import fleet_of
 from gcsplan.app.gate import GateTime
@@ -32,7 +33,7 @@ def world_of(source: MissionFile) -> World:
 
 
 def plan(
-    source: MissionFile | str | FilePath,
+    source: MissionFile | str | PathLike[str] | Mapping[str, Any],
     *,
     planner: str | None = None,
     objective: str | None = None,
@@ -41,12 +42,29 @@ def plan(
     gate_utc: datetime | None = None,
     progress: Callable[[str, Progress], None] | None = None,
 ) -> Plan:
-    """Plan every vehicle of a mission file; nothing is written or sent.
+    """Plan every vehicle of a mission; nothing is written or sent.
 
-    ``planner``, ``objective`` (length | energy), ``seed`` and ``options`` (what only some planners know, such as a
-    swarm's ``encoding``) override the file's. ``gate_utc``: the common start as a time of day; every ArduCopter then
-    waits in the air until its own second. ``progress(vehicle, what)`` is called now and then. Raises InputError for a
-    bad file, NoMission where no safe mission exists or was found.
+    ``source`` is what `load_mission` gives, or what it takes. ``planner``, ``objective`` (``length`` in metres or
+    ``energy`` in joules), ``seed`` and ``options`` (what only some planners know, such as a swarm's ``encoding``)
+    override the file's. ``gate_utc``: the common start as a time of day; every ArduCopter then waits in the air until
+    its own second. ``progress(vehicle, what)`` is called now and then.
+
+    Gives a `Plan`, whose ``vehicles`` stand in the mission's order. Of each, ``solution.path.points`` is the path,
+    (N, 3) float64: east_m, north_m in the mission's plane and amsl_m; ``mission`` holds the items as they go over the
+    wire, and ``verdict`` is the exact check of those items.
+
+    Raises InputError for a bad mission, NoMission where no safe one exists or none was found (``reason`` says which).
+
+    >>> planned = plan({
+    ...     "version": 1, "terrain": {"flat_m": 100},
+    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+    ...     "limits": {"min_agl_m": 30},
+    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+    ... })
+    >>> [uav1] = planned.vehicles
+    >>> uav1.verdict.safe, round(uav1.verdict.length_m), uav1.solution.path.points.shape
+    (True, 900, (2, 3))
     """
     if not isinstance(source, MissionFile):
         source = load_mission(source)

@@ -147,14 +147,10 @@ def make_problem(
             )
         return amsl
 
-    start_agl = request.takeoff_agl_m
-    goal_agl = request.approach_agl_m
-    if start_agl is None and request.start_amsl_m is not None and request.start_amsl_m > request.start[2]:
-        start_agl = request.start_amsl_m - request.start[2]
-    if goal_agl is None and request.goal_amsl_m is not None and request.goal_amsl_m > request.goal[2]:
-        goal_agl = request.goal_amsl_m - request.goal[2]
-    start_amsl = end_point("start", request.start, "takeoff_agl_m", start_agl)
-    goal_amsl = end_point("goal", request.goal, "approach_agl_m", goal_agl)
+    start_agl_m = _wanted_agl_m(request.takeoff_agl_m, request.start_amsl_m, request.start[2])
+    goal_agl_m = _wanted_agl_m(request.approach_agl_m, request.goal_amsl_m, request.goal[2])
+    start_amsl = end_point("start", request.start, "takeoff_agl_m", start_agl_m)
+    goal_amsl = end_point("goal", request.goal, "approach_agl_m", goal_agl_m)
     via = tuple(
         Via(e, n, None if agl is None else float(air.surface.ground_at(e, n)) + agl) for e, n, agl in request.via
     )
@@ -185,6 +181,13 @@ def make_problem(
             "are cut and the landing place is overshot while braking: track_error_m must hold both"
         )
     return problem, tuple(notes)
+
+
+def _wanted_agl_m(agl_m: float | None, amsl_m: float | None, ground_m: float) -> float | None:
+    """The height above ground that the file asks for at an end, as such or by an altitude above the ground there."""
+    if agl_m is None and amsl_m is not None and amsl_m > ground_m:
+        return amsl_m - ground_m
+    return agl_m
 
 
 def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) -> float:

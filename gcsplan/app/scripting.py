@@ -1,8 +1,11 @@
-"""What scripts call beside `load_mission` and `plan`: `upload` and `rehearse`, without a command line or asyncio.
+"""What scripts call beside `load_mission` and `plan`, without a command line or asyncio.
 
-    from gcsplan import load_mission, plan, rehearse, upload
+    from gcsplan import check, load_mission, plan, rehearse, report, upload, write
 
-    planned = plan(load_mission("fleet.yaml"))
+    mission = load_mission("fleet.yaml")
+    planned = plan(mission)
+    write(planned, "fleet", report=True)
+    print(check("somebody.plan", mission, vehicle="uav1").describe())
     flown = rehearse(planned, wind_m_s=5.0, noise_m=1.0, runs=50)
     print(flown.safe, flown.p95_s, flown.order_kept_runs)
     for delivery in upload(planned, to="link", atomic=True):
@@ -13,18 +16,168 @@ Everything blocks until it is done; errors are those of `gcsplan.errors`.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
 
-from gcsplan.app import delivery
+from gcsplan.app import delivery, outputs
+from gcsplan.app.checking import check_files, check_mission
 from gcsplan.app.jobs import LINK, Delivery, Options, ProgressCall
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import require_passing
+from gcsplan.check.judge import judge
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import CheckFailed, UsageError
+from gcsplan.export.outdir import retire_outputs, settle_outputs, steady, write_outputs, write_whole
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mission_file import MissionFile, load_mission
 
 if TYPE_CHECKING:
     from gcsplan.sim.outcome import Rehearsal
 
-__all__ = ["rehearse", "upload"]
+__all__ = ["check", "rehearse", "report", "upload", "write"]
+
+Source = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
+"""A mission as `load_mission` gives it, or what it takes."""
+
+
+@overload
+def check(what: Plan) -> dict[str, Verdict]: ...
+@overload
+def check(what: Mission | str | os.PathLike[str], within: Plan | Source, *, vehicle: str | None = None) -> Verdict: ...
+def check(
+    what: Plan | Mission | str | os.PathLike[str],
+    within: Plan | Source | None = None,
+    *,
+    vehicle: str | None = None,
+) -> Verdict | dict[str, Verdict]:
+    """Judge mission items along every leg as the autopilot flies them; nothing is planned, written or sent.
+
+    ``what`` is a plan (every vehicle's items are judged anew; gives a verdict by vehicle's name), a `Mission` (such as
+    ``planned.vehicles[0].mission`` or what was downloaded) or the path of a `.waypoints` or `.plan` file, anybody's
+    (gives one verdict). The last two need ``within``: the plan or mission (or what `load_mission` takes) whose terrain,
+    zones and limits count; ``vehicle`` names the one in it that flies, where the file's stem, or the mission's name,
+    does not.
+
+    Of a `Verdict`, ``safe`` is True, False or None (something could not be judged: ``not_judged``); ``findings`` say
+    which limit is broken on which item, ``legs`` hold heights in m, angles in degrees, times in s and energies in J.
+    Each vehicle is judged alone: a plan's separation in the air is ``planned.fleet.separation``.
+
+    Raises InputError for a file that cannot be read, UsageError where it is not clear what is to be judged.
+
+    >>> from gcsplan import check, load_mission, plan
+    >>> mission = load_mission({
+    ...     "version": 1, "terrain": {"flat_m": 100},
+    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+    ...     "limits": {"min_agl_m": 30},
+    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+    ... })
+    >>> planned = plan(mission)
+    >>> check(planned)["uav1"].safe
+    True
+    >>> check(planned.vehicles[0].mission, mission).safe
+    True
+    """
+    if isinstance(what, Plan):
+        if within is not None or vehicle is not None:
+            raise UsageError("a plan is judged whole, in its own world: give nothing else to check")
+        return {
+            v.name: judge(
+                v.mission, v.request.vehicle, what.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
+                terrain_error_m=what.source.terrain_error_m,
+            )
+            for v in what.vehicles
+        }  # fmt: skip
+    if within is None:
+        raise UsageError("in which world? Give check a plan or a mission file as its second argument")
+    if isinstance(within, Plan):
+        source = within.source
+    else:
+        source = within if isinstance(within, MissionFile) else load_mission(within)
+    if isinstance(what, Mission):
+        return check_mission(source, what, vehicle).verdict
+    file = os.fspath(what)
+    with steady([file]):
+        [checked] = check_files(source, [file if vehicle is None else f"{vehicle}={file}"])
+    return checked.verdict
+
+
+def write(
+    planned: Plan,
+    folder: str | os.PathLike[str],
+    *,
+    report: bool = False,
+    way_home: bool = False,
+    allow_unjudged: bool = False,
+) -> list[Path]:
+    """Write what ``gcsplan plan -o FOLDER`` writes, the same bytes, whole or not at all; gives the files' paths.
+
+    These are for each vehicle `.waypoints` and `.plan`, and `mission.kml`, `mission.geojson`, `profile.csv` and
+    `summary.json`; with ``report`` `report.html`. ``way_home``: the summary says how each vehicle returns from
+    everywhere, as with ``report``; about a second for 20 km.
+
+    Outputs of an earlier plan in ``folder`` go; a file of somebody else's that stands in the way is moved to its
+    ``previous/``. Raises CheckFailed where a verdict does not pass (``allow_unjudged`` lets pass what could not be
+    judged); the earlier outputs are moved to ``previous/`` then, so that no old mission is flown by mistake. Raises
+    InputError where ``folder`` cannot be written; everything is as it was then.
+
+    >>> import tempfile
+    >>> from gcsplan import plan, write
+    >>> planned = plan({
+    ...     "version": 1, "terrain": {"flat_m": 100},
+    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+    ...     "limits": {"min_agl_m": 30},
+    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+    ... })
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     [file.name for file in write(planned, folder)]
+    ['uav1.waypoints', 'uav1.plan', 'mission.kml', 'mission.geojson', 'profile.csv', 'summary.json']
+    """
+    settle_outputs(folder)
+    try:
+        require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
+    except CheckFailed:
+        retire_outputs(folder)
+        raise
+    homes = outputs.homes_of(planned) if report or way_home else {}
+    files = outputs.outputs_of(planned, homes)
+    if report:
+        files["report.html"] = outputs.report_of(planned, (), homes)
+    write_outputs(folder, files)
+    return [Path(folder) / name for name in files]
+
+
+def report(
+    planned: Plan,
+    file: str | os.PathLike[str] | None = None,
+    *,
+    deliveries: Sequence[Delivery] = (),
+    way_home: bool = True,
+) -> str:
+    """The report of a plan as HTML text: map, profiles, tables; one page that needs no network.
+
+    With ``file`` it is written there too, whole or not at all (UTF-8). ``deliveries``, which `upload` gives, are told
+    on the page. ``way_home``: the return of each vehicle from everywhere is judged and shown; about a second for 20 km.
+    Raises InputError where ``file`` cannot be written.
+
+    >>> from gcsplan import plan, report
+    >>> planned = plan({
+    ...     "version": 1, "terrain": {"flat_m": 100},
+    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+    ...     "limits": {"min_agl_m": 30},
+    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+    ... })
+    >>> report(planned, way_home=False).startswith("<!DOCTYPE html>")
+    True
+    """
+    text = outputs.report_of(planned, deliveries, outputs.homes_of(planned) if way_home else {})
+    if file is not None:
+        write_whole(Path(file), text)
+    return text
 
 
 def upload(

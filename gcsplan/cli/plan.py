@@ -23,7 +23,9 @@ from gcsplan.cli.options import (
 from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
-    from gcsplan.app.jobs import Delivery, Job
+    from gcsplan.app.gate import GateTime
+    from gcsplan.app.jobs import Delivery, Job, Options
+    from gcsplan.app.model import Plan
 
 SHOWN = 15
 """Names of written files that are told; a fleet has hundreds."""
@@ -97,32 +99,13 @@ def plan(
     """
     from gcsplan.app import outputs, pipeline
     from gcsplan.app.gate import GateTime
-    from gcsplan.cli.console import (
-        delivery_table,
-        homes_table,
-        plan_table,
-        release_table,
-        say,
-        say_notes_of,
-        transfer_progress,
-    )
+    from gcsplan.cli.console import homes_table, plan_table, say, say_notes_of
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.export.outdir import add_output, can_hold, retire_outputs, settle_outputs, write_outputs, write_whole
-    from gcsplan.planners import registry
 
     directory = Path(mission.stem) if out is None else out
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
-    if planner is not None:
-        try:
-            registry.get(planner)
-        except InputError as error:
-            raise UsageError(f"--planner: {error}") from None
-    if objective not in (None, "length", "energy"):
-        raise UsageError(f"--objective {objective}: length or energy is wanted")
-    each = png is not None and (png.is_dir() or png == directory)
-    named = png is not None and png.suffix.lower() == ".png" and (png.parent.is_dir() or png.parent == directory)
-    if png is not None and not (each or named):
-        raise UsageError(f"--png {png}: a directory, or a name that ends in .png in one that is there, is wanted")
+    each = _require_options(planner, objective, png, directory)
     if settle_outputs(directory):
         say(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
     try:
@@ -166,11 +149,7 @@ def plan(
         except InputError as error:  # why there is no mission matters more
             say(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
         raise
-    pictures: dict[Path, bytes] = {}
-    if png is not None and each:
-        pictures = {png / name: content for name, content in outputs.figures_of(planned).items()}
-    elif png is not None:
-        pictures = {png: outputs.picture_of(planned)}
+    pictures = {} if png is None else _pictures(planned, png, each)
     # Pictures of this plan that lie beside it are a part of it, and go with it.
     beside = [file for file in pictures if can_hold(directory, file)]
     in_the_way = write_outputs(directory, {**files, **{file.name: pictures.pop(file) for file in beside}})
@@ -186,17 +165,8 @@ def plan(
         say(f"written to {directory}{os.sep}: {', '.join(shown)}")
     deliveries: list[Delivery] = []
     if targets:
-        from gcsplan.sim.loopback import loopback_fleet
-
-        if gate is not None:
-            gate.require_ahead(datetime.now(UTC))  # planning took its time
         options = Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout)
-        names = [job.name for job in jobs]
-        with talking(names), transfer_progress(names) as moved_on:
-            deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
-        if not as_json:
-            delivery_table(deliveries)
-            release_table(planned, deliveries, gate)
+        deliveries = _deliver(planned, jobs, options, gate, as_json)
         try:
             add_output(directory, "upload.json", outputs.upload_text(planned, deliveries, homes))
             if report:
@@ -206,6 +176,50 @@ def plan(
     if as_json:
         emit(outputs.summary_of(planned, deliveries, homes), delivery.failure(deliveries) if targets else None)
     raise typer.Exit(delivery.exit_code(deliveries) if targets else 0)
+
+
+def _require_options(planner: str | None, objective: str | None, png: Path | None, directory: Path) -> bool:
+    """Whether each figure is a picture of its own. Raises UsageError for options that are off."""
+    from gcsplan.planners import registry
+
+    if planner is not None:
+        try:
+            registry.get(planner)
+        except InputError as error:
+            raise UsageError(f"--planner: {error}") from None
+    if objective not in (None, "length", "energy"):
+        raise UsageError(f"--objective {objective}: length or energy is wanted")
+    each = png is not None and (png.is_dir() or png == directory)
+    named = png is not None and png.suffix.lower() == ".png" and (png.parent.is_dir() or png.parent == directory)
+    if png is not None and not (each or named):
+        raise UsageError(f"--png {png}: a directory, or a name that ends in .png in one that is there, is wanted")
+    return each
+
+
+def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
+    """One picture of all, or one of each figure in the directory ``png``."""
+    from gcsplan.app import outputs
+
+    if each:
+        return {png / name: content for name, content in outputs.figures_of(planned).items()}
+    return {png: outputs.picture_of(planned)}
+
+
+def _deliver(planned: Plan, jobs: list[Job], options: Options, gate: GateTime | None, as_json: bool) -> list[Delivery]:
+    """Upload all jobs with their progress shown, and say how each ended and when each vehicle starts."""
+    from gcsplan.app import delivery
+    from gcsplan.cli.console import delivery_table, release_table, transfer_progress
+    from gcsplan.sim.loopback import loopback_fleet
+
+    if gate is not None:
+        gate.require_ahead(datetime.now(UTC))  # planning took its time
+    names = [job.name for job in jobs]
+    with talking(names), transfer_progress(names) as moved_on:
+        deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
+    if not as_json:
+        delivery_table(deliveries)
+        release_table(planned, deliveries, gate)
+    return deliveries
 
 
 def planners(as_json: JsonOption = False) -> None:

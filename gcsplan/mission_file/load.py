@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.complaints import read_section, unknown_keys
+from gcsplan.mission_file.content import read_content
 from gcsplan.mission_file.ground import Ground, Site
 from gcsplan.mission_file.request import AltitudeFrame, ArrivalRequest, MissionFile, PlannerRequest, VehicleRequest
 from gcsplan.mission_file.schema import (
@@ -32,7 +33,6 @@ from gcsplan.mission_file.schema import (
     shown,
 )  # fmt: skip
 from gcsplan.mission_file.stops import Stops
-from gcsplan.mission_file.strict_yaml import MAX_BYTES, read_yaml
 from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle
 from gcsplan.mission_file.world import (
     covered,
@@ -53,46 +53,40 @@ TERRAIN_ERROR_M = 30.0
 
 
 def load_mission(
-    path: str | os.PathLike[str],
+    source: str | os.PathLike[str] | Mapping[str, Any] | None = None,
     *,
     text: str | None = None,
     planner_names: Collection[str] | None = None,
     around: Sequence[tuple[float, float]] = (),
 ) -> MissionFile:
-    """Read and judge the mission file at ``path``; other files are found relative to it.
+    """Read and judge a mission; nothing is planned yet.
 
-    ``text`` stands for the file's content; ``planner_names`` for the table of planners. ``around``:
-    places (latitude, longitude) besides the mission's own that the terrain shall be loaded for, where it holds them.
-    Raises InputError with every
-    problem that was found.
+    ``source`` is one of: the path of a mission file (``str`` without a line break, or a path object); the YAML text
+    of one (``str`` with a line break); a mapping of the same keys, lists or tuples and numpy's numbers in it. With
+    ``text``, that is the content, and ``source`` the path that it would have (or nothing). Files that a mission names
+    are found relative to its own path, else to the current folder.
+
+    ``planner_names`` stand for the table of planners. ``around``: places (latitude, longitude) in degrees, besides the
+    mission's own, that the terrain shall be loaded for, where it holds them.
+
+    Gives a `MissionFile`: vehicles, zones and terrain in metres. Raises InputError with every problem that was found,
+    each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is ``mission``);
+    TypeError where ``source`` is none of these.
+
+    >>> mission = load_mission({
+    ...     "version": 1, "terrain": {"flat_m": 100},
+    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+    ...     "limits": {"min_agl_m": 30},
+    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+    ... })
+    >>> [request.vehicle.name for request in mission.vehicles]
+    ['uav1']
     """
-    file = Path(path)
-    where = str(path)
-    raw = read_yaml(_text(file, where) if text is None else text, where=where)
-    if not isinstance(raw, dict):
-        raise InputError(f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}", where=where)
+    file, where, raw = read_content(source, text)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         raise InputError(f"this gcsplan reads version 1, given {shown(raw['version'])}", where=f"{where}: version")
     return _Reading(file, where, raw, planner_names, around).mission()
-
-
-def _text(file: Path, where: str) -> str:
-    try:
-        if file.is_dir():
-            raise InputError("this is a folder; give a mission file (.yaml)", where=where)
-        with file.open("rb") as opened:  # not by its size: a pipe or a device has none
-            data = opened.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise InputError(f"a mission file has at most {MAX_BYTES} bytes, this one has more", where=where)
-        return data.decode("utf-8-sig")
-    except InputError:
-        raise
-    except UnicodeDecodeError as why:
-        raise InputError(f"the file must be UTF-8 text, byte {why.start} is not", where=where) from None
-    except FileNotFoundError:
-        raise InputError("there is no such file", where=where) from None
-    except (OSError, ValueError) as why:
-        raise InputError(f"the file cannot be read: {why}", where=where) from None
 
 
 class _Reading:
@@ -163,7 +157,10 @@ class _Reading:
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
             notes=tuple(dict.fromkeys(self.notes)),
         )  # fmt: skip
-        return replace(source, wider=partial(site.wider, source))
+        return replace(source, wider=partial(site.wider, source), reaching=self._reaching)
+
+    def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
+        return _Reading(self.file, self.where.removesuffix(": "), self.raw, self.planner_names, places).mission()
 
     # -- the plain keys ------------------------------------------------------------------------------------------
 

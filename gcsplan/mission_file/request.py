@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -85,7 +85,7 @@ class MissionFile:
     say of the sources; ``notes`` are said to the user. ``wider(margin_m, most_cells)``: the same file with more terrain
     loaded, so far around all stops or at least twice as far as here, or what there is of it; None where that would take
     more cells, or there is no more. ``level`` counts the times that it was: the terrain of each holds that of the one
-    before.
+    before. ``reaching(places)``: the same content read again, with terrain for these places (latitude, longitude), too.
     """
 
     name: str
@@ -105,3 +105,4 @@ class MissionFile:
     notes: tuple[str, ...]
     wider: Callable[[float, int], MissionFile | None] | None = None
     level: int = 0
+    reaching: Callable[[Sequence[tuple[float, float]]], MissionFile] | None = None

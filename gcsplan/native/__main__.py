@@ -12,6 +12,7 @@ import time
 
 from gcsplan.native import shelf
 from gcsplan.native.kernels import Kernels
+from gcsplan.native.machine import llvm_version
 
 ALL = {
     "world": "gcsplan.world._compiled:KERNELS",
@@ -47,7 +48,7 @@ def main(names: list[str]) -> None:
         raise SystemExit(f"{names[0]} is made on x86-64 alone: what is best in one vector is asked of that processor")
     assert "numba" not in sys.modules
     os.environ.update({f"NUMBA_{key}": value for key, value in OPTIONS[vectors].items()}, NUMBA_DISABLE_JIT="0")
-    made_with = {name: importlib.metadata.version(name) for name in ("numba", "llvmlite")}
+    made_with = {name: importlib.metadata.version(name) for name in ("numba", "llvmlite")} | {"llvm": llvm_version()}
     shelf.write_shipped(kernels.shipped, digest, made_with, kernels.bitcode_from_source())
     took = time.perf_counter() - began
     print(f"{kernels.shipped}: {kernels.shipped.stat().st_size:,} bytes, {took:.1f} s", flush=True)

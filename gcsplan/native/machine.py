@@ -15,6 +15,11 @@ _CALLED = ("hypot", "sqrt", "floor", "ceil", "sin", "cos", "asin", "atan2", "fmo
 _engines: list[Any] = []  # machine code lives as long as its engine
 
 
+def llvm_version() -> str:
+    """The version of LLVM within llvmlite; bitcode of a newer major one is not read."""
+    return ".".join(str(part) for part in llvm.llvm_version_info)
+
+
 class Machine:
     """This machine, as numba sees it: the same processor features, the same options."""
 

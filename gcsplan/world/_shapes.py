@@ -19,6 +19,7 @@ from gcsplan.world._shared import (
     WEST_E,
     Zones,
 )
+from gcsplan.world.zones import Circle
 
 
 def spans(track: Floats, zones: Zones, within_m: float, over_ground_m: float) -> list[tuple[int, float, float]]:
@@ -116,6 +117,14 @@ def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, 
         middle = np.concatenate([open_ - half, open_ + half])
         middle = middle[(middle >= -half) & (middle <= 1.0 + half)].clip(0.0, 1.0)
     return (best + max(DEEP_M, DEEP_PART * best) if best > 0.0 else 0.0), at
+
+
+def deepest_in_circle(shape: Circle, radius_m: float, p: Floats, q: Floats) -> tuple[float, float]:
+    """How deep a segment gets into a circle, and where on it."""
+    way, to = q - p, np.array([shape.east_m, shape.north_m]) - p
+    square = float(way @ way)
+    t = min(max(float(to @ way) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return radius_m - float(np.hypot(*(to - t * way))), t
 
 
 def _depth_inside(corners: Floats, p: Floats) -> Floats:

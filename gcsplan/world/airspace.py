@@ -24,7 +24,7 @@ from gcsplan.native.form import Held
 from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES, around, judge, room
 from gcsplan.world._field import Field
 from gcsplan.world._halo import Surroundings
-from gcsplan.world._shapes import deepest_inside
+from gcsplan.world._shapes import deepest_in_circle, deepest_inside
 from gcsplan.world._shared import (
     BAND_HIGH,
     BAND_LOW,
@@ -47,7 +47,7 @@ from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.tube import Band, Reaches, Tube, make_tube
-from gcsplan.world.zones import Circle, Polygon, Zone
+from gcsplan.world.zones import Polygon, Zone
 
 __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 
@@ -360,18 +360,10 @@ class Airspace:
             if isinstance(shape, Polygon):
                 depth, t = deepest_inside(shape.vertices, p, q)
             else:
-                depth, t = _deepest_in_circle(shape, shape.radius_m * self.scale, p, q)
+                depth, t = deepest_in_circle(shape, shape.radius_m * self.scale, p, q)
             if depth > -value[row]:
                 value[row], at[row] = -depth, part[0] + t * (part[1] - part[0])
         return value, at
-
-
-def _deepest_in_circle(shape: Circle, radius_m: float, p: Floats, q: Floats) -> tuple[float, float]:
-    """How deep a segment gets into a circle, and where on it."""
-    way, to = q - p, np.array([shape.east_m, shape.north_m]) - p
-    square = float(way @ way)
-    t = min(max(float(to @ way) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    return radius_m - float(np.hypot(*(to - t * way))), t
 
 
 ZONE = 7  # after the kernel's kinds

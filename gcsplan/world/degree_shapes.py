@@ -12,15 +12,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.zones import Circle, Polygon
 
 if TYPE_CHECKING:
     import shapely
 
-Floats = NDArray[np.float64]
 Corner = tuple[float, float]
 
 LARGEST_RADIUS_M = 100_000.0

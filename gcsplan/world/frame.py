@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,10 +64,6 @@ class Frame:
         """(..., 2) latitude, longitude in degrees of points in the plane."""
         lon, lat = self._back.transform(np.asarray(east_m, float), np.asarray(north_m, float))
         return np.stack([np.asarray(lat, float), np.asarray(lon, float)], axis=-1)
-
-    def transformer_to(self, crs: Any) -> Transformer:
-        """From this plane to the horizontal part of a raster's ``crs``, (east_m, north_m) -> (x, y)."""
-        return Transformer.from_crs(self.crs, CRS.from_user_input(crs), always_xy=True)
 
     def scale_at(self, distance_m: float) -> float:
         """Largest scale of the plane within ``distance_m`` of the origin: ``1 + d²/2R²`` (Snyder 1987, eq. 8-11)."""

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
@@ -31,17 +30,6 @@ class Peak:
     height_m: float
     decay_east_m: float
     decay_north_m: float
-
-
-def height_of(peaks: Sequence[Peak], east_m: ArrayLike, north_m: ArrayLike) -> Floats:
-    """Sum of the peaks at points of the plane (any equal shapes), metres."""
-    e, n = np.broadcast_arrays(np.asarray(east_m, float), np.asarray(north_m, float))
-    total = np.zeros(e.shape)
-    for p in peaks:
-        with np.errstate(under="ignore"):
-            total += p.height_m * np.exp(-(((e - p.east_m) / p.decay_east_m) ** 2)
-                                         - ((n - p.north_m) / p.decay_north_m) ** 2)  # fmt: skip
-    return total
 
 
 def flat_grid(base_m: float, box: Box) -> tuple[Floats, GridMap]:

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import dataclasses
+import doctest
+import inspect
+import re
 import runpy
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
+from typer import testing as runner
 
 import gcsplan
-from gcsplan.app import delivery
+from gcsplan.app import delivery, pipeline, scripting
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import plan
-from gcsplan.app.scripting import rehearse, upload
-from gcsplan.errors import CheckFailed, UsageError
-from gcsplan.mission_file import load_mission
+from gcsplan.app.scripting import rehearse, upload, write
+from gcsplan.cli.main import app
+from gcsplan.errors import CheckFailed, InputError, UsageError
+from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.mission_file import load, load_mission
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -56,17 +65,166 @@ def boards(of: Plan, **trouble: Any) -> list[LoopbackVehicle]:
     ]  # fmt: skip
 
 
-def test_the_four_functions_are_at_the_front_door_and_cost_nothing_until_used() -> None:
-    for name in ("load_mission", "plan", "upload", "rehearse"):
-        assert callable(getattr(gcsplan, name))
+def run(code: str) -> str:
+    """What a fresh Python prints."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+NAMES = ["check", "load_mission", "plan", "rehearse", "report", "upload", "write"]
+
+
+def test_the_functions_are_at_the_front_door_and_cost_nothing_until_used() -> None:
+    assert dir(gcsplan) == sorted(["__version__", *NAMES])
+    for name in NAMES:
+        assert inspect.isfunction(getattr(gcsplan, name))
         assert getattr(gcsplan, name).__doc__
     with pytest.raises(AttributeError, match="uplaod"):
         gcsplan.uplaod  # type: ignore[attr-defined]  # noqa: B018
     code = (
-        "import sys, gcsplan; print(sorted({'numpy', 'pyproj', 'numba', 'pymavlink', 'pydantic'} & set(sys.modules)))"
+        "import sys, gcsplan; dir(gcsplan); "
+        "print(sorted({'numpy', 'pyproj', 'numba', 'pymavlink', 'pydantic'} & set(sys.modules)))"
     )
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60).stdout == "[]\n"
+    assert run(code) == "[]"
     assert (Path(gcsplan.__file__).parent / "py.typed").exists()
+
+
+def test_help_shows_every_function_with_its_arguments() -> None:
+    text = run("import pydoc, gcsplan; print(pydoc.render_doc(gcsplan, renderer=pydoc.plaintext))")
+    shown = [line.split("(")[0] for line in text.split("FUNCTIONS")[1].splitlines() if re.match(r"    [a-z_]+\(", line)]
+    assert [name.strip() for name in shown] == NAMES
+
+
+@pytest.mark.parametrize("first", ["gcsplan.check.verdict", "gcsplan.report.page", "gcsplan.cli.main", "gcsplan"])
+def test_check_and_report_are_functions_whatever_was_imported_before(first: str) -> None:
+    """Packages of the same names stand beside them, and importing one would put it in the function's place."""
+    code = (
+        f"import {first}; import gcsplan; from gcsplan import check, report; from gcsplan.check.verdict import Verdict"
+    )
+    assert run(code + "; print(check.__module__, gcsplan.report is report)") == "gcsplan.app.scripting True"
+
+
+@pytest.mark.parametrize("module", [load, pipeline, scripting], ids=lambda m: m.__name__)
+def test_the_examples_in_the_docstrings_run(module: ModuleType) -> None:
+    found = doctest.testmod(module)
+    assert found.attempted > 1
+    assert found.failed == 0
+
+
+def test_a_mission_is_a_path_a_text_or_a_mapping(tmp_path: Path) -> None:
+    file = tmp_path / "cross.yaml"
+    file.write_text(TEXT)
+    document = yaml.safe_load(TEXT)
+    document["vehicles"] = tuple(document["vehicles"])
+    document["limits"]["min_agl_m"] = np.float32(document["limits"]["min_agl_m"])
+    every = [load_mission(x) for x in (file, str(file), TEXT, document)]
+    every += [load_mission(file, text=TEXT), load_mission(text=TEXT)]
+    assert {m.path.name for m in every} == {"cross.yaml", "mission.yaml"}
+    for m in every:
+        assert repr(m.vehicles) == repr(every[0].vehicles)
+        assert (m.arrival, m.inputs, m.stem) == (every[0].arrival, every[0].inputs, m.path.stem)
+
+
+@pytest.mark.parametrize(
+    ("source", "text", "words"),
+    [
+        ("version: 1\nspeed: 3\n", None, "mission: speed: "),
+        (CROSS | {"limits": {"min_agl_m": "high"}}, None, r"mission: limits\.min_agl_m: "),
+        (CROSS | {"limits": {"min_agl_m": {1, 2}}}, None, r"mission: limits\.min_agl_m: .*given set"),
+        (CROSS | {"vehicles": [{1: 2}]}, None, r"mission: vehicles\[0\]: a key is text, given 1"),
+        ({}, None, "mission: version: is missing"),
+        ("version: 1\n- x", None, "mission: line 2"),
+        ("a.yaml", "[]", "a.yaml: a mission file is a mapping"),
+        ("no such file.yaml", None, "no such file.yaml: there is no such file"),
+    ],
+)
+def test_what_is_wrong_with_a_mission_is_told_with_its_place(source: Any, text: str | None, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        load_mission(source, text=text)
+
+
+def test_what_is_no_mission_at_all_is_a_mistake_of_the_script() -> None:
+    for given in ((), (7,)):
+        with pytest.raises(TypeError, match="takes a path, the text of a mission file, or a mapping"):
+            load_mission(*given)
+    for source in ("a: 1\n", {"a": 1}):
+        with pytest.raises(TypeError, match="load_mission takes"):
+            load_mission(source, text="b: 1\n")
+
+
+def test_a_mapping_that_holds_itself_is_refused() -> None:
+    loop: dict[str, Any] = {"version": 1}
+    loop["limits"] = loop
+    with pytest.raises(InputError, match="levels deep"):
+        load_mission(loop)
+
+
+def test_a_plan_a_mission_and_a_file_are_judged_alike(cross: Plan, tmp_path: Path) -> None:
+    verdicts = gcsplan.check(cross)
+    assert {name: v.legs for name, v in verdicts.items()} == {v.name: v.verdict.legs for v in cross.vehicles}
+    write(cross, tmp_path)
+    for v in cross.vehicles:
+        assert gcsplan.check(v.mission, cross).legs == v.verdict.legs
+        for file in (f"{v.name}.waypoints", f"{v.name}.plan"):
+            found = gcsplan.check(tmp_path / file, TEXT)
+            assert found.safe is True, found.describe()
+            assert found.length_m == pytest.approx(v.verdict.length_m, abs=0.01)
+    low = dataclasses.replace(cross.vehicles[0].mission, items=lowered(cross.vehicles[0].mission.items))
+    assert {f.kind for f in gcsplan.check(low, cross).findings} >= {"min_agl"}
+    other = gcsplan.check(tmp_path / "west.plan", cross, vehicle="south")
+    assert other.mission.name == "south"
+    with pytest.raises(UsageError, match="no vehicle 'nobody'"):
+        gcsplan.check(low, cross, vehicle="nobody")
+    with pytest.raises(UsageError, match="in which world"):
+        gcsplan.check(low)  # type: ignore[call-overload]
+    with pytest.raises(UsageError, match="judged whole"):
+        gcsplan.check(cross, TEXT)  # type: ignore[call-overload]
+    with pytest.raises(InputError, match=r"none\.plan"):
+        gcsplan.check(tmp_path / "none.plan", cross, vehicle="west")
+
+
+def lowered(items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
+    return tuple(dataclasses.replace(item, z=min(item.z, 5.0)) for item in items)
+
+
+def test_what_is_written_is_what_the_command_line_writes(cross: Plan, tmp_path: Path) -> None:
+    (tmp_path / "cross.yaml").write_text(TEXT)
+    (tmp_path / "ours").mkdir()
+    (tmp_path / "ours" / "west.plan").write_text("mine")
+    written = write(plan(tmp_path / "cross.yaml"), tmp_path / "ours", report=True)
+    assert runner.CliRunner().invoke(
+        app, ["plan", str(tmp_path / "cross.yaml"), "-o", str(tmp_path / "theirs"), "--report"]
+    ).exit_code == 0  # fmt: skip
+    assert {file.name for file in written} >= {"west.waypoints", "south.plan", "summary.json", "report.html"}
+    theirs = {p.name: p.read_bytes() for p in (tmp_path / "theirs").iterdir()}
+    ours = {p.name: p.read_bytes() for p in (tmp_path / "ours").iterdir() if p.is_file()}
+    assert ours == theirs
+    assert (tmp_path / "ours" / "previous" / "west.plan").read_text() == "mine"
+
+
+def test_what_does_not_pass_is_not_written_and_retires_what_was_there(cross: Plan, tmp_path: Path) -> None:
+    write(cross, tmp_path)
+    with pytest.raises(CheckFailed, match="the wind"):
+        write(doubtful(cross), tmp_path)
+    assert [p.name for p in tmp_path.iterdir() if not p.name.startswith(".")] == ["previous"]
+    assert (tmp_path / "previous" / "west.plan").exists()
+    assert write(doubtful(cross), tmp_path, allow_unjudged=True)
+
+
+def doubtful(cross: Plan) -> Plan:
+    """One vehicle of it, with something that could not be judged."""
+    v = cross.vehicles[0]
+    unjudged = dataclasses.replace(v, verdict=type(v.verdict)(v.mission, v.verdict.legs, (), ("the wind",)))
+    return dataclasses.replace(cross, vehicles=(unjudged,), fleet=None)
+
+
+def test_a_report_is_text_and_is_written_where_that_is_asked_for(cross: Plan, tmp_path: Path) -> None:
+    text = gcsplan.report(cross, tmp_path / "page.html")
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == text
+    assert "west" in text
+    with pytest.raises(InputError):
+        gcsplan.report(cross, tmp_path / "none" / "page.html", way_home=False)
 
 
 def test_a_plan_is_uploaded_to_one_port_to_a_link_each_and_to_simulated_vehicles(cross: Plan) -> None:
@@ -103,13 +261,9 @@ def test_what_is_no_target_or_not_safe_is_refused_before_anything_is_sent(cross:
         upload(cross, "nobody=sim")
     with pytest.raises(UsageError, match="link"):
         upload(cross)  # the file has no links
-    v = cross.vehicles[0]
-    bad = type(v.verdict)(v.mission, v.verdict.legs, (), ("the wind",))
-    unjudged = type(v)(v.request, v.problem, v.solution, v.mission, bad, v.speed_m_s)
-    doubtful = type(cross)(cross.source, cross.world, "optimal", "length", 1, (unjudged,))
     with pytest.raises(CheckFailed, match="the wind"):
-        upload(doubtful, "sim")
-    assert upload(doubtful, "sim", allow_unjudged=True)[0].verified
+        upload(doubtful(cross), "sim")
+    assert upload(doubtful(cross), "sim", allow_unjudged=True)[0].verified
 
 
 def test_a_rehearsal_flies_the_plan_and_finds_its_arrivals(cross: Plan) -> None:

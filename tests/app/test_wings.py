@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from gcsplan.app.checking import check_files
 from gcsplan.app.fleeting import route_of
@@ -20,6 +19,7 @@ from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of
 from gcsplan.app.pipeline import plan
 from gcsplan.app.wing_ends import starts
+from gcsplan.arrays import Floats
 from gcsplan.check.arcs import SAG_M, bend
 from gcsplan.check.climb_out import above_slant, flared, slant_shortage
 from gcsplan.check.flight import follow
@@ -46,7 +46,6 @@ from gcsplan.world.zones import Circle, Level, Zone
 from tests.support.paths import MISSIONS
 from tests.support.worlds import vehicle, world
 
-Floats = NDArray[np.float64]
 HOME_DEG, GROUND_M, RADIUS_M, SPEED_M_S = (36.6, -84.3), 300.0, 100.0, 20.0
 FLAT = world(GROUND_M)
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission import commands as cmd
@@ -24,7 +24,6 @@ from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.support.random_worlds import Ground, random_zones
 
-Floats = NDArray[np.float64]
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 LOITER_TO_ALT = 31
 

@@ -13,14 +13,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.limit_cases import WING_RADIUS_M, Case
 from tests.oracles.legs import Oracle
 
-Floats = NDArray[np.float64]
 STEP_M = 0.25
 ALLOWED = 0.05
 """Metres, or degrees, by which nothing that was called safe may be unsafe."""

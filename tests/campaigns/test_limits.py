@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-import gcsplan.check.judge as judging
+from gcsplan.check import judge as judging
 from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane
 from tests.campaigns.limit_cases import FAMILIES
 from tests.campaigns.limits import run

@@ -23,12 +23,12 @@ from pathlib import Path
 import numpy as np
 import rasterio
 import yaml
-from numpy.typing import NDArray
 from pyproj import Transformer
 from scipy.ndimage import binary_erosion, gaussian_filter, maximum_filter
 
 from gcsplan.app.pipeline import world_of
 from gcsplan.app.problems import make_problem
+from gcsplan.arrays import Bools, Floats
 from gcsplan.bench.everyday_oracle import Plane, Unreachable
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import load_mission
@@ -36,9 +36,6 @@ from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.world.frame import Frame, centre_of
 from gcsplan.world.path import Path as Track
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 CAP_M, HIGH_M, LOW_M = 300.0, 600.0, 100.0
 """The ceiling, the ridges, and the ground beside them."""

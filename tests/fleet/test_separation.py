@@ -11,13 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.fleet._nearest import Pieces, nearest
 from gcsplan.fleet._sweep import Fleet
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Conflict, Rules, in_metres, separation
-
-Floats = NDArray[np.float64]
 
 FLEETS = [range(250), pytest.param(range(250, 1000), marks=pytest.mark.slow)]
 SAMPLE_S = 1e-3

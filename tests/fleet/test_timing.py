@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.fleet.speeds import CUT_M
 from gcsplan.fleet.timing import POSITION_ERROR_M, Course, Route, fly, motion_error_m, speed_for, time_to_goal_s
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 
-Floats = NDArray[np.float64]
 FREE = math.inf
 
 

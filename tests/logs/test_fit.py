@@ -13,16 +13,15 @@ import numpy as np
 import pytest
 import typer
 import yaml
-from numpy.typing import NDArray
 from typer.testing import CliRunner
 
+from gcsplan.arrays import Floats
 from gcsplan.cli.energy import fit_energy as command
 from gcsplan.errors import InputError, UsageError
 from gcsplan.logs.fit import EnergyFit, fit_energy
 from gcsplan.logs.flight_log import FlightLog
 from gcsplan.logs.reader import read_log
 
-Floats = NDArray[np.float64]
 R1, R2, HOVER = 120.0, 100.0, 400.0
 LAT, LON = 36.6, -84.38
 

@@ -16,10 +16,10 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.cbook import get_sample_data
-from numpy.typing import NDArray
 from pyproj import Geod
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Floats
+
 Line = Literal["degrees", "geodesic", "flat"]
 LINES: tuple[Line, ...] = ("degrees", "geodesic", "flat")
 

@@ -12,12 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Zone
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

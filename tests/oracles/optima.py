@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array, eye_array, hstack, vstack
 from scipy.sparse.csgraph import dijkstra
 
-Floats = NDArray[np.float64]
+from gcsplan.arrays import Floats
 
 TOUCH = 1e-9
 """How far, in radii of the largest disc, a tangent may seem to enter a disc that it touches."""

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.optimal.planner import plan
@@ -27,8 +26,6 @@ from tests.oracles.optima_polish import PATIENT, QUICK, Effort, cost_of, polish
 from tests.oracles.optima_search import best_path
 from tests.oracles.optima_witnesses import known
 from tests.oracles.optima_worlds import FAMILIES, Case, make
-
-Floats = NDArray[np.float64]
 
 SURE_M = 2e-3
 """What brute force finds beyond this is a violation: the fitted map of a raster in degrees may be so far off."""

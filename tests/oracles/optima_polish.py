@@ -15,11 +15,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Legs
 from gcsplan.world.path import Path
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

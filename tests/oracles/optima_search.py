@@ -16,6 +16,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Legs
 from gcsplan.world.limits import Limits
@@ -23,7 +24,6 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle
 from tests.oracles.optima_polish import QUICK, Effort, cost_of, is_feasible, leg_costs, polish, pull
 
-Floats = NDArray[np.float64]
 NEAR = 1e-3
 """How far, in metres, a lattice point lies outside of what it must not touch."""
 MOST_LEVELS = 16

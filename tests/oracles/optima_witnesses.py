@@ -14,6 +14,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.optimal.planner import plan
 from tests.oracles.optima_polish import PATIENT, cost_of, is_feasible, polish, simplify
@@ -21,7 +22,6 @@ from tests.oracles.optima_search import best_path
 from tests.oracles.optima_worlds import FAMILIES, Case, make
 from tests.support.paths import DATA
 
-Floats = NDArray[np.float64]
 FILE = DATA / "witnesses.npz"
 
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -25,7 +25,6 @@ from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.oracles.legs import Oracle
 from tests.support.random_worlds import Ground, geographic, turned
 
-Floats = NDArray[np.float64]
 Kind = tuple[bool, bool]
 
 

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.mavlink.mission.commands import LAND, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -20,7 +20,6 @@ from gcsplan.world.zones import Circle, Zone
 from tests.oracles.legs import Oracle
 from tests.support.random_worlds import Ground, in_plane, oracle_of, random_limits, random_zones, surface_of, turned
 
-Floats = NDArray[np.float64]
 CONE = {Autopilot.ARDUCOPTER: 3.0, Autopilot.PX4: 1.0}
 
 

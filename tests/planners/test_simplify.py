@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Objective, Problem
 from gcsplan.planners.simplify import fewer, polished
 from gcsplan.world.airspace import Airspace, Legs
@@ -17,9 +17,6 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Zone
 from tests.support.planner_worlds import faults, ground
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 LIMITS = Limits(
     min_agl_m=50.0,

@@ -8,8 +8,8 @@ from functools import cache
 
 import numpy as np
 from matplotlib.cbook import get_sample_data
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame
@@ -17,8 +17,6 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Zone
-
-Floats = NDArray[np.float64]
 
 
 def ground(

@@ -9,15 +9,14 @@ from functools import cache
 
 import numpy as np
 from matplotlib.cbook import get_sample_data
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.frame import Frame
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.oracles.legs import Oracle
 
-Floats = NDArray[np.float64]
 ToGrid = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.airspace import Airspace, LegReport, Legs, Violation
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.support.random_worlds import jacksboro, random_zones
-
-Floats = NDArray[np.float64]
 
 
 def world(heights: ArrayLike, zones: Sequence[Zone] = (), *, cell_m: float = 100.0, scale: float = 1.0) -> Airspace:

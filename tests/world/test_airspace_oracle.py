@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.airspace import Airspace, LegReport, Legs, Violation
 from gcsplan.world.frame import Frame
 from gcsplan.world.limits import Limits
@@ -29,7 +29,6 @@ from tests.support.random_worlds import (
 
 pytestmark = pytest.mark.slow
 
-Floats = NDArray[np.float64]
 SURE_M = 1e-3  # what brute force finds beyond this is a violation
 TERRAIN = ("min_agl", "terrain_clearance", "max_agl")
 

@@ -114,14 +114,6 @@ def test_an_origin_near_a_pole_or_none_at_all_is_refused(lat: float, lon: float)
         Frame(lat, lon)
 
 
-@pytest.mark.parametrize("epsg", [4326, 32616, 3857, 5070])
-def test_the_way_to_a_rasters_own_coordinates_is_that_of_the_degrees(epsg: int) -> None:
-    direct = Transformer.from_crs(4326, epsg, always_xy=True).transform(-84.2, 36.7)
-    east, north = HOME.to_plane(36.7, -84.2)
-    found = HOME.transformer_to(CRS.from_epsg(epsg)).transform(east, north)
-    assert found == pytest.approx(direct, rel=1e-12, abs=1e-6)
-
-
 # -- the bow ------------------------------------------------------------------------------------------------------
 
 

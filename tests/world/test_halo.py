@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world import _halo
 from gcsplan.world._field import Field
 from gcsplan.world._halo import Surroundings, halo_around
@@ -15,8 +16,6 @@ from gcsplan.world._shared import Halo
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
-
-Floats = NDArray[np.float64]
 
 
 def legs_of(start: Floats, end: Floats) -> Legs:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from pyproj import Transformer
 
+from gcsplan.arrays import Floats
 from gcsplan.world.frame import Frame
 from gcsplan.world.surface import GridMap, Surface
 
-Floats = NDArray[np.float64]
 FLAT = GridMap.affine(0.0, 0.0, 1.0, 1.0)  # column = east, row = south
 
 
@@ -21,7 +21,7 @@ class Exact:
     """Plane to the nodes of a raster in ``epsg`` by pyproj alone; a cell is ``cell`` units of the raster wide."""
 
     def __init__(self, frame: Frame, epsg: int, cell: float) -> None:
-        self.transformer = frame.transformer_to(epsg)
+        self.transformer = Transformer.from_crs(frame.crs, epsg, always_xy=True)
         self.cell = cell
         self.x0, self.y0 = self.transformer.transform(0.0, 0.0)
 

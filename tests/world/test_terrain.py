@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,23 +18,23 @@ import pytest
 import rasterio
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pyproj import Transformer
 from rasterio.enums import ColorInterp
 from rasterio.errors import NotGeoreferencedWarning
 from rasterio.transform import Affine
 from rasterio.windows import Window
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world import mosaic, peaks, raster
 from gcsplan.world.frame import Frame
 from gcsplan.world.geoid import GeoidGrid
-from gcsplan.world.peaks import Peak, height_of
+from gcsplan.world.peaks import Peak
 from gcsplan.world.raster import open_raster
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import TerrainSpec, load_terrain, open_terrain
 
-Floats = NDArray[np.float64]
 FRAME = Frame(36.5, -84.5)
 BOX = (-3000.0, -2000.0, 3000.0, 2000.0)
 SAMPLE = TerrainSpec(dem=("sample:jacksboro",), vertical_datum="EGM96")
@@ -98,6 +99,17 @@ def inside(box: tuple[float, float, float, float], n: int = 2000) -> tuple[Float
 
 
 # -- the sample ---------------------------------------------------------------------------------------------------
+
+
+def height_of(peaks: Sequence[Peak], east_m: ArrayLike, north_m: ArrayLike) -> Floats:
+    """Sum of the peaks at points of the plane (any equal shapes), metres."""
+    e, n = np.broadcast_arrays(np.asarray(east_m, float), np.asarray(north_m, float))
+    total = np.zeros(e.shape)
+    for p in peaks:
+        with np.errstate(under="ignore"):
+            total += p.height_m * np.exp(-(((e - p.east_m) / p.decay_east_m) ** 2)
+                                         - ((n - p.north_m) / p.decay_north_m) ** 2)  # fmt: skip
+    return total
 
 
 def test_the_sample_has_its_heights_at_cell_centres_with_row_0_in_the_north() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.airspace import Airspace, Legs, Tube
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
@@ -25,8 +25,6 @@ from tests.support.random_worlds import (
     surface_of,
     turned,
 )
-
-Floats = NDArray[np.float64]
 
 
 def flat(zones: tuple[Zone, ...] = ()) -> Airspace:

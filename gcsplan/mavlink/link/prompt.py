@@ -4,6 +4,11 @@ An upload goes in lock-step, so the time from a request to its item counts once 
 that any request in range is answered, in any order, again and again. So only the first request of an upload goes the
 whole way, through parser, routing and machine. One that differs from it in nothing but its seq is answered on the
 spot, and the machine hears of it a moment later.
+
+This is a second encoder of MISSION_ITEM_INT, beside pymavlink's, for its speed: on two busy cores over loopback, 700
+items to one vehicle take 1.1 s with it and 1.9 s without (medians of 5 in turn; processor time here 0.04 s and 0.17 s).
+With 100 items to each of 20 vehicles at once it halves the processor time, 0.11 s and 0.23 s; the wall time, 3.4 s and
+3.8 s (medians of 3), differs by less than it varies. A test holds its bytes against pymavlink's.
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
 from gcsplan.check.rtl.obstacles import Obstacles
@@ -32,7 +32,6 @@ from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.oracles.returns import breach, random_case
 from tests.support.worlds import vehicle, world
 
-Floats = NDArray[np.float64]
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 
 

@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import label
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem
@@ -31,7 +31,6 @@ from tests.oracles.optima_worlds import FAMILIES, hills, make, pass_height, plan
 
 pytestmark = pytest.mark.slow
 
-Floats = NDArray[np.float64]
 
 WORLDS = dict.fromkeys(FAMILIES, 12) | {"clearances": 6, "passes": 6, "stops": 6, "pockets": 4}
 """How many missions of each family a run judges. `tests.oracles.optima_campaign` judges more: for as many as 46

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.bounds.climb_bound import _least, altitude_ranges, climb_bound, rise_bound
 from gcsplan.planners.optimal.cap_search import MOST_CAPS, Layer, search_caps
 from gcsplan.planners.optimal.corridor import End
@@ -26,8 +26,6 @@ from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Zone
 from tests.support.planner_worlds import ground
 from tests.support.searches import improve, looked
-
-Floats = NDArray[np.float64]
 
 HORIZONTAL, VERTICAL = 100.0, 120.0
 

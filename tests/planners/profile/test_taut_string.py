@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.profile.taut_string import Blocked, Profile, doors, taut_string
 
-Floats = NDArray[np.float64]
 Doors = tuple[Floats, Floats, Floats, float, float]
 
 

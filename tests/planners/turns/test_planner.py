@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.turns.arc_path import CHORD_M, MOST_DEG, moved
 from gcsplan.planners.turns.planner import LEVELS, Rounded, arc_path_of, rounded, with_more_clearance
@@ -21,7 +22,6 @@ from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Polygon, Zone
 from tests.support.planner_worlds import faults, ground
 
-Floats = NDArray[np.float64]
 LIMITS = Limits(min_agl_m=60.0, max_climb_deg=12.0, max_descent_deg=12.0)
 
 

@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, AltitudeIntervals, Reached, Terminal
 from gcsplan.planners.optimal.corridor import End
 from gcsplan.planners.optimal.leg import Leg
@@ -24,7 +24,6 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
-Floats = NDArray[np.float64]
 Place = tuple[float, float, float]
 CELL_M = 10.0
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)

@@ -10,8 +10,8 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.clearance import AROUND, _around, mesh_of
 from gcsplan.planners.optimal.navmesh.grid import Plane, make_plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
@@ -21,9 +21,6 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import TERMS, GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 SIZE_M, STEP_M = 600.0, 30.0
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)

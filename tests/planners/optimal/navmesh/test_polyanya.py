@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.bench.terrain_problems import problems
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal import planner as optimal
@@ -24,8 +25,6 @@ from gcsplan.planners.optimal.navmesh.grid import Plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import make_pieces, make_portals, sort_portals
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Place = tuple[float, float]
 
 PLAIN = np.array([[10.0, 0.0], [0.0, 10.0]])

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.plane_search import PlaneSearch
@@ -19,8 +18,6 @@ from gcsplan.world.path import Path
 from tests.planners.optimal.sources.test_notches import MIDDLE_M, ROUND_M, STRAIGHT_M, ridge
 from tests.support.planner_worlds import faults
 from tests.support.searches import improve, looked
-
-Floats = NDArray[np.float64]
 
 
 def through(over_m: float, **more: object) -> PlaneSearch:

@@ -1,0 +1,96 @@
+"""Where a mission comes from: a file, its text, or a mapping that a script has made; all become the same mapping."""
+
+from __future__ import annotations
+
+import datetime
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gcsplan.errors import InputError
+from gcsplan.mission_file.schema import shown
+from gcsplan.mission_file.strict_yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, read_yaml
+
+UNNAMED = Path("mission.yaml")
+"""Stands for the file of a mission without one; its folder, for files that the mission names, is the current one."""
+
+
+def read_content(
+    source: str | os.PathLike[str] | Mapping[str, Any] | None, text: str | None
+) -> tuple[Path, str, dict[str, Any]]:
+    """The file, what messages call it, and the mapping of keys. Raises InputError, TypeError as `load_mission`."""
+    if isinstance(source, str) and ("\n" in source or "\r" in source):
+        if text is not None:
+            raise TypeError("load_mission takes one text: the first argument is the file's path where text= is given")
+        source, text = None, source
+    if isinstance(source, Mapping):
+        if text is not None:
+            raise TypeError("load_mission takes a mapping or a text, not both")
+        file, where, raw = UNNAMED, "mission", _Plain().of(source, "mission", 0)
+    elif isinstance(source, str | os.PathLike):
+        file, where = Path(source), str(source)
+        raw = read_yaml(_text(file, where) if text is None else text, where=where)
+    elif source is None and text is not None:
+        file, where, raw = UNNAMED, "mission", read_yaml(text, where="mission")
+    else:
+        raise TypeError(
+            f"load_mission takes a path, the text of a mission file, or a mapping, given {type(source).__name__}"
+        )
+    if not isinstance(raw, dict):
+        raise InputError(f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}", where=where)
+    return file, where, raw
+
+
+def _text(file: Path, where: str) -> str:
+    try:
+        if file.is_dir():
+            raise InputError("this is a folder; give a mission file (.yaml)", where=where)
+        with file.open("rb") as opened:  # not by its size: a pipe or a device has none
+            data = opened.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise InputError(f"a mission file has at most {MAX_BYTES} bytes, this one has more", where=where)
+        return data.decode("utf-8-sig")
+    except InputError:
+        raise
+    except UnicodeDecodeError as why:
+        raise InputError(f"the file must be UTF-8 text, byte {why.start} is not", where=where) from None
+    except FileNotFoundError:
+        raise InputError("there is no such file", where=where) from None
+    except (OSError, ValueError) as why:
+        raise InputError(f"the file cannot be read: {why}", where=where) from None
+
+
+class _Plain:
+    """A copy of a script's mapping in what YAML can hold: tuples become lists, numpy's numbers Python's."""
+
+    def __init__(self) -> None:
+        self._values = 0
+
+    def of(self, value: Any, where: str, depth: int) -> Any:
+        """``value`` at ``where``, which lies ``depth`` levels deep."""
+        self._values += 1
+        if depth > MAX_DEPTH or self._values > MAX_NODES:
+            most = f"{MAX_DEPTH} levels deep" if depth > MAX_DEPTH else f"{MAX_NODES} values"
+            raise InputError(f"the mission has more than {most}", where=where)
+        if value is None or isinstance(value, datetime.date):
+            return value
+        for kind in (bool, int, float, str):
+            if isinstance(value, kind):
+                return kind(value)
+        if isinstance(value, os.PathLike):
+            return os.fspath(value)
+        if isinstance(value, Mapping):
+            for key in value:
+                if not isinstance(key, str):
+                    raise InputError(f"a key is text, given {key!r}", where=where)
+            # Within the file a place is a key path; the name of the whole and ": " stand before it.
+            return {str(k): self.of(v, f"{where}: {k}" if not depth else f"{where}.{k}", depth + 1)
+                    for k, v in value.items()}  # fmt: skip
+        if isinstance(value, list | tuple):
+            return [self.of(v, f"{where}[{k}]", depth + 1) for k, v in enumerate(value)]
+        if hasattr(value, "tolist"):  # numpy's arrays and numbers
+            return self.of(value.tolist(), where, depth + 1)
+        raise InputError(
+            f"a value is text, a number, true, false, a list or a mapping, given {type(value).__name__}", where=where
+        )
