@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -79,7 +78,7 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
     for path, side in ((under, False), (over, True)):
         assert faults(p, Path(path)) == []
         assert _sides(p, path, ends, free) == {0: side}
-        better = pulled(p, path, LEVELS[0], time.perf_counter() + 5.0)
+        better = pulled(p, path, LEVELS[0], math.inf)
         assert better is not None
         assert faults(p, Path(better)) == []
         assert p.cost(Path(better)) < p.cost(Path(path))
