@@ -289,6 +289,7 @@ def test_the_papers_sequence_and_together_arrive_by_their_ideal_arithmetic() -> 
         assert v["speed_m_s"] == pytest.approx(30.0 * v["length_m"] / longest_m, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_msfoa_plans_by_priority_with_those_before_in_view(monkeypatch: pytest.MonkeyPatch) -> None:
     from gcsplan.planners.swarm import planner as swarm_planner
 

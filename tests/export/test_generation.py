@@ -68,6 +68,7 @@ def caught(root: Path, after: int = 3) -> dict[str, bytes | None]:
 # -- the campaign -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @posix
 def test_a_short_campaign_of_kills_and_power_losses_finds_nothing() -> None:
     command = [sys.executable, "-m", "tests.campaigns.crash", "--seconds", "3", "--seed", "1", "--rounds", "2"]
@@ -209,6 +210,7 @@ sys.exit(0)
 """
 
 
+@pytest.mark.first_quick
 @posix
 @pytest.mark.parametrize("fatal", [1, 3, 6, 9])
 def test_sigterm_between_the_moves_takes_them_back(tmp_path: Path, fatal: int) -> None:

@@ -304,6 +304,7 @@ def tlog(path: Path, *, sysids: Sequence[int] = (1,), status: bool = False, batt
     return path
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("status", [False, True])
 def test_a_ground_stations_log(tmp_path: Path, status: bool) -> None:
     log = read_log(tlog(tmp_path / "a.tlog", status=status))
@@ -311,6 +312,7 @@ def test_a_ground_stations_log(tmp_path: Path, status: bool) -> None:
     assert bool(log.notes) is status
 
 
+@pytest.mark.slow
 def test_a_ground_stations_log_of_two_vehicles_or_without_a_battery(tmp_path: Path) -> None:
     two = tlog(tmp_path / "two.tlog", sysids=(1, 7))
     with pytest.raises(InputError, match=r"systems 1, 7.*--sysid"):

@@ -54,6 +54,7 @@ def test_a_search_that_does_not_fit_is_refused_before_it_runs_and_recorded() -> 
     assert [(s.name, s.refused) for s in incumbent.steps] == [("b", True), ("c", False), ("a", False)]
 
 
+@pytest.mark.first_quick
 @pytest.mark.usefixtures("clock")
 @pytest.mark.parametrize("kind", ["hook", "levels", "peaks", "sample"])
 def test_a_clock_that_runs_faster_changes_nothing(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:

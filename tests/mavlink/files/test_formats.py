@@ -39,6 +39,7 @@ from gcsplan.mavlink.mission.mission import (
 )
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
+from tests.support.effort import draws
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 HOME = Home(366_000_000, -843_800_000, 312.345678901)
@@ -105,7 +106,7 @@ def missions(draw: st.DrawFn, *, nan: bool = False) -> Mission:
     return Mission(autopilot, Home(draw(lat_e7), draw(lon_e7), amsl), tuple(items))
 
 
-@settings(max_examples=80)
+@settings(max_examples=draws(80))
 @given(missions())
 def test_a_waypoints_file_reads_back_as_the_same_mission(mission: Mission) -> None:
     text = write_waypoints(mission)
@@ -113,7 +114,7 @@ def test_a_waypoints_file_reads_back_as_the_same_mission(mission: Mission) -> No
     assert write_waypoints(mission) == text
 
 
-@settings(max_examples=80)
+@settings(max_examples=draws(80))
 @given(missions(nan=True))
 def test_a_plan_file_reads_back_as_the_same_mission(mission: Mission) -> None:
     text = write_plan(mission)
@@ -122,7 +123,7 @@ def test_a_plan_file_reads_back_as_the_same_mission(mission: Mission) -> None:
     assert write_plan(mission) == text
 
 
-@settings(max_examples=300)
+@settings(max_examples=draws(300))
 @given(finite32)
 def test_float32_text_is_the_shortest_that_gives_the_same_bits(value: float) -> None:
     text = float32_text(value)
@@ -132,7 +133,7 @@ def test_float32_text_is_the_shortest_that_gives_the_same_bits(value: float) -> 
         assert float32(float(f"{value:.{digits - 2}e}")) != value
 
 
-@settings(max_examples=300)
+@settings(max_examples=draws(300))
 @given(int32)
 def test_degrees_text_is_exact(e7: int) -> None:
     assert Decimal(degrees_text(e7)) == Decimal(e7) / 10**7
@@ -384,7 +385,7 @@ def test_a_mission_of_more_than_ten_thousand_items_is_not_read() -> None:
         read_plan(json.dumps(plan), autopilot=COPTER, where="f")
 
 
-@settings(max_examples=200)
+@settings(max_examples=draws(200))
 @given(st.data())
 def test_no_text_makes_the_waypoints_reader_stumble(data: st.DataObject) -> None:
     good = HEAD + HOME_LINE + POINT
@@ -644,7 +645,7 @@ json_values = st.recursive(
 )
 
 
-@settings(max_examples=100)
+@settings(max_examples=draws(100))
 @given(st.data())
 def test_no_json_makes_the_plan_reader_stumble(data: st.DataObject) -> None:
     plan = plan_of()

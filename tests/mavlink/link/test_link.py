@@ -35,6 +35,7 @@ from gcsplan.mavlink.protocol.messages import (
     RequestList,
 )
 from gcsplan.mavlink.protocol.transfer import Timers, Upload
+from tests.support.effort import draws
 
 VEHICLE = Address(1, 1)
 WAYPOINT = MissionItem(16, 3, (0.0, 0.0, 0.0, 0.0), 366_000_000, -843_800_000, 60.005)
@@ -73,7 +74,7 @@ def packed(message: MissionMessage, source: Address = VEHICLE, target: Address =
     return FrameWriter(source).pack(wire.encode(message, target))
 
 
-@settings(max_examples=200)
+@settings(max_examples=draws(200))
 @given(MESSAGES)
 def test_a_message_survives_the_wire_to_the_bit(message: MissionMessage) -> None:
     (received,) = FrameParser().feed(packed(message))
@@ -119,7 +120,7 @@ def test_mavlink_1_frames_are_read() -> None:
 # -- frames -------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=150)
+@settings(max_examples=draws(150))
 @given(st.lists(st.one_of(st.binary(max_size=40), MESSAGES), max_size=12), st.lists(st.integers(1, 50), max_size=30))
 def test_a_stream_cut_anywhere_gives_the_same_messages(parts: list[bytes | MissionMessage], cuts: list[int]) -> None:
     stream = b"".join(part if isinstance(part, bytes) else packed(part) for part in parts) + bytes(300)
@@ -171,7 +172,7 @@ def test_a_parser_never_holds_more_than_a_frame() -> None:
         assert len(parser._rest) <= 300
 
 
-@settings(max_examples=150)
+@settings(max_examples=draws(150))
 @given(st.lists(st.one_of(st.binary(max_size=400), st.binary(max_size=50).map(lambda b: b"\xfd" + b)), max_size=8))
 def test_raw_bytes_never_break_the_parser(chunks: list[bytes]) -> None:
     parser, datagrams = FrameParser(), FrameParser()

@@ -30,6 +30,7 @@ from gcsplan.mavlink.protocol.transfer import Timers, Upload, VerifiedUpload
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
+from tests.support.effort import draws
 
 VEHICLE = Address(1, 1)
 PEER = ("127.0.0.1", 14550)
@@ -73,7 +74,7 @@ def taught(
 # -- the bytes ----------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=150)
+@settings(max_examples=draws(150))
 @given(
     st.lists(WIRE_ITEMS, min_size=1, max_size=4), st.sampled_from([0, 1, 2]), st.integers(0, 1), st.integers(0, 255),
     st.tuples(st.integers(1, 255), st.integers(0, 255)), st.tuples(st.integers(1, 255), st.integers(0, 255)),
@@ -166,7 +167,7 @@ def test_no_flipped_bit_is_answered() -> None:
     assert prepared.asked == []
 
 
-@settings(max_examples=300)
+@settings(max_examples=draws(300))
 @given(st.binary(max_size=60), st.integers(0, 15))
 def test_bytes_that_are_no_frame_are_never_answered(junk: bytes, cut: int) -> None:
     answers, _ = taught(3)

@@ -60,6 +60,7 @@ def fleet(numbers: range, trouble: Mapping[int, Mapping[str, Any]], drop: float)
     assert server.mishandled == 0
 
 
+@pytest.mark.slow
 def test_twenty_vehicles_with_fifty_items_are_all_verified_over_a_link_that_loses_a_twentieth() -> None:
     sent = [mission(n) for n in FLEET]
     ended: list[str] = []

@@ -21,6 +21,7 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import TERMS, GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support.effort import draws
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -245,6 +246,7 @@ def test_the_mesh_for_bounds_has_the_straight_way_wherever_the_exact_check_passe
     assert held > 25
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("fineness", [3, 6])
 @pytest.mark.parametrize("world", ["hills", "turned"])
 def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str, fineness: int) -> None:
@@ -278,6 +280,7 @@ def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str,
     assert raised > 0.2 * held, raised / held
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("stride", [2, 3])
 @pytest.mark.parametrize("world", ["amsl", "turned"])
 def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str, stride: int) -> None:
@@ -298,6 +301,7 @@ def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str,
     assert shut > 0 or stride == 3
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("low", [True, False])
 @pytest.mark.parametrize(
     "world", ["hills", *(pytest.param(w, marks=pytest.mark.slow) for w in ("amsl", "turned")), "agl"]
@@ -358,7 +362,7 @@ def test_between_two_crossing_zones_there_is_room_only_where_their_levels_leave_
 
 
 @given(st.integers(0, 2**31), st.integers(3, 12))
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 def test_convex_parts_make_up_the_polygon_and_are_convex(seed: int, corners: int) -> None:
     rng = np.random.default_rng(seed)
     turn = 2.0 * math.pi * (np.arange(corners) + rng.uniform(0.0, 0.6, corners)) / corners

@@ -43,6 +43,7 @@ def under_a_lid() -> Problem:
     )
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("objective", ["length", pytest.param("energy", marks=pytest.mark.slow)])
 def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
     p = replace(under_a_lid(), objective="energy" if objective == "energy" else "length")
@@ -58,6 +59,7 @@ def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
     assert solution.lower_bound <= p.cost(solution.path)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("objective", ["length", "energy"])
 def test_the_track_over_the_lattice_has_way_enough_to_climb(objective: str) -> None:
     found = traverse(replace(under_a_lid(), objective="energy" if objective == "energy" else "length"), 2200.0)
@@ -88,6 +90,7 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
         assert room == pytest.approx((100.0, 400.0) if side else (10.0, 40.0))
 
 
+@pytest.mark.slow
 def test_a_path_over_such_a_track_is_better_than_one_with_laps() -> None:
     p = under_a_lid()
     below = looked(p).incumbent
