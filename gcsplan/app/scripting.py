@@ -16,10 +16,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from gcsplan.app import delivery
-from gcsplan.app.jobs import LINK, Delivery, Options, ProgressCall
+from gcsplan.app import uploads
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import require_passing
+from gcsplan.app.upload_job import LINK, JobResult, ProgressCall, UploadOptions
 
 if TYPE_CHECKING:
     from gcsplan.sim.outcome import Rehearsal
@@ -37,7 +37,7 @@ def upload(
     ignore_position: bool = False,
     timeout_s: float = 60.0,
     progress: ProgressCall | None = None,
-) -> list[Delivery]:
+) -> list[JobResult]:
     """Upload every mission of a plan, all at once, read each back, compare, and check what was read back.
 
     ``to``: a URL for all vehicles (told apart by system id), ``"link"`` (the mission file's links), ``"sim"`` (a
@@ -45,21 +45,23 @@ def upload(
     says nothing of get nothing. With ``atomic``, if one upload fails, what the others took is cleared again.
     ``timeout_s`` is the longest time without progress. ``progress(name, told)`` is called on the way.
 
-    One `Delivery` for each vehicle, in the plan's order: ``verified`` is True only where the mission was read back
+    One `JobResult` for each vehicle, in the plan's order: ``verified`` is True only where the mission was read back
     and equals what was sent; ``message`` says what went wrong. One vehicle's failure leaves the others standing and
-    raises nothing; `gcsplan.app.delivery.exit_code` sums them up. Raises UsageError for targets that are none,
+    raises nothing; `gcsplan.app.uploads.exit_code` sums them up. Raises UsageError for targets that are none,
     CheckFailed, before anything is sent, where a verdict does not pass.
     """
     if isinstance(to, Mapping):
         words = [f"{name}={url}" for name, url in to.items()]
     else:
         words = [to] if isinstance(to, str) else list(to)
-    targets = delivery.targets(words, [v.request.vehicle for v in planned.vehicles])
+    targets = uploads.targets(words, [v.request.vehicle for v in planned.vehicles])
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
     from gcsplan.sim.loopback import loopback_fleet
 
-    options = Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s)
-    return delivery.deliver(delivery.jobs_of(planned, targets), options, progress, simulator=loopback_fleet)
+    options = UploadOptions(
+        allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s
+    )
+    return uploads.run_jobs(uploads.jobs_of(planned, targets), options, progress, simulator=loopback_fleet)
 
 
 def rehearse(

@@ -23,10 +23,10 @@ from gcsplan.cli.options import (
 from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
-    from gcsplan.app.jobs import Delivery, Job
+    from gcsplan.app.upload_job import JobResult, UploadJob
 
 SHOWN = 15
-"""Names of written files that are told; a fleet has hundreds."""
+"""Names of written files that are printed; a fleet has hundreds."""
 
 
 def plan(
@@ -90,7 +90,7 @@ def plan(
     timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Plan a mission file, write its outputs, and upload and verify them if asked.
+    """Plan a mission file, write its outputs, and upload and verify them on request.
 
     Without --upload nothing is ever sent. The outputs are written whole or not at all; where no safe mission
     exists, earlier outputs are moved to DIR/previous, so that no old mission is flown by mistake.
@@ -98,13 +98,13 @@ def plan(
     from gcsplan.app import outputs, pipeline
     from gcsplan.app.gate import GateTime
     from gcsplan.cli.console import (
-        delivery_table,
         homes_table,
         plan_table,
         release_table,
         say,
         say_notes_of,
         transfer_progress,
+        upload_table,
     )
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.export.outdir import add_output, can_hold, retire_outputs, settle_outputs, write_outputs, write_whole
@@ -129,27 +129,27 @@ def plan(
         source = pipeline.load_mission(mission)
         targets: dict[str, str] = {}
         if upload or fence or fence_infinite:  # else nothing of what sends is needed
-            from gcsplan.app import delivery, fencing
-            from gcsplan.app.jobs import Options
+            from gcsplan.app import fencing, uploads
+            from gcsplan.app.upload_job import UploadOptions
 
-            targets = delivery.targets(upload or [], [r.vehicle for r in source.vehicles])
+            targets = uploads.targets(upload or [], [r.vehicle for r in source.vehicles])
         names = [r.vehicle.name for r in source.vehicles]
-        with planning_display(names, objective or source.planner.objective) as tell:
-            told = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
+        with planning_display(names, objective or source.planner.objective) as progress:
+            chosen = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
             planned = pipeline.plan(
                 source,
                 planner=planner,
                 objective=objective,
                 seed=seed,
-                options=told,
-                progress=tell,
+                options=chosen,
+                progress=progress,
                 gate_utc=None if gate is None else gate.start,
             )
         pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
         homes = outputs.homes_of(planned) if report or way_home or rally else {}
-        jobs: list[Job] = []
+        jobs: list[UploadJob] = []
         if upload or fence or fence_infinite:
-            jobs = delivery.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""))
+            jobs = uploads.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""))
         fence_notes: list[tuple[str, str]] = []
         if fence or fence_infinite:  # one that the mission would breach is found before anything is written
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
@@ -184,28 +184,30 @@ def plan(
         say_notes_of(fence_notes)
         shown = [*list(files)[:SHOWN], f"… and {len(files) - SHOWN} more"] if len(files) > SHOWN + 1 else list(files)
         say(f"written to {directory}{os.sep}: {', '.join(shown)}")
-    deliveries: list[Delivery] = []
+    results: list[JobResult] = []
     if targets:
         from gcsplan.sim.loopback import loopback_fleet
 
         if gate is not None:
             gate.require_ahead(datetime.now(UTC))  # planning took its time
-        options = Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout)
+        options = UploadOptions(
+            allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout
+        )
         names = [job.name for job in jobs]
         with talking(names), transfer_progress(names) as moved_on:
-            deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
+            results = uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)
         if not as_json:
-            delivery_table(deliveries)
-            release_table(planned, deliveries, gate)
+            upload_table(results)
+            release_table(planned, results, gate)
         try:
-            add_output(directory, "upload.json", outputs.upload_text(planned, deliveries, homes))
+            add_output(directory, "upload.json", outputs.upload_text(planned, results, homes))
             if report:
-                add_output(directory, "report.html", outputs.report_of(planned, deliveries, homes))
+                add_output(directory, "report.html", outputs.report_of(planned, results, homes))
         except InputError as error:  # what became of the upload matters more
             say(f"note: what became of the upload is not written: {error}")
     if as_json:
-        emit(outputs.summary_of(planned, deliveries, homes), delivery.failure(deliveries) if targets else None)
-    raise typer.Exit(delivery.exit_code(deliveries) if targets else 0)
+        emit(outputs.summary_of(planned, results, homes), uploads.failure(results) if targets else None)
+    raise typer.Exit(uploads.exit_code(results) if targets else 0)
 
 
 def planners(as_json: JsonOption = False) -> None:

@@ -83,9 +83,9 @@ class MissionFile:
 
     ``airspace_scale``: largest scale of the plane over the terrain that was loaded. ``inputs`` is what the outputs
     say of the sources; ``notes`` are said to the user. ``wider(margin_m, most_cells)``: the same file with more terrain
-    loaded, so far around all stops or at least twice as far as here, or what there is of it; None where that would take
-    more cells, or there is no more. ``level`` counts the times that it was: the terrain of each holds that of the one
-    before.
+    loaded, so far around all terminals or at least twice as far as here, or what there is of it; None where that
+    would take more cells, or there is no more. ``level`` counts how often it was loaded anew: the terrain of each level
+    holds that of the one before.
     """
 
     name: str

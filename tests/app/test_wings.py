@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.app.checking import check_files
-from gcsplan.app.fleeting import route_of
+from gcsplan.app.fleet_planning import route_of
 from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of
 from gcsplan.app.pipeline import plan

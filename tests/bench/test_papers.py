@@ -22,7 +22,7 @@ from gcsplan.bench.papers_pictures import best_run, stepwise
 from gcsplan.bench.papers_printed import ENDS, PRINTED, Least, Number, faults, least_of
 from gcsplan.bench.papers_remarks import remarks, schedules
 from gcsplan.bench.papers_report import IMPOSSIBLE, report, scenario_table, write
-from gcsplan.bench.papers_runs import Job, Store, seed_of, work
+from gcsplan.bench.papers_runs import PaperRun, Store, seed_of, work
 from gcsplan.bench.papers_scenarios import SCENARIOS, choose, claims_of, mission_text, prepare, settings_of
 from gcsplan.bench.papers_statistics import (
     FEW,
@@ -307,7 +307,7 @@ def test_seeds_differ_by_run_and_vehicle_only() -> None:
 
 def test_a_worker_of_another_version_refuses() -> None:
     with pytest.raises(InputError, match="another version"):
-        work(Job(SCENARIO, "gwo", mission_text(SCENARIO), 1, 0, "0" * 16))
+        work(PaperRun(SCENARIO, "gwo", mission_text(SCENARIO), 1, 0, "0" * 16))
 
 
 @pytest.fixture(scope="module")

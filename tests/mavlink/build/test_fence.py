@@ -15,7 +15,7 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gcsplan.app import delivery, fencing
+from gcsplan.app import fencing, uploads
 from gcsplan.check.judge import judge
 from gcsplan.cli import main as cli
 from gcsplan.errors import CheckFailed, InputError
@@ -366,7 +366,7 @@ def test_a_fence_is_uploaded_read_back_and_compared(autopilot: Autopilot) -> Non
     fence = fence_of(MIXED, FRAME, autopilot)
     craft = LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0)
     with SimServer([craft], "udpin:127.0.0.1:0", speedup=10.0) as server, Link(server.url_for_gcs) as link:
-        options = session.Options(listen_s=0.1, discover_s=5.0)
+        options = session.SessionOptions(listen_s=0.1, discover_s=5.0)
         result = session.upload_items(link, 1, fence.items, autopilot, FENCE, options=options, name="uav1")
         assert result.outcome == "accepted"
         assert result.verified, result.differences
@@ -398,10 +398,10 @@ def test_over_bad_links_a_fence_that_is_called_verified_is_on_board(autopilot: A
     assert sure >= draws(60) * 5 / 6
 
 
-def job_of(name: str, sysid: int, url: str, mission: Mission, craft: Vehicle, where: World) -> delivery.Job:
+def job_of(name: str, sysid: int, url: str, mission: Mission, craft: Vehicle, where: World) -> uploads.UploadJob:
     craft = replace(craft, name=name, sysid=sysid)
     mission = replace(mission, name=name, sysid=sysid)
-    return delivery.Job(name, url, mission, judge(mission, craft, where), craft, where)
+    return uploads.UploadJob(name, url, mission, judge(mission, craft, where), craft, where)
 
 
 def test_fences_go_before_the_missions_and_a_vehicle_that_is_not_there_stops_nobody_else(
@@ -418,7 +418,7 @@ def test_fences_go_before_the_missions_and_a_vehicle_that_is_not_there_stops_nob
         plain = [job_of(f"uav{n}", n, server.url_for_gcs, mission, craft, where) for n in (1, 2)]
         jobs, notes = fencing.with_fences(plain)
         assert notes == []
-        first, second = delivery.deliver(jobs, delivery.Options())
+        first, second = uploads.run_jobs(jobs, uploads.UploadOptions())
     assert first.verified
     assert first.as_dict()["fence"]["verified"] is True
     assert any("FENCE_ENABLE is 0" in w for w in first.warnings)
@@ -433,17 +433,17 @@ def test_fences_go_before_the_missions_and_a_vehicle_that_is_not_there_stops_nob
 def test_vehicles_without_zones_keep_their_fence(monkeypatch: pytest.MonkeyPatch) -> None:
     be_impatient(monkeypatch)
     where, craft = world(), vehicle()
-    jobs, notes = fencing.with_fences([job_of("uav1", 1, delivery.SIM, mission_in(where, craft), craft, where)])
+    jobs, notes = fencing.with_fences([job_of("uav1", 1, uploads.SIM, mission_in(where, craft), craft, where)])
     assert "left as it is" in notes[0][1]
-    (done,) = delivery.deliver(jobs, delivery.Options(), simulator=loopback_fleet)
+    (done,) = uploads.run_jobs(jobs, uploads.UploadOptions(), simulator=loopback_fleet)
     assert done.verified
     assert "fence" not in done.as_dict()
 
 
 def test_a_simulated_upload_sends_the_fence_too() -> None:
     where, craft = world(zones=MIXED), vehicle()
-    jobs, _ = fencing.with_fences([job_of("uav1", 1, delivery.SIM, mission_in(where, craft), craft, where)])
-    (done,) = delivery.deliver(jobs, delivery.Options(), simulator=loopback_fleet)
+    jobs, _ = fencing.with_fences([job_of("uav1", 1, uploads.SIM, mission_in(where, craft), craft, where)])
+    (done,) = uploads.run_jobs(jobs, uploads.UploadOptions(), simulator=loopback_fleet)
     assert done.verified
     assert done.as_dict()["fence"]["items"] == 6
 

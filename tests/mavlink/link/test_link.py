@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from gcsplan.errors import InputError, LinkError
 from gcsplan.mavlink.link.drive import drive
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, signing_key
-from gcsplan.mavlink.link.link import GCS, Channel, Heard, Job, Link, Steps, pump, run
+from gcsplan.mavlink.link.link import GCS, Channel, Heard, Link, PumpJob, Steps, pump, run
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import (
@@ -519,7 +519,7 @@ def test_tasks_run_together_and_errors_stay_with_their_own() -> None:
         return naps
 
     with link:
-        jobs = [Job(link.channel(n), sleeper(n, n == 3)) for n in range(1, 11)]
+        jobs = [PumpJob(link.channel(n), sleeper(n, n == 3)) for n in range(1, 11)]
         pump(jobs)
         assert [job.result for job in jobs] == [1, 2, None, *range(4, 11)]
         assert isinstance(jobs[2].error, LinkError)
@@ -539,6 +539,6 @@ def test_an_interrupt_cancels_what_runs() -> None:
             raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            pump([Job(channel, drive(upload, channel)), Job(link.channel(2), interrupted())])
+            pump([PumpJob(channel, drive(upload, channel)), PumpJob(link.channel(2), interrupted())])
         assert str(upload.outcome) == "unknown: cancelled by us"
         assert peer.hear("MISSION_ACK")[0].type == dialect.MAV_MISSION_OPERATION_CANCELLED

@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 
 from gcsplan.mavlink.link.drive import drive
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, checksum
-from gcsplan.mavlink.link.link import GCS, Link, pump, run
-from gcsplan.mavlink.link.link import Job as PumpJob
+from gcsplan.mavlink.link.link import GCS, Link, PumpJob, pump, run
 from gcsplan.mavlink.link.prompt import Prepared, PromptAnswers
 from gcsplan.mavlink.link.transport import Udp
 from gcsplan.mavlink.link.url import parse_url

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan.app.fleeting import route_of
+from gcsplan.app.fleet_planning import route_of
 from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of, summary_of
 from gcsplan.app.pipeline import plan
