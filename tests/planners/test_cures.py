@@ -138,6 +138,7 @@ def test_what_is_reported_to_help_does(name: str) -> None:
         assert np.allclose(points[[0, -1]], [problem.start, problem.goal])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "key", "given"),
     [

@@ -265,6 +265,7 @@ def test_random_missions_under_a_ceiling(seed: int) -> None:
     _is_solved(random_mission(seed, replace(FIELD, max_amsl_m=690.5)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [60, pytest.param(61, marks=pytest.mark.slow)])
 def test_random_missions_for_energy(seed: int) -> None:
     _is_solved(random_mission(seed, objective="energy"))

@@ -21,7 +21,7 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import TERMS, GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
-from tests.support.effort import draws
+from tests.support.effort import draws, worlds
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -179,12 +179,13 @@ def world_of(rng: np.random.Generator, world: str, limits: str, parts: int) -> t
     return problem, make_plane(problem, EVERYWHERE, parts), float(rng.uniform(250.0, 330.0))
 
 
+@pytest.mark.draws
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", WORLDS)
 def test_what_the_exact_check_passes_below_the_cap_is_free_in_the_mesh_for_bounds(world: str, limits: str) -> None:
     rng = np.random.default_rng([1, *world.encode(), *limits.encode()])
     passed = 0
-    for k in range(3):
+    for k in range(worlds(3)):
         problem, plane, cap = world_of(rng, world, limits, 1 + k % 2)
         places = inner(rng, 200, plane)
         ok = legal(problem, places, cap)
@@ -219,12 +220,13 @@ def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str
     assert held > 20
 
 
+@pytest.mark.draws
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", WORLDS)
 def test_the_mesh_for_bounds_has_the_straight_way_wherever_the_exact_check_passes_it(world: str, limits: str) -> None:
     rng = np.random.default_rng([3, *world.encode(), *limits.encode()])
     held = 0
-    for k in range(3):
+    for k in range(worlds(3)):
         problem, plane, cap = world_of(rng, world, limits, 1 + k % 2)
         air = problem.airspace
         a = inner(rng, 150, plane)
