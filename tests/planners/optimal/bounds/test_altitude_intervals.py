@@ -135,8 +135,8 @@ def shortest(
 @pytest.mark.draws
 def test_storeys_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
     found = above = 0
-    seeds = 30 if effort.full else 10
-    for seed in range(seeds):
+    seeds = range(0 if effort.full else 16, 30)
+    for seed in seeds:
         rng = np.random.default_rng(seed)
         s = random_storeys(rng, *rng.integers(3, 9, 2).tolist())
         climb, descent = rng.choice([0.2, 0.4, 1.0], 2)
@@ -156,8 +156,8 @@ def test_storeys_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
         straight_m = CELL_M * math.hypot(s.shape[0] - 1, s.shape[1] - 1)
         above += not len(s.reached(limits, straight_m + 2.0 * s.half_m).cell)
     # Both are needed for the test to mean something: tracks, and limits that shut them out.
-    assert found >= seeds / 2
-    assert above >= seeds / 10
+    assert found >= len(seeds) / 2
+    assert above >= 3
 
 
 @pytest.mark.parametrize("free", ["neither", "start", "goal"])
