@@ -7,8 +7,8 @@
         print(vehicle.name, vehicle.verdict.length_m, vehicle.verdict.safe)
     write(planned, "jacksboro", report=True)
     print(rehearse(planned).safe)
-    for delivery in upload(planned, to="sim"):
-        print(delivery.vehicle, delivery.outcome, delivery.verified)
+    for result in upload(planned, to="sim"):
+        print(result.vehicle, result.outcome, result.verified)
 
 Every function blocks until it is done; errors are those of `gcsplan.errors`.
 """

@@ -22,15 +22,15 @@ def main(mission_file: str, where: str) -> int:
         rehearsed = rehearse(planned)
         if (error := rehearsed.error()) is not None:
             raise error
-        deliveries = upload(planned, to=where, atomic=True)
+        results = upload(planned, to=where, atomic=True)
     except GcsplanError as error:
         print(error, file=sys.stderr)
         return error.exit_code
-    for delivery in deliveries:
-        said = "verified" if delivery.verified else f"{delivery.outcome}: {delivery.message}"
-        print(f"{delivery.vehicle}: {delivery.items} items, {said}")
-    if not all(delivery.verified for delivery in deliveries):
-        return max(delivery.code for delivery in deliveries)
+    for result in results:
+        said = "verified" if result.verified else f"{result.outcome}: {result.message}"
+        print(f"{result.vehicle}: {result.items} items, {said}")
+    if not all(result.verified for result in results):
+        return max(result.code for result in results)
     assert planned.fleet is not None
     for slot in planned.fleet.slots:
         print(f"{slot.name}: start at T+{slot.depart_s:.1f} s, at its goal at T+{slot.arrive_s:.1f} s")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
+import os
 import queue
 import socket
 import subprocess
@@ -23,11 +25,21 @@ _STOP_S = 5.0
 _CONVERSATION_S = 60.0
 
 
-def free_udp_port() -> int:
-    """A port of 127.0.0.1 that nobody listens on."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
+_worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % 10
+_ports = itertools.cycle(range(20_000 + 1_000 * _worker, 21_000 + 1_000 * _worker))
+
+
+def free_port(kind: socket.SocketKind) -> int:
+    """A port of 127.0.0.1 that nobody listens on, for a program that takes a moment to open it.
+
+    It is none of those that the system gives to sockets that ask for any, and each worker has ports of its own: until
+    the program has opened it no other test takes it.
+    """
+    for port in itertools.islice(_ports, 1_000):
+        with socket.socket(socket.AF_INET, kind) as one, contextlib.suppress(OSError):
+            one.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError("no port is free")
 
 
 def row_for(seq: int, item: MissionItem, mission_type: int = 0, *, current: int = 0) -> Row:
@@ -49,7 +61,7 @@ class MavsdkVehicle:
     """A vehicle made of MAVSDK's mission_raw_server that listens on a free port."""
 
     def __init__(self, sysid: int = 1) -> None:
-        self.port = free_udp_port()
+        self.port = free_port(socket.SOCK_DGRAM)
         self.url = f"udpout:127.0.0.1:{self.port}"
         self._sysid = sysid
         self._said: queue.Queue[dict[str, Any]] = queue.Queue()

@@ -17,6 +17,7 @@ from gcsplan.errors import LinkError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import discover
 from gcsplan.mavlink.link.watch import VehicleState
+from sitl_tests.peers import free_port
 
 VARIABLE = "GCSPLAN_SITL"
 WHY_SKIPPED = f"no autopilot: set {VARIABLE}=tcp:127.0.0.1:5760 (a running SITL) or to the path of an arducopter binary"
@@ -31,17 +32,6 @@ def wanted() -> str:
     return os.environ.get(VARIABLE, "").strip()
 
 
-def _free_ports(n: int) -> list[int]:
-    sockets = [socket.socket() for _ in range(n)]
-    try:
-        for one in sockets:
-            one.bind(("127.0.0.1", 0))
-        return [int(one.getsockname()[1]) for one in sockets]
-    finally:
-        for one in sockets:
-            one.close()
-
-
 @contextmanager
 def running(where: str, directory: Path) -> Iterator[Link]:
     """A link to the autopilot that ``where`` names. One for all tests: SITL ends when its console's link closes."""
@@ -49,7 +39,7 @@ def running(where: str, directory: Path) -> Iterator[Link]:
         with Link(where) as link:
             yield link
         return
-    ports = _free_ports(len(_PORTS))
+    ports = [free_port(socket.SOCK_STREAM) for _ in _PORTS]
     options = [word for name, port in zip(_PORTS, ports, strict=True) for word in (name, str(port))]
     process = subprocess.Popen(
         [os.path.abspath(where), "--model", "+", "--speedup", str(SPEEDUP), "--home", _HOME, *options],

@@ -11,7 +11,7 @@ from gcsplan.mavlink.build.fence import Fence, areas_of, fence_of
 from gcsplan.mavlink.files.formats import write_plan
 from gcsplan.mavlink.link import steps
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import Options, clear_mission, download_items, upload_items
+from gcsplan.mavlink.link.session import SessionOptions, clear_mission, download_items, upload_items
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, Mission
 from gcsplan.sim.server import SimServer
@@ -30,7 +30,7 @@ ZONES = (
     Zone("mast", Circle(0.0, 1500.0, 60.0), None, Level(100.0, "agl")),
     Zone("pond", Circle(-1500.0, 0.0, 80.0)),
 )
-QUICK = Options(unchecked=True, listen_s=0.1)
+QUICK = SessionOptions(unchecked=True, listen_s=0.1)
 
 
 def a_fence(autopilot: Autopilot) -> Fence:

@@ -8,7 +8,14 @@ from __future__ import annotations
 import pytest
 
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import Options, Order, download_mission, upload_fleet, upload_items, upload_mission
+from gcsplan.mavlink.link.session import (
+    SessionOptions,
+    UploadOrder,
+    download_mission,
+    upload_fleet,
+    upload_items,
+    upload_mission,
+)
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, MissionItem
 from gcsplan.mavlink.protocol.transfer import Timers
@@ -22,7 +29,7 @@ pytestmark = pytest.mark.slow
 COPTER, PX4 = Autopilot.ARDUCOPTER, Autopilot.PX4
 SPEEDUP = 30.0
 # A verdict is not what these tests are about: the missions are sent as they are.
-OPTIONS = Options(unchecked=True, listen_s=0.0, timers=Timers(response_s=0.3, item_s=0.03, silence_s=3.0))
+OPTIONS = SessionOptions(unchecked=True, listen_s=0.0, timers=Timers(response_s=0.3, item_s=0.03, silence_s=3.0))
 
 
 @pytest.mark.parametrize(("autopilot", "items", "seed"), [(COPTER, 50, 1), (PX4, 50, 2), (COPTER, 600, 3)])
@@ -63,7 +70,7 @@ def test_two_vehicles_behind_one_bad_port_each_get_their_own() -> None:
         LossyRelay(server.address, loss=0.1, seed=5) as relay,
         Link(relay.url) as link,
     ):
-        results = upload_fleet([Order(link, mission, options=OPTIONS) for mission in missions])
+        results = upload_fleet([UploadOrder(link, mission, options=OPTIONS) for mission in missions])
     assert [getattr(r, "verified", r) for r in results] == [True, True]
     assert [len(v.items()) for v in vehicles] == [31, 40]
 
@@ -83,7 +90,7 @@ def test_a_fence_goes_up_over_a_bad_link() -> None:
 def test_a_link_that_loses_everything_ends_unknown_or_dead_and_never_verified() -> None:
     # Up to the tenth item all is well, then the vehicle is heard no more.
     vehicle, mission = a_vehicle(COPTER, "silent_after=25"), a_mission(COPTER, 50)
-    options = Options(
+    options = SessionOptions(
         unchecked=True, listen_s=0.0, attempts=2, timers=Timers(response_s=0.1, item_s=0.05, silence_s=0.5, retries=2)
     )
     with SimServer([vehicle], "udpin:127.0.0.1:0", speedup=SPEEDUP) as server, Link(server.url_for_gcs) as link:

@@ -6,7 +6,7 @@ import pytest
 
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import Options, Order, upload_fleet, verify_mission
+from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet, verify_mission
 from gcsplan.mavlink.mission.mission import MISSION
 from gcsplan.sim.server import SimServer
 from gcsplan.vehicle import Autopilot
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 PX4 = Autopilot.PX4
 TIMEOUT_S = 10.0
-OPTIONS = Options(unchecked=True, listen_s=0.1, timeout_s=TIMEOUT_S, discover_s=20.0)
+OPTIONS = SessionOptions(unchecked=True, listen_s=0.1, timeout_s=TIMEOUT_S, discover_s=20.0)
 
 
 @pytest.mark.parametrize(("loss", "seed"), [(0.1, 1), (0.3, 2), (0.6, 3), (0.6, 4)])
@@ -30,7 +30,7 @@ def test_a_mavsdk_vehicle_that_is_called_verified_holds_the_mission(loss: float,
         LossyRelay(("127.0.0.1", vehicle.port), loss=loss, seed=seed) as relay,
         Link(relay.url) as bad,
     ):
-        (result,) = upload_fleet([Order(bad, mission, options=OPTIONS)])
+        (result,) = upload_fleet([UploadOrder(bad, mission, options=OPTIONS)])
         if isinstance(result, GcsplanError):
             assert result.exit_code in (5, 6)
             return

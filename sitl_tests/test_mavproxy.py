@@ -14,7 +14,7 @@ import pytest
 
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.sim.server import SimServer
 from gcsplan.vehicle import Autopilot
@@ -58,14 +58,14 @@ def test_what_is_called_verified_through_mavproxy_is_on_board(
     autopilot: Autopilot, loss: float, seed: int, tmp_path: Path
 ) -> None:
     board, mission = a_vehicle(autopilot), a_mission(autopilot, 15)
-    options = Options(unchecked=True, timeout_s=10.0 if loss else 30.0, discover_s=30.0)
+    options = SessionOptions(unchecked=True, timeout_s=10.0 if loss else 30.0, discover_s=30.0)
     with (
         SimServer([board], "udpin:127.0.0.1:0") as server,
         LossyRelay(server.address, loss=loss, seed=seed) as relay,
         Link("udpin:127.0.0.1:0") as link,
         mavproxy(relay.url, tmp_path, f"--out=udpout:{link.place}"),
     ):
-        (result,) = upload_fleet([Order(link, mission, options=options)])
+        (result,) = upload_fleet([UploadOrder(link, mission, options=options)])
     said = (tmp_path / "mavproxy.txt").read_text(errors="replace")
     if isinstance(result, GcsplanError):
         assert result.exit_code in (5, 6), said

@@ -12,7 +12,7 @@ from gcsplan.mavlink.files.formats import write_plan, write_waypoints
 from gcsplan.mavlink.link import steps
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import (
-    Options,
+    SessionOptions,
     clear_mission,
     upload_items,
     upload_mission,
@@ -26,7 +26,7 @@ from sitl_tests.peers import MavsdkVehicle, item_of, mavsdk_station, row_for
 from sitl_tests.wire_json import Row
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
-UNCHECKED = Options(unchecked=True, listen_s=0.1)
+UNCHECKED = SessionOptions(unchecked=True, listen_s=0.1)
 
 
 def a_fence(n: int) -> list[MissionItem]:

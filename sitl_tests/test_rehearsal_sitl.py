@@ -63,7 +63,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Plan:
 def test_two_real_arducopters_arrive_as_planned_and_as_the_built_in_simulator_says(planned: Plan) -> None:
     said: list[tuple[str, str]] = []
     result = rehearse_in_sitl(
-        planned, binary=Path(sitl.wanted()), speedup=10.0, tell=lambda name, what: said.append((name, what))
+        planned, binary=Path(sitl.wanted()), speedup=10.0, report=lambda name, what: said.append((name, what))
     )
     assert result.simulator == "sitl"
     assert result.breaches == ()

@@ -15,7 +15,7 @@ import pytest
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter
 from gcsplan.mavlink.link.link import GCS, Link
 from gcsplan.mavlink.link.session import (
-    Options,
+    SessionOptions,
     clear_mission,
     download_items,
     download_mission,
@@ -45,7 +45,7 @@ from sitl_tests import sitl
 pytestmark = pytest.mark.skipif(not sitl.wanted(), reason=sitl.WHY_SKIPPED)
 
 COPTER = Autopilot.ARDUCOPTER
-UNCHECKED = Options(unchecked=True, listen_s=0.0)
+UNCHECKED = SessionOptions(unchecked=True, listen_s=0.0)
 SYSID = int(os.environ.get("GCSPLAN_SITL_SYSID", "1"))
 OTHER_GCS = Address(254, 190)
 KINDS = (MISSION, FENCE, RALLY)

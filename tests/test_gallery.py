@@ -34,6 +34,7 @@ def test_a_mission_of_the_gallery_is_safe_and_its_files_are_what_was_judged(file
         assert not faults(compare(sent, stored, vehicle.mission.autopilot))
 
 
+@pytest.mark.slow
 def test_proposed_rally_points_stand_in_the_plan_file_on_request_alone() -> None:
     planned = plan(load_mission(MISSIONS / "jacksboro.yaml"))
     homes = homes_of(planned)

@@ -43,7 +43,7 @@ class Checked:
     """One file, the vehicle that it is for, and the verdict in ``world``.
 
     ``fence``, ``rally``: the file's own. ``terrain_error_m`` is what terrain-frame legs were judged with. ``way_home``
-    where that was asked for.
+    where that is requested.
     """
 
     file: Path
@@ -221,8 +221,10 @@ def check_with_options(
     inputs: dict[str, object] = dict(shared[1]) if shared is not None else {}
     for argument, file, r in read:
         try:
-            world, told = shared if shared is not None else opened.around(places_of(r.mission), beyond_m(r.mission))
-            inputs = inputs or dict(told)
+            world, described = (
+                shared if shared is not None else opened.around(places_of(r.mission), beyond_m(r.mission))
+            )
+            inputs = inputs or dict(described)
             request = _request(opened, r.mission, file.stem, world)
             checked.append(_judged(request, file, r, world, options.terrain_error_m, returns))
         except InputError as error:
@@ -265,8 +267,8 @@ def _judged(
     verdict = judge(
         mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m, misses=True
     )
-    verdict, told = own_fence(read.fence, verdict, vehicle, world)
-    notes += told
+    verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world)
+    notes += fence_notes
     if verdict.legs and verdict.legs[-1].kind == "cruise" and not any("without end" in n for n in verdict.notes):
         notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")
     home: WayHome | None = None
@@ -282,7 +284,7 @@ def _judged(
 
 
 def passes(c: Checked, *, allow_unjudged: bool) -> bool:
-    """Whether a checked mission may fly: no limit is broken, on the way home neither if that was asked for."""
+    """Whether a checked mission may fly: no limit is broken, on the way home neither if that is requested."""
     judged = [c.verdict.safe, *([c.way_home.safe] if c.way_home is not None else [])]
     return False not in judged and (allow_unjudged or None not in judged)
 

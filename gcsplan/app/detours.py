@@ -30,7 +30,7 @@ TEETH = (1, 2, 4, 8)
 """Of the zigzag of a longer path."""
 
 LONGER_BY = 1e-3
-"""Of a longer path, beyond what was asked for."""
+"""Of a longer path, beyond the requested length."""
 
 SPARE_M = 2.0
 """By which a path is raised, or a disc widened, beyond what is needed: way points are rounded, corners cut."""

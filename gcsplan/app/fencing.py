@@ -30,7 +30,7 @@ from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Polygon, Zone
 
 if TYPE_CHECKING:
-    from gcsplan.app.jobs import Job
+    from gcsplan.app.upload_job import UploadJob
     from gcsplan.mavlink.link import session
     from gcsplan.mavlink.link.link import Link
     from gcsplan.mavlink.link.results import UploadResult
@@ -43,7 +43,7 @@ __all__ = ["Fence", "breaches", "fence_for", "not_fenced", "own_fence", "upload_
 def fence_for(
     mission: Mission, vehicle: Vehicle, world: World, *, infinite: bool = False, rtl_rel_home_m: float | None = None
 ) -> Fence:
-    """The fence that the world's zones make for ``mission``; see `fence_of` for ``infinite`` and for what is told.
+    """The fence that the world's zones make for ``mission``; see `fence_of` for ``infinite`` and for its notes.
 
     Raises CheckFailed where the mission itself would breach it, naming zone and item; InputError where the autopilot
     cannot keep it.
@@ -142,7 +142,7 @@ def _beyond_shape_m(shape: Circle | Polygon, legs: Legs, scale: float) -> Floats
     import shapely
 
     polygon, lines = shapely.Polygon(shape.vertices), shapely.linestrings(ends)
-    # A vertical leg is a line without length, of which no part is left to be outside: its ends are asked for too.
+    # A vertical leg is a line without length, of which no part is left to be outside: its ends are tested too.
     out = shapely.distance(polygon, shapely.points(ends)).max(axis=1)
     rest = shapely.difference(lines, polygon)
     points, owner = shapely.get_coordinates(rest, return_index=True)
@@ -170,13 +170,13 @@ def own_fence(
     return replace(verdict, findings=(*verdict.findings, *found)), (words,)
 
 
-def with_fences(jobs: Sequence[Job], *, infinite: bool = False) -> tuple[list[Job], list[tuple[str, str]]]:
+def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[list[UploadJob], list[tuple[str, str]]]:
     """``jobs``, each with the fence that its world's zones make for its mission; and notes, (name, words) each.
 
     Raises what `fence_for` raises, and InputError for a mission that was not checked: nobody knows what it would
     breach.
     """
-    fenced: list[Job] = []
+    fenced: list[UploadJob] = []
     notes: list[tuple[str, str]] = []
     for job in jobs:
         if job.vehicle is None or job.world is None:
@@ -195,7 +195,7 @@ def _notes(name: str, fence: Fence) -> list[tuple[str, str]]:
 
 
 def upload_fences(
-    jobs: Sequence[Job], links: Mapping[str, Link], options: session.Options
+    jobs: Sequence[UploadJob], links: Mapping[str, Link], options: session.SessionOptions
 ) -> dict[str, UploadResult | GcsplanError]:
     """Send each job's fence over the link of its URL, all at once, read them back, compare; results by job's name.
 
@@ -205,7 +205,7 @@ def upload_fences(
     """
     from gcsplan.mavlink.link import session
 
-    def order_of(job: Job, fence: Fence) -> session.ListOrder:
+    def order_of(job: UploadJob, fence: Fence) -> session.ListOrder:
         simulated = job.url == "sim"
         own = replace(options, simulated=simulated, listen_s=0.0 if simulated else options.listen_s)
         mission = job.mission

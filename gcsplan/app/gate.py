@@ -19,7 +19,7 @@ from gcsplan.fleet.timing import Course
 from gcsplan.vehicle import Autopilot
 
 NEAREST_S = 60.0
-"""So far ahead the common start must be at least, when it is asked for and when it is sent."""
+"""So far ahead the common start must be at least, when it is requested and when it is sent."""
 FARTHEST_S = 20.0 * 3600.0
 SLACK_S = 30.0
 """How early everybody is to be at the gate."""

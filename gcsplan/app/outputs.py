@@ -25,7 +25,7 @@ from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
 
 if TYPE_CHECKING:
-    from gcsplan.app.jobs import Delivery
+    from gcsplan.app.upload_job import JobResult
     from gcsplan.check.rtl.verdict import WayHome
 
 Homes: TypeAlias = "Mapping[str, WayHome]"
@@ -81,11 +81,11 @@ def homes_of(plan: Plan) -> dict[str, WayHome]:
     }  # fmt: skip
 
 
-def report_of(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Homes = MappingProxyType({})) -> str:
+def report_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = MappingProxyType({})) -> str:
     """``report.html``: one page that needs no network."""
     from gcsplan.app.report_page import render
 
-    return render(plan, deliveries, homes)
+    return render(plan, results, homes)
 
 
 def figures_of(plan: Plan) -> dict[str, bytes]:
@@ -106,14 +106,14 @@ def picture_of(plan: Plan) -> bytes:
     return buffer.getvalue()
 
 
-def upload_text(plan: Plan, deliveries: Sequence[Delivery], homes: Homes = MappingProxyType({})) -> str:
+def upload_text(plan: Plan, results: Sequence[JobResult], homes: Homes = MappingProxyType({})) -> str:
     """``upload.json``: the summary with the clock readings and each vehicle's upload."""
-    return write_summary(summary_of(plan, deliveries, homes), clocks=True)
+    return write_summary(summary_of(plan, results, homes), clocks=True)
 
 
-def summary_of(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Homes = MappingProxyType({})) -> dict[str, Any]:
+def summary_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = MappingProxyType({})) -> dict[str, Any]:
     """The summary of docs/reference/contract.md as plain values, clock readings included."""
-    uploads = {d.vehicle: d for d in deliveries}
+    uploads = {d.vehicle: d for d in results}
     return {
         "name": plan.source.name,
         "gcsplan": __version__,
@@ -145,7 +145,7 @@ def _fleet(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, delivery: Delivery | None) -> dict[str, Any]:
+def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, result: JobResult | None) -> dict[str, Any]:
     slot = None if fleet is None else fleet.slot(v.name)
     verdict = v.verdict
     lowest, nearest = verdict.lowest, verdict.nearest
@@ -177,7 +177,7 @@ def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, delivery: Delivery | None)
         "not_judged": list(verdict.not_judged),
         "hold_s": slot.hold_s if slot else 0.0,
         "notes": list(dict.fromkeys((*v.notes, *v.solution.notes, *verdict.notes, *(slot.notes if slot else ())))),
-        "upload": delivery.as_dict() if delivery else None,
+        "upload": result.as_dict() if result else None,
     } | _of_search(v)
 
 

@@ -10,7 +10,7 @@ from datetime import datetime
 from os import PathLike
 from typing import Any
 
-from gcsplan.app.fleeting import fleet_of
+from gcsplan.app.fleet_planning import fleet_of
 from gcsplan.app.gate import GateTime
 from gcsplan.app.model import Brief, Plan, VehiclePlan
 from gcsplan.app.planning import over_one_terrain
@@ -68,16 +68,16 @@ def plan(
     """
     if not isinstance(source, MissionFile):
         source = load_mission(source)
-    asked = source.planner
-    name = planner or asked.name
+    settings = source.planner
+    name = planner or settings.name
     entry = get_planner(name)
-    goal = objective or asked.objective
+    goal = objective or settings.objective
     if goal not in ("length", "energy"):
         raise InputError(f"objective must be length or energy, given {goal!r}")
-    number = asked.seed if seed is None else seed
-    told = _options(source, name) | dict(options or {})
-    by_priority = bool(entry.optimiser) and (told.get("cost") or entry.defaults.get("cost")) == "msfoa"
-    brief = Brief(source, world_of(source), entry.plan, goal, number, told, by_priority and len(source.vehicles) > 1)
+    number = settings.seed if seed is None else seed
+    merged = _options(source, name) | dict(options or {})
+    by_priority = bool(entry.optimiser) and (merged.get("cost") or entry.defaults.get("cost")) == "msfoa"
+    brief = Brief(source, world_of(source), entry.plan, goal, number, merged, by_priority and len(source.vehicles) > 1)
     brief, vehicles = over_one_terrain(brief, _one_by_one(brief, progress), progress)
     source = brief.source
     flown, fleet = fleet_of(vehicles, brief, None if gate_utc is None else GateTime(gate_utc))
@@ -95,22 +95,22 @@ def _one_by_one(brief: Brief, progress: Callable[[str, Progress], None] | None) 
     plans: dict[str, VehiclePlan] = {}
     for name in arrival.order if brief.by_priority and arrival is not None else requests:
         request = requests[name]
-        tell = None if progress is None else lambda what, who=name: progress(who, what)
+        report = None if progress is None else lambda what, who=name: progress(who, what)
         more: dict[str, object] = {}
         if brief.by_priority:
             earlier = tuple(plan.solution.path.points for plan in plans.values())
             more = {"earlier": earlier, "speed_m_s": request.vehicle.speed_max_m_s}
-        plans[name] = plan_or_explain(brief, request, tell, options=more)
+        plans[name] = plan_or_explain(brief, request, report, options=more)
     return [plans[name] for name in requests]
 
 
 def _options(source: MissionFile, planner: str) -> dict[str, object]:
     """The file's own options for a planner; of another one than it names, only what suits any."""
-    told = dict(source.planner.extras)
-    own = told.get("parameters")
+    extras = dict(source.planner.extras)
+    own = extras.get("parameters")
     if planner != source.planner.name and isinstance(own, Mapping):
-        told["parameters"] = {k: v for k, v in own.items() if k in VOLUME_KEYS}
-    return told
+        extras["parameters"] = {k: v for k, v in own.items() if k in VOLUME_KEYS}
+    return extras
 
 
 def require_passing(verdicts: Mapping[str, Verdict], *, allow_unjudged: bool = False) -> None:

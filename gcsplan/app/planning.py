@@ -37,14 +37,14 @@ def plan_vehicle(
     is on the mission file's own. ``options`` are for the planner, on top of the brief's.
     """
     source, vehicle = brief.source, request.vehicle
-    asked = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))
+    limited = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))
     world = brief.world if searched is None else searched
-    told = {**brief.options, **(options or {})}
+    merged = {**brief.options, **(options or {})}
     if vehicle.turn_radius_m > 0.0:
-        return plan_wing(brief, request, asked, world, told, progress)
+        return plan_wing(brief, request, limited, world, merged, progress)
     margins, failed = MARGINS, None
     for _ in range(ATTEMPTS):
-        problem, notes = make_problem(source, asked, world, brief.objective, brief.seed, margins, progress, told)
+        problem, notes = make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, merged)
         solution = run_planner(brief.run, problem, vehicle, world)
         over = looked_over(brief, solution)
         for spaced in (True, False):  # way points nearer than the acceptance radii are dropped where that is legal
@@ -77,8 +77,8 @@ def over_one_terrain(
         if not verdict.findings:
             out.append(replace(v, mission=mission, verdict=verdict, brief=wide))
             continue
-        tell = None if progress is None else lambda what, who=v.name: progress(who, what)
-        out.append(plan_vehicle(wide, v.request, tell))
+        report = None if progress is None else lambda what, who=v.name: progress(who, what)
+        out.append(plan_vehicle(wide, v.request, report))
     return wide, out
 
 

@@ -60,7 +60,7 @@ class Wider:
 
 
 def looked_over(brief: Brief, solution: Solution) -> Brief:
-    """``brief`` over the terrain that a solution was found in: more than it was asked for, where that was needed."""
+    """``brief`` over the terrain that a solution was found in: more than was requested, where that was needed."""
     over = None if solution.problem is None else solution.problem.widen
     if not isinstance(over, Wider):
         return brief
@@ -154,7 +154,7 @@ def make_problem(
     via = tuple(
         Via(e, n, None if agl is None else float(air.surface.ground_at(e, n)) + agl) for e, n, agl in request.via
     )
-    asked = source.planner
+    settings = source.planner
     own = world.airspace.zones[len(source.zones) :]
     wider = Wider(source, world, request, own, objective, seed, given)
     problem = Problem(
@@ -168,11 +168,11 @@ def make_problem(
         horizontal_j_per_m=vehicle.energy.horizontal_j_per_m,
         turn_radius_m=vehicle.turn_radius_m,
         seed=seed,
-        gap_percent=asked.gap_percent,
-        budget_s=asked.budget_s,
-        budget_mb=asked.budget_mb,
+        gap_percent=settings.gap_percent,
+        budget_s=settings.budget_s,
+        budget_mb=settings.budget_mb,
         progress=progress,
-        options=dict(asked.extras if options is None else options),
+        options=dict(settings.extras if options is None else options),
         widen=None if source.wider is None else wider,
     )
     if vehicle.autopilot is Autopilot.ARDUPLANE and vehicle.turn_radius_m <= 0.0:

@@ -55,8 +55,8 @@ def _explained(
             source=replace(brief.source, planner=planner),
             world=World(brief.world.frame, changed.airspace),
         )
-        asked = replace(request, vehicle=replace(vehicle, limits=changed.limits))
-        return plan_vehicle(tried, asked, changed.progress, options=options).solution
+        limited = replace(request, vehicle=replace(vehicle, limits=changed.limits))
+        return plan_vehicle(tried, limited, changed.progress, options=options).solution
 
     problem, _ = make_problem(
         brief.source, request, brief.world, brief.objective, brief.seed, progress=progress, options=options

@@ -78,7 +78,7 @@ def rehearse_in_sitl(
     addresses: Mapping[str, str] | None = None,
     speedup: float | None = None,
     i_know: bool = False,
-    tell: Callable[[str, str], None] | None = None,
+    report: Callable[[str, str], None] | None = None,
 ) -> Rehearsal:
     """The same with real ArduCopter SITL: one is started of ``binary`` for each vehicle without one of ``addresses``.
 
@@ -92,10 +92,10 @@ def rehearse_in_sitl(
         require_here(list(given.values()))
     seats = {name: Seat(name, url) for name, url in given.items()}
     if binary is None:
-        return rehearse_sitl(parts, planned.world, terms_of(planned), seats, i_know=i_know, tell=tell)
+        return rehearse_sitl(parts, planned.world, terms_of(planned), seats, i_know=i_know, report=report)
     without = [p for p in parts if p.vehicle.name not in seats]
     with sitl_instances(binary, without, speedup=SPEEDUP if speedup is None else speedup) as started:
-        return rehearse_sitl(parts, planned.world, terms_of(planned), seats | started, i_know=i_know, tell=tell)
+        return rehearse_sitl(parts, planned.world, terms_of(planned), seats | started, i_know=i_know, report=report)
 
 
 def seats_of(words: Sequence[str], names: Sequence[str]) -> dict[str, str]:

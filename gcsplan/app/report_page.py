@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from gcsplan.app.jobs import Delivery
 from gcsplan.app.model import Plan
+from gcsplan.app.upload_job import JobResult
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report.page import render_page
 from gcsplan.report.subject import Certificate, Page, Subject
 
 
-def render(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Mapping[str, WayHome] | None = None) -> str:
+def render(plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None) -> str:
     """The report of ``plan`` as HTML text, with how its uploads ended; ``homes``: vehicle to its way home."""
-    return render_page(page_of_plan(plan, deliveries, homes))
+    return render_page(page_of_plan(plan, results, homes))
 
 
-def page_of_plan(plan: Plan, deliveries: Sequence[Delivery] = (), homes: Mapping[str, WayHome] | None = None) -> Page:
+def page_of_plan(plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None) -> Page:
     """The page of a plan, with how its uploads ended, and the way home of each vehicle named in ``homes``."""
-    uploads = {d.vehicle: d.as_dict() for d in deliveries}
+    uploads = {d.vehicle: d.as_dict() for d in results}
     source, fleet = plan.source, plan.fleet
     facts = [("planner", plan.planner), ("objective", plan.objective), ("seed", str(plan.seed)),
              ("altitude frame", source.altitude_frame)]  # fmt: skip

@@ -8,8 +8,8 @@
     print(check("somebody.plan", mission, vehicle="uav1").describe())
     flown = rehearse(planned, wind_m_s=5.0, noise_m=1.0, runs=50)
     print(flown.safe, flown.p95_s, flown.order_kept_runs)
-    for delivery in upload(planned, to="link", atomic=True):
-        print(delivery.vehicle, delivery.outcome, delivery.verified, delivery.message)
+    for result in upload(planned, to="link", atomic=True):
+        print(result.vehicle, result.outcome, result.verified, result.message)
 
 Everything blocks until it is done; errors are those of `gcsplan.errors`.
 """
@@ -21,11 +21,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from gcsplan.app import delivery, outputs
+from gcsplan.app import outputs, uploads
 from gcsplan.app.checking import check_files, check_mission
-from gcsplan.app.jobs import LINK, Delivery, Options, ProgressCall
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import require_passing
+from gcsplan.app.upload_job import LINK, JobResult, ProgressCall, UploadOptions
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, UsageError
@@ -154,12 +154,12 @@ def report(
     planned: Plan,
     file: str | os.PathLike[str] | None = None,
     *,
-    deliveries: Sequence[Delivery] = (),
+    results: Sequence[JobResult] = (),
     way_home: bool = True,
 ) -> str:
     """The report of a plan as HTML text: map, profiles, tables; one page that needs no network.
 
-    With ``file`` it is written there too, whole or not at all (UTF-8). ``deliveries``, which `upload` gives, are told
+    With ``file`` it is written there too, whole or not at all (UTF-8). ``results``, which `upload` gives, are told
     on the page. ``way_home``: the return of each vehicle from everywhere is judged and shown; about a second for 20 km.
     Raises InputError where ``file`` cannot be written.
 
@@ -174,7 +174,7 @@ def report(
     >>> report(planned, way_home=False).startswith("<!DOCTYPE html>")
     True
     """
-    text = outputs.report_of(planned, deliveries, outputs.homes_of(planned) if way_home else {})
+    text = outputs.report_of(planned, results, outputs.homes_of(planned) if way_home else {})
     if file is not None:
         write_whole(Path(file), text)
     return text
@@ -190,7 +190,7 @@ def upload(
     ignore_position: bool = False,
     timeout_s: float = 60.0,
     progress: ProgressCall | None = None,
-) -> list[Delivery]:
+) -> list[JobResult]:
     """Upload every mission of a plan, all at once, read each back, compare, and check what was read back.
 
     ``to``: a URL for all vehicles (told apart by system id), ``"link"`` (the mission file's links), ``"sim"`` (a
@@ -198,21 +198,23 @@ def upload(
     says nothing of get nothing. With ``atomic``, if one upload fails, what the others took is cleared again.
     ``timeout_s`` is the longest time without progress. ``progress(name, told)`` is called on the way.
 
-    One `Delivery` for each vehicle, in the plan's order: ``verified`` is True only where the mission was read back
+    One `JobResult` for each vehicle, in the plan's order: ``verified`` is True only where the mission was read back
     and equals what was sent; ``message`` says what went wrong. One vehicle's failure leaves the others standing and
-    raises nothing; `gcsplan.app.delivery.exit_code` sums them up. Raises UsageError for targets that are none,
+    raises nothing; `gcsplan.app.uploads.exit_code` sums them up. Raises UsageError for targets that are none,
     CheckFailed, before anything is sent, where a verdict does not pass.
     """
     if isinstance(to, Mapping):
         words = [f"{name}={url}" for name, url in to.items()]
     else:
         words = [to] if isinstance(to, str) else list(to)
-    targets = delivery.targets(words, [v.request.vehicle for v in planned.vehicles])
+    targets = uploads.targets(words, [v.request.vehicle for v in planned.vehicles])
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
     from gcsplan.sim.loopback import loopback_fleet
 
-    options = Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s)
-    return delivery.deliver(delivery.jobs_of(planned, targets), options, progress, simulator=loopback_fleet)
+    options = UploadOptions(
+        allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s
+    )
+    return uploads.run_jobs(uploads.jobs_of(planned, targets), options, progress, simulator=loopback_fleet)
 
 
 def rehearse(

@@ -32,7 +32,7 @@ SHARPEST = math.radians(60.0)
 """The largest turn at a joint that the straight pieces there are long enough for; what is more takes several."""
 
 STEP_DEG = 15.0
-"""Between headings that are tried, where none is asked for."""
+"""Between headings that are tried, where none is requested."""
 
 LONGER_M, LONGEST_M = 20.0, 6000.0
 """Climb-outs are tried longer by the first until the second."""
@@ -64,7 +64,7 @@ class FlightEnd:
 
 
 def circle_m(problem: Problem) -> float:
-    """The radius of the circle that is asked for at the goal: whole metres, not below the turn radius."""
+    """The radius of the circle that is requested at the goal: whole metres, not below the turn radius."""
     return float(math.ceil(problem.turn_radius_m))
 
 
@@ -134,7 +134,7 @@ def _ends(
 
 
 def _headings(ground: Floats, aim: Floats, given: float | None) -> list[float]:
-    """The one that is asked for; else all, those nearest to the way to ``aim`` first."""
+    """The requested one; else all, those nearest to the way to ``aim`` first."""
     if given is not None:
         return [given]
     natural = math.atan2(aim[1] - ground[1], aim[0] - ground[0])

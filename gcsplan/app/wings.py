@@ -49,31 +49,31 @@ ACCEPTED_M, CHORDS_M = 1.0, 0.2
 def plan_wing(
     brief: Brief,
     request: VehicleRequest,
-    asked: VehicleRequest,
+    limited: VehicleRequest,
     world: World,
-    told: Mapping[str, object],
+    options: Mapping[str, object],
     progress: Callable[[Progress], None] | None = None,
 ) -> VehiclePlan:
     """One fixed wing's path, mission and verdict, as `planning.plan_vehicle`. Raises InputError, NoMission.
 
-    ``asked``, ``world``, ``told``: the request under the limits, the world, and the planner's options of the search.
+    ``limited``, ``world``, ``options``: the request under its limits, the world, the options of the search.
     """
     source, vehicle = brief.source, request.vehicle
     margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
     sharp: Floats | None = None
     failed: VehiclePlan | None = None
     for _ in range(ATTEMPTS):
-        problem, notes = make_problem(source, asked, world, brief.objective, brief.seed, margins, progress, told)
+        problem, notes = make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, options)
         try:
-            problem = _with_goal_circle(problem, asked)
+            problem = _with_goal_circle(problem, limited)
             if sharp is None:
                 straight = replace(problem, turn_radius_m=0.0, progress=None)
                 sharp = run_planner(brief.run, straight, vehicle, world).path.points
-            plan = _joined(brief, request, asked, problem, sharp, world)
+            plan = _joined(brief, request, limited, problem, sharp, world)
         except NoMission:
             if failed is None:
                 raise
-            break  # with so much more room there is none: what was found before is told
+            break  # with so much more room there is none: what was found before is returned
         if not plan.verdict.findings:
             return replace(plan, notes=(*notes, *plan.notes))
         failed = plan
@@ -85,16 +85,16 @@ def plan_wing(
 
 
 def _joined(
-    brief: Brief, request: VehicleRequest, asked: VehicleRequest, problem: Problem, sharp: Floats, world: World
+    brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World
 ) -> VehiclePlan:
     """The mission between the first ends that a path can be joined to; it need not be legal yet."""
     vehicle = request.vehicle
-    for tried, (start, goal) in enumerate(_pairs(problem, asked, sharp)):
+    for tried, (start, goal) in enumerate(_pairs(problem, limited, sharp)):
         if tried == MOST_JOINTS:
             break
         inner = _inner(problem, start, goal)
         solution = _whole(problem, run_planner(brief.run, inner, vehicle, world), start, goal)
-        order = _order(brief, asked, start, goal)
+        order = _order(brief, limited, start, goal)
         if not _fits(solution.path.points, order, vehicle.turn_radius_m):
             continue
         over = looked_over(brief, solution)
@@ -110,9 +110,9 @@ def _joined(
     )
 
 
-def _pairs(problem: Problem, asked: VehicleRequest, sharp: Floats) -> Iterator[tuple[FlightEnd, FlightEnd | None]]:
-    for start in starts(problem, asked, sharp):
-        for goal in goals(problem, asked, sharp):
+def _pairs(problem: Problem, limited: VehicleRequest, sharp: Floats) -> Iterator[tuple[FlightEnd, FlightEnd | None]]:
+    for start in starts(problem, limited, sharp):
+        for goal in goals(problem, limited, sharp):
             yield start, goal
 
 
@@ -218,7 +218,7 @@ def _fits(points: Floats, order: Order, radius: float) -> bool:
 
 
 def _words(start: FlightEnd, goal: FlightEnd | None) -> Sequence[str]:
-    """What the user is told of the ends."""
+    """Notes for the user on the ends."""
     heading = (90.0 - math.degrees(start.heading)) % 360.0
     far_m = math.dist(start.top[:2], start.ground[:2])
     words = [

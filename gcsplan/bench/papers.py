@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.bench.papers_printed import PRINTED, Least, faults, least_of
-from gcsplan.bench.papers_runs import OPTIMA, Job, Key, Record, Store, carry_out, code_digest
+from gcsplan.bench.papers_runs import OPTIMA, Key, PaperRun, Record, Store, carry_out, code_digest
 from gcsplan.bench.papers_scenarios import Scenario, Set, choose, mission_text, prepare
 from gcsplan.bench.papers_statistics import equal_evaluations, judge, row
 from gcsplan.errors import InputError
@@ -58,15 +58,15 @@ def run(
             f"1 to {MOST_RUNS} runs, 1 job or more and a seed of 0 or more are wanted, given {runs}, {jobs}, {seed}"
         )
     chosen = choose(scenarios, algorithms)
-    asked: dict[tuple[str, str], list[Job]] = {}
+    asked: dict[tuple[str, str], list[PaperRun]] = {}
     code = code_digest()
     texts = {scenario.name: mission_text(scenario.name, missions) for scenario, _ in chosen}
     for scenario, contenders in chosen:
         text, count = texts[scenario.name], runs or scenario.paper.runs
         for name in _optima(scenario):
-            asked[scenario.name, name] = [Job(scenario.name, name, text, 0, 0, code)]
+            asked[scenario.name, name] = [PaperRun(scenario.name, name, text, 0, 0, code)]
         for c in contenders:
-            asked[scenario.name, c.name] = [Job(scenario.name, c.name, text, seed, k, code) for k in range(count)]
+            asked[scenario.name, c.name] = [PaperRun(scenario.name, c.name, text, seed, k, code) for k in range(count)]
     ready(out)
     store = Store(out / KEPT)
     there = store.load()

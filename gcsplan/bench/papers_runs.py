@@ -70,7 +70,7 @@ def code_digest() -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class PaperRun:
     """One run to do. It carries the mission's text, so that a machine without the file can do it."""
 
     scenario: str
@@ -140,7 +140,7 @@ class Store:
             raise InputError(f"cannot be written: {error.strerror or error}", where=str(self.path)) from error
 
 
-def work(job: Job) -> Record:
+def work(job: PaperRun) -> Record:
     """Do one run. Raises InputError where this machine's code is not that of the one who asks."""
     optimal = job.algorithm in OPTIMA
     if job.code != code_digest():
@@ -189,13 +189,13 @@ def _search(problem: Problem, contender: Contender, settings: Settings) -> Found
 @lru_cache(maxsize=256)
 def _warm(scenario: str, text: str, algorithm: str) -> None:
     """Compile and load whatever this contender needs, so that no run's time holds it."""
-    job = Job(scenario, algorithm, text, 1, 0, "")
+    job = PaperRun(scenario, algorithm, text, 1, 0, "")
     ready = prepare(scenario, text)
     with suppress(NoMission):  # one round of ants need not arrive
         _search(ready.problems[0], job.contender, replace(settings_of(job.contender, ready.source), iterations=1))
 
 
-def _swarm(job: Job, ready: Set) -> Record:
+def _swarm(job: PaperRun, ready: Set) -> Record:
     contender = job.contender
     settings = settings_of(contender, ready.source)
     _warm(job.scenario, job.text, job.algorithm)
@@ -266,7 +266,7 @@ def _nearest_m(found: Found, problem: Problem) -> float | None:
     return float(np.maximum(np.min(wall, axis=0), 0.0).mean())
 
 
-def carry_out(todo: Sequence[Job], jobs: int, cluster: str | None, keep: Callable[[Record], None]) -> None:
+def carry_out(todo: Sequence[PaperRun], jobs: int, cluster: str | None, keep: Callable[[Record], None]) -> None:
     """Do every job, ``keep`` each record as soon as it is there; what Ctrl-C finds at work is finished and kept."""
     if cluster is not None:
         _over_cluster(todo, cluster, keep)
@@ -277,7 +277,7 @@ def carry_out(todo: Sequence[Job], jobs: int, cluster: str | None, keep: Callabl
         _over_processes(todo, jobs, keep)
 
 
-def _over_processes(todo: Sequence[Job], jobs: int, keep: Callable[[Record], None]) -> None:
+def _over_processes(todo: Sequence[PaperRun], jobs: int, keep: Callable[[Record], None]) -> None:
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(min(jobs, len(todo)), mp_context=context, initializer=_deaf) as pool:
         waiting = {pool.submit(work, job) for job in todo}
@@ -299,7 +299,7 @@ def _deaf() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _over_cluster(todo: Sequence[Job], address: str, keep: Callable[[Record], None]) -> None:
+def _over_cluster(todo: Sequence[PaperRun], address: str, keep: Callable[[Record], None]) -> None:
     try:
         distributed = import_module("distributed")
     except ImportError:

@@ -15,7 +15,7 @@ from gcsplan.bench.upload import START, items_of
 from gcsplan.errors import GcsplanError, InputError, LinkError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.results import UploadResult
-from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
@@ -73,10 +73,10 @@ def _timed(numbers: Sequence[int], items: int, drop: float, autopilot: Autopilot
         )
         for n in numbers
     ]
-    options = Options(unchecked=True, simulated=True)
+    options = SessionOptions(unchecked=True, simulated=True)
     with SimServer(boards, "udpin:127.0.0.1:0", process=True) as server, Link(server.url_for_gcs) as link:
         started = time.perf_counter()
-        results = upload_fleet([Order(link, mission, options=options) for mission in missions])
+        results = upload_fleet([UploadOrder(link, mission, options=options) for mission in missions])
         took_s = time.perf_counter() - started
     fine: list[UploadResult] = []
     for result in results:

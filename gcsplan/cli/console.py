@@ -13,8 +13,8 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
-    from gcsplan.app.jobs import Delivery
     from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
+    from gcsplan.app.upload_job import JobResult
     from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.check.verdict import Verdict
     from gcsplan.mavlink.protocol.machine import Progress as Transfer
@@ -94,12 +94,12 @@ def _say_fleet(plan: Plan) -> None:
     closest = fleet.closest
     if fleet.separation is None:
         return
-    asked = f" of {arrival.separation_m:g}" if arrival is not None else ""
+    needed = f" of {arrival.separation_m:g}" if arrival is not None else ""
     if closest is None:
         say("separation: no two vehicles are in the air at the same time")
     else:
         a, b = closest.vehicles
-        say(f"separation: {closest.distance_m:.1f} m{asked} m, {a} and {b} at T+{closest.time_s:.1f} s")
+        say(f"separation: {closest.distance_m:.1f} m{needed} m, {a} and {b} at T+{closest.time_s:.1f} s")
 
 
 def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[Table]:
@@ -165,32 +165,32 @@ def verdict_table(name: str, verdict: Verdict) -> None:
         console.print(verdict.describe(), style="red" if verdict.findings else "yellow", markup=False)
 
 
-def delivery_table(deliveries: Sequence[Delivery], title: str = "upload") -> None:
+def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
     """One row for each vehicle that something was sent to, or compared with."""
     sent = title == "upload"
     columns = [("vehicle", False), ("link", False), ("items", True), *([("outcome", False)] if sent else []),
                ("read back", False), ("s", True), ("retries", True)]  # fmt: skip
     table = _table(f"[bold]{title}[/]", columns)
-    for d in deliveries:
-        told = {"accepted": "[green]accepted[/]", "withdrawn": "[yellow]withdrawn[/]"}.get(
+    for d in results:
+        outcome_words = {"accepted": "[green]accepted[/]", "withdrawn": "[yellow]withdrawn[/]"}.get(
             d.outcome, f"[bold red]{d.outcome}[/]"
         )
         verified = "[green]verified[/]" if d.verified else "[bold red]not verified[/]"
         link = escape(d.url) + (" [bold yellow]simulated[/]" if d.simulated else "")
-        outcome = [told] if sent else []  # a comparison sends nothing
+        outcome = [outcome_words] if sent else []  # a comparison sends nothing
         table.add_row(escape(d.vehicle), link, str(d.items), *outcome, verified, number(d.seconds, 2), str(d.retries))
     _print(table)
-    say_notes_of([(d.vehicle, w) for d in deliveries for w in d.warnings])
-    for d in deliveries:
+    say_notes_of([(d.vehicle, w) for d in results for w in d.warnings])
+    for d in results:
         if d.message:
             console.print(f"{d.vehicle}: {d.message}", style="red", markup=False)
 
 
-def release_table(plan: Plan, deliveries: Sequence[Delivery], gate: GateTime | None = None) -> None:
+def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | None = None) -> None:
     """When to start each vehicle of a fleet, for whoever does it: we never arm or start one."""
     if plan.fleet is None or len(plan.fleet.slots) < 2:
         return
-    ready = {d.vehicle for d in deliveries if d.verified and not d.code}
+    ready = {d.vehicle for d in results if d.verified and not d.code}
     columns = [("vehicle", False), ("release, T+ s", True), ("at the goal, T+ s", True), ("", False)]
     table = _table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
     for slot in sorted(plan.fleet.slots, key=lambda s: s.depart_s):
@@ -234,7 +234,7 @@ def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
 def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer], None]]:
     """A live table of transfers, on a terminal only: call the result with (name, progress)."""
     if not console.is_terminal:
-        yield lambda name, told: None
+        yield lambda name, transfer: None
         return
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
@@ -246,11 +246,11 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
     with Bars(*columns, console=console, transient=True) as bars:
         tasks = {name: bars.add_task(escape(name), total=None, phase="looking for it") for name in names}
 
-        def update(name: str, told: Transfer) -> None:
-            ended = {"verified": "[green]verified[/]"}.get(told.phase)
-            if told.phase.endswith("!"):
-                ended = f"[bold red]{told.phase.removesuffix('!')}[/]"
-            bars.update(tasks[name], completed=told.done, total=told.total, phase=ended or told.phase)
+        def update(name: str, transfer: Transfer) -> None:
+            ended = {"verified": "[green]verified[/]"}.get(transfer.phase)
+            if transfer.phase.endswith("!"):
+                ended = f"[bold red]{transfer.phase.removesuffix('!')}[/]"
+            bars.update(tasks[name], completed=transfer.done, total=transfer.total, phase=ended or transfer.phase)
             if ended:
                 bars.stop_task(tasks[name])
 
@@ -258,7 +258,7 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
 
 
 def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
-    """The planners, one a row, on standard output: it is what was asked for."""
+    """The planners, one a row, on standard output: it is the command's result."""
     table = _table("planners", [("name", False)])
     for name in ("what it does", "paper", "defaults"):
         table.add_column(name)

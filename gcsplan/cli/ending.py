@@ -24,7 +24,7 @@ class Interrupted(GcsplanError):
 
 
 class Terminated(Interrupted):
-    """SIGTERM: the same, asked for by another process."""
+    """SIGTERM: the same, sent by another process."""
 
     exit_code: ClassVar[int] = 143
     default_reason: ClassVar[str] = "terminated"
@@ -92,13 +92,13 @@ def put(text: str) -> None:
 
 @contextmanager
 def talking(names: Sequence[str]) -> Iterator[None]:
-    """Around a conversation with vehicles: Ctrl-C in it leaves something to be told."""
+    """Around a conversation with vehicles: after Ctrl-C the message says what state they may be in."""
     try:
         yield
     except KeyboardInterrupt:
         raise interrupted(
             f"interrupted while talking to {', '.join(names)}: a transfer under way was broken off, and the vehicle "
-            f"told so; what it holds now is unknown: send it again, or compare with gcsplan verify"
+            f"was told; what it holds now is unknown: send it again, or compare with gcsplan verify"
         ) from None
 
 
@@ -111,12 +111,12 @@ def speak_plainly() -> None:
 
 def explained(error: Exception) -> GcsplanError:
     """What an exception that is none of ours amounts to."""
-    told = getattr(error, "format_message", None)  # click's usage errors, whichever click typer brings along
-    if told is not None:
+    describe = getattr(error, "format_message", None)  # click's usage errors, whichever click typer brings along
+    if describe is not None:
         context = getattr(error, "ctx", None)
         if type(error).__name__ == "NoArgsIsHelpError":
-            return UsageError(f"a command is wanted\n\n{told()}")
-        return UsageError(f"{told()} (see {context.command_path if context else 'gcsplan'} --help)")
+            return UsageError(f"a command is wanted\n\n{describe()}")
+        return UsageError(f"{describe()} (see {context.command_path if context else 'gcsplan'} --help)")
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, KeyboardInterrupt):  # compiled code turns Ctrl-C into an error of its own
@@ -132,12 +132,12 @@ def printable(text: str) -> str:
 
 def complain(error: GcsplanError) -> None:
     """One message on standard error."""
-    with suppress(OSError):  # there is nobody left to tell
+    with suppress(OSError):  # nobody reads it any more
         print(f"gcsplan: {printable(str(error))}", file=sys.stderr)
 
 
 def fail(error: GcsplanError, as_json: bool, debug: bool) -> NoReturn:
-    """One message on standard error, one JSON document if asked, and the exit code."""
+    """One message on standard error, one JSON document on request, and the exit code."""
     code = error.exit_code
     if debug:
         traceback.print_exc()

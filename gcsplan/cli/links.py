@@ -56,9 +56,9 @@ def upload(
     A file goes out only with a passing verdict in --mission's world, or with --unchecked. The file's name (uav1.plan)
     or NAME= says which vehicle of the mission it is for.
     """
-    from gcsplan.app import checking, delivery, fencing, pipeline
-    from gcsplan.app.jobs import Options
-    from gcsplan.cli.console import delivery_table, say_notes, say_notes_of, transfer_progress, verdict_table
+    from gcsplan.app import checking, fencing, pipeline, uploads
+    from gcsplan.app.upload_job import UploadOptions
+    from gcsplan.cli.console import say_notes, say_notes_of, transfer_progress, upload_table, verdict_table
     from gcsplan.export.outdir import require_settled, steady
     from gcsplan.sim.loopback import loopback_fleet
 
@@ -66,7 +66,7 @@ def upload(
         raise UsageError("give either --mission FILE, in whose world the files are checked, or --unchecked")
     if unchecked and (fence or fence_infinite):
         raise UsageError("--fence is made of the zones of a mission file: give --mission FILE instead of --unchecked")
-    options = Options(
+    options = UploadOptions(
         allow_armed=allow_armed, ignore_position=ignore_position, unchecked=unchecked, atomic=atomic,
         timeout_s=timeout,
     )  # fmt: skip
@@ -76,7 +76,7 @@ def upload(
                 "--sysid goes with --unchecked: with --mission each vehicle's number is the mission file's"
             )
         source = pipeline.load_mission(mission)
-        delivery.targets([to], [r.vehicle for r in source.vehicles])  # a slip in the URL shows before the tables do
+        uploads.targets([to], [r.vehicle for r in source.vehicles])  # a slip in the URL shows before the tables do
         with steady(checking.split_name(file)[1] for file in files):
             checked = checking.check_files(source, files)
         if not as_json:
@@ -85,7 +85,7 @@ def upload(
                 verdict_table(f"{c.file} as {c.vehicle.name}", c.verdict)
         verdicts = {c.vehicle.name: c.verdict for c in checked}
         pipeline.require_passing(verdicts, allow_unjudged=allow_unjudged)
-        jobs = delivery.jobs_of_files(source, checked, to)
+        jobs = uploads.jobs_of_files(source, checked, to)
         if fence or fence_infinite:
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
             say_notes_of(fence_notes)
@@ -93,15 +93,15 @@ def upload(
         if len(files) > 1:
             raise UsageError("--unchecked takes one FILE, for the vehicle --sysid; send the others one by one")
         require_settled([checking.split_name(files[0])[1]])
-        jobs = [delivery.unchecked_job(files[0], to, sysid or 1)]
+        jobs = [uploads.unchecked_job(files[0], to, sysid or 1)]
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
-        deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
+        results = uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)
     if as_json:
-        emit({"vehicles": [{"name": d.vehicle} | d.as_dict() for d in deliveries]}, delivery.failure(deliveries))
+        emit({"vehicles": [{"name": d.vehicle} | d.as_dict() for d in results]}, uploads.failure(results))
     else:
-        delivery_table(deliveries)
-    raise typer.Exit(delivery.exit_code(deliveries))
+        upload_table(results)
+    raise typer.Exit(uploads.exit_code(results))
 
 
 def verify(
@@ -112,17 +112,17 @@ def verify(
     as_json: JsonOption = False,
 ) -> None:
     """Is exactly this file on board? Reads the mission back and compares; sends nothing else."""
-    from gcsplan.app import delivery
-    from gcsplan.cli.console import delivery_table
+    from gcsplan.app import uploads
+    from gcsplan.cli.console import upload_table
     from gcsplan.export.outdir import require_settled
 
     require_settled([file])
-    done = delivery.verify_file(file, to, sysid, timeout_s=timeout)
+    done = uploads.verify_file(file, to, sysid, timeout_s=timeout)
     if as_json:
-        emit(done.as_dict(), delivery.failure([done]))
+        emit(done.as_dict(), uploads.failure([done]))
     else:
-        delivery_table([done], title="verify")
-    raise typer.Exit(delivery.exit_code([done]))
+        upload_table([done], title="verify")
+    raise typer.Exit(uploads.exit_code([done]))
 
 
 def download(
@@ -135,10 +135,10 @@ def download(
     as_json: JsonOption = False,
 ) -> None:
     """Read the mission on board into a file."""
-    from gcsplan.app import delivery
+    from gcsplan.app import uploads
     from gcsplan.cli.console import say
 
-    items = delivery.download_to(source, sysid, out, timeout_s=timeout)
+    items = uploads.download_to(source, sysid, out, timeout_s=timeout)
     if as_json:
         emit({"file": str(out), "items": items})
     else:
@@ -154,11 +154,11 @@ def clear(
     as_json: JsonOption = False,
 ) -> None:
     """Remove the mission, fence or rally points on board, and read back that nothing is left."""
-    from gcsplan.app import delivery
+    from gcsplan.app import uploads
     from gcsplan.cli.console import say
 
     with talking([f"vehicle {sysid}"]):
-        delivery.clear(to, sysid, kind, allow_armed=allow_armed, timeout_s=timeout)
+        uploads.clear(to, sysid, kind, allow_armed=allow_armed, timeout_s=timeout)
     if as_json:
         emit({"cleared": kind, "sysid": sysid})
     else:

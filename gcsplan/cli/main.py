@@ -25,7 +25,7 @@ app = typer.Typer(
     "7 read-back differs, 70 a bug of ours, 129, 130, 143 interrupted (SIGHUP, Ctrl-C, SIGTERM).",
 )
 app.add_typer(bench_app, name="bench")
-app.command(short_help="Plan a mission file; upload and verify if asked.")(plan.plan)
+app.command(short_help="Plan a mission file; upload and verify on request.")(plan.plan)
 app.command(short_help="Plan, fly it all in a simulator, judge.")(rehearse.rehearse)
 app.command(short_help="Does a file fly safely in a mission's world?")(check.check)
 app.command(short_help="Check files, upload them, read them back, compare.")(links.upload)

@@ -24,11 +24,11 @@ from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
-    from gcsplan.app.jobs import Delivery, Job, Options
     from gcsplan.app.model import Plan
+    from gcsplan.app.upload_job import JobResult, UploadJob, UploadOptions
 
 SHOWN = 15
-"""Names of written files that are told; a fleet has hundreds."""
+"""Names of written files that are printed; a fleet has hundreds."""
 
 
 def plan(
@@ -92,7 +92,7 @@ def plan(
     timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Plan a mission file, write its outputs, and upload and verify them if asked.
+    """Plan a mission file, write its outputs, and upload and verify them on request.
 
     Without --upload nothing is ever sent. The outputs are written whole or not at all; where no safe mission
     exists, earlier outputs are moved to DIR/previous, so that no old mission is flown by mistake.
@@ -112,27 +112,27 @@ def plan(
         source = pipeline.load_mission(mission)
         targets: dict[str, str] = {}
         if upload or fence or fence_infinite:  # else nothing of what sends is needed
-            from gcsplan.app import delivery, fencing
-            from gcsplan.app.jobs import Options
+            from gcsplan.app import fencing, uploads
+            from gcsplan.app.upload_job import UploadOptions
 
-            targets = delivery.targets(upload or [], [r.vehicle for r in source.vehicles])
+            targets = uploads.targets(upload or [], [r.vehicle for r in source.vehicles])
         names = [r.vehicle.name for r in source.vehicles]
-        with planning_display(names, objective or source.planner.objective) as tell:
-            told = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
+        with planning_display(names, objective or source.planner.objective) as progress:
+            chosen = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
             planned = pipeline.plan(
                 source,
                 planner=planner,
                 objective=objective,
                 seed=seed,
-                options=told,
-                progress=tell,
+                options=chosen,
+                progress=progress,
                 gate_utc=None if gate is None else gate.start,
             )
         pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
         homes = outputs.homes_of(planned) if report or way_home or rally else {}
-        jobs: list[Job] = []
+        jobs: list[UploadJob] = []
         if upload or fence or fence_infinite:
-            jobs = delivery.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""))
+            jobs = uploads.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""))
         fence_notes: list[tuple[str, str]] = []
         if fence or fence_infinite:  # one that the mission would breach is found before anything is written
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
@@ -163,19 +163,21 @@ def plan(
         say_notes_of(fence_notes)
         shown = [*list(files)[:SHOWN], f"… and {len(files) - SHOWN} more"] if len(files) > SHOWN + 1 else list(files)
         say(f"written to {directory}{os.sep}: {', '.join(shown)}")
-    deliveries: list[Delivery] = []
+    results: list[JobResult] = []
     if targets:
-        options = Options(allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout)
-        deliveries = _deliver(planned, jobs, options, gate, as_json)
+        options = UploadOptions(
+            allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout
+        )
+        results = _upload(planned, jobs, options, gate, as_json)
         try:
-            add_output(directory, "upload.json", outputs.upload_text(planned, deliveries, homes))
+            add_output(directory, "upload.json", outputs.upload_text(planned, results, homes))
             if report:
-                add_output(directory, "report.html", outputs.report_of(planned, deliveries, homes))
+                add_output(directory, "report.html", outputs.report_of(planned, results, homes))
         except InputError as error:  # what became of the upload matters more
             say(f"note: what became of the upload is not written: {error}")
     if as_json:
-        emit(outputs.summary_of(planned, deliveries, homes), delivery.failure(deliveries) if targets else None)
-    raise typer.Exit(delivery.exit_code(deliveries) if targets else 0)
+        emit(outputs.summary_of(planned, results, homes), uploads.failure(results) if targets else None)
+    raise typer.Exit(uploads.exit_code(results) if targets else 0)
 
 
 def _require_options(planner: str | None, objective: str | None, png: Path | None, directory: Path) -> bool:
@@ -205,21 +207,23 @@ def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
     return {png: outputs.picture_of(planned)}
 
 
-def _deliver(planned: Plan, jobs: list[Job], options: Options, gate: GateTime | None, as_json: bool) -> list[Delivery]:
+def _upload(
+    planned: Plan, jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None, as_json: bool
+) -> list[JobResult]:
     """Upload all jobs with their progress shown, and say how each ended and when each vehicle starts."""
-    from gcsplan.app import delivery
-    from gcsplan.cli.console import delivery_table, release_table, transfer_progress
+    from gcsplan.app import uploads
+    from gcsplan.cli.console import release_table, transfer_progress, upload_table
     from gcsplan.sim.loopback import loopback_fleet
 
     if gate is not None:
         gate.require_ahead(datetime.now(UTC))  # planning took its time
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
-        deliveries = delivery.deliver(jobs, options, moved_on, simulator=loopback_fleet)
+        results = uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)
     if not as_json:
-        delivery_table(deliveries)
-        release_table(planned, deliveries, gate)
-    return deliveries
+        upload_table(results)
+        release_table(planned, results, gate)
+    return results
 
 
 def planners(as_json: JsonOption = False) -> None:

@@ -75,23 +75,23 @@ def rehearse(
     source = pipeline.load_mission(mission)
     names = [r.vehicle.name for r in source.vehicles]
     addresses = rehearsing.seats_of(sitl or [], names)
-    with planning_display(names, source.planner.objective) as tell:
-        planned = pipeline.plan(source, planner=planner, progress=tell)
+    with planning_display(names, source.planner.objective) as progress:
+        planned = pipeline.plan(source, planner=planner, progress=progress)
     pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
     if in_sitl:
         with talking(names):
             result = rehearsing.rehearse_in_sitl(
                 planned, binary=sitl_binary, addresses=addresses, speedup=speedup, i_know=i_know,
-                tell=None if as_json else lambda name, what: say(f"{name} {what}"),
+                report=None if as_json else lambda name, what: say(f"{name} {what}"),
             )  # fmt: skip
     else:
         result = rehearsing.rehearse(planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed)
     error = result.error(allow_unjudged=allow_unjudged)
     if as_json:
-        told = None
+        failure = None
         if error is not None:
-            told = {"code": error.exit_code, "reason": error.reason, "message": error.message, "where": str(mission)}
-        emit({"name": source.name} | result.as_dict(), told)
+            failure = {"code": error.exit_code, "reason": error.reason, "message": error.message, "where": str(mission)}
+        emit({"name": source.name} | result.as_dict(), failure)
     else:
         _show(planned, result)
         say_notes(result.notes)

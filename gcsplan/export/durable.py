@@ -1,7 +1,7 @@
 """Files that stay written: whole or not at all, and on the disk before anything relies on them.
 
-What the operating system was told is not yet on the disk: after a loss of power any part of it may be missing, and in
-any order. `sync_directory` and the `fsync` of a file are the only fences; a write that others rely on passes one first.
+What was handed to the operating system is not yet on the disk: after a loss of power any part may be missing, in any
+order. `sync_directory` and the `fsync` of a file are the only fences; a write that others rely on passes one first.
 """
 
 from __future__ import annotations

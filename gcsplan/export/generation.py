@@ -197,13 +197,13 @@ def _read_journal(path: Path) -> tuple[list[Move], list[Move], dict[str, str], b
             raise ValueError("it is no file")
         with path.open("rb") as stream:
             data = stream.read(MAX_JOURNAL_BYTES + 1)
-        told = json.loads(data)
-        leaving, coming = ([(str(s), str(t)) for s, t in told[key]] for key in ("leaving", "coming"))
+        record = json.loads(data)
+        leaving, coming = ([(str(s), str(t)) for s, t in record[key]] for key in ("leaving", "coming"))
         places = [place for move in (*leaving, *coming) for place in move]
-        if told["version"] != 1 or not all(_PLACE.fullmatch(p) and p != PREVIOUS for p in places):
+        if record["version"] != 1 or not all(_PLACE.fullmatch(p) and p != PREVIOUS for p in places):
             raise ValueError("it names places that no journal names")
-        digests = {str(name): str(digest) for name, digest in told["digests"].items()}
-        return leaving, coming, digests, told["makes_previous"] is True
+        digests = {str(name): str(digest) for name, digest in record["digests"].items()}
+        return leaving, coming, digests, record["makes_previous"] is True
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"an earlier run was cut off here, and its journal cannot be read ({str(error)[:80]}): the files of that "

@@ -235,10 +235,10 @@ def _folders(files: Iterable[str | os.PathLike[str]]) -> list[Path]:
 def _mark(folder: Path) -> tuple[int, int, int] | None:
     """What tells one plan in ``folder`` from the next; None where gcsplan wrote none."""
     try:
-        told = os.lstat(folder / MANIFEST)
+        status = os.lstat(folder / MANIFEST)
     except OSError:
         return None
-    return told.st_ino, told.st_mtime_ns, told.st_size
+    return status.st_ino, status.st_mtime_ns, status.st_size
 
 
 def _is_ours(path: Path, digest: str | None) -> bool:
@@ -253,7 +253,7 @@ def _manifest_text(record: Mapping[str, str | None]) -> bytes:
 
 
 def _manifest(directory: Path) -> dict[str, str | None]:
-    """Names that gcsplan wrote here to their digests; None for those of a damaged manifest, told by their names."""
+    """Names that gcsplan wrote here to their digests; None for those of a damaged manifest, known by their names."""
     path = directory / MANIFEST
     if not os.path.lexists(path):
         return {}

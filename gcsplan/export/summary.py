@@ -44,7 +44,7 @@ def write_summary(summary: Mapping[str, Any], *, clocks: bool = False) -> str:
     """The JSON text of ``summary``; NaN and infinity become null, numpy's numbers plain ones.
 
     ``clocks`` keeps the clock readings. Floats are rounded by their unit; least values and lower bounds (``min_…``,
-    ``lower_bound_…``) downwards, so that none is told better than it is. Raises TypeError for what JSON has not.
+    ``lower_bound_…``) downwards, so that none looks better than it is. Raises TypeError for what JSON has not.
     """
     return json.dumps(_plain(summary, "", clocks), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 

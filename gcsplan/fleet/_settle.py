@@ -23,7 +23,7 @@ Again = Callable[[float], Schedule]
 
 ATTEMPTS = 4
 PROMOTIONS = 3
-"""How many vehicles that nothing helps may be put before the one in their way, where no priority was asked for."""
+"""How many vehicles that nothing helps may be put before the one in their way, where no priority is set."""
 
 LATER_S = 600.0
 """By how much the whole fleet may arrive later where its clock leaves somebody no room."""
@@ -132,7 +132,7 @@ def moved(settled: Settled) -> tuple[Settled, float]:
 
 
 def _settle(plan: Schedule, ask: Ask) -> Settled | Stuck:
-    """Fix all in order; who is stuck goes before those in its way, where no priority was asked for."""
+    """Fix all in order; who is stuck goes before those in its way, where no priority is set."""
     order = list(plan.order if ask.priority is None else ask.priority)
     promoted: set[str] = set()
     done: Settled = {}

@@ -52,7 +52,7 @@ class Schedule:
 
 
 class NoSchedule(NoMission):
-    """The vehicles cannot arrive as asked; ``vehicle`` names the one that cannot.
+    """The vehicles cannot arrive as requested; ``vehicle`` names the one that cannot.
 
     ``interval_s`` is the smallest interval with which the same order works, ``arrive_s`` the earliest clock (the
     first arrival of a sequence, the common one of ``together``); None where there is none.
@@ -78,7 +78,7 @@ def schedule(
     arrive_s: float | None = None,
     longer: Longer | None = None,
 ) -> Schedule:
-    """Departures and speeds with which the fleet arrives as asked.
+    """Departures and speeds with which the fleet arrives as requested.
 
     ``mode``: ``sequence``: in ``order`` (names; None: as handed in; ``best``: finishing earliest, exact, see
     `order.best_order`), ``interval_s`` apart; ``together``; ``none``: everybody at once, at its fastest.
@@ -87,7 +87,7 @@ def schedule(
     there at ``arrive_s`` (of ``together`` the common arrival; else the slowest at its fastest).
     Who must come later than its slowest speed takes it leaves later (``hold="ground"``: costs nothing), or all leave at
     once and it holds at the gate (``gate``: multicopters; costs ``hover_w``), or nobody waits (``none``); where it
-    cannot wait ``longer(name, length_m)`` is asked for a path of that length.
+    cannot wait ``longer(name, length_m)`` is called for a path of that length.
 
     Raises NoSchedule where somebody cannot, with the smallest interval or the earliest arrival that works.
     """

@@ -49,7 +49,7 @@ class Slot:
 
     It leaves the ground at ``depart_s`` after the common start, holds ``hold_s`` (whole seconds) at the gate, flies
     at ``speed_m_s`` (a float32, as DO_CHANGE_SPEED carries it) and is at the goal at ``arrive_s``. ``energy_j`` is that
-    of the whole flight. ``route`` is the one to fly: longer than the one handed in where that was asked for.
+    of the whole flight. ``route`` is the one to fly: longer than the one handed in where that was needed.
     """
 
     name: str
@@ -139,7 +139,7 @@ class Craft:
         return self.fly(self.slowest_m_s, spare_s - hold_s, float(hold_s), [note])
 
     def _longer(self, arrive_s: float, longer: Longer) -> Slot | None:
-        """A longer path at the slowest speed, or a little faster: asked for until it fits."""
+        """A longer path at the slowest speed, or a little faster: requested until it fits."""
         wanted_m = self.crew.route.length_m + (arrive_s - self.slow_s) * self.slowest_m_s
         for _ in range(LONGER_TRIES):
             route = longer(self.name, wanted_m)

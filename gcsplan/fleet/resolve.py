@@ -117,7 +117,7 @@ def resolve(
     too tight, all move by the same time of at most ``later_s`` (0: the clock stands); with none they are free.
     ``hold`` as in `arrival.schedule`: ``ground`` departures may change, and where that does not help a multicopter
     holds at the gate; ``gate`` all leave as scheduled; ``none`` nobody waits. Routes that end with ``none`` are gone on
-    arrival. ``replan`` is asked last. ``again(interval_s)`` makes a schedule anew (None: from ``crews``).
+    arrival. ``replan`` is called last. ``again(interval_s)`` makes a schedule anew (None: from ``crews``).
 
     Raises NotSeparated (NoMission, ``separation``).
     """

@@ -37,7 +37,7 @@ def in_metres(place: Place) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """What is asked: ``separation_m`` between any two, of which each may be ``error_m`` away from its place in the
+    """The requested ``separation_m`` between any two, of which each may be ``error_m`` away from its place in the
     model, and up to ± ``window_s`` early or late, independently of the others.
 
     A landed vehicle stands where it landed for ``pad_clear_s`` (inf: for good). ``leaving`` names those that fly on and

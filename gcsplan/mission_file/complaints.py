@@ -32,7 +32,7 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Pro
         unknown = {e["loc"][0] for e in errors if e["type"] == "extra_forbidden" and len(e["loc"]) == 1}
         if len(unknown) < len(errors):
             return None
-    # Nothing but unknown keys: the rest is judged too, so that its mistakes are told in the same breath.
+    # Nothing but unknown keys: the rest is judged too, so that its mistakes are reported together.
     return kind.model_validate({k: v for k, v in value.items() if k not in unknown})
 
 

@@ -136,12 +136,12 @@ class OpenWorld:
         if problems:
             raise InputError.of([_renamed(p) for p in problems])
         notes = surface.info.get("notes", ())
-        told = [*self.notes, *(str(n) for n in (notes if isinstance(notes, tuple) else ()))]
+        said = [*self.notes, *(str(n) for n in (notes if isinstance(notes, tuple) else ()))]
         if far:
-            told.append(f"{len(far)} zone(s) of files lie too far away to matter and are left out")
+            said.append(f"{len(far)} zone(s) of files lie too far away to matter and are left out")
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}
         inputs["zones_sha256"] = zones_sha256(self._drafts)
-        inputs["notes"] = tuple(dict.fromkeys(told))
+        inputs["notes"] = tuple(dict.fromkeys(said))
         return World(frame, Airspace(surface, zones, scale=scale)), inputs
 
     def _box(self, points: Sequence[tuple[float, float]], reach_m: float) -> Box:

@@ -13,7 +13,7 @@ from weakref import WeakValueDictionary
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.request import MissionFile, VehicleRequest
-from gcsplan.mission_file.stops import Stops, make_request
+from gcsplan.mission_file.terminals import Terminals, make_request
 from gcsplan.mission_file.world import LOCAL_MARGIN_M, MARGIN_M, Box, Place, settle_zones
 from gcsplan.mission_file.zone_draft import ZoneDraft
 from gcsplan.world.frame import FARTHEST_M, Frame
@@ -36,7 +36,7 @@ QUICK_CELLS = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """One window: its surface, and what the ground decides about zones and stops."""
+    """One window: its surface, and what the ground decides about zones and terminals."""
 
     surface: Surface
     zones: tuple[Zone, ...]
@@ -47,13 +47,13 @@ class Ground:
 @dataclass(eq=False)
 class Site:
     """A mission's places in its plane. ``box`` (west, south, east, north) is the first window; ``good``: the places
-    of ``stops`` that lie on the terrain."""
+    of ``terminals`` that lie on the terrain."""
 
     terrain: Terrain
     frame: Frame
     box: Box
     placed: Placed
-    stops: Sequence[Stops]
+    terminals: Sequence[Terminals]
     good: Collection[Place]
     local: bool
     _extent: Box | None = None
@@ -101,11 +101,11 @@ class Site:
             problems += why.problems
             return None
         zones = settle_zones(self.placed, surface, problems)
-        requests = [make_request(s, self.frame, surface, zones, self.good, problems) for s in self.stops]
+        requests = [make_request(s, self.frame, surface, zones, self.good, problems) for s in self.terminals]
         return Ground(surface, tuple(zones), scale, tuple(r for r in requests if r is not None))
 
     def _level_for(self, margin_m: float, level: int) -> int:
-        """The first window after ``level`` that is so wide around all stops, or so many times the first one."""
+        """The first window after ``level`` that is so wide around all terminals, or so many times the first one."""
         east, north = zip(*(p.in_plane(self.frame) for p in self.good), strict=True)
         least, most = (min(east), min(north)), (max(east), max(north))
         need = self._clipped((*(x - margin_m for x in least), *(x + margin_m for x in most)))
@@ -162,7 +162,7 @@ def _within_frame(box: Box) -> Box:
 
 
 def _is_larger(wide: Surface, surface: Surface) -> bool:
-    """Whether a window reaches farther than another; the border of one is not asked for again and again."""
+    """Whether a window reaches farther than another; the border of one is not loaded again and again."""
     if wide.ground_m.shape != surface.ground_m.shape:
         return True
     far = wide.ground_m.shape[1] - 1, wide.ground_m.shape[0] - 1

@@ -1,7 +1,7 @@
-"""In which order a mission file's parts are asked; every mistake is reported at once.
+"""Reads the parts of a mission file in their order and reports every mistake at once.
 
 Each has its file, key path, what was given and what is wanted. What stands where: `schema` (keys), `vehicles` and
-`stops` (vehicles, limits, where they go), `world` (points, terrain, zones).
+`terminals` (vehicles, limits, where they go), `world` (points, terrain, zones).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from gcsplan.mission_file.schema import (
     nearest,
     shown,
 )  # fmt: skip
-from gcsplan.mission_file.stops import Stops
+from gcsplan.mission_file.terminals import Terminals
 from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle
 from gcsplan.mission_file.world import (
     covered,
@@ -120,7 +120,7 @@ class _Reading:
         frame_keys = self._section(FrameKeys, "frame")
         terrain_keys = self._section(TerrainKeys, "terrain")
         planner = self._planner()
-        stops = self._vehicles(terrain_keys, altitude_frame)
+        terminals = self._vehicles(terrain_keys, altitude_frame)
         names = check_unique(self._list("vehicles"), f"{self.where}vehicles", problems)
         arrival_keys = self._section(ArrivalKeys, "arrival")
         arrival = make_arrival(arrival_keys, names, f"{self.where}arrival", problems)
@@ -128,7 +128,7 @@ class _Reading:
 
         spec = None if terrain_keys is None else make_spec(terrain_keys, self.file.parent)
         terrain = None if spec is None else self._open(spec)
-        places = [p for s in stops for p in s.all]
+        places = [p for s in terminals for p in s.all]
         if terrain is not None:
             places = covered(places, terrain, problems)
         frame: Frame | None = None
@@ -142,7 +142,7 @@ class _Reading:
             others = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in self.around if terrain.covers(*p))]
             others = [p for p in others if math.hypot(*p) <= FARTHEST_M]
             box = make_box([*(p.in_plane(frame) for p in places), *others], [z for _, z in placed], local=self.local)
-            site = Site(terrain, frame, box, placed, stops, set(places), self.local)
+            site = Site(terrain, frame, box, placed, terminals, set(places), self.local)
             ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
             raise InputError.of(problems)
@@ -223,7 +223,7 @@ class _Reading:
             keys.name, keys.objective, keys.seed, keys.gap_percent, keys.budget_s, keys.budget_mb, extras
         )
 
-    def _vehicles(self, terrain: TerrainKeys | None, altitude_frame: AltitudeFrame) -> list[Stops]:
+    def _vehicles(self, terrain: TerrainKeys | None, altitude_frame: AltitudeFrame) -> list[Terminals]:
         where = f"{self.where}vehicles"
         value = self.raw.get("vehicles")
         if value is not None and (not isinstance(value, list) or not value or len(value) > 255):
@@ -234,7 +234,7 @@ class _Reading:
         broken = any(p.where.startswith(f"{self.where}limits") for p in self.problems)
         if broken and shared.min_agl_m is None:
             shared = LimitKeys(min_agl_m=0.0)
-        stops = []
+        terminals = []
         for i, one in enumerate(self._list("vehicles")):
             at = f"{where}[{i}]"
             keys = read_section(VehicleKeys, one, at, self.problems)
@@ -252,8 +252,8 @@ class _Reading:
             start = make_place(keys.start, f"{at}.start", self.problems, local=self.local)
             goal = make_place(keys.goal, f"{at}.goal", self.problems, local=self.local)
             via = [make_place(p, f"{at}.via[{j}]", self.problems, local=self.local) for j, p in enumerate(keys.via)]
-            stops.append(Stops(keys, vehicle, start, goal, tuple(via)))
-        return stops
+            terminals.append(Terminals(keys, vehicle, start, goal, tuple(via)))
+        return terminals
 
     def _zones(self) -> list[ZoneDraft]:
         where = f"{self.where}no_fly"

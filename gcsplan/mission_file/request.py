@@ -81,12 +81,12 @@ class PlannerRequest:
 class MissionFile:
     """A mission file, read and found good; metres inside.
 
-    ``airspace_scale``: largest scale of the plane over the terrain that was loaded. ``inputs`` is what the outputs
-    say of the sources; ``notes`` are said to the user. ``wider(margin_m, most_cells)``: the same file with more terrain
-    loaded, so far around all stops or at least twice as far as here, or what there is of it; None where that would take
-    more cells, or there is no more. ``level`` counts the times that it was: the terrain of each holds that of the one
-    before. ``reaching(places)``: the same content read again, with terrain for these places (latitude, longitude), too.
-    """
+    ``airspace_scale``: largest scale of the plane over the terrain that was loaded. ``inputs`` is what the outputs say
+    of the sources; ``notes`` are said to the user. ``wider(margin_m, most_cells)``: the same file with more terrain
+    loaded, so far around all terminals or at least twice as far as here, or what there is of it; None where that would
+    take more cells, or there is no more. ``level`` counts the times that it was: the terrain of each holds that of the
+    one before. ``reaching(places)``: the same content read again, with terrain for these places (latitude, longitude),
+    too."""
 
     name: str
     path: Path

@@ -15,8 +15,8 @@ MAX_BYTES = 20_000_000
 def read_zones(path: Path, *, where: str) -> ZoneFile:
     """Zones of a .geojson, .json or .kml file.
 
-    ``where`` names the key that asked for it. Mistakes in single features are collected in ``problems``; a file that
-    cannot be read at all raises InputError.
+    ``where`` names the key that the zones stand under. Mistakes in single features are collected in ``problems``; a
+    file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
     if kind not in (".geojson", ".json", ".kml"):

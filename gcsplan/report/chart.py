@@ -54,7 +54,7 @@ class Axes:
 
 
 def chart_html(name: str, axes: Axes, shapes: Sequence[str], marks: Sequence[Mark], words: str, tall: float) -> str:
-    """The figure ``name``; ``words`` tell somebody who cannot see it what it shows; ``tall`` is height over width."""
+    """The figure ``name``; ``words`` say what it shows to somebody who cannot see it; ``tall`` is height over width."""
     xs, ys = ticks(axes.x0, axes.x1, 8), ticks(axes.y0, axes.y1, 6)
     grid = "".join(
         f'<path class="grid" d="M{u:.0f} 0V10000"/>' for u in axes.xy(xs, np.full(len(xs), axes.y0))[:, 0]

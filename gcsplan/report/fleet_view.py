@@ -103,13 +103,13 @@ def separation_words(page: Page) -> str:
     found = page.separation
     if found is None:
         return ""
-    asked = f"{num(found.rules.separation_m, 1, 'm')} asked, {num(found.rules.needed_m, 1, 'm')} needed in the model"
+    needed = f"{num(found.rules.separation_m, 1, 'm')} asked, {num(found.rules.needed_m, 1, 'm')} needed in the model"
     if found.least is None:
-        return f"No two vehicles are ever in the air at the same time ({asked})."
+        return f"No two vehicles are ever in the air at the same time ({needed})."
     a, b = found.least.vehicles
     near = f"{least(found.least.distance_m, 1, 'm')} at {num(found.least.time_s, 1, 's')}"
     word = "kept" if found.safe else "<b>broken</b>"
-    return f"Separation {word}: {esc(a)} and {esc(b)} come nearest, {near} ({asked}; exact, not sampled)."
+    return f"Separation {word}: {esc(a)} and {esc(b)} come nearest, {near} ({needed}; exact, not sampled)."
 
 
 def _distance_chart(motions: Sequence[tuple[int, TimedPath]], times: Floats, charts: dict[str, object]) -> str:
@@ -137,13 +137,13 @@ def _separation_chart(
         return '<p class="note">No two vehicles are ever in the air at the same time.</p>'
     nearest = np.full(len(times), np.nan)
     nearest[some] = np.nanmin(every[:, some], axis=0)
-    asked = page.separation.rules.needed_m if page.separation is not None else None
-    high = max(float(np.nanmax(nearest)), 1.4 * (asked or 0.0), 1.0)
+    needed_m = page.separation.rules.needed_m if page.separation is not None else None
+    high = max(float(np.nanmax(nearest)), 1.4 * (needed_m or 0.0), 1.0)
     axes = Axes(float(times[0]), float(times[-1]), 0.0, 1.08 * high, "time, s", "apart, m")
     shapes, numbers = [], [("nearest two", "m", 1, nearest)]
-    if asked:
+    if needed_m:
         ends, zero = [times[0], times[-1]], [0.0, 0.0]
-        shapes += [axes.area(ends, zero, [asked, asked], "below"), axes.line(ends, [asked, asked], "floor")]
+        shapes += [axes.area(ends, zero, [needed_m, needed_m], "below"), axes.line(ends, [needed_m, needed_m], "floor")]
     if len(pairs) <= MOST_PAIRS:
         shapes += [axes.line(times, d, "pair") for _, _, d in pairs]
         numbers += [(f"{a[1].name} – {b[1].name}", "m", 1, d) for a, b, d in pairs]
@@ -152,14 +152,14 @@ def _separation_chart(
     a, b, _ = pairs[int(np.nanargmin(every[:, at]))]
     label = f"{least(float(nearest[at]), 1, 'm')}"
     tip = f"{a[1].name} and {b[1].name} are nearest at {num(float(times[at]), 1, 's')}: about {label}"
-    kind = "broken" if asked and nearest[at] < asked - 1e-6 else "tight"
+    kind = "broken" if needed_m and nearest[at] < needed_m - 1e-6 else "tight"
     marks = [axes.mark(float(times[at]), float(nearest[at]), kind, label, tip, 0)]
     charts["separation"] = _numbers(times, numbers)
-    words = f"Distance of the nearest two vehicles over time; {tip}; asked for: {num(asked, 0, 'm')}"
+    words = f"Distance of the nearest two vehicles over time; {tip}; asked for: {num(needed_m, 0, 'm')}"
     key = (
         '<ul class="legend"><li><i class="stroke nearest"></i>nearest two</li>'
         + ('<li><i class="stroke pair"></i>each pair</li>' if len(pairs) <= MOST_PAIRS else "")
-        + ('<li><i class="swatch below"></i>nearer than needed</li>' if asked else "")
+        + ('<li><i class="swatch below"></i>nearer than needed</li>' if needed_m else "")
         + "</ul>"
     )
     return chart_html("separation", axes, shapes, marks, words, TALL) + key

@@ -28,8 +28,8 @@ def home_lines(page: Page) -> str:
     if len(lines) <= MOST_LINES:
         return "".join(line for _, line in lines)
     names = ", ".join(esc(s.name) for s, _ in lines[:MOST_LINES])
-    told = f"<b>the way home of {len(lines)} vehicles is not safe, or not judged</b> ({names} …)"
-    return f'<p class="bare bad">{told}: see <a href="#home">below</a></p>'
+    text = f"<b>the way home of {len(lines)} vehicles is not safe, or not judged</b> ({names} …)"
+    return f'<p class="bare bad">{text}: see <a href="#home">below</a></p>'
 
 
 def _home_line(subject: Subject, several: bool) -> str:
@@ -46,8 +46,8 @@ def _home_line(subject: Subject, several: bool) -> str:
     if home.battery is not None and home.battery.short:
         words.append("beyond the battery from some of it")
     judged = f"{esc(home.parameter)} {num(home.rtl_rel_home_m, 0, 'm')} above home"
-    told = f"<b>{who}the way home is {' and '.join(words)}</b> ({judged})"
-    return f'<p class="bare bad">{told}: see <a href="#home">below</a></p>'
+    text = f"<b>{who}the way home is {' and '.join(words)}</b> ({judged})"
+    return f'<p class="bare bad">{text}: see <a href="#home">below</a></p>'
 
 
 def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object]) -> str:
@@ -77,11 +77,11 @@ def _one(
 
 
 def _facts(home: WayHome) -> str:
-    told = home.rows()
+    rows = home.rows()
     rows = [
-        (esc(label), esc(words)) for label, words in told if label not in ("not clear", "not judged", "left unsafe")
+        (esc(label), esc(words)) for label, words in rows if label not in ("not clear", "not judged", "left unsafe")
     ]
-    left = [words for label, words in told if label == "left unsafe"]
+    left = [words for label, words in rows if label == "left unsafe"]
     folded = "".join(f"<li>{esc(words)}</li>" for words in left)
     return table(
         f"Return of {esc(home.vehicle)}, judged from every point of its mission", ("what|", "found|"), rows

@@ -35,7 +35,7 @@ def num(value: float | None, decimals: int = 0, unit: str = "") -> str:
 
 
 def least(value: float | None, decimals: int = 1, unit: str = "") -> str:
-    """The same, rounded down: room that is left is never told larger than it is."""
+    """The same, rounded down: a margin is never shown larger than it is."""
     if value is None or not math.isfinite(value):
         return "–"
     power = 10.0**decimals

@@ -102,7 +102,7 @@ class Relief:
     """The ground of an extent, ready to be shown. ``low_m``, ``high_m`` AMSL of known ground, NaN where none is.
 
     ``picture``: a data URI. ``contours``: an SVG path in map units, a line every ``interval_m``. ``grid``: what the
-    page's script needs to tell the ground under the pointer and to build the terrain's mesh.
+    page's script needs to show the ground under the pointer and to build the terrain's mesh.
     """
 
     extent: Extent

@@ -48,7 +48,7 @@ class Subject:
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """Everything that one report shows. ``facts``: name and value of what was asked, in the order shown."""
+    """Everything that one report shows. ``facts``: name and value of what was requested, in the order shown."""
 
     title: str
     world: World

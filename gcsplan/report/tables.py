@@ -69,18 +69,18 @@ def legs_table(subject: Subject) -> str:
 def limits_table(subject: Subject, line: Line | None) -> str:
     """Every limit, with the errors it is widened by, what was reached, and what was left."""
     rows, marks = [], []
-    for name, asked, reached, left, unit, where, share in _limits(subject, line):
+    for name, needed, reached, left, unit, where, share in _limits(subject, line):
         broken = left is not None and left < -1e-6
         close = left is not None and not broken and share is not None and left <= share
         word = "broken" if broken else "close" if close else "kept" if left is not None else "–"
-        rows.append((name, asked, reached, least(left, {"m": 2, "": 0}.get(unit, 1), unit), word, where))
+        rows.append((name, needed, reached, least(left, {"m": 2, "": 0}.get(unit, 1), unit), word, where))
         marks.append("bad" if broken else "close" if close else "")
     head = ("limit|", "asked", "reached", "left", "|", "where|")
     return table(f"Limits of {esc(subject.name)}, and how near each came to binding", head, rows, marks=marks)
 
 
 Row = tuple[str, str, str, float | None, str, str, float | None]
-"""Limit, what is asked, what was reached, what is left, its unit, where, and what counts as close."""
+"""Limit, what is needed, what was reached, what is left, its unit, where, and what counts as close."""
 
 
 def _limits(subject: Subject, line: Line | None) -> list[Row]:
@@ -90,11 +90,11 @@ def _limits(subject: Subject, line: Line | None) -> list[Row]:
     rows: list[Row] = []
     low = verdict.lowest
     if low is not None:
-        asked = limits.min_agl_m + error
+        needed_m = limits.min_agl_m + error
         words = f"{num(limits.min_agl_m, 1)} + {num(error, 1)} error"
         at = f"item {low.seq}, {place(*low.min_agl_at)}"
         rows.append(("lowest above ground and what stands on it", words, least(low.min_agl_m, 2, "m"),
-                     low.min_agl_m - asked, "m", at, CLOSE * asked))  # fmt: skip
+                     low.min_agl_m - needed_m, "m", at, CLOSE * needed_m))  # fmt: skip
     highs = [leg for leg in verdict.legs if not math.isnan(leg.max_agl_m)]
     if limits.max_agl_m is not None and highs:
         top = max(highs, key=lambda leg: leg.max_agl_m)
@@ -108,11 +108,11 @@ def _limits(subject: Subject, line: Line | None) -> list[Row]:
                      num(z, 2, "m"), limits.max_amsl_m - error - z, "m", f"item {peak.seq}", 1.0))  # fmt: skip
     near = verdict.nearest
     if near is not None:
-        asked = limits.horizontal_clearance_m + track
+        needed_m = limits.horizontal_clearance_m + track
         rows.append(("horizontal distance from zones at the path's height",
                      f"{num(limits.horizontal_clearance_m, 1)} + {num(track, 1)} error",
-                     least(near.zone_clearance_m, 2, "m"), near.zone_clearance_m - asked, "m",
-                     f"item {near.seq}, {esc(near.nearest_zone)}", max(CLOSE * asked, 1.0)))  # fmt: skip
+                     least(near.zone_clearance_m, 2, "m"), near.zone_clearance_m - needed_m, "m",
+                     f"item {near.seq}, {esc(near.nearest_zone)}", max(CLOSE * needed_m, 1.0)))  # fmt: skip
     if line is not None:
         rows += _height_left(subject, line)
     rows += _steepness(flown, limits.max_climb_deg, limits.max_descent_deg)
@@ -139,9 +139,9 @@ def _height_left(subject: Subject, line: Line) -> list[Row]:
     if not math.isfinite(room[at]):
         return []
     words = "the judgement is exact; this is drawn from samples, on the safe side, to some centimetres"
-    asked = f'<abbr title="{words}">{least(float(line.floor_m[at]), 1, "m AMSL")}</abbr>'
+    needed = f'<abbr title="{words}">{least(float(line.floor_m[at]), 1, "m AMSL")}</abbr>'
     left = float(room[at])
-    return [("terrain with clearance and all errors, tightest sample", asked, num(float(line.amsl_m[at]), 1, "m AMSL"),
+    return [("terrain with clearance and all errors, tightest sample", needed, num(float(line.amsl_m[at]), 1, "m AMSL"),
              max(left, 0.0) if left > -0.5 and subject.verdict.safe is not False else left, "m",
              f"item {legs[line.leg[at]].seq}, {num(line.run_m[at] / 1000, 2, 'km')} along", 1.0)]  # fmt: skip
 
@@ -214,8 +214,8 @@ def upload_table(page: Page) -> str:
     if not rows:
         return '<p class="note">Nothing was sent to any vehicle when this report was written.</p>'
     head = ("vehicle|", "link|", "items", "outcome|", "read back|", "took", "said|")
-    told = [(s.name, w) for s in page.subjects if s.upload is not None for w in _warnings(s.upload)]
-    listed = "".join(f"<li><b>{esc(who)}</b>: {esc(words)}</li>" for who, words in told)
+    warned = [(s.name, w) for s in page.subjects if s.upload is not None for w in _warnings(s.upload)]
+    listed = "".join(f"<li><b>{esc(who)}</b>: {esc(words)}</li>" for who, words in warned)
     return table("Upload", head, rows, marks=marks) + (f"<ul>{listed}</ul>" if listed else "")
 
 

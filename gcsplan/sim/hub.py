@@ -35,7 +35,7 @@ class _Listener:
 
 
 class Hub:
-    """One or many vehicles behind one port. ``always`` is a client that is told everything from the start.
+    """One or many vehicles behind one port. ``always`` is a client that hears everything from the start.
 
     With ``signing`` they sign what they say and take signed frames alone.
 
@@ -59,7 +59,7 @@ class Hub:
 
     @property
     def clients(self) -> list[Client]:
-        """Who is told what a vehicle says unasked."""
+        """Which clients hear what a vehicle sends of its own accord."""
         heard = list(self._listeners)
         return heard if self._always is None or self._always in self._listeners else [self._always, *heard]
 

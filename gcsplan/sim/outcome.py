@@ -42,7 +42,7 @@ class Part:
 @dataclass(frozen=True, slots=True)
 class Terms:
     """What a fleet is held to. ``order``: names in the order of arrival, empty where any will do. ``separation_m``
-    None: the least distance is told, and not judged. A landed vehicle is in the way for ``pad_clear_s``."""
+    None: the least distance is reported, and not judged. A landed vehicle is in the way for ``pad_clear_s``."""
 
     order: tuple[str, ...] = ()
     separation_m: float | None = None

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.kinematics import Kinematics
 from gcsplan.sim.mission_flight import fly
@@ -84,9 +84,9 @@ def on_board(parts: Sequence[Part]) -> list[Mission]:
         raise InputError(f"every vehicle needs a name of its own, given {', '.join(names)}")
     with SimServer(vehicles, "udpin:127.0.0.1:0") as server, Link(server.url_for_gcs) as link:
         orders = [
-            Order(
+            UploadOrder(
                 link, p.mission, p.verdict,
-                Options(unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True),
+                SessionOptions(unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True),
             )
             for p in parts
         ]  # fmt: skip

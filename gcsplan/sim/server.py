@@ -127,7 +127,7 @@ class SimServer:
 def serve(
     vehicles: Sequence[LoopbackVehicle], listen_url: str, *, on_ready: Callable[[SimServer], None] | None = None
 ) -> None:
-    """Serve until interrupted (Ctrl-C); ``on_ready`` is told when the socket is open. Blocks."""
+    """Serve until interrupted (Ctrl-C); ``on_ready`` is called when the socket is open. Blocks."""
     with SimServer(vehicles, listen_url) as server, contextlib.suppress(KeyboardInterrupt):
         if on_ready is not None:
             on_ready(server)

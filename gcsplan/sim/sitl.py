@@ -21,8 +21,8 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.errors import GcsplanError, LinkError, UsageError, VehicleRefused
 from gcsplan.mavlink.link.frames import signing_key
-from gcsplan.mavlink.link.link import Channel, Job, Link, Steps, pump
-from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump
+from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.link.watch import VehicleState, Watch
@@ -41,7 +41,7 @@ _RATE_US = 100_000.0
 _ARMED_MS = 3000
 """It is armed so long before it is released: ArduCopter's motors do not turn for 2 s (ARMING_DELAY_SEC)."""
 _NEAR_M, _STILL_M_S = 3.0, 0.4
-"""The goal is reached where the vehicle is this near and this slow: it stops there."""
+"""The goal is reached where the vehicle is this near and this slow."""
 _SLACK_M = 0.3
 """What its position may be off, and where it may be between two messages."""
 LIFT_S = 1.6
@@ -90,9 +90,9 @@ def rehearse_sitl(
     seats: Mapping[str, Seat],
     *,
     i_know: bool = False,
-    tell: Callable[[str, str], None] | None = None,
+    report: Callable[[str, str], None] | None = None,
 ) -> Rehearsal:
-    """Upload, arm, start, watch, judge: one run. ``seats`` by the vehicles' names; ``tell(vehicle, what)``.
+    """Upload, arm, start, watch, judge: one run. ``seats`` by the vehicles' names; ``report(vehicle, what)``.
 
     Raises UsageError for a vehicle without a seat, an autopilot that is not ArduCopter, and (unless ``i_know``) a
     link off this machine; VehicleRefused for what is no simulator, will not arm, or does not take its mission;
@@ -106,17 +106,19 @@ def rehearse_sitl(
             raise UsageError(f"--sitl flies ArduCopter; {part.vehicle.name} is {part.vehicle.autopilot}")
     if not i_know:
         require_here([seats[p.vehicle.name].url for p in parts])
-    said = tell or (lambda name, what: None)
+    said = report or (lambda name, what: None)
     with ExitStack() as stack:
         urls = list(dict.fromkeys(seats[p.vehicle.name].url for p in parts))
         links = {url: stack.enter_context(Link(url, key=signing_key())) for url in urls}
         channels = [links[seats[p.vehicle.name].url].channel(p.vehicle.sysid) for p in parts]
-        states = _all([Job(c, _ready(c, p, said, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
+        states = _all([PumpJob(c, _ready(c, p, said, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
         for result in upload_fleet(
             [
-                Order(
+                UploadOrder(
                     c.link, p.mission, p.verdict,
-                    Options(unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True),
+                    SessionOptions(
+                        unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True
+                    ),
                 )
                 for c, p in zip(channels, parts, strict=True)
             ]
@@ -125,7 +127,7 @@ def rehearse_sitl(
                 raise result
             result.raise_for_outcome()
         flights = [
-            Job(c, _fly(c, p, s, seats[p.vehicle.name], world, said))
+            PumpJob(c, _fly(c, p, s, seats[p.vehicle.name], world, said))
             for c, p, s in zip(channels, parts, states, strict=True)
         ]
         logs = _all(flights)
@@ -142,7 +144,7 @@ def rehearse_sitl(
     return tally.result("sitl", 0, {}, energy, [()] * len(parts))
 
 
-def _all(jobs: list[Job[Any]]) -> list[Any]:
+def _all(jobs: list[PumpJob[Any]]) -> list[Any]:
     """Run all to their ends; raises the first error."""
     pump(jobs)
     for job in jobs:
@@ -154,11 +156,11 @@ def _all(jobs: list[Job[Any]]) -> list[Any]:
 # -- one vehicle ----------------------------------------------------------------------------------------------------
 
 
-def _ready(channel: Channel, part: Part, tell: Callable[[str, str], None], *, i_know: bool) -> Steps[VehicleState]:
+def _ready(channel: Channel, part: Part, report: Callable[[str, str], None], *, i_know: bool) -> Steps[VehicleState]:
     """Wait until it knows where it is, and make sure that it is a simulator and stands still."""
     clock, name = channel.link.clock, part.vehicle.name
     end = clock() + _READY_S
-    tell(name, "waits for its position")
+    report(name, "waits for its position")
     while True:
         watch = Watch(channel.sysid)
         state = yield from discover_steps(channel, watch, timeout_s=20.0, listen_s=0.0, standby_s=60.0)
@@ -178,7 +180,7 @@ def _ready(channel: Channel, part: Part, tell: Callable[[str, str], None], *, i_
 
 
 def _fly(
-    channel: Channel, part: Part, state: VehicleState, seat: Seat, world: World, tell: Callable[[str, str], None]
+    channel: Channel, part: Part, state: VehicleState, seat: Seat, world: World, report: Callable[[str, str], None]
 ) -> Steps[_Log]:
     """Arm, start, and listen until it is down (or there, where it stays in the air)."""
     to, name, log = state.address, part.vehicle.name, _Log()
@@ -187,14 +189,14 @@ def _fly(
         (dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, _RATE_US), (dialect.MAVLINK_MSG_ID_MISSION_CURRENT, _RATE_US)
     ):  # fmt: skip
         yield from pilot.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message, every_us)
-    tell(name, "arms")
+    report(name, "arms")
     yield from pilot.insist(dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, _GUIDED)
     yield from pilot.insist(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
     armed_ms = pilot.boot_ms
     while pilot.boot_ms < armed_ms + _ARMED_MS:
         yield from pilot.listen(_ANSWER_S)
     yield from pilot.insist(dialect.MAV_CMD_MISSION_START)
-    tell(name, "flies")
+    report(name, "flies")
     planned_s = part.verdict.time_s if part.arrive_s is None else part.arrive_s - part.depart_s + part.verdict.time_s
     latest_ms = log.released_ms + 1000.0 * (_LATE * planned_s + _SPARE_S)
     goal = _goal(part)
@@ -206,7 +208,7 @@ def _fly(
         yield from pilot.listen(_ANSWER_S)
         if item != pilot.item:
             item = pilot.item
-            tell(name, f"flies item {item}")
+            report(name, f"flies item {item}")
         if log.down or pilot.boot_ms > latest_ms:
             return log
         if not log.places:

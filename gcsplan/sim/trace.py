@@ -175,7 +175,7 @@ class Meeting:
     def describe(self, needed_m: float) -> str:
         """One sentence."""
         a, b = self.names
-        near = f"{self.distance_m:.1f} m, asked were {needed_m:g} m, at {self.time_s:.1f} s"
+        near = f"{self.distance_m:.1f} m, needed are {needed_m:g} m, at {self.time_s:.1f} s"
         if self.kind == "air":
             return f"{a} and {b} came as near as {near}"
         return f"{a} landed beside {b}, which stood there: {near}"

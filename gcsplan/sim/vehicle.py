@@ -158,7 +158,7 @@ class LoopbackVehicle:
         return min((at for at in due if at is not None), default=None)
 
     def on_timer(self, now: float) -> list[Packet]:
-        """What is due at ``now``: requests asked again, transfers given up, packets that were held back."""
+        """What is due at ``now``: requests sent again, transfers given up, packets that were held back."""
         self._switch_on(now)
         if not self.reachable(now):
             return []

@@ -55,6 +55,7 @@ def amiss(written: dict[str, Case], batch: Batch) -> list[str]:
     return [words for file, case in written.items() if (words := compare_with(case, found[file]))]
 
 
+@pytest.mark.slow
 def test_files_with_a_home_are_judged_as_planted(folder: Path, options: WorldOptions) -> None:
     written = corpus.write(folder, corpus.WITH_HOME)
     assert len(written) > 100
@@ -72,6 +73,7 @@ def test_files_without_a_home_are_judged_with_the_one_that_is_given(folder: Path
     assert all("home" in error.message for _, error in batch.unreadable)
 
 
+@pytest.mark.slow
 def test_plans_for_px4_are_judged_as_planted(folder: Path, options: WorldOptions) -> None:
     written = corpus.write(folder, corpus.PX4)
     assert amiss(written, check_with_options(options, None, list(written))) == []
@@ -265,6 +267,7 @@ def test_wrong_usage_is_explained(run: Any, arguments: list[str], said: str) -> 
     assert said in err
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("far", [(36.6, 177.0), (0.0, 5.6), (-36.6, 95.6), (38.6, -84.3)])
 def test_a_spline_to_the_other_end_of_the_world_is_a_finding_and_asks_for_no_terrain(
     run: Any, folder: Path, world: list[str], far: tuple[float, float]

@@ -14,7 +14,7 @@ from gcsplan.app.pipeline import plan
 from gcsplan.errors import InputError, UsageError
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import load_mission
-from tests.app.test_fleeting import CROSS
+from tests.app.test_fleet_planning import CROSS
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
 START = datetime(2026, 3, 1, 23, 59, 0, tzinfo=UTC)

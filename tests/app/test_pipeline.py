@@ -114,6 +114,7 @@ def test_a_take_off_below_the_limits_is_bad_input_and_one_just_at_them_is_raised
     assert any("takeoff_agl_m 65 raised" in n for n in done.vehicles[0].notes)
 
 
+@pytest.mark.slow
 def test_the_energy_objective_spends_no_more_than_the_shortest_way() -> None:
     sharp = yaml.safe_dump(CROSSING | {"planner": {"gap_percent": 0.1}})
     length, energy = (

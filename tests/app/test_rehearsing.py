@@ -234,7 +234,7 @@ def test_vehicles_that_fly_by_themselves_are_armed_released_watched_and_judged(
     said: list[tuple[str, str]] = []
     with flying(parts, planned, monkeypatch) as seats:
         result = rehearse_sitl(
-            parts, planned.world, terms_of(planned), seats, tell=lambda name, what: said.append((name, what))
+            parts, planned.world, terms_of(planned), seats, report=lambda name, what: said.append((name, what))
         )
     assert result.simulator == "sitl"
     assert result.breaches == ()

@@ -19,7 +19,7 @@ import yaml
 from typer import testing as runner
 
 import gcsplan
-from gcsplan.app import delivery, pipeline, scripting
+from gcsplan.app import pipeline, scripting, uploads
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import plan
 from gcsplan.app.scripting import rehearse, upload, write
@@ -31,7 +31,7 @@ from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
-from tests.app.test_fleeting import CROSS
+from tests.app.test_fleet_planning import CROSS
 from tests.support.impatient import be_impatient
 from tests.support.paths import MISSIONS
 
@@ -250,7 +250,7 @@ def test_a_failure_raises_nothing_and_is_told_and_all_or_nothing_takes_back(cros
     with SimServer(boards(cross, south={"refuse": 2}), "udpin:127.0.0.1:0", speedup=10.0) as server:
         west, south = upload(cross, server.url_for_gcs)
         assert (west.verified, south.verified, south.outcome) == (True, False, "refused")
-        assert delivery.exit_code([west, south]) == 5
+        assert uploads.exit_code([west, south]) == 5
         west, south = upload(cross, server.url_for_gcs, atomic=True)
         assert (west.outcome, south.outcome) == ("withdrawn", "refused")
         assert server.vehicles[0].items()[1:] == ()

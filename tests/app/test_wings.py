@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gcsplan.app.checking import check_files
-from gcsplan.app.fleeting import route_of
+from gcsplan.app.fleet_planning import route_of
 from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of
 from gcsplan.app.pipeline import plan
@@ -43,6 +43,7 @@ from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
+from tests.support.effort import draws
 from tests.support.paths import MISSIONS
 from tests.support.worlds import vehicle, world
 
@@ -154,7 +155,7 @@ def path_of(turns: list[tuple[float, float, float]]) -> list[tuple[float, float,
     return points
 
 
-@settings(max_examples=12)
+@settings(max_examples=draws(12))
 @given(corners)
 @pytest.mark.slow
 def test_the_judged_pieces_hold_the_flown_track_with_every_way_to_reckon_its_altitude(
@@ -197,6 +198,7 @@ def test_a_verdict_on_arcs_can_be_safe_and_says_what_it_assumes() -> None:
     assert any("heading of 90°" in n for n in verdict.notes)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(4))
 def test_the_lowest_height_above_ground_is_what_sampling_the_flown_track_finds(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -346,7 +348,7 @@ def test_a_glide_is_judged_straight_and_one_that_is_too_steep_is_named() -> None
     assert any("30.0 m below" in n for n in high.not_judged)
 
 
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 @given(st.floats(-30.0, 60.0), st.floats(100.0, 700.0), st.floats(-100.0, 100.0), st.floats(80.0, 250.0))
 @example(60.0, 100.0, 100.0, 99.0)
 def test_the_room_below_a_climb_out_is_what_sampling_finds(high: float, east: float, north: float, wide: float) -> None:
@@ -541,7 +543,7 @@ def test_a_corner_that_needs_more_acceptance_than_a_byte_holds_is_two_on_the_sam
     assert rates[[0, -1]] == pytest.approx(before)
 
 
-@settings(max_examples=30)
+@settings(max_examples=draws(30))
 @given(st.lists(st.tuples(st.floats(-20.0, 20.0), st.floats(0.1, 500.0)), min_size=2, max_size=8))
 def test_way_points_that_crowd_are_thinned_and_what_is_left_lies_on_the_same_way(
     steps: list[tuple[float, float]],

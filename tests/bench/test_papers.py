@@ -22,7 +22,7 @@ from gcsplan.bench.papers_pictures import best_run, stepwise
 from gcsplan.bench.papers_printed import ENDS, PRINTED, Least, Number, faults, least_of
 from gcsplan.bench.papers_remarks import remarks, schedules
 from gcsplan.bench.papers_report import IMPOSSIBLE, report, scenario_table, write
-from gcsplan.bench.papers_runs import Job, Store, seed_of, work
+from gcsplan.bench.papers_runs import PaperRun, Store, seed_of, work
 from gcsplan.bench.papers_scenarios import SCENARIOS, choose, claims_of, mission_text, prepare, settings_of
 from gcsplan.bench.papers_statistics import (
     FEW,
@@ -37,6 +37,7 @@ from gcsplan.bench.papers_statistics import (
     values,
 )  # fmt: skip
 from gcsplan.errors import InputError
+from tests.support.effort import draws
 
 SCENARIO = "ssgwo-table7-tall"
 PAIR = ("ssgwo", "gwo")
@@ -94,7 +95,7 @@ def test_marks_follow_from_the_ends_and_not_from_a_list(scenario: str) -> None:
 
 
 @given(st.lists(st.tuples(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5)), min_size=1, max_size=30))
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 def test_no_path_of_even_steps_pitches_more_than_its_length_allows(steps: list[tuple[float, float]]) -> None:
     heading, pitch = np.array(steps).T
     legs = np.stack([np.cos(pitch) * np.cos(heading), np.cos(pitch) * np.sin(heading), np.sin(pitch)], axis=-1)
@@ -126,6 +127,7 @@ def test_every_scenario_has_its_mission_and_every_printed_algorithm_its_contende
     assert {place for place, _ in PRINTED} <= set(SCENARIOS)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("name", ["krill-mound", "ssgwo-table3", "msfoa-1", "abo", "ib-abc-together"])
 def test_contenders_search_as_the_paper_has_it(name: str) -> None:
     ready = prepare(name, mission_text(name))
@@ -193,7 +195,7 @@ def test_the_rank_test_is_scipys_on_made_runs() -> None:
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 def test_holms_correction_lies_between_the_raw_values_and_bonferronis(p: list[float]) -> None:
     out = holm(p)
     order = np.argsort(p, kind="stable")
@@ -305,7 +307,7 @@ def test_seeds_differ_by_run_and_vehicle_only() -> None:
 
 def test_a_worker_of_another_version_refuses() -> None:
     with pytest.raises(InputError, match="another version"):
-        work(Job(SCENARIO, "gwo", mission_text(SCENARIO), 1, 0, "0" * 16))
+        work(PaperRun(SCENARIO, "gwo", mission_text(SCENARIO), 1, 0, "0" * 16))
 
 
 @pytest.fixture(scope="module")
@@ -377,6 +379,7 @@ def test_what_is_finished_is_not_run_again(
     assert calls[4:] == ["optimal", "gwo"]
 
 
+@pytest.mark.slow
 def test_ctrl_c_loses_nothing_that_is_finished_and_processes_give_the_same_numbers(
     finished: tuple[dict[str, Any], Path], missions: Path, tmp_path: Path
 ) -> None:

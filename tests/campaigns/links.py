@@ -1,6 +1,6 @@
 """Uploads among adversaries, in simulated time: ``python -m tests.campaigns.links --seconds 120``.
 
-Each run is one fleet upload through everything from `delivery.deliver` down to the frames, on a bad radio, while a
+Each run is one fleet upload through everything from `uploads.run_jobs` down to the frames, on a bad radio, while a
 seeded mixture of these happens: vehicles that lose, spoil, refuse or forget what they get, are armed, carried off,
 switched off, rebooted, edited by a second ground station or replaced by another one; twins with the same number at
 another address or behind the same one; forged mission messages, hostile parameters and telemetry; signatures, and
@@ -27,7 +27,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from gcsplan.app import delivery
+from gcsplan.app import uploads
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link.frames import FrameParser, Signing, SigningKey
 from gcsplan.mavlink.link.link import Link
@@ -86,7 +86,7 @@ class Run:
     def __init__(self, seed: int) -> None:
         self.seed = seed
         self.rng = rng = random.Random(seed)
-        self.options = delivery.Options(
+        self.options = uploads.UploadOptions(
             unchecked=True, allow_armed=rng.random() < 0.1, ignore_position=rng.random() < 0.1,
             atomic=rng.random() < 0.25, timeout_s=rng.choice((5.0, 20.0, 60.0, 60.0)),
         )  # fmt: skip
@@ -331,8 +331,8 @@ class Run:
 
     # the run
 
-    def go(self) -> tuple[list[delivery.Delivery], list[str]]:
-        """Upload; the deliveries and what was found."""
+    def go(self) -> tuple[list[uploads.JobResult], list[str]]:
+        """Upload; the results and what was found."""
         if self.key and self.rng.random() < 0.5:
             self._play_again()
         began = self.air.now
@@ -341,10 +341,10 @@ class Run:
             for one in (seat.craft, *seat.others):
                 one.forget()
         self.voices.clear()
-        jobs = [delivery.Job(s.mission.name, URL, s.mission) for s in self.seats.values()]
+        jobs = [uploads.UploadJob(s.mission.name, URL, s.mission) for s in self.seats.values()]
         try:
             with self._links():
-                deliveries = delivery.deliver(jobs, self.options)
+                results = uploads.run_jobs(jobs, self.options)
         except Hang as hang:
             return [], [*self.found, f"hang: {hang}"]
         except Exception as error:
@@ -354,9 +354,9 @@ class Run:
         longest_s = self._longest_s()
         if took_s > longest_s:
             self.found.append(f"hang: {took_s:.1f} s, {longest_s:.1f} s are allowed")
-        for d, seat in zip(deliveries, self.seats.values(), strict=True):
+        for d, seat in zip(results, self.seats.values(), strict=True):
             self._judge(d, seat)
-        return deliveries, self.found
+        return results, self.found
 
     def _longest_s(self) -> float:
         timeout_s = self.options.timeout_s
@@ -368,23 +368,23 @@ class Run:
 
     @contextlib.contextmanager
     def _links(self) -> Iterator[None]:
-        opened = delivery._open
+        opened = uploads._open
 
         def link(url: str) -> Link:
             return self.air.link(self._signing())
 
-        delivery._open = link
+        uploads._open = link
         try:
             yield
         finally:
-            delivery._open = opened
+            uploads._open = opened
 
     def _play_again(self) -> None:
         """Record a first, good upload; then the vehicle is gone or empty, and the recording speaks in its place."""
         rng, air = self.rng, self.air
         seat = self.seats[1]
         with self._links():
-            delivery.deliver([delivery.Job(seat.mission.name, URL, seat.mission)], self.options)
+            uploads.run_jobs([uploads.UploadJob(seat.mission.name, URL, seat.mission)], self.options)
         seat.craft.vehicle.load(())
         seat.craft._look()
         if rng.random() < 0.5:
@@ -394,7 +394,7 @@ class Run:
         self._recorder.replay(rng.choice((seat.address, "recorder")), rng.uniform(0.0, 3.0), Recorder.MOST)
         seat.asked_at = seat.acked_at = air.now
 
-    def _judge(self, d: delivery.Delivery, seat: Seat) -> None:
+    def _judge(self, d: uploads.JobResult, seat: Seat) -> None:
         now, checked = self.air.now, seat.checked
         if d.code == GcsplanError.exit_code:
             self.found.append(f"crash: {d.vehicle}: {d.message}")
@@ -430,11 +430,11 @@ class Run:
 def one(seed: int) -> tuple[Counter[str], list[str]]:
     """Run ``seed``: what came of it, and what was found, each with what had happened."""
     run = Run(seed)
-    deliveries, found = run.go()
+    results, found = run.go()
     counts = Counter(
         {"uploads": len(run.seats), "runs": 1, "packets written": sum(s.wrote for s in run.seats.values())}
     )
-    for d in deliveries:
+    for d in results:
         counts[f"exit {d.code}"] += 1
         counts["verified"] += d.verified
         counts["changed"] += bool((d.details or {}).get("changed"))

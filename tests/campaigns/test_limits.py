@@ -21,6 +21,7 @@ def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
     assert sum(tally.judged.values()) >= 4
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("seed", "family"),
     [

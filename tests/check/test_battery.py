@@ -17,6 +17,7 @@ from gcsplan.mavlink.mission.commands import LAND, LOITER_TIME, RTL, TAKEOFF, WA
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.world import World
+from tests.support.effort import draws
 from tests.support.worlds import vehicle, world
 
 FLAT = world(300.0)
@@ -122,7 +123,7 @@ def test_rounds_are_flown_as_often_as_they_are() -> None:
     assert [leg.seq for leg in flown(legs)] == [1, 2, 3, 4, 3, 4, 3, 4, 5]
 
 
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 @given(
     places=st.lists(
         st.tuples(st.floats(-3000, 3000), st.floats(-3000, 3000), st.floats(5, 200)), min_size=1, max_size=4

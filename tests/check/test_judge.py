@@ -240,6 +240,7 @@ def test_terrain_following_is_as_steep_as_its_steepest_metre_and_not_as_the_chor
     assert verdict(steepest + 0.2).safe is True
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("frame", ["relative", "terrain"])
 def test_who_moves_by_what_a_violation_tells_keeps_the_limit(frame: str) -> None:
     rng = np.random.default_rng(17)

@@ -16,6 +16,7 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
+from tests.support.effort import draws
 
 HOME = Home.at(36.6, -84.3, 300.0)
 TAKEOFF = MissionItem(cmd.TAKEOFF, m.RELATIVE, z=65.0)
@@ -79,7 +80,7 @@ def jumpy(draw: st.DrawFn) -> tuple[MissionItem, ...]:
     return tuple(items)
 
 
-@settings(max_examples=120)
+@settings(max_examples=draws(120))
 @given(jumpy())
 def test_every_leg_is_flown_as_often_as_one_by_one(items: tuple[MissionItem, ...]) -> None:
     # Relative to the wire, where the take-off is item 1.

@@ -15,7 +15,7 @@ from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
-from tests.app.test_fleeting import CROSS
+from tests.app.test_fleet_planning import CROSS
 from tests.support.impatient import be_impatient
 
 LIMITS = CROSS["limits"] | {"track_error_m": 3, "altitude_error_m": 3}

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan.app import delivery, outputs, pipeline
+from gcsplan.app import outputs, pipeline, uploads
 from gcsplan.cli import main as cli
 from gcsplan.cli.options import MISBEHAVIOURS
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan
@@ -62,7 +62,7 @@ Run = Callable[..., tuple[int, str, str]]
 def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
     """Call ``gcsplan ARGUMENTS`` in a directory with m.yaml and uav1.waypoints: exit code, standard output, error."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(delivery, "LISTEN_S", 0.05)
+    monkeypatch.setattr(uploads, "LISTEN_S", 0.05)
     (tmp_path / "m.yaml").write_text(MISSION)
     (tmp_path / "uav1.waypoints").write_text("\n".join(ROWS) + "\n")
 
@@ -225,7 +225,7 @@ class Meddler(threading.Thread):
 def test_garbage_on_the_link_neither_crashes_nor_passes_for_the_truth(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(session, "Options", functools.partial(session.Options, discover_s=3.0))
+    monkeypatch.setattr(session, "SessionOptions", functools.partial(session.SessionOptions, discover_s=3.0))
     for seed in range(2):
         craft = LoopbackVehicle(1, Autopilot.ARDUCOPTER, lat_deg=36.6, lon_deg=-84.38, amsl_m=400.0)
         with SimServer([craft], "udpin:127.0.0.1:0") as server:
@@ -307,7 +307,7 @@ def test_ctrl_c_during_an_upload_says_what_is_unknown_now(run: Run, monkeypatch:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(delivery, "deliver", interrupted)
+    monkeypatch.setattr(uploads, "run_jobs", interrupted)
     code, out, err = run("upload", "uav1.waypoints", "--to", "sim", "--mission", "m.yaml", "--json")
     assert code == 130
     assert "what it holds now is unknown" in err
@@ -405,7 +405,7 @@ def test_a_missing_file_is_told_before_a_vehicle_is_looked_for(run: Run, monkeyp
     def opened(*_: object) -> None:
         raise AssertionError("the link was opened")
 
-    monkeypatch.setattr(delivery, "_open", opened)
+    monkeypatch.setattr(uploads, "_open", opened)
     for command in ("verify", "upload"):
         more = ["--unchecked"] if command == "upload" else []
         code, _, err = run(command, "nowhere.waypoints", "--to", "udpout:127.0.0.1:9", *more)

@@ -19,7 +19,7 @@ try:
     cli.main()
 except SystemExit as ended:
     print(ended.code, gc.get_threshold()[0] == memory.OBJECTS)
-others = ("numba", "scipy", "pymavlink", "matplotlib", "gcsplan.app.delivery", "gcsplan.check.rtl.rally",
+others = ("numba", "scipy", "pymavlink", "matplotlib", "gcsplan.app.uploads", "gcsplan.check.rtl.rally",
           "gcsplan.fleet.resolve", "gcsplan.report")
 print([name for name in others if name in sys.modules])
 """

@@ -26,6 +26,7 @@ from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support.effort import draws
 
 FRAME = Frame(36.6, -84.3)
 TRACK = Track(
@@ -82,7 +83,7 @@ def test_a_track_that_is_none_is_refused(lat: list[float], lon: list[float], lab
         Track("a", np.array(lat), np.array(lon), np.array(lat), labels)
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(st.floats(-40_000, 40_000), st.floats(-40_000, 40_000), st.floats(1.0, 20_000.0))
 def test_the_outline_of_a_circle_holds_the_circle_even_after_rounding(east: float, north: float, radius: float) -> None:
     corners = np.round(outline_deg(Zone("z", Circle(east, north, radius)), FRAME), 7)
@@ -144,7 +145,7 @@ def test_zones_stand_in_the_kml_from_floor_to_ceiling() -> None:
     assert "from 50 m AGL to 900.5 m AMSL" in str(zones["airfield"].findtext(KML + "description"))
 
 
-@settings(max_examples=25)
+@settings(max_examples=draws(25))
 @given(st.text())
 def test_no_name_breaks_the_kml(name: str) -> None:
     zone = Zone(name, Circle(0.0, 0.0, 10.0))
@@ -304,7 +305,7 @@ def test_plain_words_and_nothing_else_go_into_json() -> None:
         write_summary({"a": object()})
 
 
-@settings(max_examples=100)
+@settings(max_examples=draws(100))
 @given(st.dictionaries(st.sampled_from(["a_m", "min_b_m", "lat", "c"]), st.floats() | st.integers() | st.text()))
 def test_any_numbers_make_valid_json(values: dict[str, Any]) -> None:
     document = json.loads(write_summary(values), parse_constant=lambda word: pytest.fail(word))

@@ -68,6 +68,7 @@ def caught(root: Path, after: int = 3) -> dict[str, bytes | None]:
 # -- the campaign -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @posix
 def test_a_short_campaign_of_kills_and_power_losses_finds_nothing() -> None:
     command = [sys.executable, "-m", "tests.campaigns.crash", "--seconds", "3", "--seed", "1", "--rounds", "2"]
@@ -152,9 +153,10 @@ def test_the_campaign_kills_at_every_system_call_that_changes_the_folder(tmp_pat
 # -- signals ----------------------------------------------------------------------------------------------------------
 
 
-def heed_ctrl_c() -> None:
-    """A shell starts what runs in its background with SIGINT ignored, which children inherit."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def heed_signals() -> None:
+    """Undo what a child inherits: a shell's background job ignores SIGINT, a command under nohup ignores SIGHUP."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 @posix
@@ -171,7 +173,7 @@ def test_a_signal_ends_a_command_with_a_message_and_its_code(tmp_path: Path, num
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=heed_ctrl_c,
+        preexec_fn=heed_signals,
     )
     try:
         with pipe.open("w"):  # returns when it is read
@@ -208,6 +210,7 @@ sys.exit(0)
 """
 
 
+@pytest.mark.first_quick
 @posix
 @pytest.mark.parametrize("fatal", [1, 3, 6, 9])
 def test_sigterm_between_the_moves_takes_them_back(tmp_path: Path, fatal: int) -> None:
@@ -215,7 +218,7 @@ def test_sigterm_between_the_moves_takes_them_back(tmp_path: Path, fatal: int) -
     write_outputs(out, FIRST)
     before = tree(out)
     command = [sys.executable, "-c", TERMINATED, str(out), str(fatal)]
-    ended = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=60)
+    ended = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=60, preexec_fn=heed_signals)
     assert (ended.returncode, ended.stderr) == (9, "")
     assert tree(out) == before
 

@@ -22,6 +22,7 @@ from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 from tests.mission_file.test_load import base, load, local, the_problem
 from tests.mission_file.test_load import vehicle as keys
+from tests.support.effort import draws
 
 INF = math.inf
 FREE = {
@@ -301,7 +302,7 @@ def test_a_refusal_survives_another_process() -> None:
     )  # fmt: skip
 
 
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 @given(
     st.lists(st.floats(100, 2000), min_size=2, max_size=6), st.sampled_from(["ground", "gate", "none"]),
     st.sampled_from(["first", "fleet"]),
@@ -332,6 +333,7 @@ def finish_of(crews: list[Crew], **more: Any) -> tuple[float, float]:
     return round(plan.slots[-1].arrive_s, 3), plan.energy_j
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", [*range(6), *(pytest.param(s, marks=pytest.mark.slow) for s in range(6, 30))])
 def test_the_best_order_finishes_as_early_as_the_best_of_all_orders(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -375,7 +377,7 @@ def test_a_hundred_vehicles_are_ordered_as_sorting_orders_them() -> None:
     assert best_order(fast, fast, 5.0, "first", None) is None
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(st.lists(st.tuples(st.floats(1, 100), st.floats(0, 100)), min_size=2, max_size=6), st.booleans())
 def test_an_interval_works_exactly_where_its_range_says(windows: list[tuple[float, float]], fleet: bool) -> None:
     fast = np.array([a for a, _ in windows])

@@ -22,6 +22,7 @@ from gcsplan.fleet.timing import End, Route
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 from tests.fleet.test_separation import random_fleet
+from tests.support.effort import draws
 
 RULES = Rules(30.0, error_m=0.25)
 Point = tuple[float, float]
@@ -324,6 +325,7 @@ def test_landing_on_one_pad_has_no_interval_that_works_while_nobody_clears_it() 
     assert refused.value.goals_m == 30.5
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("end", "clear_s"), [("land", 20.0), ("none", math.inf)])
 def test_the_smallest_interval_at_one_goal_works_and_a_tenth_less_does_not(end: End, clear_s: float) -> None:
     crews = fan(2, 0.0, end)
@@ -342,6 +344,7 @@ def test_the_smallest_interval_at_one_goal_works_and_a_tenth_less_does_not(end: 
         assert interval > clear_s
 
 
+@pytest.mark.slow
 def test_the_interval_is_looked_for_with_the_callers_own_schedule() -> None:
     crews = fan(2, 0.0, "none")
     asked: list[float] = []
@@ -390,7 +393,7 @@ def made_fleet(count: int, seed: int, side_m: float, legs: int = 6) -> list[Crew
     return out
 
 
-@settings(max_examples=12, phases=[Phase.explicit, Phase.generate])
+@settings(max_examples=draws(12), phases=[Phase.explicit, Phase.generate])
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["none", "sequence", "together"]), st.sampled_from([0.0, 1.0]))
 def test_whatever_is_resolved_keeps_its_separation_and_its_arrivals(seed: int, mode: str, window_s: float) -> None:
     crews = made_fleet(4, seed, 700.0)

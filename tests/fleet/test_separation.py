@@ -17,6 +17,7 @@ from gcsplan.fleet._nearest import Pieces, nearest
 from gcsplan.fleet._sweep import Fleet
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Conflict, Rules, in_metres, separation
+from tests.support.effort import draws
 
 FLEETS = [range(250), pytest.param(range(250, 1000), marks=pytest.mark.slow)]
 SAMPLE_S = 1e-3
@@ -93,8 +94,9 @@ def test_the_least_distance_is_that_of_a_thousand_sampled_fleets_and_never_more(
     assert pairs > len(seeds)
 
 
+@pytest.mark.draws
 def test_the_moment_and_the_places_told_are_those_of_the_least_distance() -> None:
-    for seed in range(100):
+    for seed in range(draws(100)):
         fleet = random_fleet(seed)
         by_name = {p.name: p for p in fleet}
         found = separation(fleet, Rules(15.0))
@@ -105,9 +107,10 @@ def test_the_moment_and_the_places_told_are_those_of_the_least_distance() -> Non
             assert math.isclose(float(np.linalg.norm(places[0] - places[1])), e.distance_m, abs_tol=1e-6)
 
 
+@pytest.mark.draws
 def test_spans_of_conflict_are_those_of_samples() -> None:
     spans = 0
-    for seed in range(200):
+    for seed in range(draws(200)):
         fleet = random_fleet(seed)
         found = separation(fleet, Rules(12.0))
         for i, j in combinations(range(len(fleet)), 2):
@@ -126,7 +129,7 @@ def test_spans_of_conflict_are_those_of_samples() -> None:
             edges = [x for c in own for x in (c.from_s, c.until_s)]
             assert all(min(abs(t[k] - x) for x in edges) < 3e-3 for k in changes), f"seed {seed}"
             assert all(x.until_s < y.from_s for x, y in pairwise(own))
-    assert spans > 100
+    assert spans > draws(200) / 2
 
 
 # -- windows ------------------------------------------------------------------------------------------------------
@@ -144,9 +147,10 @@ def sampled_window(a: TimedPath, b: TimedPath, window_s: float, until_s: float) 
     return float(gaps.min()), fastest * step
 
 
+@pytest.mark.draws
 def test_with_a_window_the_least_distance_is_that_over_all_shifts() -> None:
     met = 0
-    for seed in range(45):
+    for seed in range(draws(45)):
         fleet = random_fleet(seed)[:2]
         window = float(np.random.default_rng(seed).choice([0.05, 0.4, 1.5, 6.0]))
         until = max(p.end_s for p in fleet) + 2.0 * window
@@ -156,10 +160,10 @@ def test_with_a_window_the_least_distance_is_that_over_all_shifts() -> None:
         if brute < math.inf:
             assert exact >= brute - between - 1e-6, f"seed {seed}: {exact}, sampled {brute}"
             met += 1
-    assert met > 30
+    assert met > draws(45) * 2 / 3
 
 
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 3.0))
 def test_a_wider_window_never_shows_more_distance(seed: int, window_s: float) -> None:
     fleet = random_fleet(seed)
@@ -169,8 +173,9 @@ def test_a_wider_window_never_shows_more_distance(seed: int, window_s: float) ->
     assert (narrow <= separation(fleet, Rules(10.0)).distance_m + 1e-6).all()
 
 
+@pytest.mark.draws
 def test_every_shift_within_the_window_keeps_at_least_what_was_told() -> None:
-    for seed in range(40):
+    for seed in range(draws(40)):
         rng = np.random.default_rng(seed)
         fleet = random_fleet(seed)
         told = separation(fleet, Rules(10.0, window_s=0.7)).distance_m
@@ -179,7 +184,7 @@ def test_every_shift_within_the_window_keeps_at_least_what_was_told() -> None:
             assert (separation(moved, Rules(10.0)).distance_m >= told - 1e-6).all(), f"seed {seed}"
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(st.integers(0, 2**32 - 1))
 def test_two_straight_pieces_come_no_nearer_on_any_grid_than_in_closed_form(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -16,6 +16,7 @@ from gcsplan.fleet.speeds import CUT_M
 from gcsplan.fleet.timing import POSITION_ERROR_M, Course, Route, fly, motion_error_m, speed_for, time_to_goal_s
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
+from tests.support.effort import draws
 
 FREE = math.inf
 
@@ -290,7 +291,7 @@ def test_energy_counts_columns_the_way_home_and_hovering() -> None:
 # -- properties ---------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(routes, st.floats(0.5, 20), st.floats(1.0, 3.0))
 def test_faster_is_never_later(way: Route, speed: float, factor: float) -> None:
     for craft in (vehicle(), SHARP, IDEAL, vehicle(accel_m_s2=FREE)):
@@ -299,7 +300,7 @@ def test_faster_is_never_later(way: Route, speed: float, factor: float) -> None:
         assert course.time_to_goal_s(speed * factor) <= slow * (1 + 1e-9)
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(routes, st.floats(0.5, 20))
 def test_the_way_back_with_climb_and_descent_swapped_takes_as_long(way: Route, speed: float) -> None:
     craft = vehicle()
@@ -308,7 +309,7 @@ def test_the_way_back_with_climb_and_descent_swapped_takes_as_long(way: Route, s
     assert time_to_goal_s(back, swapped, speed) == pytest.approx(time_to_goal_s(way, craft, speed), rel=1e-6, abs=1e-6)
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(routes, st.floats(0.5, 20), st.sampled_from([0.05, 0.25, 1.0]))
 def test_straight_pieces_stray_no_further_than_they_say(way: Route, speed: float, error_m: float) -> None:
     if len(np.unique(way.points, axis=0)) < 2:
@@ -322,7 +323,7 @@ def test_straight_pieces_stray_no_further_than_they_say(way: Route, speed: float
     assert np.linalg.norm(coarse.at(t) - fine.at(t), axis=1).max() <= error_m + 1e-4
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(routes, st.floats(0.5, 20))
 def test_no_piece_is_faster_than_the_vehicle(way: Route, speed: float) -> None:
     if len(np.unique(way.points, axis=0)) < 2:
@@ -337,7 +338,7 @@ def test_no_piece_is_faster_than_the_vehicle(way: Route, speed: float) -> None:
     assert (-step[:, 2] / seconds <= craft.descent_m_s * (1 + 1e-6) + slack).all()
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(routes, st.floats(0.0, 1.0))
 def test_the_speed_for_a_time_is_found(way: Route, share: float) -> None:
     time_s = Course(way, vehicle()).time_to_goal_s
@@ -458,6 +459,7 @@ def stepped(points: Floats, craft: Vehicle, speed: float) -> tuple[Floats, Float
     return np.append(0.0, np.cumsum(seconds)), places
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(12))
 def test_a_step_by_step_flight_takes_as_long_and_is_in_the_same_places(seed: int) -> None:
     craft = JERKY if seed % 2 else vehicle()

@@ -22,6 +22,7 @@ from gcsplan.vehicle import Autopilot, Energy
 from gcsplan.world.frame import Frame
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Polygon
+from tests.support.effort import draws
 from tests.support.paths import DATA
 
 EXAMPLE = DATA / "interface_example.yaml"
@@ -702,7 +703,7 @@ def seeds() -> list[Any]:
     return [yaml.safe_load(EXAMPLE.read_text(encoding="utf-8").replace("5.0e6", "5.0e+6")), local(), base()]
 
 
-@settings(max_examples=75, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=draws(75), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_mutation_of_a_mission_loads_or_is_refused(seeds: list[Any], tmp_path: Path, data: st.DataObject) -> None:
     whole = copy.deepcopy(data.draw(st.sampled_from(seeds)))
@@ -736,7 +737,7 @@ def test_any_mutation_of_a_mission_loads_or_is_refused(seeds: list[Any], tmp_pat
     assert mission.airspace_scale >= 1.0
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(st.data())
 def test_any_damage_to_the_text_of_a_mission_is_read_or_refused(data: st.DataObject) -> None:
     text = EXAMPLE.read_text(encoding="utf-8")

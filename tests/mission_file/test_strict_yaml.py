@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from gcsplan.errors import InputError
 from gcsplan.mission_file import strict_yaml
 from gcsplan.mission_file.strict_yaml import read_yaml
+from tests.support.effort import draws
 
 
 def refusal(text: str) -> str:
@@ -82,7 +83,7 @@ def test_too_much_of_anything_is_refused(monkeypatch: pytest.MonkeyPatch) -> Non
     assert "1 million" in refusal("a" * 1_000_001)
 
 
-@settings(max_examples=300)
+@settings(max_examples=draws(300))
 @given(st.text(st.sampled_from("ab:{}[],&*!|>'\"#%@`-?\n\t 1.~<"), max_size=60) | st.text(max_size=40))
 def test_any_text_is_read_or_refused(text: str) -> None:
     try:

@@ -21,6 +21,7 @@ from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support.effort import draws
 
 FRAME = Frame(36.6, -84.3)
 SQUARE = [[-84.31, 36.59], [-84.29, 36.59], [-84.29, 36.61], [-84.31, 36.61], [-84.31, 36.59]]
@@ -354,7 +355,7 @@ def test_a_swapped_zone_is_told_from_a_far_one() -> None:
     assert not looks_swapped(far, FRAME)
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(
     st.floats(-80, 80), st.floats(-180, 180), st.floats(0.001, 1.5), st.integers(3, 12), st.integers(0, 10**6),
     st.booleans(),
@@ -407,7 +408,7 @@ def paths_into(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return found
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=draws(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path, data: st.DataObject) -> None:
     multi = feature({"type": "MultiPolygon", "coordinates": [[SQUARE, HOLE]]})
@@ -429,7 +430,7 @@ def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path, data: st.Data
     judged(tmp_path / "z.geojson", text.encode())
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=draws(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_kml_gives_zones_or_clear_problems(tmp_path: Path, data: st.DataObject) -> None:
     broken = bytearray(KML.encode())

@@ -12,6 +12,7 @@ from gcsplan.errors import GcsplanError, InputError
 from gcsplan.optimisers.box import WORST, Run, Steps, clipped, partners
 from gcsplan.optimisers.driver import State, minimise
 from gcsplan.optimisers.registry import Entry, get
+from tests.support.effort import draws
 
 
 def row(update: object, **rest: object) -> Entry:
@@ -197,7 +198,7 @@ def test_a_threshold_may_be_a_number_where_its_default_is_none() -> None:
     assert get("msfoa").with_defaults()["threshold"] is None
 
 
-@settings(max_examples=30)
+@settings(max_examples=draws(30))
 @given(st.integers(4, 12), st.integers(1, 3), st.integers(0, 2**32))
 def test_partners_differ_from_each_other_and_from_oneself(n: int, k: int, seed: int) -> None:
     drawn = np.stack([np.arange(n), *partners(np.random.default_rng(seed), n, n, k)])

@@ -97,7 +97,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_ones(name: st
 
 
 @every
-@pytest.mark.parametrize("function", ["f1", "f7"])
+@pytest.mark.parametrize("function", [pytest.param("f1", marks=pytest.mark.slow), "f7"])
 def test_it_beats_random_search_of_equal_evaluations_or_its_row_says_why_not(name: str, function: str) -> None:
     cost = FUNCTIONS[function].on_unit_box(DIM, shifted=True)
     found = [minimise(name, cost, DIM, evaluations=BUDGET, seed=seed).cost for seed in range(RUNS)]

@@ -121,7 +121,7 @@ def refusal_of(problem: Problem) -> Refusal:
     return with_cures(replace(problem, budget_s=30.0), caught.value, plan)  # so that a busy machine tries as much
 
 
-SLOW = {"cliff", "cliff, long way", "two ceilings", *(f"ridges {k}" for k in (2, 3, 4))}
+SLOW = {"ridges with errors 5", "cliff", "cliff, long way", "two ceilings", *(f"ridges {k}" for k in (2, 3, 4))}
 SLOW |= {f"ridges with errors {k}" for k in (6, 7, 8)}
 
 
@@ -138,6 +138,7 @@ def test_what_is_reported_to_help_does(name: str) -> None:
         assert np.allclose(points[[0, -1]], [problem.start, problem.goal])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "key", "given"),
     [
@@ -227,6 +228,7 @@ def test_a_plan_that_runs_on_is_stopped_when_it_reports_progress(monkeypatch: py
     assert "not tried in 3 s: without max_climb_deg and max_descent_deg, max_agl_m, the no-fly zones or" in message
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("opens", [lambda p: True, lambda p: False, lambda p: p.limits.max_amsl_m is None])
 def test_so_many_plans_and_no_more(opens: Callable[[Problem], bool], monkeypatch: pytest.MonkeyPatch) -> None:
     slow = SlowPlan(0.0, opens)

@@ -40,6 +40,7 @@ from gcsplan.vehicle import Energy, Vehicle
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support.effort import draws
 from tests.support.worlds import vehicle, world
 
 HOME_DEG = (36.6, -84.3)
@@ -312,7 +313,7 @@ def test_a_hostile_name_is_words_and_nothing_else() -> None:
     assert "</script><script>alert('x')</script>\"'><img src=x onerror=alert(1)>&amp;gnp.exe" in read.text
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(st.text(max_size=40))
 def test_any_words_survive_escaping_and_the_data_block(words: str) -> None:
     read = Reader(f'<p title="{markup.esc(words)}">{markup.esc(words)}</p>{markup.data_block("data", [words])}')
@@ -326,7 +327,7 @@ def test_any_words_survive_escaping_and_the_data_block(words: str) -> None:
 # -- numbers ------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=100)
+@settings(max_examples=draws(100))
 @given(st.floats(-1e6, 1e6), st.integers(0, 3))
 def test_room_that_is_left_is_never_told_larger_than_it_is(value: float, decimals: int) -> None:
     told = float(markup.least(value, decimals).replace(markup.THIN, ""))
@@ -343,7 +344,7 @@ def test_numbers_have_no_negative_zero_and_a_dash_where_there_is_none() -> None:
     assert markup.minutes(59.4) == "59\u202fs"
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(st.floats(-1e4, 1e4), st.floats(1e-3, 1e5), st.integers(2, 9))
 def test_ticks_lie_within_their_axis_and_are_neither_few_nor_many(low: float, span: float, wanted: int) -> None:
     found = ticks(low, low + span, wanted)
@@ -393,7 +394,7 @@ def test_zones_are_passed_over_and_under_and_the_far_one_is_not_passed() -> None
     assert "below its floor" in text
 
 
-@settings(max_examples=80)
+@settings(max_examples=draws(80))
 @given(st.lists(st.tuples(st.floats(-900, 900), st.floats(-900, 900)), min_size=1, max_size=8), st.integers(3, 9))
 def test_the_distance_from_a_polygon_is_that_of_its_densely_sampled_rim(
     places: list[tuple[float, float]], corners: int
@@ -413,7 +414,7 @@ def test_the_distance_from_a_polygon_is_that_of_its_densely_sampled_rim(
     assert ((found < 0) == inside)[clear].all()
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(st.integers(3, 40), st.integers(0, 10_000))
 def test_the_lid_of_a_prism_covers_its_shape_exactly(corners: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

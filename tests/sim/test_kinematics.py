@@ -59,6 +59,7 @@ CLIMB_S = 50 / 2.5 + 2.5 / 1.0
 """To 50 m: 2.5 m/s reached and lost again at 1 m/s²."""
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("leg_m", "measured_m_s"), [(60.0, 7.0), (100.0, 4.0), (150.0, 3.0)])
 def test_a_lower_speed_commanded_on_the_move_takes_hold_as_slowly_as_on_a_real_arducopter(
     leg_m: float, measured_m_s: float
@@ -100,6 +101,7 @@ def test_a_leg_too_short_for_its_speed_is_a_triangle() -> None:
     assert flown.arrive_s[0] == pytest.approx(CLIMB_S + 2 * math.sqrt(20 / 1.5), abs=0.03)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("rise_m", "rate_m_s"), [(200.0, 2.5), (-200.0, 1.5)])
 def test_a_steep_leg_is_flown_as_slowly_as_climb_and_descent_demand(rise_m: float, rate_m_s: float) -> None:
     way = track(at(cmd.TAKEOFF, 0, 0, 300), at(cmd.WAYPOINT, 0, 400, 300 + rise_m))
@@ -124,6 +126,7 @@ def test_a_right_angle_is_rounded_two_metres_from_its_way_point_at_the_speed_of_
     assert flown.arrive_s[0] == pytest.approx(CLIMB_S + 2 * leg_s + arc_m / slow, abs=0.1)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("leg_m", "measured_m_s"),
     [(12.0, 3.08), (22.9, 4.80), (38.8, 6.93), (49.7, 8.17), (60.7, 9.20), (70.3, 10.1)],
@@ -255,6 +258,7 @@ def test_no_limit_of_motion_is_ever_broken(
     assert np.linalg.norm(points[-1] - goal) < 0.05
 
 
+@pytest.mark.slow
 def test_a_quarter_of_the_step_flies_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     way = track(
         TAKEOFF, speed(9), at(cmd.WAYPOINT, 0, 200, 60), at(cmd.WAYPOINT, 150, 250, 40), at(cmd.WAYPOINT, 160, 100, 70),
@@ -270,6 +274,7 @@ def test_a_quarter_of_the_step_flies_the_same(monkeypatch: pytest.MonkeyPatch) -
 # -- weather ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_wind_within_the_airspeed_costs_no_time_and_beyond_it_costs_what_is_missing() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 1000, 50))
     calm = fly([way], [0.0]).arrive_s[0]
@@ -283,6 +288,7 @@ def test_wind_within_the_airspeed_costs_no_time_and_beyond_it_costs_what_is_miss
     assert across == pytest.approx(CLIMB_S + 1000 / v + v / 1.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_run_is_the_same_whether_it_is_flown_alone_or_among_others() -> None:
     ways = [track(TAKEOFF, at(cmd.WAYPOINT, 0, 600, 50)), track(TAKEOFF, at(cmd.WAYPOINT, 600, 0, 50))]
     weather = Weather(5.0, None, 2.0, 1.0)
@@ -293,6 +299,7 @@ def test_a_run_is_the_same_whether_it_is_flown_alone_or_among_others() -> None:
     assert other.arrive_s.tolist() != alone.arrive_s.tolist()
 
 
+@pytest.mark.slow
 def test_noise_and_gusts_have_the_size_that_was_asked_for() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 1500, 50))
     noisy = fly([way], [0.0], weather=Weather(noise_m=2.0), runs=40, seed=3)
@@ -304,6 +311,7 @@ def test_noise_and_gusts_have_the_size_that_was_asked_for() -> None:
     assert gusty.offset_m[..., 2].std() == 0.0
 
 
+@pytest.mark.slow
 def test_one_that_cannot_make_way_never_arrives_and_the_flight_still_ends() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 600, 50))
     flown = fly([way], [0.0], weather=Weather(30.0, 0.0))

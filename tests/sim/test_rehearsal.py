@@ -27,6 +27,7 @@ from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Zone
 from tests.support import worlds
+from tests.support.effort import draws
 
 GROUND_M = 300.0
 FLAT = worlds.world(GROUND_M, half_m=4000.0)
@@ -165,6 +166,7 @@ def test_two_that_meet_are_named_with_the_moment() -> None:
     assert rehearse(later, FLAT, Terms((), 30.0)).safe
 
 
+@pytest.mark.slow
 def test_one_that_lands_beside_another_that_stands_there_is_a_violation_until_the_pad_is_clear() -> None:
     parts = [a_part(1, (0, 0), (1000, 0)), a_part(2, (0, 300), (1000, 20), depart_s=200.0)]
     assert kinds(rehearse(parts, FLAT, Terms((), 30.0))) == ["separation"]
@@ -208,6 +210,7 @@ def test_every_run_has_its_own_weather_and_the_same_seed_the_same_figures() -> N
     assert other.vehicles[0].arrive_s != one.vehicles[0].arrive_s
 
 
+@pytest.mark.slow
 def test_noise_beyond_the_margin_is_counted_in_runs() -> None:
     parts = [a_part(1, (0, 0), (1500, 0), height_m=66.005)]
     result = rehearse(parts, FLAT, Terms(), weather=Weather(noise_m=3.0), runs=12, seed=2)
@@ -217,6 +220,7 @@ def test_noise_beyond_the_margin_is_counted_in_runs() -> None:
     assert result.vehicles[0].min_agl_m == pytest.approx(60.0 - breach.by, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_wind_that_is_too_strong_leaves_a_vehicle_that_never_arrives() -> None:
     result = rehearse([a_part(1, (0, 0), (0, 1000), arrive_s=90.0)], FLAT, Terms(), weather=Weather(40.0, 0.0))
     assert kinds(result) == ["arrival"]
@@ -260,7 +264,7 @@ def a_trace(name: str, rng: np.random.Generator, *, stays: bool = False, spread_
     return Trace(name, times, points, column, np.ones(n - 1, np.intp), float(times[-1]), 0.0, np.zeros(n - 1), stays)
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(seed=st.integers(0, 2**32), count=st.integers(2, 5), stays=st.booleans())
 def test_the_least_distance_is_that_of_brute_force_and_never_more(seed: int, count: int, stays: bool) -> None:
     rng = np.random.default_rng(seed)
@@ -310,7 +314,7 @@ def test_two_that_keep_their_speed_are_as_far_apart_in_the_air_as_planned() -> N
     assert planned_m - 0.05 <= flown.distance_m <= planned_m + 0.05
 
 
-@settings(max_examples=30)
+@settings(max_examples=draws(30))
 @given(seed=st.integers(0, 2**32), slack=st.sampled_from([0.0, 0.1]))
 def test_the_least_height_and_every_zone_of_a_trace_are_those_of_fine_sampling(seed: int, slack: float) -> None:
     rng = np.random.default_rng(seed)

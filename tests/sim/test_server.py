@@ -29,6 +29,7 @@ from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
+from tests.support.effort import draws
 
 GCS = Address(255, 190)
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
@@ -287,7 +288,7 @@ INTERESTING = [
 ]
 
 
-@settings(max_examples=150)
+@settings(max_examples=draws(150))
 @given(
     autopilot=st.sampled_from(list(Autopilot)),
     said=st.lists(
@@ -332,7 +333,7 @@ def test_half_a_frame_of_an_unknown_kind_does_not_swallow_the_next_datagram() ->
         assert len(sent) == 2
 
 
-@settings(max_examples=200)
+@settings(max_examples=draws(200))
 @given(st.lists(st.binary(max_size=300), max_size=10), st.booleans())
 def test_any_bytes_are_survived(pieces: list[bytes], datagram: bool) -> None:
     hub = Hub([a_vehicle()])

@@ -26,6 +26,7 @@ from gcsplan.mavlink.protocol.messages import (
 from gcsplan.sim.misbehaviour import Misbehaviour, spoilt
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
+from tests.support.effort import draws
 
 GCS = Address(255, 190)
 OTHER_GCS = Address(254, 190)
@@ -530,7 +531,7 @@ def test_rally_points_are_kept_in_whole_metres_on_ardupilot() -> None:
     assert upload(vehicle, [at(16)], RALLY) == Ack(3, RALLY)
 
 
-@settings(max_examples=150)
+@settings(max_examples=draws(150))
 @given(
     autopilot=st.sampled_from(list(Autopilot)),
     command=st.integers(0, 65535) | st.sampled_from([16, 17, 18, 19, 20, 21, 22, 31, 84, 85, 93, 177, 178, 5004]),
@@ -592,7 +593,7 @@ def test_every_mistake_in_a_misbehaviour_is_named_with_its_cure() -> None:
         Misbehaviour.parse("drop=1.5")
 
 
-@settings(max_examples=200)
+@settings(max_examples=draws(200))
 @given(st.text(max_size=60) | st.lists(st.sampled_from(["drop", "seed", "=", ",", "1", "nan", "-3", "x"])).map("".join))
 def test_any_text_is_a_misbehaviour_or_a_usage_error(text: str) -> None:
     try:
@@ -722,7 +723,7 @@ def test_a_delayed_answer_comes_by_the_timer_and_a_reordered_one_after_the_next(
     assert vehicle.deadline == pytest.approx(0.2)
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(
     seed=st.integers(0, 2**32), autopilot=st.sampled_from([COPTER, PX4]), drop=st.sampled_from([0.0, 0.1, 0.3]),
     trouble=st.sampled_from(["", "duplicate=0.3", "reorder=0.3", "delay=0.3,delay_s=0.6"]),

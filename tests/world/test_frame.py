@@ -12,6 +12,7 @@ from pyproj import CRS, Geod, Proj, Transformer
 
 from gcsplan.errors import InputError
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
+from tests.support.effort import draws
 
 WGS84 = Geod(ellps="WGS84")
 HOME = Frame(36.6, -84.3)
@@ -47,7 +48,7 @@ def test_at_sixty_degrees_a_degree_of_longitude_is_half_as_long() -> None:
     assert east[0] == pytest.approx(27_900.0, rel=0.001)
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(latitudes, longitudes, azimuths, st.floats(0.0, FARTHEST_M))
 def test_both_round_trips_close_within_a_micrometre(lat: float, lon: float, azimuth: float, far_m: float) -> None:
     frame = Frame(lat, lon)
@@ -59,7 +60,7 @@ def test_both_round_trips_close_within_a_micrometre(lat: float, lon: float, azim
     assert abs(back[1]) <= 180.0
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(latitudes, longitudes, azimuths, st.floats(1.0, FARTHEST_M))
 def test_a_distance_in_the_plane_is_the_real_one_times_at_most_the_scale(
     lat: float, lon: float, azimuth: float, far_m: float
@@ -70,7 +71,7 @@ def test_a_distance_in_the_plane_is_the_real_one_times_at_most_the_scale(
     assert far_m * (1 - 1e-9) - 1e-7 <= planar <= far_m * frame.scale_at(far_m) + 1e-7
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(st.floats(-85.0, 85.0), longitudes, st.floats(100.0, FARTHEST_M))
 def test_scale_at_is_the_largest_scale_of_the_projection_and_hardly_more(lat: float, lon: float, far_m: float) -> None:
     frame = Frame(lat, lon)
@@ -129,7 +130,7 @@ def sampled_bow(frame: Frame, a: tuple[float, float], b: tuple[float, float]) ->
     return float(np.linalg.norm(apart, axis=1).max()), float(sideways.max())
 
 
-@settings(max_examples=120)
+@settings(max_examples=draws(120))
 @given(latitudes, longitudes, azimuths, st.floats(0.0, FARTHEST_M), azimuths, st.floats(10.0, 200_000.0))
 @example(0.0, 0.0, 270.0, 100_000.0, 90.0, 200_000.0)  # nothing in the middle, 1.7 m at the quarters
 @example(0.0, 0.0, 0.0, 0.0, 0.0, 50_000.0)
@@ -168,7 +169,7 @@ def test_the_centre_lies_in_the_middle_rounded_to_a_ten_thousandth() -> None:
     assert centre_of([36.60004], [-84.30006]) == (36.6, -84.3001)
 
 
-@settings(max_examples=200)
+@settings(max_examples=draws(200))
 @given(latitudes, longitudes, st.lists(st.tuples(st.floats(-2, 2), st.floats(-2, 2)), min_size=1, max_size=6))
 def test_the_centre_is_near_all_points_even_across_the_antimeridian(
     lat: float, lon: float, offsets: list[tuple[float, float]]

@@ -71,6 +71,7 @@ def same_where_seen(part: Halo, whole: Halo, rows: NDArray[np.intp], cols: NDArr
     return all(np.array_equal(a[rows, cols], b[rows, cols]) for a, b in zip(part[:3], whole[:3], strict=True))
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("reach_m", [0.0, 4.0, 70.0])
 def test_lines_find_all_that_they_meet_looked_at_and_little_else(
     reach_m: float, monkeypatch: pytest.MonkeyPatch
@@ -96,6 +97,7 @@ def test_lines_find_all_that_they_meet_looked_at_and_little_else(
     assert same_where_seen(copy.halo, whole, cells[:, 1], cells[:, 0])
 
 
+@pytest.mark.slow
 def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(8)
     z = np.cumsum(np.cumsum(rng.normal(0.0, 0.4, (700, 800)), axis=0), axis=1)

@@ -13,6 +13,7 @@ from pyproj import Transformer
 from gcsplan.arrays import Floats
 from gcsplan.world.frame import Frame
 from gcsplan.world.surface import GridMap, Surface
+from tests.support.effort import draws
 
 FLAT = GridMap.affine(0.0, 0.0, 1.0, 1.0)  # column = east, row = south
 
@@ -41,7 +42,7 @@ RASTERS = [
 ]
 
 
-@settings(max_examples=14)
+@settings(max_examples=draws(14))
 @given(st.data())
 def test_the_fitted_grid_is_nowhere_farther_from_the_exact_one_than_it_says(data: st.DataObject) -> None:
     epsg, cell, lats, lons = data.draw(st.sampled_from(RASTERS))
@@ -63,7 +64,7 @@ def test_the_fitted_grid_is_nowhere_farther_from_the_exact_one_than_it_says(data
     assert fitted.error_m < limit_m
 
 
-@settings(max_examples=12)
+@settings(max_examples=draws(12))
 @given(st.data())
 def test_the_way_back_from_the_grid_closes(data: st.DataObject) -> None:
     epsg, cell, lats, lons = data.draw(st.sampled_from(RASTERS))
@@ -130,7 +131,7 @@ def by_hand(z: Floats, col: float, row: float) -> float:
 heights = st.one_of(st.floats(-400, 9000), st.just(math.nan))
 
 
-@settings(max_examples=100)
+@settings(max_examples=draws(100))
 @given(st.data())
 def test_heights_are_those_worked_out_by_hand_unknown_nodes_included(data: st.DataObject) -> None:
     rows, cols = data.draw(st.integers(2, 4)), data.draw(st.integers(2, 4))

@@ -34,6 +34,7 @@ from gcsplan.world.peaks import Peak
 from gcsplan.world.raster import open_raster
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import TerrainSpec, load_terrain, open_terrain
+from tests.support.effort import draws
 
 FRAME = Frame(36.5, -84.5)
 BOX = (-3000.0, -2000.0, 3000.0, 2000.0)
@@ -237,6 +238,7 @@ def test_an_ascii_grid_needs_its_coordinate_system(tmp_path: Path) -> None:
     assert np.abs(surface.ground_at(e, n) - wanted).max() < 1e-5
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("lon_deg", [179.98, -179.98])
 @pytest.mark.parametrize("layout", ["two tiles", "one across", "global"])
 def test_the_antimeridian_is_no_edge(tmp_path: Path, lon_deg: float, layout: str) -> None:
@@ -701,6 +703,7 @@ MOUND = (Peak(50.0, 50.0, 70.0, 20.0, 20.0),)
 MIXED = (Peak(20.0, 70.0, 33.0, 7.0, 11.0), Peak(60.0, 40.0, -25.0, 9.0, 8.0), Peak(62.0, 45.0, 50.0, 6.0, 15.0))
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("shapes", [MOUND, MIXED], ids=["mound", "hills and a pit"])
 @pytest.mark.parametrize("most", [4_000_000, 3_000], ids=["affordable", "too coarse"])
 def test_gridded_peaks_are_never_below_the_true_ones(
@@ -717,7 +720,7 @@ def test_gridded_peaks_are_never_below_the_true_ones(
         assert above.max() <= 0.02
 
 
-@settings(max_examples=24)
+@settings(max_examples=draws(24))
 @given(
     st.lists(
         st.builds(
@@ -773,6 +776,7 @@ def test_an_obstacle_height_stands_on_all_ground(tmp_path: Path) -> None:
     assert surface.info["bare_dem"] is False
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("crs", "cell"),
     [("EPSG:4326", 0.0003), ("EPSG:4326", 0.0071), ("EPSG:4326", 0.002), ("EPSG:32616", 35.0), ("EPSG:32616", 400.0)],
@@ -845,7 +849,7 @@ def good_tif(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-@settings(max_examples=90, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=draws(90), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_corrupted_geotiff_is_read_or_refused(good_tif: bytes, tmp_path: Path, data: st.DataObject) -> None:
     broken = bytearray(good_tif)
@@ -859,7 +863,7 @@ def test_a_corrupted_geotiff_is_read_or_refused(good_tif: bytes, tmp_path: Path,
     judged(path)
 
 
-@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=draws(25), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 1201 * 1201 * 2 + 50), st.binary(max_size=64))
 def test_an_hgt_of_the_wrong_size_is_refused(tmp_path: Path, size: int, head: bytes) -> None:
     path = tmp_path / "N36W085.hgt"
@@ -872,7 +876,7 @@ def test_an_hgt_without_its_name_is_refused_with_the_cure(tmp_path: Path) -> Non
     assert "N36W085.hgt" in str(refusal(hgt(tmp_path / "tile.hgt", hills(1201, 1201))))
 
 
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=draws(80), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_garbled_ascii_grid_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> None:
     number = st.sampled_from(["100", "0", "-1", "1e9", "99999999999", "nan", "inf", "0.002", "-84.6", "x", "", "36.4"])

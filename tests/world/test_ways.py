@@ -23,6 +23,7 @@ from tests.support.random_worlds import (
 )
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("make", [in_plane, turned, in_degrees])
 def test_what_is_clear_of_ground_and_zones_passes_the_exact_check(make: object) -> None:
     rng, looked = np.random.default_rng(11), 0
@@ -99,6 +100,7 @@ def test_nothing_demanded_still_means_not_within() -> None:
     assert met.begins.tolist() == [True, False]
 
 
+@pytest.mark.slow
 def test_distances_of_hulls_are_those_of_their_points_mixed() -> None:
     rng = np.random.default_rng(2)
     mix = rng.dirichlet(np.full(5, 0.25), 4000)

@@ -263,7 +263,7 @@ class Link:
         )
 
 
-class Job(Generic[T]):
+class PumpJob(Generic[T]):
     """One task of `pump` with its result or error."""
 
     def __init__(self, channel: Channel, steps: Steps[T]) -> None:
@@ -292,7 +292,7 @@ class Job(Generic[T]):
         self._steps.close()
 
 
-def pump(jobs: Sequence[Job[T]]) -> None:
+def pump(jobs: Sequence[PumpJob[T]]) -> None:
     """Run all ``jobs`` to their ends, together. Errors stay with their job."""
     if not jobs:
         return
@@ -320,7 +320,7 @@ def pump(jobs: Sequence[Job[T]]) -> None:
 
 def run(channel: Channel, steps: Steps[T]) -> T:
     """Run one task to its end and return its result; raises what it raises."""
-    job = Job(channel, steps)
+    job = PumpJob(channel, steps)
     pump([job])
     if job.error is not None:
         raise job.error

@@ -15,13 +15,13 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
-from gcsplan.mavlink.link.link import Channel, Job, Link, Steps, pump, run
+from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump, run
 from gcsplan.mavlink.link.results import UploadResult
 from gcsplan.mavlink.link.steps import discover_steps
 from gcsplan.mavlink.link.tasks import (
     Judge,
-    Options,
     ProgressCall,
+    SessionOptions,
     Task,
     clearing,
     looking_at,
@@ -38,9 +38,9 @@ __all__ = [
     "EndCall",
     "Judge",
     "ListOrder",
-    "Options",
-    "Order",
     "ProgressCall",
+    "SessionOptions",
+    "UploadOrder",
     "UploadResult",
     "clear_fleet",
     "clear_mission",
@@ -73,18 +73,18 @@ class Checked(Protocol):
 
 
 @dataclass(frozen=True)
-class Order:
+class UploadOrder:
     """One upload of a fleet."""
 
     link: Link
     mission: Mission
     verdict: Checked | None = None
-    options: Options = field(default_factory=Options)
+    options: SessionOptions = field(default_factory=SessionOptions)
     judge: Judge | None = None
     progress: ProgressCall | None = None
 
 
-EndCall = Callable[[Order, UploadResult | GcsplanError], None]
+EndCall = Callable[[UploadOrder, UploadResult | GcsplanError], None]
 
 
 def discover(
@@ -102,7 +102,7 @@ def upload_mission(
     mission: Mission,
     *,
     verdict: Checked | None = None,
-    options: Options | None = None,
+    options: SessionOptions | None = None,
     judge: Judge | None = None,
     progress: ProgressCall | None = None,
 ) -> UploadResult:
@@ -112,13 +112,13 @@ def upload_mission(
     VehicleRefused if it may not go to that vehicle as it stands, LinkError if nobody answers. How the transfer itself
     ended is in the result.
     """
-    result = upload_fleet([Order(link, mission, verdict, options or Options(), judge, progress)])[0]
+    result = upload_fleet([UploadOrder(link, mission, verdict, options or SessionOptions(), judge, progress)])[0]
     if isinstance(result, GcsplanError):
         raise result
     return result
 
 
-def upload_fleet(orders: Sequence[Order], *, ended: EndCall | None = None) -> list[UploadResult | GcsplanError]:
+def upload_fleet(orders: Sequence[UploadOrder], *, ended: EndCall | None = None) -> list[UploadResult | GcsplanError]:
     """Several uploads at once, on one link or several; results in the order given, an error in place of a result.
 
     ``ended(order, outcome)`` is called as each of them ends. Raises CheckFailed, and sends nothing to anybody, unless
@@ -130,7 +130,7 @@ def upload_fleet(orders: Sequence[Order], *, ended: EndCall | None = None) -> li
     if len(set(seats)) < len(seats):
         raise InputError("two missions of one fleet are meant for the same system id on the same link")
 
-    def starting(order: Order) -> Callable[[Channel], Steps[UploadResult]]:
+    def starting(order: UploadOrder) -> Callable[[Channel], Steps[UploadResult]]:
         task = Task.of(order.mission, order.options, order.judge, order.progress)
         return lambda channel: _telling(uploading(channel, task), order, ended)
 
@@ -146,7 +146,7 @@ class ListOrder:
     items: tuple[MissionItem, ...]
     autopilot: Autopilot
     name: str = ""
-    options: Options = field(default_factory=Options)
+    options: SessionOptions = field(default_factory=SessionOptions)
 
 
 def upload_lists(orders: Sequence[ListOrder], mission_type: int) -> list[UploadResult | GcsplanError]:
@@ -160,14 +160,16 @@ def upload_lists(orders: Sequence[ListOrder], mission_type: int) -> list[UploadR
     return _together([(order.link, order.sysid, starting(order)) for order in orders])
 
 
-def clear_fleet(orders: Sequence[Order], seen: Mapping[str, VehicleState | None]) -> list[UploadResult | GcsplanError]:
+def clear_fleet(
+    orders: Sequence[UploadOrder], seen: Mapping[str, VehicleState | None]
+) -> list[UploadResult | GcsplanError]:
     """Clear the mission on every vehicle of ``orders``, all at once, and read back that it is gone.
 
     ``seen``: by mission name the vehicle that was uploaded to; one that speaks from another address is left alone.
     Results in the order given, an error in place of a result: a vehicle that is armed, or gone, keeps what it has.
     """
 
-    def starting(order: Order) -> Callable[[Channel], Steps[UploadResult]]:
+    def starting(order: UploadOrder) -> Callable[[Channel], Steps[UploadResult]]:
         same = seen.get(order.mission.name)
         return lambda channel: clearing(channel, order.mission.name, (MISSION,), order.options, same)
 
@@ -177,11 +179,11 @@ def clear_fleet(orders: Sequence[Order], seen: Mapping[str, VehicleState | None]
 def _together(
     starts: Sequence[tuple[Link, int, Callable[[Channel], Steps[UploadResult]]]],
 ) -> list[UploadResult | GcsplanError]:
-    jobs: list[Job[UploadResult]] = []
+    jobs: list[PumpJob[UploadResult]] = []
     try:
         for link, sysid, steps in starts:
             channel = link.channel(sysid)
-            jobs.append(Job(channel, steps(channel)))
+            jobs.append(PumpJob(channel, steps(channel)))
         pump(jobs)
     finally:
         for job in jobs:
@@ -194,7 +196,7 @@ def _together(
     return outcomes
 
 
-def _telling(steps: Steps[UploadResult], order: Order, ended: EndCall | None) -> Steps[UploadResult]:
+def _telling(steps: Steps[UploadResult], order: UploadOrder, ended: EndCall | None) -> Steps[UploadResult]:
     """``steps``, and how they ended told to the caller at once: the others of the fleet may take much longer."""
     try:
         result = yield from steps
@@ -229,12 +231,12 @@ def upload_items(
     autopilot: Autopilot,
     mission_type: int,
     *,
-    options: Options | None = None,
+    options: SessionOptions | None = None,
     name: str = "",
 ) -> UploadResult:
     """Upload a fence (1) or rally points (2), and prove it. Raises as `upload_mission` does, but for the verdict."""
     _require_list(mission_type)
-    task = Task(name, sysid, autopilot, tuple(items), mission_type, options or Options())
+    task = Task(name, sysid, autopilot, tuple(items), mission_type, options or SessionOptions())
     return _run(link, sysid, lambda channel: uploading(channel, task))
 
 
@@ -244,10 +246,10 @@ def _require_list(mission_type: int) -> None:
 
 
 def download_items(
-    link: Link, sysid: int, mission_type: int = MISSION, *, options: Options | None = None
+    link: Link, sysid: int, mission_type: int = MISSION, *, options: SessionOptions | None = None
 ) -> tuple[MissionItem, ...]:
     """The list on board in wire order. Raises LinkError or VehicleRefused if it cannot be read."""
-    settings = options or Options()
+    settings = options or SessionOptions()
 
     def steps(channel: Channel) -> Steps[tuple[MissionItem, ...]]:
         state, recheck = yield from looking_at(channel, settings)
@@ -264,13 +266,13 @@ def download_mission(
     *,
     home: Home | None = None,
     name: str = "",
-    options: Options | None = None,
+    options: SessionOptions | None = None,
 ) -> Mission:
     """The mission on board. PX4 keeps no home in it: ``home``, else the one that the vehicle reports, else its place.
 
     Raises InputError where no home is known, LinkError or VehicleRefused if it cannot be read.
     """
-    settings = options or Options()
+    settings = options or SessionOptions()
 
     def steps(channel: Channel) -> Steps[Mission]:
         state, recheck = yield from looking_at(channel, settings)
@@ -286,25 +288,25 @@ def download_mission(
 
 
 def verify_mission(
-    link: Link, mission: Mission, *, options: Options | None = None, judge: Judge | None = None
+    link: Link, mission: Mission, *, options: SessionOptions | None = None, judge: Judge | None = None
 ) -> UploadResult:
     """Read the mission on board and compare it with ``mission``; nothing is written.
 
     Raises LinkError or VehicleRefused if it cannot be read; what differs is in the result.
     """
-    task = Task.of(mission, options or Options(), judge)
+    task = Task.of(mission, options or SessionOptions(), judge)
     return _run(link, mission.sysid, lambda channel: verifying(channel, task))
 
 
 def clear_mission(
-    link: Link, sysid: int, mission_type: int = MISSION, *, options: Options | None = None, name: str = ""
+    link: Link, sysid: int, mission_type: int = MISSION, *, options: SessionOptions | None = None, name: str = ""
 ) -> UploadResult:
     """Clear one list, or mission, fence and rally points (255), and read back that nothing is left.
 
     Raises VehicleRefused (armed, or being flown) and LinkError.
     """
     kinds = (MISSION, FENCE, RALLY) if mission_type == ALL else (mission_type,)
-    return _run(link, sysid, lambda channel: clearing(channel, name, kinds, options or Options()))
+    return _run(link, sysid, lambda channel: clearing(channel, name, kinds, options or SessionOptions()))
 
 
 def _same_mission(a: Mission, b: Mission) -> bool:

@@ -55,7 +55,7 @@ _MOST_HELD_BY_ANY = 4369
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class SessionOptions:
     """How to go about it. ``unchecked`` sends without a verdict; ``simulated`` is only passed on to the result.
 
     ``discover_s``: wait for a first heartbeat; ``listen_s``: listen for rivals after it; ``standby_s``: wait for a
@@ -93,13 +93,15 @@ class Task:
     autopilot: Autopilot
     items: tuple[MissionItem, ...]
     mission_type: int
-    options: Options
+    options: SessionOptions
     mission: Mission | None = None
     judge: Judge | None = None
     progress: ProgressCall | None = None
 
     @classmethod
-    def of(cls, mission: Mission, options: Options, judge: Judge | None, progress: ProgressCall | None = None) -> Task:
+    def of(
+        cls, mission: Mission, options: SessionOptions, judge: Judge | None, progress: ProgressCall | None = None
+    ) -> Task:
         """The task of sending ``mission``."""
         return cls(
             mission.name, mission.sysid, mission.autopilot, mission.wire_items(), MISSION, options, mission, judge,
@@ -107,7 +109,7 @@ class Task:
         )  # fmt: skip
 
 
-def finding(channel: Channel, watch: Watch, options: Options) -> Steps[VehicleState]:
+def finding(channel: Channel, watch: Watch, options: SessionOptions) -> Steps[VehicleState]:
     """Find the vehicle, and wait for it while it boots."""
     return discover_steps(
         channel, watch, timeout_s=min(options.discover_s, options.timeout_s), listen_s=options.listen_s,
@@ -180,7 +182,9 @@ def _terms(task: Task) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _holding(channel: Channel, watch: Watch, state: VehicleState, options: Options, judge: JudgeState) -> Recheck:
+def _holding(
+    channel: Channel, watch: Watch, state: VehicleState, options: SessionOptions, judge: JudgeState
+) -> Recheck:
     return Recheck(channel, watch, state, judge, may_move=options.ignore_position, standby_s=options.standby_s)
 
 
@@ -203,7 +207,7 @@ def _parameters(
 
 
 def reading(
-    channel: Channel, state: VehicleState, mission_type: int, options: Options, recheck: Recheck | None = None
+    channel: Channel, state: VehicleState, mission_type: int, options: SessionOptions, recheck: Recheck | None = None
 ) -> Steps[Download]:
     """Read one list whole, from the address that ``state`` was heard at. Raises VehicleRefused, LinkError."""
     channel.pin(state.peer)
@@ -225,7 +229,7 @@ def reading(
     return machine
 
 
-def looking_at(channel: Channel, options: Options) -> Steps[tuple[VehicleState, Recheck]]:
+def looking_at(channel: Channel, options: SessionOptions) -> Steps[tuple[VehicleState, Recheck]]:
     """Find a vehicle that is to be read from, and hold on to it. Raises VehicleRefused where two have its number."""
     watch = Watch(channel.sysid)
     state = yield from finding(channel, watch, options)
@@ -244,7 +248,7 @@ def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
 
 
 def clearing(
-    channel: Channel, name: str, kinds: tuple[int, ...], options: Options, same: VehicleState | None = None
+    channel: Channel, name: str, kinds: tuple[int, ...], options: SessionOptions, same: VehicleState | None = None
 ) -> Steps[UploadResult]:
     """Clear each of ``kinds`` and read back that nothing is left. Raises VehicleRefused, LinkError.
 
@@ -290,7 +294,9 @@ def clearing(
     )
 
 
-def _against_clearing(options: Options, same: VehicleState | None, state: VehicleState) -> tuple[Reasons, list[str]]:
+def _against_clearing(
+    options: SessionOptions, same: VehicleState | None, state: VehicleState
+) -> tuple[Reasons, list[str]]:
     against, warnings = _ambiguous(state)
     if state.armed and not options.allow_armed:
         against.append(("armed", "the vehicle is armed: disarm it, or allow it with --allow-armed"))

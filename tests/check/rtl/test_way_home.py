@@ -357,6 +357,7 @@ def test_figures_are_plain_values_and_words() -> None:
 # -- brute force ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("autopilot", "seeds"), [(COPTER, (5002, 5119, 6077, 4000, 4002)), (PX4, (4003, 4007, 4011)), (PLANE, (4000, 4001))]
 )
@@ -398,6 +399,7 @@ def test_never_kinder_than_brute_force_in_rough_random_worlds(autopilot: Autopil
     assert strict <= 0.2 * looked  # on ground as rough as this the bounds beside a line cost that much
 
 
+@pytest.mark.slow
 def test_on_smooth_ground_the_lowest_altitude_is_hardly_higher_than_it_must_be() -> None:
     rng = np.random.default_rng(5)
     for _ in range(4):

@@ -14,6 +14,7 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import stored
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.path import Path
+from tests.support.effort import draws
 from tests.support.worlds import vehicle, world
 
 WORLD = world()
@@ -48,7 +49,7 @@ def test_px4_points_its_nose_along_the_leg_and_ardupilot_is_sent_none() -> None:
     assert all(item.params[3] == 0 for item in copter.items)
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(
     st.lists(
         st.tuples(st.floats(-9000, 9000), st.floats(-9000, 9000), st.floats(360, 2000)), min_size=2, max_size=6,

@@ -25,6 +25,7 @@ from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP, LAND, RTL
 from gcsplan.mavlink.mission.mission import GLOBAL, NO_POSITION, RELATIVE, TERRAIN, Home, Mission, MissionItem, float32
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
+from tests.support.effort import draws
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 HOME = Home(366_000_000, -843_800_000, 312.345678901)
@@ -91,7 +92,7 @@ def missions(draw: st.DrawFn, *, nan: bool = False) -> Mission:
     return Mission(autopilot, Home(draw(lat_e7), draw(lon_e7), amsl), tuple(items))
 
 
-@settings(max_examples=80)
+@settings(max_examples=draws(80))
 @given(missions())
 def test_a_waypoints_file_reads_back_as_the_same_mission(mission: Mission) -> None:
     text = write_waypoints(mission)
@@ -99,7 +100,7 @@ def test_a_waypoints_file_reads_back_as_the_same_mission(mission: Mission) -> No
     assert write_waypoints(mission) == text
 
 
-@settings(max_examples=80)
+@settings(max_examples=draws(80))
 @given(missions(nan=True))
 def test_a_plan_file_reads_back_as_the_same_mission(mission: Mission) -> None:
     text = write_plan(mission)
@@ -108,7 +109,7 @@ def test_a_plan_file_reads_back_as_the_same_mission(mission: Mission) -> None:
     assert write_plan(mission) == text
 
 
-@settings(max_examples=300)
+@settings(max_examples=draws(300))
 @given(finite32)
 def test_float32_text_is_the_shortest_that_gives_the_same_bits(value: float) -> None:
     text = float32_text(value)
@@ -118,7 +119,7 @@ def test_float32_text_is_the_shortest_that_gives_the_same_bits(value: float) -> 
         assert float32(float(f"{value:.{digits - 2}e}")) != value
 
 
-@settings(max_examples=300)
+@settings(max_examples=draws(300))
 @given(int32)
 def test_degrees_text_is_exact(e7: int) -> None:
     assert Decimal(degrees_text(e7)) == Decimal(e7) / 10**7
@@ -370,7 +371,7 @@ def test_a_mission_of_more_than_ten_thousand_items_is_not_read() -> None:
         read_plan(json.dumps(plan), autopilot=COPTER, where="f")
 
 
-@settings(max_examples=200)
+@settings(max_examples=draws(200))
 @given(st.data())
 def test_no_text_makes_the_waypoints_reader_stumble(data: st.DataObject) -> None:
     good = HEAD + HOME_LINE + POINT
@@ -630,7 +631,7 @@ json_values = st.recursive(
 )
 
 
-@settings(max_examples=100)
+@settings(max_examples=draws(100))
 @given(st.data())
 def test_no_json_makes_the_plan_reader_stumble(data: st.DataObject) -> None:
     plan = plan_of()

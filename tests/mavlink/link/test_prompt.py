@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 
 from gcsplan.mavlink.link.drive import drive
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, checksum
-from gcsplan.mavlink.link.link import GCS, Link, pump, run
-from gcsplan.mavlink.link.link import Job as PumpJob
+from gcsplan.mavlink.link.link import GCS, Link, PumpJob, pump, run
 from gcsplan.mavlink.link.prompt import Prepared, PromptAnswers
 from gcsplan.mavlink.link.transport import Udp
 from gcsplan.mavlink.link.url import parse_url
@@ -30,6 +29,7 @@ from gcsplan.mavlink.protocol.transfer import Timers, Upload, VerifiedUpload
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
+from tests.support.effort import draws
 
 VEHICLE = Address(1, 1)
 PEER = ("127.0.0.1", 14550)
@@ -73,7 +73,7 @@ def taught(
 # -- the bytes ----------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=150)
+@settings(max_examples=draws(150))
 @given(
     st.lists(WIRE_ITEMS, min_size=1, max_size=4), st.sampled_from([0, 1, 2]), st.integers(0, 1), st.integers(0, 255),
     st.tuples(st.integers(1, 255), st.integers(0, 255)), st.tuples(st.integers(1, 255), st.integers(0, 255)),
@@ -166,7 +166,7 @@ def test_no_flipped_bit_is_answered() -> None:
     assert prepared.asked == []
 
 
-@settings(max_examples=300)
+@settings(max_examples=draws(300))
 @given(st.binary(max_size=60), st.integers(0, 15))
 def test_bytes_that_are_no_frame_are_never_answered(junk: bytes, cut: int) -> None:
     answers, _ = taught(3)

@@ -20,8 +20,8 @@ from gcsplan.mavlink.link.frames import FrameWriter, Signing, SigningKey
 from gcsplan.mavlink.link.link import GCS, Heard, Link
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.link.session import (
-    Options,
-    Order,
+    SessionOptions,
+    UploadOrder,
     clear_mission,
     download_items,
     upload_fleet,
@@ -202,7 +202,7 @@ def craft(air: Air, home: Home = HOME, signing: Signing | None = None, **more: A
     return Craft(one, air, signing)
 
 
-SLOW = Options(unchecked=True, read_parameters=False)
+SLOW = SessionOptions(unchecked=True, read_parameters=False)
 
 
 def test_two_behind_one_address_are_told_by_their_boot_clocks() -> None:
@@ -379,7 +379,7 @@ def fleet(*boards: LoopbackVehicle, judge: Callable[[Mission], str | None] | Non
                 telemetry.parameters = OddParameters(boards[0].autopilot, 1, random.Random(1))
         with Link(server.url_for_gcs) as link:
             orders = [
-                Order(
+                UploadOrder(
                     link, mission(sysid=b.sysid), options=replace(OPTIONS, **options), judge=judge if n == 0 else None
                 )
                 for n, b in enumerate(boards)

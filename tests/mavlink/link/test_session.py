@@ -19,8 +19,8 @@ from gcsplan.mavlink.link.link import Heard, Link
 from gcsplan.mavlink.link.parameters import judge_parameters
 from gcsplan.mavlink.link.preflight import preflight
 from gcsplan.mavlink.link.session import (
-    Options,
-    Order,
+    SessionOptions,
+    UploadOrder,
     clear_mission,
     discover,
     download_items,
@@ -44,7 +44,9 @@ from gcsplan.vehicle import Autopilot
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 HOME = Home.at(36.6, -84.38, 371.0)
 QUICK = Timers(response_s=0.15, item_s=0.05, silence_s=0.6, retries=3)
-OPTIONS = Options(unchecked=True, listen_s=0.0, standby_s=0.0, discover_s=5.0, read_parameters=False, timers=QUICK)
+OPTIONS = SessionOptions(
+    unchecked=True, listen_s=0.0, standby_s=0.0, discover_s=5.0, read_parameters=False, timers=QUICK
+)
 
 
 def mission(autopilot: Autopilot = COPTER, count: int = 8, sysid: int = 1, bearing: int = 777) -> Mission:
@@ -126,9 +128,9 @@ def test_nothing_is_sent_without_a_passing_verdict_of_this_mission(
     with air(board) as link:
         with pytest.raises(CheckFailed, match=words):
             upload_mission(link, sent, verdict=verdict(sent), options=replace(OPTIONS, unchecked=False))
-        other = Order(link, sent, Verdict(True, sent), replace(OPTIONS, unchecked=False))
+        other = UploadOrder(link, sent, Verdict(True, sent), replace(OPTIONS, unchecked=False))
         with pytest.raises(CheckFailed):
-            upload_fleet([other, Order(link, mission(sysid=3), verdict(sent), replace(OPTIONS, unchecked=False))])
+            upload_fleet([other, UploadOrder(link, mission(sysid=3), verdict(sent), replace(OPTIONS, unchecked=False))])
     assert board.items() == ()
 
 
@@ -440,7 +442,7 @@ def test_a_fleet_on_one_port_takes_as_long_as_its_slowest_and_each_gets_its_own(
     boards = [vehicle(COPTER if n % 2 else PX4, n) for n in range(1, 13)]
     sent = [mission(board.autopilot, 10 + board.sysid, board.sysid, 700 + board.sysid) for board in boards]
     with air(*boards) as link:
-        results = upload_fleet([Order(link, each, options=OPTIONS) for each in sent])
+        results = upload_fleet([UploadOrder(link, each, options=OPTIONS) for each in sent])
     for board, each, result in zip(boards, sent, results, strict=True):
         assert not isinstance(result, GcsplanError)
         assert result.verified
@@ -453,9 +455,9 @@ def test_a_fleet_on_several_links_keeps_the_errors_apart() -> None:
     with air(good) as first, air(armed) as second, Link("udpin:127.0.0.1:0") as dead:
         began = time.monotonic()
         results = upload_fleet([
-            Order(first, mission(sysid=1), options=OPTIONS),
-            Order(second, mission(sysid=2), options=OPTIONS),
-            Order(dead, mission(sysid=3), options=replace(OPTIONS, discover_s=0.5)),
+            UploadOrder(first, mission(sysid=1), options=OPTIONS),
+            UploadOrder(second, mission(sysid=2), options=OPTIONS),
+            UploadOrder(dead, mission(sysid=3), options=replace(OPTIONS, discover_s=0.5)),
         ])  # fmt: skip
         assert time.monotonic() - began < 5.0
     assert getattr(results[0], "verified", False)
@@ -465,7 +467,9 @@ def test_a_fleet_on_several_links_keeps_the_errors_apart() -> None:
 
 def test_two_missions_for_one_vehicle_are_refused() -> None:
     with Link("udpin:127.0.0.1:0") as link, pytest.raises(InputError, match="same system id"):
-        upload_fleet([Order(link, mission(), options=OPTIONS), Order(link, mission(count=3), options=OPTIONS)])
+        upload_fleet(
+            [UploadOrder(link, mission(), options=OPTIONS), UploadOrder(link, mission(count=3), options=OPTIONS)]
+        )
 
 
 # -- download, verify, clear, fence, rally ------------------------------------------------------------------------

@@ -11,14 +11,14 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from gcsplan.app import delivery
-from gcsplan.app.jobs import Delivery, Job
+from gcsplan.app import uploads
+from gcsplan.app.upload_job import JobResult, UploadJob
 from gcsplan.bench import upload_fleet as upload_fleet_bench
 from gcsplan.cli import console
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, VehicleRefused
 from gcsplan.mavlink.link import session
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import Options, Order, upload_fleet
+from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
@@ -32,7 +32,9 @@ from gcsplan.vehicle import Autopilot
 COPTER = Autopilot.ARDUCOPTER
 HOME = Home.at(36.6, -84.38, 371.0)
 QUICK = Timers(response_s=0.3, item_s=0.05, silence_s=1.5, retries=4)
-OPTIONS = Options(unchecked=True, listen_s=0.0, standby_s=0.0, discover_s=2.0, read_parameters=False, timers=QUICK)
+OPTIONS = SessionOptions(
+    unchecked=True, listen_s=0.0, standby_s=0.0, discover_s=2.0, read_parameters=False, timers=QUICK
+)
 FLEET = range(1, 21)
 
 
@@ -60,11 +62,12 @@ def fleet(numbers: range, trouble: Mapping[int, Mapping[str, Any]], drop: float)
     assert server.mishandled == 0
 
 
+@pytest.mark.slow
 def test_twenty_vehicles_with_fifty_items_are_all_verified_over_a_link_that_loses_a_twentieth() -> None:
     sent = [mission(n) for n in FLEET]
     ended: list[str] = []
     with fleet(FLEET, {}, drop=0.05) as server, Link(server.url_for_gcs) as link:
-        orders = [Order(link, each, options=OPTIONS) for each in sent]
+        orders = [UploadOrder(link, each, options=OPTIONS) for each in sent]
         results = upload_fleet(orders, ended=lambda order, outcome: ended.append(order.mission.name))
         for board, each, result in zip(server.vehicles, sent, results, strict=True):
             assert not isinstance(result, GcsplanError), result
@@ -82,7 +85,7 @@ def test_a_dead_a_refusing_and_a_corrupting_vehicle_are_named_and_the_other_seve
         13: {"corrupt": 5},
     }
     with fleet(FLEET, trouble, drop=0.05) as server, Link(server.url_for_gcs) as link:
-        results = upload_fleet([Order(link, mission(n), options=OPTIONS) for n in FLEET])
+        results = upload_fleet([UploadOrder(link, mission(n), options=OPTIONS) for n in FLEET])
     by_number = dict(zip(FLEET, results, strict=True))
     errors = {
         n: r if isinstance(r, GcsplanError) else r.error()
@@ -101,18 +104,18 @@ def test_a_dead_a_refusing_and_a_corrupting_vehicle_are_named_and_the_other_seve
 
 def delivered(
     trouble: Mapping[int, Mapping[str, Any]], monkeypatch: pytest.MonkeyPatch, *, atomic: bool = True, count: int = 4
-) -> tuple[dict[str, Delivery], dict[str, int], list[tuple[str, Progress]]]:
+) -> tuple[dict[str, JobResult], dict[str, int], list[tuple[str, Progress]]]:
     """What became of a small fleet: deliveries, items on board without home, and what was told on the way."""
-    monkeypatch.setattr(delivery, "LISTEN_S", 0.0)
-    order = delivery.order_of
+    monkeypatch.setattr(uploads, "LISTEN_S", 0.0)
+    order = uploads.order_of
     monkeypatch.setattr(
-        delivery, "order_of", lambda *a, **k: replace(o := order(*a, **k), options=replace(o.options, timers=QUICK))
+        uploads, "order_of", lambda *a, **k: replace(o := order(*a, **k), options=replace(o.options, timers=QUICK))
     )
     told: list[tuple[str, Progress]] = []
     with fleet(range(1, count + 1), trouble, drop=0.0) as server:
-        jobs = [Job(f"uav{n}", server.url_for_gcs, mission(n, 12)) for n in range(1, count + 1)]
-        options = delivery.Options(unchecked=True, atomic=atomic)
-        done = delivery.deliver(jobs, options, lambda name, progress: told.append((name, progress)))
+        jobs = [UploadJob(f"uav{n}", server.url_for_gcs, mission(n, 12)) for n in range(1, count + 1)]
+        options = uploads.UploadOptions(unchecked=True, atomic=atomic)
+        done = uploads.run_jobs(jobs, options, lambda name, progress: told.append((name, progress)))
         boards = {f"uav{v.sysid}": len(v.items()[1:]) for v in server.vehicles}
     return {d.vehicle: d for d in done}, boards, told
 
@@ -120,7 +123,7 @@ def delivered(
 def test_one_failure_leaves_the_others_results_standing(monkeypatch: pytest.MonkeyPatch) -> None:
     done, boards, told = delivered({2: {"refuse": 3}, 3: {"corrupt": 4}}, monkeypatch, atomic=False)
     assert [d.verified for d in done.values()] == [True, False, False, True]
-    assert delivery.exit_code(list(done.values())) == 7
+    assert uploads.exit_code(list(done.values())) == 7
     assert boards["uav1"] == boards["uav4"] == 11
     last = {name: progress.phase for name, progress in told}
     assert last == {"uav1": "verified", "uav2": "refused!", "uav3": "accepted!", "uav4": "verified"}
@@ -133,7 +136,7 @@ def test_all_or_nothing_takes_back_what_the_others_took_and_reads_that_back(monk
     }  # fmt: skip
     assert not any(d.verified for d in done.values())
     assert all(boards[n] == 0 for n in ("uav1", "uav3", "uav4"))
-    assert delivery.exit_code(list(done.values())) == 5
+    assert uploads.exit_code(list(done.values())) == 5
     assert "uav2" in done["uav1"].message
     assert "item 3" in done["uav2"].message
 
@@ -142,7 +145,7 @@ def test_all_or_nothing_changes_nothing_where_all_went_well(monkeypatch: pytest.
     done, boards, _ = delivered({}, monkeypatch)
     assert all(d.verified and d.outcome == "accepted" for d in done.values())
     assert set(boards.values()) == {11}
-    assert delivery.exit_code(list(done.values())) == 0
+    assert uploads.exit_code(list(done.values())) == 0
 
 
 def test_what_read_back_wrong_is_cleared_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,13 +153,13 @@ def test_what_read_back_wrong_is_cleared_as_well(monkeypatch: pytest.MonkeyPatch
     assert done["uav3"].outcome == "withdrawn"
     assert done["uav3"].code == 7
     assert set(boards.values()) == {0}
-    assert delivery.exit_code(list(done.values())) == 7
+    assert uploads.exit_code(list(done.values())) == 7
 
 
 def test_a_vehicle_that_keeps_its_mission_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     clear = session.clear_fleet
 
-    def armed_in_between(orders: list[Order], seen: Any) -> Any:
+    def armed_in_between(orders: list[UploadOrder], seen: Any) -> Any:
         results = clear(orders[1:], seen)
         return [VehicleRefused("not cleared: the vehicle is armed"), *results]
 
@@ -167,13 +170,16 @@ def test_a_vehicle_that_keeps_its_mission_is_told(monkeypatch: pytest.MonkeyPatc
     assert "still holds" in done["uav1"].message
     assert boards["uav1"] == 11
     assert boards["uav2"] == boards["uav3"] == 0
-    assert delivery.exit_code(list(done.values())) == 6
+    assert uploads.exit_code(list(done.values())) == 6
 
 
 def test_all_or_nothing_sends_nothing_where_a_link_does_not_open(monkeypatch: pytest.MonkeyPatch) -> None:
     with fleet(range(1, 2), {}, drop=0.0) as server:
-        jobs = [Job("uav1", server.url_for_gcs, mission(1, 12)), Job("uav2", "tcp:127.0.0.1:1", mission(2, 12))]
-        done = delivery.deliver(jobs, delivery.Options(unchecked=True, atomic=True))
+        jobs = [
+            UploadJob("uav1", server.url_for_gcs, mission(1, 12)),
+            UploadJob("uav2", "tcp:127.0.0.1:1", mission(2, 12)),
+        ]
+        done = uploads.run_jobs(jobs, uploads.UploadOptions(unchecked=True, atomic=True))
         assert server.vehicles[0].items()[1:] == ()
     assert [d.code for d in done] == [6, 6]
     assert "nothing was sent" in done[0].message

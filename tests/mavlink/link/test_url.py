@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
 from gcsplan.mavlink.link.url import DEFAULT_BAUD, Endpoint, parse_url
+from tests.support.effort import draws
 
 
 @pytest.mark.parametrize(
@@ -91,7 +92,7 @@ def test_a_very_long_link_is_not_repeated_whole() -> None:
     assert len(str(refused.value)) < 600
 
 
-@settings(max_examples=500)
+@settings(max_examples=draws(500))
 @given(
     st.one_of(
         st.text(max_size=60),

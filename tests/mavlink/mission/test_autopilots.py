@@ -20,6 +20,7 @@ from gcsplan.sim.ardupilot_storage import keep_fence_item, keep_mission_item, ke
 from gcsplan.sim.board import Refused
 from gcsplan.sim.px4_storage import keep_item
 from gcsplan.vehicle import Autopilot
+from tests.support.effort import draws
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 ARDUPILOTS = [COPTER, PLANE]
@@ -42,7 +43,7 @@ def item(command: int, *params: float, frame: int = 3, z: float = 60.005, x: int
 # -- altitudes ----------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=500)
+@settings(max_examples=draws(500))
 @given(CENTIMETRES, st.sampled_from(list(Autopilot)))
 def test_exactly_the_wanted_centimetres_are_stored(cm: int, autopilot: Autopilot) -> None:
     sent = altitude_of_cm(cm, autopilot)
@@ -61,7 +62,7 @@ def test_every_centimetre_around_zero_and_at_binary_edges_is_stored() -> None:
             assert stored_cm(altitude_of_cm(cm, COPTER)) == cm
 
 
-@settings(max_examples=500)
+@settings(max_examples=draws(500))
 @given(st.floats(-500, 9000), st.sampled_from(list(Autopilot)))
 def test_a_bound_from_below_rounds_up_and_one_from_above_down(altitude_m: float, autopilot: Autopilot) -> None:
     up, down = (
@@ -84,7 +85,7 @@ def test_an_altitude_that_cannot_be_kept_is_refused(altitude_m: float) -> None:
         encode_altitude(altitude_m, COPTER, "up")
 
 
-@settings(max_examples=500)
+@settings(max_examples=draws(500))
 @given(st.floats(-80_000, 80_000, width=32))
 def test_centimetres_are_cut_as_float32_hardware_cuts_them(altitude_m: float) -> None:
     assert stored_cm(altitude_m) == int((np.float32(altitude_m) * np.float32(100)).astype(np.int32))
@@ -179,7 +180,7 @@ ITEMS = st.builds(
 )
 
 
-@settings(max_examples=400)
+@settings(max_examples=draws(400))
 @given(ITEMS, st.sampled_from(ARDUPILOTS))
 def test_ardupilots_rules_agree_with_an_independent_reading_of_its_source(
     one: MissionItem, autopilot: Autopilot
@@ -236,7 +237,7 @@ def test_px4_passes_raw_x_and_y_through_float32_without_a_frame() -> None:
     assert jump.params[:2] == (5.0, 4464.0)
 
 
-@settings(max_examples=200)
+@settings(max_examples=draws(200))
 @given(ITEMS, st.sampled_from([*LOCATED, 20, 93, 112, 177, 178, 179, 206, 211, 2000, 2500]))
 def test_px4s_rules_agree_with_an_independent_reading_of_its_source(shape: MissionItem, command: int) -> None:
     one = MissionItem(command, shape.frame, shape.params, shape.x, shape.y, shape.z)

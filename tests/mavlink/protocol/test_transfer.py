@@ -40,6 +40,7 @@ from gcsplan.mavlink.protocol.transfer import (
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
+from tests.support.effort import draws
 from tests.support.lossy import Weather, run
 
 US, V = Address(255, 190), Address(1, 1)
@@ -484,7 +485,7 @@ MESSAGES = st.one_of(
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=draws(150))
 @given(st.integers(0, 3), st.lists(st.tuples(MESSAGES, st.floats(0, 5), st.booleans()), max_size=60))
 def test_nothing_that_a_vehicle_says_breaks_a_machine_or_keeps_it_from_ending(
     which: int, script: list[tuple[MissionMessage, float, bool]]

@@ -21,6 +21,7 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support.effort import draws
 from tests.support.planner_worlds import FIELD, Floats, faults, ground, jacksboro
 
 BAND = replace(FIELD, max_agl_m=120.0)
@@ -54,6 +55,7 @@ def is_clear(problem: Problem, points: Floats) -> bool:
     return bool(problem.airspace.clear(Legs.of_path(points, problem.limits), problem.limits).all())
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("seed", "degrees"), [(1, 10.0), pytest.param(2, 10.0, marks=pytest.mark.slow), (3, 15.0)])
 def test_crosses_real_ground_between_60_and_120_m(seed: int, degrees: float) -> None:
     p = band_mission(seed, degrees)
@@ -104,6 +106,7 @@ def test_vias_are_passed_at_their_altitudes() -> None:
     assert off.min() < 1e-6
 
 
+@pytest.mark.slow
 def test_energy_is_worth_a_detour_around_climbs() -> None:
     p = band_mission(7, 15.0, objective="energy")
     thrifty = plan(p)
@@ -121,7 +124,7 @@ def test_the_bound_knows_how_long_a_climb_takes() -> None:
     assert energy == pytest.approx(120.0 * 300.0 + 100.0 * 300.0 / math.tan(math.radians(15.0)))
 
 
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 @given(st.integers(0, 10**6), st.integers(2, 40))
 def test_the_kernels_string_is_the_taut_string(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)

@@ -151,6 +151,7 @@ def is_legal_way(lattice: Lattice, places: Floats, z0: float, z1: float, slope: 
     )
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("block", range(5))
 def test_finds_the_cheapest_way_that_a_profile_exists_for(block: int) -> None:
     solved = 0

@@ -24,6 +24,7 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Zone
+from tests.support.effort import draws
 from tests.support.planner_worlds import ground
 from tests.support.searches import improve, looked
 
@@ -80,7 +81,7 @@ class Caps:
 
 
 @given(st.integers(0, 2**31), st.sampled_from([0.0, 1e-3, 1e-2]), st.sampled_from([0.0, 0.02, 0.3]))
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 def test_no_cap_costs_less_than_the_bound(seed: int, gap: float, blind: float) -> None:
     caps = Caps(seed, blind=blind)
     bound = caps.search(gap)
@@ -90,6 +91,7 @@ def test_no_cap_costs_less_than_the_bound(seed: int, gap: float, blind: float) -
     assert all(caps.low <= cap <= caps.top for cap in caps.tried)
 
 
+@pytest.mark.slow
 def test_the_bound_meets_the_best_path_where_tracks_and_paths_are_as_long() -> None:
     met = 0
     for seed in range(60):
@@ -115,7 +117,7 @@ def test_out_of_time_the_bound_holds_and_nothing_more_is_asked() -> None:
 
 
 @given(st.integers(0, 2**31))
-@settings(max_examples=80)
+@settings(max_examples=draws(80))
 def test_the_least_of_ranges_is_that_of_each_place_alone(seed: int) -> None:
     rng = np.random.default_rng(seed)
     size, count = int(rng.integers(1, 70)), int(rng.integers(0, 30))

@@ -172,6 +172,7 @@ def test_round_trip_over_a_via_and_a_via_on_the_start_are_flown() -> None:
     assert s.path.length_m < 1.01 * tangent_length(800.0, 100.0)
 
 
+@pytest.mark.slow
 def test_energy_pays_the_detour_that_climbs_less_and_no_more() -> None:
     p = problem(ground(ridge), objective="energy", vertical_j_per_m=600.0)
     aside = np.linspace(0.0, 1000.0, 10_001)
@@ -252,16 +253,19 @@ def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
     _is_solved(random_mission(seed))
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", [20, pytest.param(21, marks=pytest.mark.slow), 22])
 def test_random_missions_under_the_120_m_rule(seed: int) -> None:
     _is_solved(random_mission(seed, replace(FIELD, min_agl_m=50.0, max_agl_m=120.0), zones=6))
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", [40, 42, pytest.param(44, marks=pytest.mark.slow)])
 def test_random_missions_under_a_ceiling(seed: int) -> None:
     _is_solved(random_mission(seed, replace(FIELD, max_amsl_m=690.5)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [60, pytest.param(61, marks=pytest.mark.slow)])
 def test_random_missions_for_energy(seed: int) -> None:
     _is_solved(random_mission(seed, objective="energy"))
@@ -317,6 +321,7 @@ MAST = Zone("mast", Circle(45.0, 38.0, 9.0), None, Level(60.0, "amsl"))
 ROOF = Zone("roof", Circle(75.0, 60.0, 20.0), Level(50.0, "agl"), None)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("zones", "via", "degrees", "objective"),
     [

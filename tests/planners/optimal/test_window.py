@@ -67,6 +67,7 @@ def box(west: float, south: float, east: float, north: float) -> Zone:
 # -- the world that was given ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_way_round_the_ridge_that_leaves_the_first_window_is_found_and_judged_where_it_leads() -> None:
     source = source_of(ROW_4)
     done = plan(source)
@@ -98,6 +99,7 @@ def test_where_memory_ends_before_the_terrain_nothing_is_called_proved() -> None
     assert f"not found within {within_m(problem) / 1000.0:.1f} km" in caught.value.message
 
 
+@pytest.mark.slow
 def test_every_vehicle_is_judged_over_the_widest_terrain_that_one_of_them_needed() -> None:
     short = {**ROW_4["vehicles"][0], "name": "short", "sysid": 2, "goal": [36.55317, -84.264]}  # type: ignore[index]
     done = plan(source_of({**ROW_4, "vehicles": [short, *ROW_4["vehicles"]]}))  # type: ignore[misc]
@@ -381,6 +383,7 @@ def test_the_lines_of_a_border_in_degrees_lie_within_the_nodes() -> None:
 # -- the campaign ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("family", "seed"), [("ridge", 4), ("tiles", 3), ("edge", 1)])
 def test_campaign_of_worlds(family: str, seed: int) -> None:
     outcome = worlds.judge(family, seed, budget_s=600.0)
@@ -396,6 +399,7 @@ def test_campaign_of_worlds_longer(family: str, seed: int) -> None:
     assert outcome.wrong == [], str(outcome)
 
 
+@pytest.mark.slow
 def test_the_campaign_finds_a_planner_that_takes_its_window_for_the_world() -> None:
     def blind(problem: Problem) -> Solution:
         surface = replace(problem.airspace.surface, goes_on=NO_SIDES)

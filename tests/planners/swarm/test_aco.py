@@ -92,6 +92,7 @@ def test_ants_find_a_legal_way_round_a_wall() -> None:
     assert 1400.0 < solution.path.length_m < 1800.0
 
 
+@pytest.mark.slow
 def test_the_best_cost_never_rises_and_the_budget_is_exact() -> None:
     problem = mission()
     found = search(problem, settings(evaluations=333, population=50, points=3))

@@ -19,6 +19,7 @@ from gcsplan.planners.swarm.encodings import ENCODINGS, LATERAL, OFFSET, Code, g
 from gcsplan.planners.swarm.scene import GROWN, Scene
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
+from tests.support.effort import draws
 from tests.support.planner_worlds import FIELD, ground, jacksboro, random_mission
 
 
@@ -41,7 +42,7 @@ def scene() -> Scene:
 
 @pytest.mark.parametrize("name", ENCODINGS)
 @given(seed=st.integers(0, 2**31), points=st.integers(1, 12), corner=st.booleans())
-@settings(max_examples=25)
+@settings(max_examples=draws(25))
 def test_control_points_lie_in_the_volume_and_the_stops_are_among_them(
     name: str, seed: int, points: int, corner: bool
 ) -> None:
@@ -208,7 +209,7 @@ def test_what_kernels_have_of_a_basis_is_the_whole_of_it(points: tuple[int, ...]
 
 
 @given(seed=st.integers(0, 2**31), part=st.floats(1e-4, 0.3))
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 def test_fewer_points_keep_every_sample_within_the_corridor(seed: int, part: float) -> None:
     rng = np.random.default_rng(seed)
     line = curve((4, 3), (40, 30))

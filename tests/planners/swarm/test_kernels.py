@@ -34,6 +34,7 @@ from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support.effort import draws
 from tests.support.planner_worlds import ground
 
 ZONES = (
@@ -124,6 +125,7 @@ def test_two_processes_that_compile_for_themselves_get_the_same_bytes(tmp_path: 
     assert found[0] == found[1] != ""
 
 
+@pytest.mark.first_quick
 @pytest.mark.skipif(platform.machine().lower() not in ("x86_64", "amd64"), reason="names processors of one family")
 @pytest.mark.parametrize("processor", ["x86-64", "haswell"])
 def test_an_older_processors_instructions_give_the_same_bytes(
@@ -153,7 +155,7 @@ def test_a_path_costs_the_same_alone_and_in_any_company() -> None:
         assert together[::-1].tobytes() == cost.terms(np.ascontiguousarray(controls[::-1])).tobytes()
 
 
-@settings(max_examples=200)
+@settings(max_examples=draws(200))
 @given(st.floats(0.0, math.pi), st.floats(-12.0, 12.0))
 def test_angles_are_those_of_the_library(turn: float, size: float) -> None:
     across, along = abs(math.sin(turn)) * 10.0**size, math.cos(turn) * 10.0**size
@@ -164,7 +166,7 @@ def test_angles_at_the_corners() -> None:
     assert [ck.angle(*p) for p in ((0.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 0.0))] == [0, 0, math.pi, math.pi / 2]
 
 
-@settings(max_examples=200)
+@settings(max_examples=draws(200))
 @given(st.floats(0.0, ck.EXP_MOST))
 def test_exponentials_are_those_of_the_library(x: float) -> None:
     assert ck.exponential(x) == pytest.approx(math.exp(x), rel=5e-15)

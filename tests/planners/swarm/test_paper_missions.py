@@ -125,6 +125,7 @@ def test_cylinders_are_the_tables() -> None:
     assert sorted(o for o in overlaps if o > 0) == pytest.approx([6.1], abs=0.05)
 
 
+@pytest.mark.slow
 def test_fleets_have_their_order() -> None:
     for n in (1, 2, 3):
         assert [v.vehicle.name for v in mission(f"msfoa-{n}").vehicles] == ["uav1", "uav2", "uav3"]

@@ -53,6 +53,7 @@ def test_every_swarm_solves_a_toy_map_and_says_what_it_did(name: str) -> None:
     assert solution.lower_bound is None
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("encoding", ["box", "sections", "polar", "bspline", "offsets"])
 def test_every_encoding_and_cost_go_together(encoding: str) -> None:
     for cost in ("krill", "ssgwo", "msfoa", "abo", "ib-abc"):
@@ -130,6 +131,7 @@ def test_a_repaired_curve_passes_its_via_points() -> None:
     assert np.hypot(*(mended.points[:, :2] - (1350.0, 1250.0)).T).min() < 1e-3
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(6))
 def test_what_is_repaired_passes_on_real_ground(seed: int) -> None:
     problem = random_mission(seed, replace(FIELD, max_amsl_m=900.0))
@@ -209,6 +211,7 @@ def test_a_refusal_has_a_place_on_real_ground() -> None:
 
 
 # With its own 30 points anywhere in the volume, SSGWO finds a way that can be mended from half of the seeds.
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("name", "seed"), [("krill", 1), ("ssgwo", 4), ("msfoa", 1), ("abo", 1), ("ib-abc", 1)])
 def test_the_five_systems_plan_a_mission_over_real_ground(name: str, seed: int) -> None:
     mission = MISSIONS / "jacksboro-high.yaml"

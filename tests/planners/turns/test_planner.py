@@ -224,6 +224,7 @@ def way_below(problem: Problem, step_m: float = 100.0) -> Floats:
     return np.column_stack([way[out], np.full(len(out), ceiling)])
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", [0, 2])
 def test_paths_between_hills_are_rounded_with_altitudes_that_climb_no_steeper_than_allowed(seed: int) -> None:
     problem = hills(seed, 145.0)
@@ -265,6 +266,7 @@ def test_a_via_is_passed_exactly_at_its_altitude_and_is_a_way_point() -> None:
     assert np.linalg.norm(found.flown - corners[1], axis=1).min() < 1e-6
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("goal", [(500.0, 900.0), (500.0, 520.0), (900.0, 500.0)])
 def test_a_via_is_passed_even_where_the_way_goes_straight_back(goal: tuple[float, float]) -> None:
     corners = at_100((500, 500), (3500, 500), goal)

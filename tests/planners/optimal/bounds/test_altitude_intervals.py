@@ -23,6 +23,7 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support import effort
 
 Place = tuple[float, float, float]
 CELL_M = 10.0
@@ -61,6 +62,7 @@ def random_storeys(rng: np.random.Generator, rows: int, cols: int) -> AltitudeIn
     )
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(8))
 def test_what_is_carried_on_is_the_least_of_all_ways(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -129,9 +131,11 @@ def shortest(
     return math.inf, []
 
 
+@pytest.mark.draws
 def test_storeys_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
     found = above = 0
-    for seed in range(30):
+    seeds = range(0 if effort.full else 16, 30)
+    for seed in seeds:
         rng = np.random.default_rng(seed)
         s = random_storeys(rng, *rng.integers(3, 9, 2).tolist())
         climb, descent = rng.choice([0.2, 0.4, 1.0], 2)
@@ -151,7 +155,7 @@ def test_storeys_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
         straight_m = CELL_M * math.hypot(s.shape[0] - 1, s.shape[1] - 1)
         above += not len(s.reached(limits, straight_m + 2.0 * s.half_m).cell)
     # Both are needed for the test to mean something: tracks, and limits that shut them out.
-    assert found >= 15
+    assert found >= len(seeds) / 2
     assert above >= 3
 
 

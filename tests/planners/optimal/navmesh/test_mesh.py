@@ -21,6 +21,7 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import TERMS, GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support.effort import draws, worlds
 
 SIZE_M, STEP_M = 600.0, 30.0
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
@@ -175,12 +176,13 @@ def world_of(rng: np.random.Generator, world: str, limits: str, parts: int) -> t
     return problem, make_plane(problem, EVERYWHERE, parts), float(rng.uniform(250.0, 330.0))
 
 
+@pytest.mark.draws
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", WORLDS)
 def test_what_the_exact_check_passes_below_the_cap_is_free_in_the_mesh_for_bounds(world: str, limits: str) -> None:
     rng = np.random.default_rng([1, *world.encode(), *limits.encode()])
     passed = 0
-    for k in range(3):
+    for k in range(worlds(3)):
         problem, plane, cap = world_of(rng, world, limits, 1 + k % 2)
         places = inner(rng, 200, plane)
         ok = legal(problem, places, cap)
@@ -215,12 +217,13 @@ def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str
     assert held > 20
 
 
+@pytest.mark.draws
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", WORLDS)
 def test_the_mesh_for_bounds_has_the_straight_way_wherever_the_exact_check_passes_it(world: str, limits: str) -> None:
     rng = np.random.default_rng([3, *world.encode(), *limits.encode()])
     held = 0
-    for k in range(3):
+    for k in range(worlds(3)):
         problem, plane, cap = world_of(rng, world, limits, 1 + k % 2)
         air = problem.airspace
         a = inner(rng, 150, plane)
@@ -242,6 +245,7 @@ def test_the_mesh_for_bounds_has_the_straight_way_wherever_the_exact_check_passe
     assert held > 25
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("fineness", [3, 6])
 @pytest.mark.parametrize("world", ["hills", "turned"])
 def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str, fineness: int) -> None:
@@ -275,6 +279,7 @@ def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str,
     assert raised > 0.2 * held, raised / held
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("stride", [2, 3])
 @pytest.mark.parametrize("world", ["amsl", "turned"])
 def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str, stride: int) -> None:
@@ -295,6 +300,7 @@ def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str,
     assert shut > 0 or stride == 3
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("low", [True, False])
 @pytest.mark.parametrize(
     "world", ["hills", *(pytest.param(w, marks=pytest.mark.slow) for w in ("amsl", "turned")), "agl"]
@@ -355,7 +361,7 @@ def test_between_two_crossing_zones_there_is_room_only_where_their_levels_leave_
 
 
 @given(st.integers(0, 2**31), st.integers(3, 12))
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 def test_convex_parts_make_up_the_polygon_and_are_convex(seed: int, corners: int) -> None:
     rng = np.random.default_rng(seed)
     turn = 2.0 * math.pi * (np.arange(corners) + rng.uniform(0.0, 0.6, corners)) / corners

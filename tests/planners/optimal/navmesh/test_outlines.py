@@ -77,6 +77,7 @@ def test_bound_and_path_enclose_the_visibility_graphs_track(seed: int) -> None:
     assert all(shapely.distance(s, line) >= reach_m - 0.03 for s in shapes)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", [2, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 30))])
 def test_plans_on_flat_ground_are_certified_to_a_hair(seed: int) -> None:
     rng = np.random.default_rng([7, seed])

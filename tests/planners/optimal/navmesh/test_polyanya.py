@@ -24,6 +24,7 @@ from gcsplan.planners.optimal.navmesh import polyanya, portals
 from gcsplan.planners.optimal.navmesh.grid import Plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import make_pieces, make_portals, sort_portals
+from tests.support.effort import draws
 
 Place = tuple[float, float]
 
@@ -203,6 +204,7 @@ def turned(place: Floats) -> Place:
     return float(place[0]), float(place[1])
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("form", EACH_FORM)
 @pytest.mark.parametrize("holes", [pytest.param(0, marks=pytest.mark.slow), 5])
 @pytest.mark.parametrize("zones", [0, 12])
@@ -243,6 +245,7 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
     assert exact > 0.8 * compared
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("form", EACH_FORM)
 def test_where_walls_touch_exactly_ways_are_legal_and_shorter_than_round_the_touching_places(form: str) -> None:
     """A touching point may be passed or not, but nothing may be lost beside it, and no wall may be crossed."""
@@ -272,7 +275,7 @@ def test_where_walls_touch_exactly_ways_are_legal_and_shorter_than_round_the_tou
 
 
 @given(st.integers(0, 2**31), st.sampled_from(sorted(FORMS)))
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 def test_a_way_is_never_longer_than_any_bent_line_that_is_free(seed: int, form: str) -> None:
     rng = np.random.default_rng(seed)
     excess = hilly(rng, 7, 2)
@@ -382,6 +385,7 @@ def test_a_flood_says_of_no_piece_that_it_is_farther_than_it_is(slack: float, fo
     assert compared > 5
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("block", [pytest.param(1, marks=pytest.mark.slow), 4])
 def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block: int) -> None:
@@ -421,6 +425,7 @@ def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block
     assert left_out > 60
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("form", EACH_FORM)
 @pytest.mark.parametrize("slack", [0.05, math.inf])
 def test_a_guide_from_a_mesh_with_more_room_never_changes_the_answer(form: str, slack: float) -> None:

@@ -44,6 +44,7 @@ def test_a_path_leads_through_a_notch_that_was_passed_by() -> None:
     assert not bound_corridor.follow(plane)  # there is no other
 
 
+@pytest.mark.slow
 def test_a_notch_that_is_shut_is_left_alone() -> None:
     plane = through(-0.3)
     before = plane.incumbent.cost
@@ -51,6 +52,7 @@ def test_a_notch_that_is_shut_is_left_alone() -> None:
     assert plane.incumbent.cost == before
 
 
+@pytest.mark.slow
 def test_stops_are_passed_as_before() -> None:
     plane = through(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
     below = plane.incumbent
@@ -67,6 +69,7 @@ def test_stops_are_passed_as_before() -> None:
     assert faults(below.problem, Path(below.best)) == []
 
 
+@pytest.mark.slow
 def test_the_planner_asks_for_it() -> None:
     plane = through(0.1)
     improve(plane, ())

@@ -26,6 +26,7 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support.effort import draws
 from tests.support.planner_worlds import Floats, faults, ground
 from tests.support.searches import improve, looked, plane_of
 
@@ -131,7 +132,7 @@ def test_zones_that_leave_no_room_between_them_are_named() -> None:
     assert shut.by == pytest.approx(20.0, abs=0.1)
 
 
-@settings(max_examples=25)
+@settings(max_examples=draws(25))
 @given(st.integers(0, 10**6))
 def test_no_choice_of_sides_costs_less_than_what_is_lacking_tells(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -207,6 +208,7 @@ def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_w
         assert np.interp(500.0, below.best[:, 0], below.best[:, 2]) > 90.0
 
 
+@pytest.mark.slow
 def test_laps_are_flown_under_one_zone_to_get_over_another() -> None:
     # A roof over the start leaves room for laps below it; past it, the wall is too near.
     roof, wall = box(100.0, 0.0, 450.0, 2000.0, 80.0, None), box(500.0, 0.0, 600.0, 2000.0, None, 78.0)
@@ -215,6 +217,7 @@ def test_laps_are_flown_under_one_zone_to_get_over_another() -> None:
     assert best - 1.0 <= below.cost <= 1.005 * best
 
 
+@pytest.mark.slow
 def test_what_is_shut_for_one_cap_is_looked_at_again_for_the_best_path() -> None:
     # Around both is shorter than over either, but over one of them, with laps, is shorter than that.
     p = crossing(box(300.0, 0.0, 400.0, 1900.0, None, 40.0), box(1500.0, 300.0, 1600.0, 2000.0, None, 70.0))
@@ -222,6 +225,7 @@ def test_what_is_shut_for_one_cap_is_looked_at_again_for_the_best_path() -> None
     assert below.cost <= 1.005 * (climbing_m(100.0, 30.0) + 1100.0 + climbing_m(200.0, 60.0) + 200.0)
 
 
+@pytest.mark.slow
 def test_a_track_a_hand_too_high_is_looked_at_again_a_hand_lower() -> None:
     # Over real ground: the ceiling leaves no more than a saddle over the lid of a zone.
     (p,) = (named.problem for named in problems("main", 201, count=4) if named.name == "main 201/02, 40 zones")

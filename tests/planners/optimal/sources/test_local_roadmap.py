@@ -37,6 +37,7 @@ def flat(discs: list[tuple[float, float, float]], via: tuple[Via, ...] = (), cle
     return Case("flat", Problem(air, limits, (700.0, 1000.0, 10.05), (1300.0, 1010.0, 10.05), via), ground)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("family", "seed", "part"),
     [
@@ -63,6 +64,7 @@ def test_a_first_path_is_legal_by_brute_force_and_near_the_best_that_patience_fo
     assert cost_of(case.problem, points) <= (1.0 + part) * cost_of(case.problem, best)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("gap_m", "clearance_m"), [(1e-3, 0.0), pytest.param(0.5, 0.0, marks=pytest.mark.slow), (0.02, 7.0)]
 )
@@ -84,6 +86,7 @@ def test_a_slit_between_cylinders_is_flown_through(gap_m: float, clearance_m: fl
     assert exact - 1e-6 <= cost_of(p, found[0]) <= 1.0005 * exact
 
 
+@pytest.mark.slow
 def test_only_a_cheaper_path_is_returned_and_the_same_one_each_time() -> None:
     case = flat([(1000.0, 1000.0, 80.0)])
     p = case.problem
@@ -98,6 +101,7 @@ def test_only_a_cheaper_path_is_returned_and_the_same_one_each_time() -> None:
     assert small_path(p, detour, lambda: False) is None
 
 
+@pytest.mark.slow
 def test_stops_are_passed_in_their_order_at_their_heights() -> None:
     via = (Via(1100.0, 1150.0, 40.0), Via(900.0, 850.0))
     case = flat([(1000.0, 1000.0, 80.0)], via)
@@ -127,6 +131,7 @@ def test_long_missions_and_stops_in_one_place_are_left_alone() -> None:
     assert plane_of(flat([]).problem).is_small
 
 
+@pytest.mark.slow
 def test_the_planner_finds_passes_exactly_as_high_as_the_ceiling() -> None:
     case = make("passes", 2)
     solution = plan(replace(case.problem, gap_percent=1.0))

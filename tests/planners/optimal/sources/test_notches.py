@@ -54,6 +54,7 @@ def test_a_path_leads_through_what_is_open_by_centimetres(
     assert problem.cost(optimal.plan(problem).path) > ROUND_M, "the notch is too wide to show anything"
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("over_m", "askew", "half_m"), CASES)
 def test_the_first_path_leads_through_it_where_there_is_no_other(over_m: float, askew: float, half_m: float) -> None:
     problem = ridge(over_m, askew, half_m, False)

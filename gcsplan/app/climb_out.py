@@ -13,10 +13,10 @@ from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.verdict import LegFigures
 from gcsplan.world.world import World
 
-__all__ = ["circling_m", "slants_of"]
+__all__ = ["circling_m", "climb_out_and_glide"]
 
 
-def slants_of(v: VehiclePlan, world: World) -> tuple[Floats | None, Floats | None]:
+def climb_out_and_glide(v: VehiclePlan, world: World) -> tuple[Floats | None, Floats | None]:
     """The climb-out and the glide of a fixed wing, (K, 3) metres each; None for what stands in the air, or is not."""
     if v.order.wing is None:
         return None, None

@@ -20,7 +20,7 @@ ON_GROUND_M = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Stops:
+class Terminals:
     """One vehicle's keys and places, None where they are no good."""
 
     keys: VehicleKeys
@@ -44,7 +44,7 @@ class _End:
 
 
 def make_request(
-    stops: Stops,
+    terminals: Terminals,
     frame: Frame,
     surface: Surface,
     zones: Sequence[Zone],
@@ -56,22 +56,22 @@ def make_request(
     Only places in ``good`` are looked at: the others are in ``problems`` already.
     """
     before = len(problems)
-    keys, start, goal = stops.keys, None, None
-    if stops.start in good and stops.start is not None:
-        start = _end("start", stops.start, frame, surface, zones, keys.takeoff_agl_m, problems)
-    if stops.goal in good and stops.goal is not None:
-        goal = _end("goal", stops.goal, frame, surface, zones, keys.approach_agl_m, problems)
-    via = [_via(p, frame, surface, zones, problems) for p in stops.via if p is not None and p in good]
-    if len(problems) > before or stops.vehicle is None or stops.start is None or stops.goal is None:
+    keys, start, goal = terminals.keys, None, None
+    if terminals.start in good and terminals.start is not None:
+        start = _end("start", terminals.start, frame, surface, zones, keys.takeoff_agl_m, problems)
+    if terminals.goal in good and terminals.goal is not None:
+        goal = _end("goal", terminals.goal, frame, surface, zones, keys.approach_agl_m, problems)
+    via = [_via(p, frame, surface, zones, problems) for p in terminals.via if p is not None and p in good]
+    if len(problems) > before or terminals.vehicle is None or terminals.start is None or terminals.goal is None:
         return None
     if start is None or goal is None:
         return None
     return VehicleRequest(
-        vehicle=stops.vehicle,
+        vehicle=terminals.vehicle,
         start=start.at,
         goal=goal.at,
-        start_deg=stops.start.in_degrees(frame),
-        goal_deg=stops.goal.in_degrees(frame),
+        start_deg=terminals.start.in_degrees(frame),
+        goal_deg=terminals.goal.in_degrees(frame),
         takeoff_agl_m=keys.takeoff_agl_m,
         approach_agl_m=keys.approach_agl_m,
         via=tuple(v for v in via if v is not None),

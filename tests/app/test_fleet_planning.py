@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan.app.fleeting import route_of
+from gcsplan.app.fleet_planning import route_of
 from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of, summary_of
 from gcsplan.app.pipeline import plan
@@ -289,6 +289,7 @@ def test_the_papers_sequence_and_together_arrive_by_their_ideal_arithmetic() -> 
         assert v["speed_m_s"] == pytest.approx(30.0 * v["length_m"] / longest_m, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_msfoa_plans_by_priority_with_those_before_in_view(monkeypatch: pytest.MonkeyPatch) -> None:
     from gcsplan.planners.swarm import planner as swarm_planner
 

@@ -1,6 +1,6 @@
 """Sending plans and files to vehicles: who gets what, over which link, and how it ended.
 
-One link for each URL; several vehicles on one URL are told apart by system id. For ``sim`` the caller hands in what
+One link for each URL; vehicles on one URL differ by system id. For ``sim`` the caller hands in what
 starts a loopback vehicle for each UAV where its mission starts; the results say *simulated*.
 
 Links and transfers are imported by what opens one: most plans are sent nowhere, and the dialect is slow to import.
@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 from gcsplan.app.checking import Checked, split_name
 from gcsplan.app.fencing import not_fenced, upload_fences
-from gcsplan.app.jobs import LINK, SIM, Delivery, Job, Options, ProgressCall
 from gcsplan.app.model import Plan
-from gcsplan.app.orders import order_of, teller
-from gcsplan.app.withdrawal import withdrawn
+from gcsplan.app.rollback import rolled_back
+from gcsplan.app.upload_job import LINK, SIM, JobResult, ProgressCall, UploadJob, UploadOptions
+from gcsplan.app.upload_orders import order_of, report_end
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan, write_waypoints
@@ -75,11 +75,11 @@ def _url(text: str, word: str) -> str:
         raise UsageError(f"{error.message}{hint}", where=f"upload to {word!r}") from None
 
 
-def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[Job]:
+def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[UploadJob]:
     """The uploads of a plan; vehicles without a target are left out."""
     source = plan.source
     return [
-        Job(
+        UploadJob(
             v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
             source.terrain_error_m,
         )
@@ -87,7 +87,7 @@ def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[Job]:
     ]  # fmt: skip
 
 
-def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) -> list[Job]:
+def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) -> list[UploadJob]:
     """The uploads of checked files; ``word`` as of ``--upload``. Raises UsageError for two files of one vehicle."""
     seen: dict[str, Path] = {}
     for c in checked:
@@ -98,7 +98,7 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
     if missing:
         raise UsageError(f"--to {word} says nothing of {', '.join(missing)}")
     return [
-        Job(
+        UploadJob(
             c.vehicle.name, to[c.vehicle.name], c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m,
             c.terrain_error_m,
         )
@@ -106,7 +106,7 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
     ]  # fmt: skip
 
 
-def unchecked_job(argument: str, url: str, sysid: int) -> Job:
+def unchecked_job(argument: str, url: str, sysid: int) -> UploadJob:
     """A file for ``--unchecked``; the vehicle itself says which autopilot it is where the file does not."""
     name, file = split_name(argument)
     endpoint = parse_url(url)
@@ -116,7 +116,7 @@ def unchecked_job(argument: str, url: str, sysid: int) -> Job:
         with _open(url) as link:
             autopilot = _autopilot_of(link, sysid)
     read = read_mission_file(file, autopilot=autopilot)
-    return Job(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
+    return UploadJob(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
 
 
 def _open(url: str) -> Link:
@@ -141,9 +141,13 @@ def _autopilot_of(link: Link, sysid: int) -> Autopilot:
     )
 
 
-def deliver(
-    jobs: Sequence[Job], options: Options, progress: ProgressCall | None = None, *, simulator: Simulator | None = None
-) -> list[Delivery]:
+def run_jobs(
+    jobs: Sequence[UploadJob],
+    options: UploadOptions,
+    progress: ProgressCall | None = None,
+    *,
+    simulator: Simulator | None = None,
+) -> list[JobResult]:
     """Upload every job, all at once, read back, compare, and check what was read back; in the order given."""
     from gcsplan.mavlink.link import session
     from gcsplan.mavlink.link.link import Link
@@ -165,12 +169,12 @@ def deliver(
         if failed and options.atomic:  # known before anything was sent: nobody's old mission need be lost
             where = ", ".join(failed)
             held = LinkError(f"nothing was sent, all or nothing: the link {where} did not open")
-            return [_delivery(job, failed.get(job.url) or held) for job in jobs]
+            return [_result(job, failed.get(job.url) or held) for job in jobs]
         fenced = _fenced(jobs, links, options)
         barred = not_fenced(fenced)
         if barred and options.atomic:
             held = LinkError("nothing was sent but fences, all or nothing: another vehicle's fence is not on board")
-            return [_delivery(job, barred.get(job.name) or held) for job in jobs]
+            return [_result(job, barred.get(job.name) or held) for job in jobs]
         orders = {
             job.name: order_of(
                 job,
@@ -183,11 +187,11 @@ def deliver(
             for job in jobs
             if job.url in links and job.name not in barred
         }
-        results = session.upload_fleet(list(orders.values()), ended=teller(progress))
+        results = session.upload_fleet(list(orders.values()), ended=report_end(progress))
         ended = dict(zip(orders, results, strict=True))
         done = [
             _with_fence(
-                _delivery(
+                _result(
                     job,
                     ended.get(job.name) or barred.get(job.name) or failed.get(job.url)
                     or LinkError("the link did not open"),
@@ -196,61 +200,68 @@ def deliver(
             )
             for job in jobs
         ]  # fmt: skip
-        return withdrawn(done, orders, ended) if options.atomic else done
+        return rolled_back(done, orders, ended) if options.atomic else done
 
 
-def _fenced(jobs: Sequence[Job], links: Mapping[str, Link], options: Options) -> dict[str, UploadResult | GcsplanError]:
+def _fenced(
+    jobs: Sequence[UploadJob], links: Mapping[str, Link], options: UploadOptions
+) -> dict[str, UploadResult | GcsplanError]:
     if not any(job.fence is not None for job in jobs):
         return {}
     from gcsplan.mavlink.link import session
 
-    settings = session.Options(
+    settings = session.SessionOptions(
         allow_armed=options.allow_armed, ignore_position=options.ignore_position, listen_s=LISTEN_S,
         timeout_s=options.timeout_s,
     )  # fmt: skip
     return upload_fences(jobs, links, settings)
 
 
-def _with_fence(delivery: Delivery, fence: UploadResult | GcsplanError | None) -> Delivery:
+def _with_fence(result: JobResult, fence: UploadResult | GcsplanError | None) -> JobResult:
     if fence is None or isinstance(fence, GcsplanError):
-        return delivery
-    told = {"outcome": fence.outcome, "verified": fence.verified, "items": fence.items, "seconds": fence.seconds}
+        return result
+    fence_result = {
+        "outcome": fence.outcome,
+        "verified": fence.verified,
+        "items": fence.items,
+        "seconds": fence.seconds,
+    }
     words = f"a fence of {fence.items} item(s) is on board too, read back and compared"
     return replace(
-        delivery,
-        warnings=tuple(dict.fromkeys((words, *delivery.warnings, *fence.warnings))),
-        details=dict(delivery.details or {}) | {"fence": told},
+        result,
+        warnings=tuple(dict.fromkeys((words, *result.warnings, *fence.warnings))),
+        details=dict(result.details or {}) | {"fence": fence_result},
     )
 
 
-def _delivery(job: Job, ended: UploadResult | GcsplanError) -> Delivery:
+def _result(job: UploadJob, ended: UploadResult | GcsplanError) -> JobResult:
     if isinstance(ended, GcsplanError):
         outcome = "refused" if isinstance(ended, VehicleRefused) else "unknown"
-        return Delivery(
+        return JobResult(
             job.name, job.url, outcome, False, len(job.mission.wire_items()), 0.0, simulated=job.url == SIM,
             message=str(ended), code=ended.exit_code, reason=ended.reason,
         )  # fmt: skip
     error = ended.error()
-    return Delivery(
+    return JobResult(
         job.name, job.url if job.url == SIM else ended.url, ended.outcome, ended.verified, ended.items, ended.seconds,
         ended.retries, ended.simulated, str(error) if error else "", ended.warnings,
         error.exit_code if error else 0, error.reason if error else "", ended.as_dict(),
     )  # fmt: skip
 
 
-def exit_code(deliveries: Sequence[Delivery]) -> int:
+def exit_code(results: Sequence[JobResult]) -> int:
     """The worst of 70 (our bug), 7, 6, 5 (then 4): a fleet's exit code; 0 if all are verified."""
-    codes = {d.code for d in deliveries}
+    codes = {d.code for d in results}
     order = (GcsplanError.exit_code, ReadBackDiffers.exit_code, LinkError.exit_code, VehicleRefused.exit_code)
     return next((c for c in order if c in codes), max(codes, default=0))
 
 
-def failure(deliveries: Sequence[Delivery]) -> dict[str, Any] | None:
+def failure(results: Sequence[JobResult]) -> dict[str, Any] | None:
     """The ``error`` of ``--json``: of those that failed the worst kind; None if all are verified."""
-    code = exit_code(deliveries)
+    code = exit_code(results)
     if code == 0:
         return None
-    worst = [d for d in deliveries if d.code == code]
+    worst = [d for d in results if d.code == code]
     return {
         "code": code,
         "reason": worst[0].reason,
@@ -265,7 +276,7 @@ def require_file(file: Path) -> None:
         raise InputError("there is no such file", where=str(file))
 
 
-def verify_file(file: Path, url: str, sysid: int, *, timeout_s: float = 60.0) -> Delivery:
+def verify_file(file: Path, url: str, sysid: int, *, timeout_s: float = 60.0) -> JobResult:
     """Compare a file with what is on board; nothing is written to the vehicle."""
     from gcsplan.mavlink.link import session
 
@@ -274,9 +285,9 @@ def verify_file(file: Path, url: str, sysid: int, *, timeout_s: float = 60.0) ->
         autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
         read = read_mission_file(file, autopilot=autopilot)
         mission = replace(read.mission, sysid=sysid)
-        job = Job(file.stem, link.url, mission)
-        options = session.Options(listen_s=LISTEN_S, timeout_s=timeout_s)
-        done = _delivery(job, session.verify_mission(link, mission, options=options))
+        job = UploadJob(file.stem, link.url, mission)
+        options = session.SessionOptions(listen_s=LISTEN_S, timeout_s=timeout_s)
+        done = _result(job, session.verify_mission(link, mission, options=options))
     return replace(done, warnings=(*read.notes, *done.warnings))
 
 
@@ -291,7 +302,7 @@ def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) ->
     with _open(url) as link:
         autopilot = _autopilot_of(link, sysid)
         mission = session.download_mission(
-            link, sysid, autopilot, name=file.stem, options=session.Options(listen_s=0.0, timeout_s=timeout_s)
+            link, sysid, autopilot, name=file.stem, options=session.SessionOptions(listen_s=0.0, timeout_s=timeout_s)
         )
     text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
     write_whole(file, text)
@@ -305,5 +316,5 @@ def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False, timeout
     if kind not in KINDS:
         raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
     with _open(url) as link:
-        options = session.Options(listen_s=LISTEN_S, allow_armed=allow_armed, timeout_s=timeout_s)
+        options = session.SessionOptions(listen_s=LISTEN_S, allow_armed=allow_armed, timeout_s=timeout_s)
         session.clear_mission(link, sysid, KINDS[kind], options=options).raise_for_outcome()

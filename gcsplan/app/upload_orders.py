@@ -1,4 +1,4 @@
-"""A job as the session wants it: its limits, the check of what is read back, and whom to tell how it ended."""
+"""A job as the session wants it: its limits, the check of what is read back, and the call that reports how it ended."""
 
 from __future__ import annotations
 
@@ -13,34 +13,40 @@ from gcsplan.errors import GcsplanError, VehicleRefused
 from gcsplan.mavlink.mission.mission import Mission
 
 if TYPE_CHECKING:
-    from gcsplan.app.jobs import Job, Options, ProgressCall
+    from gcsplan.app.upload_job import ProgressCall, UploadJob, UploadOptions
     from gcsplan.mavlink.link import session
     from gcsplan.mavlink.link.link import Link
     from gcsplan.mavlink.link.results import UploadResult
 
 
-def teller(progress: ProgressCall | None) -> session.EndCall | None:
-    """What tells ``progress`` how each order ended, in a word."""
+def report_end(progress: ProgressCall | None) -> session.EndCall | None:
+    """A call that reports to ``progress`` how each order ended, in a word."""
     if progress is None:
         return None
     from gcsplan.mavlink.protocol.machine import Progress
 
-    def tell(order: session.Order, ended: UploadResult | GcsplanError) -> None:
+    def report(order: session.UploadOrder, ended: UploadResult | GcsplanError) -> None:
         count = len(order.mission.wire_items())
         refused = isinstance(ended, VehicleRefused)
         word: str = ("refused" if refused else "unknown") if isinstance(ended, GcsplanError) else ended.outcome
         verified = not isinstance(ended, GcsplanError) and ended.verified
         if not isinstance(ended, GcsplanError) and ended.changed:
             word = f"verified, {ended.changed}" if verified else f"stopped, {ended.changed}"
-        told = "verified" if verified and word == "accepted" else f"{word}!"
-        progress(order.mission.name, Progress(told, count if verified else 0, count))
+        phase = "verified" if verified and word == "accepted" else f"{word}!"
+        progress(order.mission.name, Progress(phase, count if verified else 0, count))
 
-    return tell
+    return report
 
 
 def order_of(
-    job: Job, link: Link, options: Options, progress: ProgressCall | None, *, simulated: bool, listen_s: float
-) -> session.Order:
+    job: UploadJob,
+    link: Link,
+    options: UploadOptions,
+    progress: ProgressCall | None,
+    *,
+    simulated: bool,
+    listen_s: float,
+) -> session.UploadOrder:
     """``job`` as an order of the session over ``link``; ``listen_s``: how long to listen for rivals."""
     from gcsplan.mavlink.link import session
 
@@ -49,7 +55,7 @@ def order_of(
         home = job.mission.home
         ground_m = job.world.ground_amsl(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
         ground_m = None if math.isnan(ground_m) else ground_m
-    settings = session.Options(
+    settings = session.SessionOptions(
         unchecked=options.unchecked or (job.verdict is not None and job.verdict.safe is None),
         allow_armed=options.allow_armed,
         ignore_position=options.ignore_position,
@@ -59,10 +65,10 @@ def order_of(
         timeout_s=options.timeout_s,
         listen_s=listen_s,
     )
-    return session.Order(link, job.mission, job.verdict, settings, _judge_again(job), progress)
+    return session.UploadOrder(link, job.mission, job.verdict, settings, _judge_again(job), progress)
 
 
-def _judge_again(job: Job) -> session.Judge | None:
+def _judge_again(job: UploadJob) -> session.Judge | None:
     """The check on what was read back: what a vehicle holds is what it will fly."""
     if job.world is None or job.vehicle is None or job.verdict is None:
         return None

@@ -1,4 +1,4 @@
-"""All vehicles together: when each leaves and how fast it flies, so that they arrive as asked and keep apart.
+"""All vehicles together: when each leaves and how fast it flies, so that they arrive as requested and keep apart.
 
 The routes are those of the missions as the autopilots store them. A schedule gives departures, holds and speeds; each
 mission is built anew with its own and judged again; then every pair is held against the separation, and what conflicts
@@ -14,11 +14,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.app.climb_out import circling_m, climb_out_and_glide
 from gcsplan.app.detours import Detours
 from gcsplan.app.gate import SLACK_S, GateTime, gated
 from gcsplan.app.model import Brief, FleetPlan, VehiclePlan
 from gcsplan.app.planning import rebuilt
-from gcsplan.app.slants import circling_m, slants_of
 from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
@@ -32,11 +32,11 @@ Ints = NDArray[np.intp]
 
 TERRAIN_STEP_M = 25.0
 LATER_S = 600.0
-"""By which all arrivals may move, where nobody asked for their time, to keep a fleet apart."""
+"""By which all arrivals may move, where the mission file sets no time, to keep a fleet apart."""
 ARDUPILOT_DEGREE_M = 111318.84502145034
 """Location.h, `LOCATION_SCALING_FACTOR`. An ArduCopter flew east and west 0.2 % faster than commanded, at 37° N."""
 SEPARATION_M = 30.0
-"""Judged where the file asks for no arrival."""
+"""Judged where the file has no `arrival`."""
 
 __all__ = ["crew_of", "fleet_of", "route_of"]
 
@@ -47,7 +47,7 @@ def fleet_of(
     """The vehicles' missions with their speeds and gates, and the fleet's time table.
 
     With ``gate`` everybody waits in the air until its own second of the day. Raises NoMission: ``time`` where they
-    cannot arrive as asked, ``separation`` where they cannot keep apart.
+    cannot arrive as requested, ``separation`` where they cannot keep apart.
     """
     world, arrival = brief.world, brief.source.arrival
     crews = [crew_of(v, world) for v in vehicles]
@@ -78,11 +78,11 @@ def fleet_of(
     if found is not None:
         notes += found.notes
         if not found.safe and arrival is not None:  # the missions as built are what flies: the last word
-            raise NoMission(_told(found.conflicts, world), reason="separation")
+            raise NoMission(_conflict_text(found.conflicts, world), reason="separation")
         if not found.safe:
             notes.append(
                 f"the file asks for no `arrival`, so nothing keeps the vehicles apart; released together, "
-                f"{_told(found.conflicts, world)}"
+                f"{_conflict_text(found.conflicts, world)}"
             )
     if gate is not None:
         notes.append(
@@ -93,7 +93,7 @@ def fleet_of(
 
 
 def crew_of(v: VehiclePlan, world: World) -> Crew:
-    """A vehicle and its route, as the fleet's rooms take them."""
+    """A vehicle and its route, as the fleet package takes them."""
     return Crew(v.request.vehicle, route_of(v, world))
 
 
@@ -119,7 +119,7 @@ def route_of(v: VehiclePlan, world: World) -> Route:
         points, holds, numbers = _over_ground(points, holds, numbers, world)
     items = np.array([legs[0].seq, *numbers, last.seq], dtype=np.intp)
     pace = _pace(points, legs[0].start[:2], world) if request.vehicle.lays_curves else None
-    climb_out, glide = slants_of(v, world)
+    climb_out, glide = climb_out_and_glide(v, world)
     return Route(
         v.name, points,
         start_ground_amsl_m=None if ideal else ground,
@@ -167,7 +167,7 @@ def _over_ground(points: Floats, holds: Floats, numbers: Ints, world: World) -> 
 
 
 def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) -> Rules:
-    """The separation that is asked, with how far the motions may be from the true ones."""
+    """The requested separation, with how far the motions may be from the true ones."""
     error_m = max(motion_error_m(v.request.vehicle) + circling_m(v) for v in vehicles)
     leaving = frozenset(v.name for v in vehicles if v.request.end == "none")
     if arrival is None:
@@ -182,12 +182,12 @@ def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) ->
 
 
 def _scheduled(crews: Sequence[Crew], arrival: ArrivalRequest, detours: Detours) -> tuple[Schedule, list[str]]:
-    """The schedule that is asked for, and notes on it.
+    """The requested schedule, and notes on it.
 
     Where the file does not say whose clock counts, it is the first one's, else that of the whole fleet.
     """
 
-    def asked(clock: Literal["first", "fleet"]) -> Schedule:
+    def by_clock(clock: Literal["first", "fleet"]) -> Schedule:
         return schedule(
             crews, arrival.mode,
             order="best" if arrival.best_order else arrival.order,
@@ -196,11 +196,11 @@ def _scheduled(crews: Sequence[Crew], arrival: ArrivalRequest, detours: Detours)
         )  # fmt: skip
 
     try:
-        return asked(arrival.clock or "first"), []
+        return by_clock(arrival.clock or "first"), []
     except NoSchedule:
         if arrival.clock is not None or arrival.arrive_s is not None or arrival.mode != "sequence":
             raise
-    plan = asked("fleet")
+    plan = by_clock("fleet")
     first = plan.slots[0]
     early_s = min(c.fast_s for c in map(Craft, crews) if c.name == first.name)
     return plan, [
@@ -243,7 +243,7 @@ def words_of(world: World, place: Place) -> str:
     return f"{lat:.6f}, {lon:.6f}, {place[2]:.0f} m AMSL"
 
 
-def _told(conflicts: Sequence[Conflict], world: World) -> str:
+def _conflict_text(conflicts: Sequence[Conflict], world: World) -> str:
     lines = [f"  {c.describe(lambda place: words_of(world, place))}" for c in conflicts[:8]]
     more = f"\n  and {len(conflicts) - 8} more" if len(conflicts) > 8 else ""
     return "the vehicles come too near to each other:\n" + "\n".join(lines) + more

@@ -19,7 +19,7 @@ ProgressCall = Callable[[str, Progress], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class UploadOptions:
     """What the user allows. ``atomic``: if one upload fails, the missions that others took are cleared again.
 
     ``timeout_s``: the user's patience, of `gcsplan.mavlink.protocol.patience`.
@@ -33,7 +33,7 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
-class Job:
+class UploadJob:
     """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own)."""
 
     name: str
@@ -48,7 +48,7 @@ class Job:
 
 
 @dataclass(frozen=True, eq=False)
-class Delivery:
+class JobResult:
     """How one upload or comparison ended. ``message`` is the error in words, empty if there is none."""
 
     vehicle: str
