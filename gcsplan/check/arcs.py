@@ -26,6 +26,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.circles import circle_growth
+from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m
 from gcsplan.check.tuning import DEFAULTS, Tuning
@@ -345,10 +346,8 @@ def _chord(radius: float, heading: float, turn: float) -> Floats:
 
 def _moves(s: Stretch) -> bool:
     """True for a stretch that leads to another place, and at whose ends the aircraft turns on arcs."""
-    north = (s.end[0] - s.start[0]) * 111_195.0
-    east = (s.end[1] - s.start[1]) * 111_195.0 * math.cos(math.radians(s.start[0]))
     circles = s.reach_m > 0.0  # a climb in circles, which turns as it is
-    return s.kind in ("takeoff", "cruise", "land") and not circles and math.hypot(north, east) > SAME_M
+    return s.kind in ("takeoff", "cruise", "land") and not circles and flat_m(s.start, s.end) > SAME_M
 
 
 def _runs(stretches: Sequence[Stretch]) -> Iterator[tuple[int, int]]:

@@ -26,7 +26,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.circles import circle_growth
-from gcsplan.check.geodesy import flat_m
+from gcsplan.check.geodesy import degree_m, flat_m
 from gcsplan.check.spline import towards
 from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding
@@ -156,15 +156,15 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
 
 def _helix(begin: Place, top: Place, radius_m: float, turns: float, slope: float) -> list[Place]:
     """From ``begin`` up to the altitude of ``top`` on a circle around it; ``turns`` 1: clockwise."""
-    scale = (111_195.0, 111_195.0 * math.cos(math.radians(top[0])))
-    north, east = (begin[0] - top[0]) * scale[0], (begin[1] - top[1]) * scale[1]
+    east_m, north_m = degree_m(top[0])
+    east, north = (begin[1] - top[1]) * east_m, (begin[0] - top[0]) * north_m
     angle = math.atan2(north, east)
     whole = (top[2] - begin[2]) / slope / radius_m
     parts = max(1, math.ceil(whole / (2.0 * math.acos(max(0.0, 1.0 - CHORD_M / radius_m)))))
     places = [begin]
     for i in range(1, parts + 1):
         now, z = angle - turns * whole * i / parts, begin[2] + (top[2] - begin[2]) * i / parts
-        flat = radius_m * math.sin(now) / scale[0], radius_m * math.cos(now) / scale[1]
+        flat = radius_m * math.sin(now) / north_m, radius_m * math.cos(now) / east_m
         places.append((top[0] + flat[0], top[1] + flat[1], z))
     return places
 

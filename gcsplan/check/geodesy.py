@@ -9,10 +9,20 @@ from gcsplan.check.stretch import Place
 EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
 
 
-def flat_m(a: Place, b: Place) -> float:
-    """Horizontal metres between places on the ellipsoid, by its radii half way: good to a millionth over 100 km."""
-    lat = math.radians(0.5 * (a[0] + b[0]))
+def degree_m(lat_deg: float) -> tuple[float, float]:
+    """Metres of a degree of longitude and of one of latitude, at a latitude on the ellipsoid."""
+    lat = math.radians(lat_deg)
     w = 1.0 - ECCENTRICITY_2 * math.sin(lat) ** 2
-    north = EQUATOR_M * (1.0 - ECCENTRICITY_2) / w**1.5 * math.radians(b[0] - a[0])
-    east = EQUATOR_M / math.sqrt(w) * math.cos(lat) * math.radians((b[1] - a[1] + 180.0) % 360.0 - 180.0)
-    return math.hypot(north, east)
+    east, north = EQUATOR_M / math.sqrt(w) * math.cos(lat), EQUATOR_M * (1.0 - ECCENTRICITY_2) / w**1.5
+    return math.radians(east), math.radians(north)
+
+
+def offset_m(a: Place, b: Place) -> tuple[float, float]:
+    """Metres east and north from ``a`` to ``b``, by the ellipsoid's radii half way: a millionth off over 100 km."""
+    east, north = degree_m(0.5 * (a[0] + b[0]))
+    return east * ((b[1] - a[1] + 180.0) % 360.0 - 180.0), north * (b[0] - a[0])
+
+
+def flat_m(a: Place, b: Place) -> float:
+    """Horizontal metres between places, as `offset_m` has them."""
+    return math.hypot(*offset_m(a, b))

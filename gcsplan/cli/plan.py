@@ -116,8 +116,9 @@ def plan(
             from gcsplan.app.upload_job import UploadOptions
 
             targets = uploads.targets(upload or [], [r.vehicle for r in source.vehicles])
-        names = [r.vehicle.name for r in source.vehicles]
-        with planning_display(names, objective or source.planner.objective) as progress:
+        with planning_display(
+            [r.vehicle.name for r in source.vehicles], objective or source.planner.objective
+        ) as progress:
             chosen = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
             planned = pipeline.plan(
                 source,

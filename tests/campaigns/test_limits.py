@@ -30,6 +30,7 @@ def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
             "circle",
         ),  # a leg off a circle smaller than the track error was judged as begun in the circle's middle
         (600078, "return"),  # a PX4 begins its return lower than the mission has it, and flies all of it there
+        (700239, "spline"),  # its angle was that of a curve on a sphere
         (600111, "spline"),  # the steepest place of a curve that all but turns back lies between eight looks
         (600036, "wing"),  # of two arcs that overlap, what lies back from one to the next counted as climbed on
     ],
