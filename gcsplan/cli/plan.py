@@ -116,16 +116,14 @@ def plan(
             from gcsplan.app.upload_job import UploadOptions
 
             targets = uploads.targets(upload or [], [r.vehicle for r in source.vehicles])
-        with planning_display(
-            [r.vehicle.name for r in source.vehicles], objective or source.planner.objective
-        ) as progress:
-            chosen = {k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None}
+        names = [r.vehicle.name for r in source.vehicles]
+        with planning_display(names, objective or source.planner.objective) as progress:
             planned = pipeline.plan(
                 source,
                 planner=planner,
                 objective=objective,
                 seed=seed,
-                options=chosen,
+                options={k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None},
                 progress=progress,
                 gate_utc=None if gate is None else gate.start,
             )
