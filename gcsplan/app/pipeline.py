@@ -55,16 +55,17 @@ def plan(
 
     Raises InputError for a bad mission, NoMission where no safe one exists or none was found (``reason`` says which).
 
-    >>> planned = plan({
-    ...     "version": 1, "terrain": {"flat_m": 100},
-    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
-    ...     "limits": {"min_agl_m": 30},
-    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
-    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
-    ... })
-    >>> [uav1] = planned.vehicles
-    >>> uav1.verdict.safe, round(uav1.verdict.length_m), uav1.solution.path.points.shape
-    (True, 900, (2, 3))
+    Examples:
+        >>> planned = plan({
+        ...     "version": 1, "terrain": {"flat_m": 100},
+        ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        ...     "limits": {"min_agl_m": 30},
+        ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+        ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+        ... })
+        >>> [uav1] = planned.vehicles
+        >>> uav1.verdict.safe, round(uav1.verdict.length_m), uav1.solution.path.points.shape
+        (True, 900, (2, 3))
     """
     if not isinstance(source, MissionFile):
         source = load_mission(source)

@@ -66,19 +66,20 @@ def check(
 
     Raises InputError for a file that cannot be read, UsageError where it is not clear what is to be judged.
 
-    >>> from gcsplan import check, load_mission, plan
-    >>> mission = load_mission({
-    ...     "version": 1, "terrain": {"flat_m": 100},
-    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
-    ...     "limits": {"min_agl_m": 30},
-    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
-    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
-    ... })
-    >>> planned = plan(mission)
-    >>> check(planned)["uav1"].safe
-    True
-    >>> check(planned.vehicles[0].mission, mission).safe
-    True
+    Examples:
+        >>> from gcsplan import check, load_mission, plan
+        >>> mission = load_mission({
+        ...     "version": 1, "terrain": {"flat_m": 100},
+        ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        ...     "limits": {"min_agl_m": 30},
+        ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+        ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+        ... })
+        >>> planned = plan(mission)
+        >>> check(planned)["uav1"].safe
+        True
+        >>> check(planned.vehicles[0].mission, mission).safe
+        True
     """
     if isinstance(what, Plan):
         if within is not None or vehicle is not None:
@@ -123,18 +124,19 @@ def write(
     judged); the earlier outputs are moved to ``previous/`` then, so that no old mission is flown by mistake. Raises
     InputError where ``folder`` cannot be written; everything is as it was then.
 
-    >>> import tempfile
-    >>> from gcsplan import plan, write
-    >>> planned = plan({
-    ...     "version": 1, "terrain": {"flat_m": 100},
-    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
-    ...     "limits": {"min_agl_m": 30},
-    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
-    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
-    ... })
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     [file.name for file in write(planned, folder)]
-    ['uav1.waypoints', 'uav1.plan', 'mission.kml', 'mission.geojson', 'profile.csv', 'summary.json']
+    Examples:
+        >>> import tempfile
+        >>> from gcsplan import plan, write
+        >>> planned = plan({
+        ...     "version": 1, "terrain": {"flat_m": 100},
+        ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        ...     "limits": {"min_agl_m": 30},
+        ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+        ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+        ... })
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [file.name for file in write(planned, folder)]
+        ['uav1.waypoints', 'uav1.plan', 'mission.kml', 'mission.geojson', 'profile.csv', 'summary.json']
     """
     settle_outputs(folder)
     try:
@@ -163,16 +165,17 @@ def report(
     on the page. ``way_home``: the return of each vehicle from everywhere is judged and shown; about a second for 20 km.
     Raises InputError where ``file`` cannot be written.
 
-    >>> from gcsplan import plan, report
-    >>> planned = plan({
-    ...     "version": 1, "terrain": {"flat_m": 100},
-    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
-    ...     "limits": {"min_agl_m": 30},
-    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
-    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
-    ... })
-    >>> report(planned, way_home=False).startswith("<!DOCTYPE html>")
-    True
+    Examples:
+        >>> from gcsplan import plan, report
+        >>> planned = plan({
+        ...     "version": 1, "terrain": {"flat_m": 100},
+        ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        ...     "limits": {"min_agl_m": 30},
+        ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+        ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+        ... })
+        >>> report(planned, way_home=False).startswith("<!DOCTYPE html>")
+        True
     """
     text = outputs.report_of(planned, results, outputs.homes_of(planned) if way_home else {})
     if file is not None:

@@ -73,15 +73,16 @@ def load_mission(
     each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is ``mission``);
     TypeError where ``source`` is none of these.
 
-    >>> mission = load_mission({
-    ...     "version": 1, "terrain": {"flat_m": 100},
-    ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
-    ...     "limits": {"min_agl_m": 30},
-    ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
-    ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
-    ... })
-    >>> [request.vehicle.name for request in mission.vehicles]
-    ['uav1']
+    Examples:
+        >>> mission = load_mission({
+        ...     "version": 1, "terrain": {"flat_m": 100},
+        ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        ...     "limits": {"min_agl_m": 30},
+        ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+        ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+        ... })
+        >>> [request.vehicle.name for request in mission.vehicles]
+        ['uav1']
     """
     file, where, raw = read_content(source, text)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
