@@ -94,12 +94,12 @@ def _say_fleet(plan: Plan) -> None:
     closest = fleet.closest
     if fleet.separation is None:
         return
-    needed = f" of {arrival.separation_m:g}" if arrival is not None else ""
+    needed = f" of {arrival.separation_m:g} m" if arrival is not None else ""
     if closest is None:
         say("separation: no two vehicles are in the air at the same time")
     else:
         a, b = closest.vehicles
-        say(f"separation: {closest.distance_m:.1f} m{needed} m, {a} and {b} at T+{closest.time_s:.1f} s")
+        say(f"separation: {closest.distance_m:.1f} m{needed}, {a} and {b} at T+{closest.time_s:.1f} s")
 
 
 def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[Table]:
