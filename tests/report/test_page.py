@@ -20,7 +20,7 @@ from PIL import Image
 
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import load_mission, plan
-from gcsplan.app.report_page import render
+from gcsplan.app.report_page import page_of_plan, render
 from gcsplan.check.judge import judge
 from gcsplan.check.rtl.way_home import way_home
 from gcsplan.check.verdict import Verdict
@@ -568,7 +568,7 @@ def test_the_way_home_is_drawn_and_told_at_the_top_where_it_is_not_safe() -> Non
 
 @pytest.mark.slow
 def test_each_figure_is_drawn_as_a_png_too() -> None:
-    drawn = figures(planned())
+    drawn = figures(page_of_plan(planned()))
     assert set(drawn) == {"report-map.png", "report-space.png", "report-profile.png"}
     for content in drawn.values():
         image = Image.open(io.BytesIO(content))
