@@ -95,7 +95,10 @@ def _basis(u: Floats, v: Floats) -> Floats:
     for _ in range(DEGREE):
         pu.append(pu[-1] * u)
         pv.append(pv[-1] * v)
-    return np.stack([pu[i] * pv[j] for i, j in TERMS], axis=-1)
+    terms = np.empty((*np.broadcast_shapes(np.shape(u), np.shape(v)), len(TERMS)))
+    for k, (i, j) in enumerate(TERMS):
+        np.multiply(pu[i], pv[j], out=terms[..., k])
+    return terms
 
 
 @dataclass(frozen=True, eq=False)
