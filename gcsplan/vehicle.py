@@ -10,7 +10,7 @@ from gcsplan.world.limits import Limits
 
 
 class Autopilot(StrEnum):
-    """Whose manners a mission is written for."""
+    """The autopilot that a mission is written for."""
 
     ARDUCOPTER = "arducopter"
     ARDUPLANE = "arduplane"

@@ -39,7 +39,7 @@ from gcsplan.sim.board import (
 from gcsplan.sim.misbehaviour import Faults
 
 
-class ArduPilotManner:
+class ArduPilotServer:
     """Three independent lists; not atomic: COUNT cuts the old mission, every item replaces in place."""
 
     def __init__(self, board: Board, faults: Faults, *, plane: bool) -> None:

@@ -61,7 +61,7 @@ class Board:
         return zlib.crc32(b"".join(item.wire for item in self.lists.get(mission_type, [])))
 
 
-class Manner(Protocol):
+class MissionServer(Protocol):
     """An autopilot's side of the protocol for all its lists."""
 
     def receive(self, message: MissionMessage, sender: Address, now: float) -> Out:

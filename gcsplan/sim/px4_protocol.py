@@ -36,7 +36,7 @@ from gcsplan.sim.board import (
 from gcsplan.sim.misbehaviour import Faults
 
 
-class Px4Manner:
+class Px4Server:
     """One transfer at a time for all lists; atomic: the new list is swapped in after its last item."""
 
     ASK_AGAIN_S = 0.25

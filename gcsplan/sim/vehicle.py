@@ -1,4 +1,4 @@
-"""A loopback vehicle: a mission server with an autopilot's manners, without sockets and with time handed in.
+"""A loopback vehicle: a mission server that answers as an autopilot does, without sockets and with time handed in.
 
     vehicle = LoopbackVehicle(1, Autopilot.ARDUCOPTER, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.0)
     answers = vehicle.receive(packet, now)
@@ -18,11 +18,11 @@ from collections.abc import Callable, Sequence
 
 from gcsplan.mavlink.mission.mission import MISSION, Home, MissionItem
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, MissionMessage, Packet, Request, RequestList
-from gcsplan.sim.ardupilot_protocol import ArduPilotManner
+from gcsplan.sim.ardupilot_protocol import ArduPilotServer
 from gcsplan.sim.ardupilot_storage import home_item
-from gcsplan.sim.board import Board, Manner
+from gcsplan.sim.board import Board, MissionServer
 from gcsplan.sim.misbehaviour import Channel, Faults, Misbehaviour, spoilt
-from gcsplan.sim.px4_protocol import Px4Manner
+from gcsplan.sim.px4_protocol import Px4Server
 from gcsplan.vehicle import Autopilot
 
 _MISSION_PLANNER = 190  # a component id that PX4 also answers to
@@ -56,10 +56,10 @@ class LoopbackVehicle:
         self._boot_s = boot_s
         self._board = Board(Home.at(lat_deg, lon_deg, amsl_m), armed=self.misbehave.armed)
         faults = Faults(self.misbehave)
-        self._manner: Manner = (
-            ArduPilotManner(self._board, faults, plane=autopilot is Autopilot.ARDUPLANE)
+        self._server: MissionServer = (
+            ArduPilotServer(self._board, faults, plane=autopilot is Autopilot.ARDUPLANE)
             if autopilot.is_ardupilot
-            else Px4Manner(self._board, faults)
+            else Px4Server(self._board, faults)
         )
         rng = random.Random(self.misbehave.seed)
         self._inbound, self._outbound = Channel(self.misbehave, rng), Channel(self.misbehave, rng)
@@ -154,7 +154,7 @@ class LoopbackVehicle:
         """When `on_timer` wants to be called, or None."""
         if self.silent:
             return None
-        due = (self._manner.deadline, self._inbound.deadline, self._outbound.deadline)
+        due = (self._server.deadline, self._inbound.deadline, self._outbound.deadline)
         return min((at for at in due if at is not None), default=None)
 
     def on_timer(self, now: float) -> list[Packet]:
@@ -163,12 +163,12 @@ class LoopbackVehicle:
         if not self.reachable(now):
             return []
         self._board.booting = self.booting(now)
-        self._send(self._manner.on_timer(now), now)
+        self._send(self._server.on_timer(now), now)
         return self._run(now)
 
     def reboot(self, now: float) -> None:
         """Fall silent for half of ``reboot_s``, boot for the other half, and forget every transfer."""
-        self._manner.reset()
+        self._server.reset()
         self._inbound.clear()
         self._outbound.clear()
         self._board.armed = self._board.flying_mission = False
@@ -185,7 +185,7 @@ class LoopbackVehicle:
         for packet in self._inbound.due(now):
             self._edit_before(packet.message)
             self._board.booting = self.booting(now)
-            self._send(self._manner.receive(packet.message, packet.source, now), now)
+            self._send(self._server.receive(packet.message, packet.source, now), now)
             if isinstance(packet.message, Item) and self._reboots_now():
                 self.reboot(now)
                 return []
