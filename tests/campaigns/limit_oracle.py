@@ -47,6 +47,13 @@ def stored_m(item: MissionItem, autopilot: Autopilot) -> float:
     return float(z) if autopilot is Autopilot.PX4 else int(np.float32(z * np.float32(100.0))) / 100.0
 
 
+def _beside(points: Floats, a: Floats, b: Floats) -> Floats:
+    """(N,) how far points are from the leg from ``a`` to ``b``, seen from above."""
+    way = (b - a)[:2]
+    t = np.clip((points[:, :2] - a[:2]) @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
+    return np.asarray(np.hypot(*(points[:, :2] - a[:2] - t[:, None] * way).T))
+
+
 class Flight:
     """The mission as it is flown: `lines` gives every line that the vehicle may fly."""
 
@@ -251,11 +258,12 @@ class Flight:
             return
         if np.array_equal(begun, here):
             return
-        off = math.dist(begun[:2], here[:2])
         part = float(self.rng.choice([1.0, 1.0, self.rng.uniform(0.05, 1.0)]))
         joins = here + part * (to - here)
         points = np.concatenate([self.straight(begun, joins), self.straight(joins, to)])
-        held, held_high = off <= track + 1e-3, abs(begun[2] - here[2]) <= high + 1e-3  # an acceptance radius, rounded
+        # The errors hold corners that stay within them, an acceptance radius that is rounded too.
+        off = float(np.minimum(_beside(points, begun, here), _beside(points, here, to)).max())
+        held, held_high = off <= track + 1e-3, abs(begun[2] - here[2]) <= high + 1e-3
         yield Line(points, 0.0 if held else track, 0.0 if held_high else high, angles=False)
 
     # -- a fixed wing ------------------------------------------------------------------------------------------------
