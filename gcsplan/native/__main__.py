@@ -32,6 +32,8 @@ OPTIONS = {
 
 def main(names: list[str]) -> None:
     """Make each and say how large it is."""
+    if not set(names) <= set(ALL):
+        raise SystemExit(f"usage: python -m gcsplan.native [{' | '.join(ALL)}] …: without a name, all of them")
     if len(names) != 1:
         for name in names or ALL:
             subprocess.run([sys.executable, "-m", "gcsplan.native", name], check=True)
