@@ -21,7 +21,9 @@ Vector = NDArray[np.float64]
 LONGEST = 4.0  # SPLINE_FACTOR
 BULGE_M = 0.25
 MOST_PIECES = 200
-LOOKS = 16
+LOOKS, BESIDE, STILL = 16, 1e-5, 1e-6
+"""Places of a piece that are looked at; how near to a place its sides are, as a part of the curve; and at what part of
+its fastest a curve stands still."""
 
 
 def towards(a: Place, b: Place) -> Vector:
@@ -58,23 +60,23 @@ def _slopes(leaves: Vector, square: Vector, cube: Vector, pieces: int) -> Slopes
     """Steepest slopes of each piece, up and down: at its ends and wherever the slope has an extreme, and between.
 
     With the speed v(t), a quadratic in each direction, the slope is v_up / sqrt(r), r = v_east² + v_north². Its
-    derivative is 0 at the roots of 2 v_up' r - v_up r': at most five. `LOOKS` places of each piece are a net below
-    them, for roots are not exact where several fall together.
+    derivative is 0 at the roots of 2 v_up' r - v_up r': at most five. Where the curve stands still, at an end or on
+    the way, the slope is what it tends to on either side: `BESIDE` is so near. `LOOKS` places of each piece are a net
+    below them, for roots are not exact where several fall together.
     """
     speed = zip(leaves, 2.0 * square, 3.0 * cube, strict=True)
     east, north, up = (np.polynomial.Polynomial(coefficients) for coefficients in speed)
     level = east * east + north * north
-    extremes = np.clip((2.0 * up.deriv() * level - up * level.deriv()).roots().real, 0.0, 1.0)
-    t = np.unique(np.concatenate([np.linspace(0.0, 1.0, pieces * LOOKS + 1), extremes]))
-    run = np.sqrt(np.maximum(level(t), 0.0))
-    moves = run > 1e-6 * max(float(run.max()), 1e-9)
+    extremes = (2.0 * up.deriv() * level - up * level.deriv()).roots().real
+    edges = np.linspace(0.0, 1.0, pieces + 1)
+    near = np.concatenate([extremes, edges])
+    t = np.concatenate([np.linspace(0.0, 1.0, pieces * LOOKS + 1), near, near - BESIDE, near + BESIDE])
+    t = np.unique(t.clip(0.0, 1.0))
+    run = np.hypot(east(t), north(t))
+    moves = run > STILL * max(float(run.max()), 1e-9)
     if not moves.any():
         return [(np.inf, -np.inf)] * pieces
-    t = t[moves]  # standing still it has no direction
+    t = t[moves]
     slope = up(t) / run[moves]
-    found = []
-    for k in range(pieces):
-        first, last = np.searchsorted(t, [k / pieces - 1e-12, (k + 1) / pieces + 1e-12])
-        inside = slope[max(int(first) - 1, 0) : int(last) + 1]
-        found.append((float(inside.max()), float(inside.min())))
-    return found
+    first, last = np.searchsorted(t, edges[:-1], "left"), np.searchsorted(t, edges[1:], "right")
+    return [(float(slope[a:b].max()), float(slope[a:b].min())) for a, b in zip(first, last, strict=True)]

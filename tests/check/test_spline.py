@@ -35,6 +35,28 @@ def test_no_place_of_a_curve_is_steeper_than_is_said(seed: int) -> None:
     assert min(downs) >= slope.min() - 1e-3 * abs(slope.min()) - 1e-3
 
 
+@pytest.mark.parametrize("stands", ["at_start", "at_end", "on_the_way"])
+@pytest.mark.parametrize("seed", range(20))
+def test_where_a_curve_stands_still_it_is_as_steep_as_it_leaves_and_arrives(stands: str, seed: int) -> None:
+    """A spline behind a hold has no speed where it begins: its slope there is what it tends to."""
+    rng = np.random.default_rng(seed)
+    way, other = rng.normal(0.0, [[100.0, 100.0, 20.0]] * 2)
+    leaves, arrives = (np.zeros(3), other) if stands == "at_start" else (other, np.zeros(3))
+    square, cube = 3.0 * way - 2.0 * leaves - arrives, leaves + arrives - 2.0 * way
+    if stands == "on_the_way":  # the speed is (t - t0) (a + b t)
+        t0, a, b = rng.uniform(0.2, 0.8), way, other
+        leaves, square, cube = -t0 * a, 0.5 * (a - t0 * b), b / 3.0
+    pieces = 4
+    t = np.linspace(0.0, 1.0, LOOKS + 1)[1:-1]
+    speed = leaves + 2.0 * square * t[:, None] + 3.0 * cube * t[:, None] ** 2
+    run = np.hypot(speed[:, 0], speed[:, 1])
+    slope, t = (speed[:, 2] / run)[run > 1e-7 * run.max()], t[run > 1e-7 * run.max()]
+    for k, (up, down) in enumerate(_slopes(leaves, square, cube, pieces)):
+        mine = slope[(t >= k / pieces) & (t <= (k + 1) / pieces)]
+        assert np.degrees(np.arctan(mine.max())) <= np.degrees(np.arctan(up)) + 0.002
+        assert np.degrees(np.arctan(mine.min())) >= np.degrees(np.arctan(down)) - 0.002
+
+
 @pytest.mark.parametrize("lat", [-60.0, -12.0, 0.0, 36.0, 70.0])
 @pytest.mark.parametrize("bearing", [0.0, 50.0, 90.0])
 def test_metres_of_a_curve_are_the_ellipsoids(lat: float, bearing: float) -> None:
