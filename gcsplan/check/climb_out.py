@@ -26,7 +26,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.circles import circle_growth
-from gcsplan.check.geodesy import degree_m, flat_m
+from gcsplan.check.geodesy import degree_m, flat_m, offset_m
 from gcsplan.check.spline import towards
 from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding
@@ -157,7 +157,7 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
 def _helix(begin: Place, top: Place, radius_m: float, turns: float, slope: float) -> list[Place]:
     """From ``begin`` up to the altitude of ``top`` on a circle around it; ``turns`` 1: clockwise."""
     east_m, north_m = degree_m(top[0])
-    east, north = (begin[1] - top[1]) * east_m, (begin[0] - top[0]) * north_m
+    east, north = offset_m(top, begin)
     angle = math.atan2(north, east)
     whole = (top[2] - begin[2]) / slope / radius_m
     parts = max(1, math.ceil(whole / (2.0 * math.acos(max(0.0, 1.0 - CHORD_M / radius_m)))))

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
+from gcsplan.check.geodesy import offset_m
 from gcsplan.errors import GcsplanError, LinkError, UsageError, VehicleRefused
 from gcsplan.mavlink.link.frames import signing_key
 from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump
@@ -314,9 +315,7 @@ def _goal(part: Part) -> tuple[float, float, float]:
 
 
 def _apart_m(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
-    north = (b[0] - a[0]) * 111_195.0
-    east = (b[1] - a[1]) * 111_195.0 * math.cos(math.radians(0.5 * (a[0] + b[0])))
-    return math.hypot(north, east, b[2] - a[2])
+    return math.hypot(*offset_m(a, b), b[2] - a[2])
 
 
 def _trace(log: _Log, part: Part, world: World) -> Trace:
