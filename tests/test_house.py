@@ -52,6 +52,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "app": OUTWARD | {"mission_file"},
     "bench": APP,
     "cli": APP | {"bench", "logs"},
+    "__main__": {"cli"},
 }
 
 PROJECTION = {"world/frame.py", "world/datum.py", "world/terrain.py"}

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import gcsplan
 from gcsplan.cli import main as cli
 from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.sim.misbehaviour import Misbehaviour
@@ -259,3 +261,8 @@ def test_ctrl_c_is_exit_130(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(pipeline, "load_mission", interrupted)
     assert run("plan", CROSSING)[0] == 130
+
+
+def test_the_package_runs_as_a_module() -> None:
+    ran = subprocess.run([sys.executable, "-m", "gcsplan", "--version"], capture_output=True, text=True, timeout=60)
+    assert (ran.returncode, ran.stdout.strip(), ran.stderr) == (0, gcsplan.__version__, "")

@@ -1,0 +1,6 @@
+"""``python -m gcsplan``: the same as the command ``gcsplan``, for where scripts are not on the PATH."""
+
+from gcsplan.cli.main import main
+
+if __name__ == "__main__":
+    main()
