@@ -156,8 +156,8 @@ class _Run:
         half = np.array([0.5 * self.radius * abs(c.turn) for c in self.corners])
         tangent = np.array([c.tangent for c in self.corners])
         self.straight_m = self.long_m - tangent[:-1] - tangent[1:]
-        # Arcs may overlap by `FIT_M`: a straight part of negative length has no climb.
-        self.flown_m = half[:-1] + np.maximum(self.straight_m, 0.0) + half[1:]
+        # Arcs may overlap by `FIT_M`: then the aircraft flies less than both, and climbs as much.
+        self.flown_m = half[:-1] + self.straight_m + half[1:]
         self.half_m = half
 
     def _corners(self, mission: Mission, flight: Flight) -> list[_Corner]:
@@ -260,7 +260,7 @@ class _Run:
         """Leg ``k``, altitude even along what is flown."""
         z0, z1 = self.points[k, 2], self.points[k + 1, 2]
         whole = max(float(self.flown_m[k]), 1e-9)
-        track = [(p, z0 + (z1 - z0) * s / whole, off) for p, s, off in self._track(k)]
+        track = [(p, z0 + (z1 - z0) * min(s / whole, 1.0), off) for p, s, off in self._track(k)]
         yield from self._pieces(k, track)
 
     def _pieces(self, k: int, track: list[tuple[Floats, float, float]]) -> Iterator[Stretch]:

@@ -220,3 +220,21 @@ def test_a_plan_keeps_what_its_corners_take_beyond_the_track_error(autopilot: Au
     assert planned.verdict.safe is True
     assert corner_m(planned.request.vehicle) == (2.0 if autopilot is COPTER else 1.0)
     assert planned.verdict.nearest is None or planned.verdict.nearest.zone_clearance_m >= 30.0 + 0.5 + 1.0
+
+
+@pytest.mark.parametrize(("limit_deg", "safe"), [(51.0, True), (49.0, False), (46.0, False)])
+def test_a_leg_shorter_than_its_arcs_climbs_over_what_is_flown(limit_deg: float, safe: bool) -> None:
+    # Arcs of 0.5 m each on a leg of 0.8 m, which the check allows for rounding: 50 degrees, not 44 over both arcs.
+    turn = 2.0 * math.atan(0.5 / 40.0)
+    places = [np.array([0.0, 0.0]), np.array([600.0, 0.0])]
+    for k, metres in enumerate((0.8, 700.0), 1):
+        places.append(places[-1] + metres * np.array([math.cos(k * turn), math.sin(k * turn)]))
+    rise = 0.8 * math.tan(math.radians(50.0))
+    ups = (100.0, 100.0, 100.0 + rise, 100.0 + rise)
+    items = [at(cmd.WAYPOINT, *p, up, 0.0, 1.0) for p, up in zip(places[1:], ups[1:], strict=True)]
+    up = at(cmd.VTOL_TAKEOFF, 0, 0, 100)
+    end = at(cmd.LOITER_UNLIM, *places[-1], ups[-1])
+    craft = replace(vehicle(PLANE, horizontal_clearance_m=0.0, max_climb_deg=limit_deg), turn_radius_m=40.0)
+    found = verdict(Mission(PLANE, HOME, (up, *items, end), "uav1"), FLAT, craft)
+    kinds = {f.kind for f in found.findings}
+    assert kinds == (set() if safe else {"climb"}), found.describe()
