@@ -17,7 +17,8 @@ RATES = {
     "portal": 0.1e-6,
     "opened": 0.8e-6,
     "check": 1e-3,
-    "leg": 1.5e-6,
+    "leg": 0.8e-6,
+    "cut": 0.11e-6,
     "cell": 0.02e-6,
     "piece": 0.3e-6,
     "place": 0.5e-6,
@@ -28,7 +29,8 @@ RATES = {
     "walked": 0.7e-6,
 }
 """Counted seconds of a lattice's node made ready, a mesh's portal and an interval opened on one, a call of the exact
-check with what is made of it, a leg under it and a cell of terrain that it crosses, a piece of a tube, a place whose
+check with what is made of it, a leg under it, a piece of ground that it cuts beside a leg, a cell of terrain that the
+leg crosses, a piece of a tube, a place whose
 floor is read, a corner of an outline triangulated, a label of the lattice search, a point of a line that is pulled, for
 each size of move, and a node that an end of a leg is looked at from, or walked to. Rounded from a fit over plans of all
 kinds."""

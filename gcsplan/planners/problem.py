@@ -93,7 +93,9 @@ class Problem:
         self.budget.spend("check", 1)
         self.budget.spend("leg", len(start))
         self.budget.spend("cell", metres / float(grid.metres_per_cell(*self.start[:2]).min()))
-        return self.airspace.clear(Legs.between(start, end, self.limits), self.limits)
+        legal, cut = self.airspace.clear_counted(Legs.between(start, end, self.limits), self.limits)
+        self.budget.spend("cut", cut)
+        return legal
 
     def floors(self, east_m: NDArray[np.float64], north_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Lowest legal altitudes over places, as `Airspace.floor_amsl` has them; counted as work."""

@@ -55,11 +55,12 @@ class Room(threading.local):
 
     def __init__(self) -> None:
         self._size = (-1, -1)
+        self._out = np.zeros(12)
 
     def __call__(self, most_corners: int, zones: int) -> Held:
         """For polygons of so many corners, and so many zones."""
         if self._size != (most_corners, zones):
-            self._out, self._seen = np.zeros(12), np.empty(zones, np.int64)
+            self._seen = np.empty(zones, np.int64)
             self._list = np.arange(zones)
             self._ready = Held(
                 _ROOM, np.empty((256, 8)), self._out, np.empty(2 * most_corners), self._seen, np.arange(zones)
@@ -69,6 +70,11 @@ class Room(threading.local):
         self._seen.fill(-1)
         self._ready.arguments[-1][:] = self._list
         return self._ready
+
+    @property
+    def cut(self) -> float:
+        """How many pieces of ground the last call of `judge` cut, see `_sweep_beside.deepest`."""
+        return float(self._out[-1])  # `_sweep_terrain.CUT`, whose module needs the compiler
 
 
 room = Room()

@@ -49,7 +49,8 @@ def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):
     """Worst break of the demand along a short segment: its depth and where on the segment (< 0: no news).
 
     ``best`` is the depth already known. With ``full`` the worst is resolved to 5 mm or a tenth, else the first
-    break ends the search. Unknown cells are passed over: they are judged elsewhere.
+    break ends the search. Unknown cells are passed over: they are judged elsewhere. The third value is the number of
+    pieces that were cut.
     """
     rows, cols = z.shape
     length = math.hypot(e1 - e0, n1 - n0)
@@ -114,13 +115,13 @@ def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):
                     if stack[size, 6] + rise * across <= fine or across <= SMALLEST_M or worked > MOST_PIECES:
                         found, at = bound, stack[size, 5]
                         if not full or worked > MOST_PIECES:
-                            return found, at
+                            return found, at, worked
                         continue
                     um = 0.5 * (u0 + u1) if wide >= tall else u1
                     vm = v1 if wide >= tall else 0.5 * (v0 + v1)
                     ul, vl = (um, v0) if wide >= tall else (u0, vm)
                     children = 2
-    return found, at
+    return found, at, worked
 
 
 @device

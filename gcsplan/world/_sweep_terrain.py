@@ -24,6 +24,7 @@ GROUP_M, GROUP_BOW_M = 500.0, 0.003  # longest stretch, and its bow, that the se
 
 # What `sweep` leaves behind, by place.
 LOW, LOW_AT, DEPTH, DEPTH_AT, UNKNOWN, UNKNOWN_AT, STEEPEST, REACH = range(8)
+CUT = 11  # pieces cut by the second tier so far, of all legs
 
 
 @device
@@ -242,12 +243,13 @@ def sweep(m, z, slopes, extremes, halo_c, halo_r, sign, e0, n0, h0, e1, n1, h1, 
                     for k in range(pieces):
                         ta = first + (group + (group_end - group) * k / pieces) * share
                         te = first + (group + (group_end - group) * (k + 1) / pieces) * share
-                        d, s = deepest(
+                        d, s, cut = deepest(
                             m, z, sign,
                             e0 + (e1 - e0) * ta, n0 + (n1 - n0) * ta, h0 + (h1 - h0) * ta,
                             e0 + (e1 - e0) * te, n0 + (n1 - n0) * te, h0 + (h1 - h0) * te,
                             need, reach, out[DEPTH], stack, full,
                         )  # fmt: skip
+                        out[CUT] += cut
                         if s >= 0.0:
                             out[DEPTH], out[DEPTH_AT] = d, ta + s * (te - ta)
                             if not full:
