@@ -59,9 +59,10 @@ def _level_at(zones: Floats, z: int, at: int, ground: Floats, up: Floats, down: 
 
 @device
 def _open(
-    zones: Floats, z: int, floor: float, allowed: float, ground: Floats, up: Floats, down: Floats, j: int, i: int
+    zones: Floats, z: int, floors: Floats, excess: Floats, ground: Floats, up: Floats, down: Floats, j: int, i: int
 ) -> bool:
     """Whether there is an altitude to fly at, over a zone, under it, or between the two of a pair."""
+    floor, allowed = floors[j, i], floors[j, i] - excess[j, i]
     bottom, top = (
         _level_at(zones, z, BOTTOM, ground, up, down, j, i), _level_at(zones, z, TOP, ground, up, down, j, i)
     )  # fmt: skip
@@ -101,27 +102,39 @@ def stamp_zones(
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         if _looks_beside(zones, z):
+            _guess_beside(around, steep, fineness, boxes, z, reach, up, down)
             if exact and zones[z, PAIR] == 0.0:
                 _look_beside(around, excess, ground, x, y, zones, edges, boxes, z, reach, up, down)
-            else:
-                _guess_beside(around, steep, fineness, boxes, z, reach, up, down)
+        west = east = north_west = north_east = 0.0
+        west_open = east_open = north_west_open = north_east_open = False
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
+            before = -2
             for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
                 cell = j * (excess.shape[1] - 1) + i
                 if min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0:
                     continue  # nothing there is free anyway
                 under = zones[z, UNDER] > 0.0
-                deepest, shallowest = -np.inf, np.inf
-                ways = 0
-                for k in range(4):
-                    jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
-                    wall[k] = depth(zones, edges, z, x[jj, ii], y[jj, ii])
-                    deepest, shallowest = max(deepest, wall[k]), min(shallowest, wall[k])
-                    allowed = floor[jj, ii] - excess[jj, ii]
-                    if _open(zones, z, floor[jj, ii], allowed, ground, up, down, jj, ii):
-                        ways += 1
+                first = 0
+                if before == i - 1:  # the western nodes are the eastern ones of the cell before
+                    west, north_west = east, north_east
+                    west_open, north_west_open = east_open, north_east_open
+                    first = 1
+                for q in range(first, 2):
+                    south_depth = depth(zones, edges, z, x[j, i + q], y[j, i + q])
+                    north_depth = depth(zones, edges, z, x[j + 1, i + q], y[j + 1, i + q])
+                    south_open = _open(zones, z, floor, excess, ground, up, down, j, i + q)
+                    north_open = _open(zones, z, floor, excess, ground, up, down, j + 1, i + q)
+                    if q == 0:
+                        west, north_west, west_open, north_west_open = south_depth, north_depth, south_open, north_open
+                    else:
+                        east, north_east, east_open, north_east_open = south_depth, north_depth, south_open, north_open
+                before = i
+                ways = int(west_open) + int(east_open) + int(north_east_open) + int(north_west_open)
                 if ways == 4:
                     continue
+                wall[0], wall[1], wall[2], wall[3] = west, east, north_east, north_west
+                deepest = max(max(west, east), max(north_east, north_west))
+                shallowest = min(min(west, east), min(north_east, north_west))
                 if shallowest > 0.0 and zones[z, PAIR] == 0.0 and not under and zones[z, TOP] < np.inf:
                     # The whole cell is under a lid, which is what must be flown over: bilinear, as ground is.
                     twist = _twist(floor, ground, j, i) if zones[z, TOP_AGL] > 0.0 else 0.0
@@ -136,16 +149,7 @@ def stamp_zones(
                         count = _in_part(excess, floor, ground, zones, z, of, values, wall, shallowest, j, i, count)
                     continue
                 if not low:
-                    dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
-                    square = dx * dx + dy * dy
-                    # A linear function under a concave one: by so much it may be too low between the corners.
-                    more = 0.0
-                    if zones[z, RADIUS] >= 0.0:
-                        more += square / (8.0 * max(zones[z, RADIUS] - math.sqrt(square), 0.5 * math.sqrt(square)))
-                    elif zones[z, LAST] - zones[z, FIRST] > 1.0 and shallowest < 0.0:
-                        more += _kink(zones, edges, z, x, y, j, i)
-                    if zones[z, RADIUS] >= 0.0 and deepest + more <= 0.0 and _meets(zones, z, x, y, j, i):
-                        more = 0.02 - deepest  # a disc that no corner lies near
+                    more = _more_between(zones, edges, z, wall, deepest, shallowest, x, y, j, i)
                     for k in range(4):
                         wall[k] += more
                 count = _put(of, values, cell, wall, count)
@@ -190,6 +194,8 @@ def _look_beside(
     every = 1 + max(rows, cols) // (MOST_BESIDE + 1)
     for j in range(boxes[z, 2], boxes[z, 3] + 2):
         for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
+            if up[j, i] == 0.0:
+                continue  # flat ground
             up[j, i] = down[j, i] = 0.0
             if excess[j, i] == np.inf:
                 continue
@@ -348,19 +354,38 @@ def _meets(zones: Floats, z: int, x: Floats, y: Floats, j: int, i: int) -> bool:
 
 
 @device
-def _kink(zones: Floats, edges: Floats, z: int, x: Floats, y: Floats, j: int, i: int) -> float:
-    """How much the least of several linear functions may rise between a cell's corners above its interpolation."""
-    most = 0.0
+def _more_between(
+    zones: Floats, edges: Floats, z: int, depths: Floats, deepest: float, shallowest: float, x: Floats, y: Floats,
+    j: int, i: int,
+) -> float:  # fmt: skip
+    """How much deeper in a shape a place of a cell may lie than is linear between its corners: what is concave lies
+    above that. -inf where all of the cell surely lies outside."""
+    dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
+    square = dx * dx + dy * dy
+    if zones[z, RADIUS] >= 0.0:
+        more = square / (8.0 * max(zones[z, RADIUS] - math.sqrt(square), 0.5 * math.sqrt(square)))
+        if deepest + more <= 0.0 and _meets(zones, z, x, y, j, i):
+            more = 0.02 - deepest  # a disc that no corner lies near
+        return more
+    if zones[z, LAST] - zones[z, FIRST] <= 1.0 or shallowest >= 0.0:
+        return 0.0
+    most = 0.5 * math.sqrt(square)
+    if deepest + most <= 0.0:
+        return -np.inf
+    return most if _is_kinked(zones, edges, z, depths, x, y, j, i) else 0.0
+
+
+@device
+def _is_kinked(zones: Floats, edges: Floats, z: int, depths: Floats, x: Floats, y: Floats, j: int, i: int) -> bool:
+    """Whether the least of a shape's linear functions is not linear over a cell, whose corners lie so deep in it: then
+    no one edge binds at all four."""
     for k in range(int(zones[z, FIRST]), int(zones[z, LAST])):
-        # Where one edge alone binds at all four corners, the function is linear: nothing to add.
         alone = True
         for q in range(4):
             jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
-            own = _within(edges, k, x[jj, ii], y[jj, ii])
-            if own > depth(zones, edges, z, x[jj, ii], y[jj, ii]) + 1e-9:
+            if _within(edges, k, x[jj, ii], y[jj, ii]) > depths[q] + 1e-9:
                 alone = False
+                break
         if alone:
-            return 0.0
-        most = 1.0
-    dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
-    return 0.5 * math.sqrt(dx * dx + dy * dy) * most
+            return False
+    return True
