@@ -21,10 +21,11 @@ from gcsplan.world.path import Path
 
 LITTLE, WORTH = 5e-6, 2e-5
 """What fewer way points may cost, as a part: on the way, and at last."""
+STEEP = 0.15
+"""Rise of a path, as a part of its track's length, from which a cap tells little: what is passed low must be flown
+around, what is passed high need not."""
 HOPE = 1.5
 """A path is simplified if it would be the best so far by gaining that times what one of its kind has gained yet."""
-STEEP = 0.5
-"""What part of the gap climbing up and down again must be before lower caps are tried for length, too."""
 
 
 class Incumbent:
@@ -167,11 +168,13 @@ class Incumbent:
         """Whether a better path is wanted, and there is work left for it."""
         return not self.done() and self.budget.goes_on()
 
+    @property
     def is_steep(self) -> bool:
-        """Whether what the best path climbs is more than half of what it lacks: a longer track may climb less."""
-        assert self.best is not None
+        """Whether the best path rises by `STEEP` of its track's length or more: a world about as high as it is wide."""
+        if self.best is None:
+            return False
         track_m = float(np.hypot(*np.diff(self.best[:, :2], axis=0).T).sum())
-        return self.cost - math.hypot(track_m, self.rise(-math.inf)) > STEEP * (self.cost - self.bound)
+        return float(np.ptp(self.best[:, 2])) >= STEEP * track_m
 
     @property
     def climbs(self) -> bool:

@@ -52,7 +52,6 @@ class PlaneSearch:
         self.legs = [Leg(problem, a, b, self.top_m) for a, b in pairwise(ends) if math.dist(a.place, b.place) > 1e-3]
         self.by_intervals = False
         """Whether bounds ask where tracks can get to by what they climb and descend on their way."""
-        self.in_space = False
         zones = len(problem.airspace.zones)
         self._open = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
         self.choice = self._open

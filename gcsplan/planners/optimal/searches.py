@@ -20,9 +20,9 @@ from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
-FAR, MUCH, NEAR = 5e-3, 5e-2, 5e-2
-"""Gaps, as parts: beyond which other ways to find a path are asked for a better one; beyond which small worlds are
-searched before time is spent on a bound; and up to which cells are cut once more."""
+FAR, MUCH = 5e-3, 5e-2
+"""Gaps, as parts: beyond which other sources of paths are tried; and beyond which small worlds are searched before time
+is spent on a bound."""
 TWICE = 2.0
 """From so many times the wanted gap on bounds that cost more are asked for."""
 PAST_FINE, ROUNDS = 9, 2
@@ -35,8 +35,8 @@ MOST_CELLS = 50_000
 
 NAMES = (
     "straight", "outlines", "track_bound", "cap_search", "corridor_first", "lattice_first", "roadmap_first",
-    "roadmap_3d", "roadmap_near", "fine_tracks", "detours", "detours_fine", "bound_corridor", "contour_climb",
-    "lattice", "local_roadmap", "cap_pairs", "length_bound", "space_bound", "altitude_intervals", "refinement",
+    "roadmap_near", "fine_tracks", "detours", "detours_fine", "bound_corridor", "contour_climb", "lattice",
+    "local_roadmap", "cap_pairs", "length_bound", "altitude_intervals", "refinement",
 )  # fmt: skip
 """Of all searches; which a mission has depends on its objective and limits."""
 
@@ -87,7 +87,7 @@ class Searches:
             return i.best is not None
 
         def small(beyond: float) -> Callable[[], bool]:
-            return lambda: i.best is not None and i.gap > beyond and self.plane.is_small
+            return lambda: i.best is not None and i.gap > beyond and (self.plane.is_small or i.is_steep)
 
         def on(run: Callable[[PlaneSearch], object]) -> Callable[[], object]:
             return self._over(lambda: run(self.plane))
@@ -108,13 +108,11 @@ class Searches:
             Search("corridor_first", 0.5, missing, nodes(4.0), on(follow)),
             Search("lattice_first", 0.5, missing, of(1.0, 0.0), self._search_lattice),
             Search("roadmap_first", 0.1, self._small_lacks, of(1.0, 0.0), self._search_small),
-            Search("roadmap_3d", 0.9, self._is_high, of(0.5, 0.0), self._search_space),
             Search("roadmap_near", 0.5, small(MUCH), of(0.5, 0.0), self._search_small),
             Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
             Search("detours", 0.8, far, nodes(2.0), on(lambda plane: plane.past(PAST, fine=False))),
             Search("bound_corridor", 0.2, twice, nodes(3.0), on(follow)),
             Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
-            Search("lattice", 0.02, self._wants_lattice, of(0.5, 0.0), self._search_lattice_again),
             Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
         ]
         if energy:
@@ -122,14 +120,14 @@ class Searches:
                 *rows,
                 Search("cap_pairs", 0.5, known, nodes(3.0), self._over(self._bound_caps), again=True),
                 Search("detours_fine", 0.3, far, nodes(4.0), on(lambda plane: plane.past(PAST_FINE, fine=True))),
+                Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
             ]
         return [
             *rows,
             Search("length_bound", 0.9, known, nodes(1.0), on(halve), again=True, nearer=True),
-            Search("space_bound", 0.3, lambda: self.plane.in_space, nodes(2.0), on(bound_by_caps)),
             Search("detours_fine", 0.3, known, nodes(4.0), self._over(self._past_finely)),
             Search("altitude_intervals", 0.08, self._has_intervals, nodes(8.0), self._over(self._bound_by_intervals)),
-            Search("refinement", 0.07, self._is_near, nodes(8.0), self._over(self._refine)),
+            Search("refinement", 0.07, twice, nodes(8.0), self._over(self._refine)),
         ]
 
     def _over(self, run: Callable[[], object]) -> Callable[[], object]:
@@ -208,20 +206,6 @@ class Searches:
         incumbent = self.incumbent
         incumbent.offer(small_path(self.problem, incumbent.best, incumbent.budget.goes_on))
 
-    def _is_high(self) -> bool:
-        incumbent = self.incumbent
-        far = incumbent.best is not None and incumbent.gap > FAR
-        return far and (self.problem.objective == "energy" or incumbent.is_steep())
-
-    def _search_space(self) -> None:
-        from gcsplan.planners.optimal.sources.roadmap_3d import is_steep, steep_path  # few worlds are as high as wide
-
-        incumbent = self.incumbent
-        assert incumbent.best is not None
-        self.plane.in_space = is_steep(self.problem, incumbent.best)
-        if self.plane.in_space:
-            incumbent.offer(steep_path(self.problem, incumbent.best, incumbent.budget.goes_on))
-
     def _look_finely(self) -> None:
         self.plane.try_below(self.plane.top_m, fine=True)
 
@@ -262,12 +246,6 @@ class Searches:
         if plane.by_intervals:
             halve(plane)
 
-    def _is_near(self) -> bool:
-        incumbent = self.incumbent
-        return (
-            incumbent.best is not None and not self.plane.in_space and TWICE * incumbent.wanted < incumbent.gap <= NEAR
-        )
-
     def _refine(self) -> None:
         plane, incumbent = self.plane, self.incumbent
         cut = 2 if incumbent.gap > FAR else 1
@@ -276,11 +254,6 @@ class Searches:
             halve(plane, far=True)
             if incumbent.gap > TWICE * incumbent.wanted and incumbent.budget.goes_on() and follow(plane):
                 halve(plane, far=True)
-
-    def _wants_lattice(self) -> bool:
-        incumbent = self.incumbent
-        far = incumbent.best is not None and incumbent.gap > FAR
-        return far and (self.problem.objective == "energy" or self.plane.in_space)
 
     def _search_lattice_again(self) -> None:
         self._search_lattice(known=True)

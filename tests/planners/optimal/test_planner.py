@@ -13,17 +13,14 @@ from gcsplan.app.pipeline import plan as plan_mission
 from gcsplan.app.problems import make_problem
 from gcsplan.errors import InputError
 from gcsplan.planners.optimal.planner import plan
-from gcsplan.planners.optimal.sources.roadmap_3d import is_steep, steep_path
 from gcsplan.planners.problem import Problem, Progress, Solution, Via
 from gcsplan.planners.registry import get, names
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path as FlownPath
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.support.paths import MISSIONS
 from tests.support.planner_worlds import FIELD, Floats, faults, ground, random_mission
-from tests.support.searches import looked
 
 LOW = Limits(min_agl_m=10.0)
 
@@ -331,42 +328,24 @@ ROOF = Zone("roof", Circle(75.0, 60.0, 20.0), Level(50.0, "agl"), None)
         ((), (Via(75.0, 45.0),), 90.0, "energy"),
     ],
 )
-def test_search_in_space_among_needles(
+def test_paths_among_needles_as_high_as_the_world_is_wide(
     zones: tuple[Zone, ...], via: tuple[Via, ...], degrees: float, objective: str
 ) -> None:
     limits = replace(AMONG, max_climb_deg=degrees, max_descent_deg=max(degrees - 10.0, 50.0))
     surface = ground(needles, size_m=120.0, step_m=1.0)
     p = problem(surface, zones, limits, (5.0, 5.0, 3.5), (115.0, 115.0, 80.0), via=via, objective=objective)
-    # Far over everything: a path that is legal, known, and bad.
-    low, high = ([*p.start[:2], z] for z in (p.start[2], 110.0))
-    over = [low, high, *([v.east_m, v.north_m, 110.0] for v in via), [*p.goal[:2], 110.0], list(p.goal)]
-    known = np.array(over)
-    assert is_steep(p, known)
-    found = steep_path(p, known, lambda: True)
-    assert found is not None
-    points, pinned = found
-    assert p.airspace.examine(Legs.of_path(points, limits), limits).violations == ()
-    stops = points[pinned]
-    assert stops[0].tolist() == list(p.start)
-    assert stops[-1].tolist() == list(p.goal)
-    assert [s[:2] for s in stops[1:-1].tolist()] == [[v.east_m, v.north_m] for v in via]
-    assert all(v.amsl_m is None or s[2] == v.amsl_m for s, v in zip(stops[1:-1], via, strict=True))
-    # Not above what is found below a cap at once, but for a little: each finds ways that the other does not.
-    below = looked(p).incumbent
-    assert below.best is not None
-    assert below.bound - 1e-6 <= p.cost(FlownPath(points)) <= 1.003 * below.cost
-    if objective == "length":
-        again = steep_path(p, known, lambda: True)
-        assert again is not None
-        assert again[0].tobytes() == points.tobytes()
-
-
-def test_search_in_space_is_given_up_when_time_is_over_and_not_begun_over_real_terrain() -> None:
-    p = problem(ground(needles, size_m=120.0, step_m=1.0), (), AMONG, (5.0, 5.0, 3.5), (115.0, 115.0, 80.0))
-    known = np.array([p.start, [5.0, 5.0, 110.0], [115.0, 115.0, 110.0], p.goal])
-    assert steep_path(p, known, lambda: False) is None
-    real = random_mission(0)
-    assert not is_steep(real, plan(real).path.points)
+    found = plan(p)
+    legs = Legs.of_path(found.path.points, limits)
+    assert p.airspace.examine(legs, limits).violations == ()
+    assert found.lower_bound is not None
+    cost = p.cost(found.path)
+    print(
+        "GAP",
+        cost / found.lower_bound - 1,
+        found.stopped_by,
+        [(s.name, round(s.s, 2), s.gained_percent, s.bound_percent) for s in found.search],
+    )
+    assert found.lower_bound <= cost * (1.0 + 1e-9) <= 1.1 * found.lower_bound
 
 
 def test_table_names_the_nearest_planner() -> None:

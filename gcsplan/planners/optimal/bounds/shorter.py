@@ -141,15 +141,12 @@ def raise_climb(plane: PlaneSearch) -> None:
 
 
 def bound_by_caps(plane: PlaneSearch) -> None:
-    """Look below lower caps for what climbs less, and raise the bound to that of all caps."""
+    """Look for paths below lower caps, which climb less, and raise the bound of energy to the least of all caps."""
     p, incumbent = plane.problem, plane.incumbent
-    energy = p.objective == "energy"
     tried: set[float] = set()
 
     def cost_of(layer: Layer) -> float:
-        if energy:
-            return layer.cost(incumbent.rise, p.vertical_j_per_m, p.horizontal_j_per_m)
-        return math.hypot(layer.track_m, incumbent.rise(layer.low_m))
+        return layer.cost(incumbent.rise, p.vertical_j_per_m, p.horizontal_j_per_m)
 
     def track_m(cap: float, care: int) -> float:
         limits = [plane.limit(leg) for leg in plane.legs]
@@ -163,7 +160,7 @@ def bound_by_caps(plane: PlaneSearch) -> None:
             if plane.try_below(cap, fine=False):
                 plane.try_below(cap, fine=True)
 
-    near = (NEARER if energy else 1.0) * incumbent.wanted
+    near = NEARER * incumbent.wanted
     layers = [Layer(max(incumbent.known_m), plane.top_m, sum(leg.length_m for leg in plane.legs))]
     found = search_caps(layers, cost_of, track_m, lambda: incumbent.cost, try_at, near, incumbent.budget.goes_on)
     incumbent.raise_bound(found)

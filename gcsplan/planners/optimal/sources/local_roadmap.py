@@ -1,22 +1,22 @@
-"""Paths through small worlds, of a few dozen cells of the terrain model: ways between places that matter.
+"""Paths through small worlds of a few dozen cells of the terrain model, over a roadmap of places that matter.
 
-There the lattices of the plane, fine as they are, miss what is narrower than their cells: a pass exactly as high as the
-ceiling, a slit between two cylinders, a climb that must wind along a wall. Here ways are searched between few places,
-chosen where such ways lead: the terrain model's own nodes and its saddles, the rims of zones, slits between them, and a
-regular lattice in between. Each has a column of altitudes from its floor up; legs between neighbours are put to the
-exact check, and what is best is drawn together (`section_dp`), as in `roadmap_3d`. There is no bound in it.
+There the lattices of the plane miss what is narrower than their cells: a pass exactly as high as the ceiling, a slit
+between two cylinders, a climb that must wind along a wall. The roadmap has few places: the terrain model's own nodes
+and its saddles, the rims of zones, slits between them, and a regular lattice in between. Each has a column of altitudes
+from its floor up; legs between neighbours pass the exact check, and the best path over them is drawn together.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.sources.roadmap_3d import Lattice, path_of, terminals_by_leg
+from gcsplan.planners.optimal.sources.roadmap import Roadmap, path_over, terminals_by_leg
 from gcsplan.planners.optimal.sources.section_dp import cost_of
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.zones import Circle
@@ -24,7 +24,7 @@ from gcsplan.world.zones import Circle
 Ints = NDArray[np.intp]
 
 NODES, PLACES, LEVELS = 8000, (200, 1000), (7, 30)
-"""Nodes of a lattice, about; its places and the altitudes over each, at least and at most."""
+"""Nodes of a roadmap, about; its places and the altitudes over each, at least and at most."""
 NEIGHBOURS = 16
 """Nearest places that each place is linked to."""
 SPOKES = 12
@@ -36,9 +36,7 @@ WIDEST, WIDEST_CELLS = 2.0, 30.0
 HAIR_M = 1e-3
 """How far outside of what they pass places lie."""
 SLIT = 0.5
-"""Slits between circles are looked for that are as wide as that part of the lattice's spacing, at most."""
-HOPE = 1.06
-"""A path drawn together coarsely that costs so much times the best known is not worth more."""
+"""Slits between circles matter up to that part of the roadmap's spacing in width."""
 WORTH = 0.03
 """What a first search must gain, as a part, for a second one closer to what it found."""
 
@@ -53,7 +51,7 @@ def small_path(problem: Problem, known: Floats | None, in_time: Callable[[], boo
     best = math.inf if known is None else cost_of(problem, known)
     for _ in range(2):
         terminals = terminals_by_leg(problem, _straight(problem) if known is None else known)
-        better = path_of(problem, terminals, best, known, in_time, _lattice, HOPE)
+        better = path_over(problem, terminals, best, known, in_time, partial(_roadmap, in_time))
         if better is None:
             break
         before, found, known = best, better, better[0]
@@ -75,8 +73,8 @@ def _straight(problem: Problem) -> Floats:
     return np.column_stack([flat, np.where(known, heights, free)])
 
 
-def _lattice(problem: Problem, starts: Floats, goals: Floats, limit: float) -> Lattice:
-    """Places that matter on ways from one of ``starts`` (K, 3) to one of ``goals`` that cost ``limit`` at most."""
+def _roadmap(in_time: Callable[[], bool], problem: Problem, starts: Floats, goals: Floats, limit: float) -> Roadmap:
+    """The roadmap for paths from one of ``starts`` (K, 3) to one of ``goals`` that cost ``limit`` at most."""
     air, limits = problem.airspace, problem.limits
     ends = np.vstack([starts, goals])
     low, high = _box(problem, ends, limit)
@@ -121,7 +119,7 @@ def _lattice(problem: Problem, starts: Floats, goals: Floats, limit: float) -> L
     both = both[:, (both[0] >= 0) & (both[0] < both[1])]
     count = len(ends) + len(flat)
     once = np.stack(np.divmod(np.unique(both[0] * count + both[1]), count))
-    return Lattice.of(problem, np.vstack([ends, flat]), once, len(starts), len(goals), spacing_m)
+    return Roadmap.of(problem, np.vstack([ends, flat]), once, (len(starts), len(goals)), spacing_m, in_time)
 
 
 def _near(places: Floats) -> Ints:
