@@ -1,1 +1,1 @@
-"""Convex pieces of free plane below a cap, and the exact shortest way over them (Polyanya)."""
+"""The free plane below an altitude cap, cut into convex pieces, and exact shortest tracks over those (Polyanya)."""

@@ -1,4 +1,4 @@
-"""Room for arrays that are needed anew for one mesh after the other."""
+"""Buffers that are reused from one mesh to the next."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 LARGE = 1 << 22
-"""Bytes from which on numpy asks for huge pages."""
+"""Size of an array, in bytes, from which numpy requests huge pages."""
 
 
 class Scratch:
-    """Arrays by name, each as it was left by whoever had it last: memory is cleared by the system when it is first
-    touched, which takes longer than what is done with it.
+    """Named arrays that are kept and handed out again, with what their last user left in them.
 
-    Of large arrays only a corridor is touched, a few numbers of each row. With huge pages that would be all of them.
+    New memory is cleared by the operating system when it is first touched, which takes longer than the work done in it.
+    Of a large array only a corridor is touched, a few numbers of each row; with huge pages, all of it would be cleared.
     """
 
     def __init__(self) -> None:
         self._held: dict[str, NDArray[Any]] = {}
 
     def array(self, name: str, shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
-        """Room of that shape with anything in it, until that name is asked for again."""
+        """An array of that shape with arbitrary content, free to use until the same name is requested again."""
         size = math.prod(shape)
         held = self._held.get(name)
         if held is None or held.size < size:

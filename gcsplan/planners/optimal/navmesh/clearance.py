@@ -1,7 +1,7 @@
-"""What can be flown over a part of a plane below a cap, node by node, and the mesh of that.
+"""The clearance grid: by how much each lattice node's floor exceeds a cap, and the mesh of the free cells.
 
-A clearance grid may be held down: near the ends of a leg paths can be only so high, which a bound may use as a lower
-cap. Each time tracks become longer by that there is less to spare for a climb, so it can be held down once more.
+For bounds, the cap may be lowered near the ends of a leg to what a path can climb to there (`ClearanceGrid.hold`).
+That shuts nodes, so tracks get longer and leave less length to climb with, and the cap can be lowered once more.
 """
 
 from __future__ import annotations
@@ -25,31 +25,32 @@ from gcsplan.planners.profile.track import divided
 
 Ints = NDArray[np.int32]
 Cone = tuple[float, float, float, float]
-"""Where it stands (east_m, north_m), its height there, and its slope."""
+"""A climb cone, the highest altitudes near an end of a leg: its east_m and north_m, altitude there (m AMSL), slope."""
 
 AROUND = 8
-"""How many nodes beside those of cells that are wanted are looked at, at most: more than `climb_cones.BESIDE`."""
+"""Nodes on each side of the wanted cells that are looked at too, at most: more than `climb_cones.BESIDE`."""
 RIM = 12.0
-"""How many cells deep zones are looked at that cannot be climbed over so near to an end."""
+"""Depth, in cells, to which a zone is looked at that may be too high to climb over so near an end."""
 ALIKE = 12.0
-"""How many times as large as the error of tracks cells may be for bounds to make use of it."""
+"""A bound's floors make use of the track error only if a cell's diagonal is less than this many times the error."""
 LEARN_M, LEARN_HAIR_M = 2.0, 0.05
-"""How closely a track is looked at, and by how much more than is missing nodes are raised."""
+"""Longest step, m, at which `learn` checks a track, and metres by which nodes are raised above what was missing."""
 NODE_BYTES = 150.0
-"""What a node takes that is looked at, with the cells and pieces beside it."""
+"""Bytes of a node that is looked at, with the cells and pieces beside it."""
 MANY = 8
-"""Names a portal from which on a mesh's are numbered one by one, for searches have room for every name."""
+"""If a mesh has more possible names per portal than this, names are renumbered without gaps: searches allocate arrays
+with an entry for every name."""
 
 
 class ClearanceGrid:
-    """The nodes of the ``wanted`` cells of a plane, or of all, cut ``fineness`` times finer: how much too high the
-    lowest is that can be flown at (*excess*), and the walls of the zones.
+    """The *excess* (floor minus cap, m) at the nodes of a plane's ``wanted`` cells (None: all), cut ``fineness`` times
+    finer, and the walls of the zones.
 
-    ``cap_m``, ``low`` as in `mesh_of`; ``ends``: where paths climb from, see `clearance_kernels.fill`; ``under``,
-    ``over`` (zones,): which zones may be passed below their floors, above their ceilings; None for all. ``whole``: such
-    meshes are asked for places all over them, and kept; others last until the plane's next grid. ``exact``: nodes are
-    as high as the exact check has them, and not higher for what may be between them. Raises Exhausted where the nodes
-    take more memory than the budget leaves.
+    ``cap_m``, ``low`` as in `mesh_of`; ``ends``: the cones in which paths climb from the ends of the leg, see
+    `clearance_kernels.fill`; ``under``, ``over`` (zones,): which zones may be passed below their floors, above their
+    ceilings; None for all. ``whole``: the mesh is kept and can be read at all its nodes; other grids are valid only
+    until the plane's next one. ``exact``: floors are those of the exact check at the nodes, without a margin for what
+    lies between them. Raises Exhausted if the nodes take more memory than the budget leaves.
     """
 
     def __init__(
@@ -89,14 +90,14 @@ class ClearanceGrid:
         more = limits.min_agl_m + limits.altitude_error_m
         if low:
             more -= plane.fit.spare_m
-            # Where cells are much larger, slopes are hardly alike as far as that.
+            # In much larger cells the slope varies too much for a useful lower bound within the track error.
             cell_m = math.dist((x[0, 0], y[0, 0]), (x[1, 1], y[1, 1])) / fineness
             beside = limits.track_error_m if limits.track_error_m * ALIKE > cell_m else 0.0
         else:
             more += plane.fit.hair_m
             beside = limits.track_error_m * scale + plane.fit.hair_m
             if limits.horizontal_clearance_m > limits.min_agl_m:
-                # Beside cliffs it is the clearance that binds; this is more than both demand together.
+                # Beside cliffs the horizontal clearance is the binding limit; the sum is more than both demand.
                 beside += limits.horizontal_clearance_m * scale
         fill(
             top, ground, steep, x, y, np.ascontiguousarray(wanted[inner]), fineness, more, beside, cap_m,
@@ -117,7 +118,7 @@ class ClearanceGrid:
         self._either: NDArray[np.int8]
 
     def _be_exact(self) -> None:
-        """Give the nodes that are looked at the floors that the exact check has there."""
+        """Set the floors of the nodes that are looked at to those of the exact check."""
         cols = np.arange(self.shape[1])
         seen = (cols >= self._around[:, :1]) & (cols < self._around[:, 1:])
         seen[seen] = np.isfinite(self._excess[seen])
@@ -126,12 +127,12 @@ class ClearanceGrid:
         self._excess[seen] += more
 
     def _too_high(self, east_m: Floats, north_m: Floats) -> Floats:
-        """What floors of the exact check are over the cap."""
+        """(N,) metres by which the exact check's floors at places exceed the cap."""
         floor = self.plane.problem.floors(east_m, north_m)
         return np.asarray(floor) - self.cap_m
 
     def learn(self, track: Floats) -> bool:
-        """Raise the nodes of cells in which the exact check shuts a track (N, 2) over them; whether there are any."""
+        """Raise the nodes of the cells in which the exact check shuts a track (N, 2); return whether there are any."""
         places = sampled(track, LEARN_M)
         over = self._too_high(*places.T)
         shut = np.isfinite(over) & (over > 0.0)
@@ -139,9 +140,9 @@ class ClearanceGrid:
         return bool(shut.any())
 
     def lift(self, places: Floats, by_m: Floats) -> None:
-        """Raise the nodes of the cells of ``places`` (N, 2) by so much (N,), and a hair."""
+        """Raise the four nodes of each cell that holds one of ``places`` (N, 2) by ``by_m`` (N,) + `LEARN_HAIR_M`."""
         cells = np.floor((self.plane.all_at(places) - [self.col, self.row]) * self.fineness).astype(np.intp)
-        more: dict[tuple[int, int], float] = {}  # of few nodes: those that are not touched take no memory
+        more: dict[tuple[int, int], float] = {}  # only the few nodes to raise: an array would touch memory for all
         for (i, j), by in zip(cells.tolist(), by_m.tolist(), strict=True):
             for node in product((j, j + 1), (i, i + 1)):
                 if 0 <= node[0] < self.shape[0] and 0 <= node[1] < self.shape[1]:
@@ -152,8 +153,8 @@ class ClearanceGrid:
         self._laid = False
 
     def hold(self, cones: list[Cone]) -> None:
-        """Hold nodes down to ``cones``, which no path of a length that matters is higher than near its ends: a bound's
-        clearance. Cones that come later know of the ways that are longer because of those before."""
+        """Limit the altitude near the ends of a leg to ``cones``, for a bound: no path of a length that matters is
+        higher there. Distances for later cones take account of the walls that earlier ones raised."""
         if not cones:
             return
         cell_m = self.plane.stride * float(
@@ -194,11 +195,11 @@ class ClearanceGrid:
                 self._around, excess, self._floor, lift, self._either, self._of, self._values, x, y, cone, lone, seen,
                 away,
             )  # fmt: skip
-        # What cannot be reached so soon is no way over a zone either.
+        # Altitudes that a path cannot reach so soon do not lead over a zone either: lay the zones anew.
         self._laid = False
 
     def mesh(self, *, single: bool = False) -> Mesh:
-        """The mesh of what can be crossed. ``single``: each free cell is a piece of its own."""
+        """Make the mesh of the free cells. ``single``: each free cell is a piece of its own."""
         if not self._laid:
             self._lay()
         rows, cols = self.shape
@@ -230,7 +231,7 @@ class ClearanceGrid:
         )  # fmt: skip
 
     def _lay(self) -> None:
-        """Lay the zones on the cells."""
+        """Give the cells the walls of the zones."""
         stamp_zones(
             self._around, self._span, self._excess, self._floor, self._ground, self._steep, self.fineness,
             self._reach_m, self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges, self._boxes,
@@ -242,7 +243,8 @@ class ClearanceGrid:
 def mesh_of(
     plane: Plane, cap_m: float, low: bool, fineness: int = 1, wanted: Bools | None = None, single: bool = False
 ) -> Mesh:
-    """What of a plane can be crossed at or below ``cap_m``: by a bound's track (``low``: all of it) or by a path's.
+    """Make the mesh of what can be crossed at or below ``cap_m``: for bounds (``low``), all that any legal track may
+    cross; for paths, only what can be crossed legally.
 
     ``wanted``: only these cells. ``single``: each free cell is a piece of its own. Raises Exhausted.
     """
@@ -250,14 +252,14 @@ def mesh_of(
 
 
 def sampled(track: Floats, step_m: float) -> Floats:
-    """(K, 2) places over a track (N, 2), at most so far from each other."""
+    """(K, 2) the middles of equal parts of each leg of a track (N, 2), none longer than ``step_m``."""
     leg, part, parts = divided(track, step_m)
     t = ((part + 0.5) / parts)[:, None]
     return np.asarray(track[leg] + t * (track[leg + 1] - track[leg]))
 
 
 def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:
-    """Whether cones about different places do not come nearer than ``more_m`` to each other below a cap."""
+    """Whether cones around different places stay more than ``more_m`` apart below a cap."""
     wide = [max(cap_m - height, 0.0) / slope for *_, height, slope in cones]
     return all(
         a[:2] == b[:2] or math.dist(a[:2], b[:2]) > reach_a + reach_b + more_m
@@ -266,15 +268,15 @@ def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:
 
 
 def _spans(wanted: Bools, fineness: int) -> Ints:
-    """(rows, 2) of cells cut so many times finer: of each row the first that is wanted, and that after the last."""
+    """(rows, 2) for each row of cells, cut ``fineness`` times finer: first wanted column, and that after the last."""
     first, last = wanted.argmax(axis=1), wanted.shape[1] - wanted[:, ::-1].argmax(axis=1)
     spans = np.stack([first, np.where(wanted.any(axis=1), last, first)], axis=-1) * fineness
     return np.ascontiguousarray(np.repeat(spans, fineness, axis=0), np.int32)
 
 
 def _around(span: Ints, cols: int) -> Ints:
-    """(rows + 1, 2) of nodes: of each row the first that is no farther than `AROUND` from cells of the ``span``, and
-    that after the last."""
+    """(rows + 1, 2) for each row of nodes: the first column no farther than `AROUND` nodes from cells of the ``span``,
+    and that after the last."""
     first, last = np.full(len(span) + 1, cols), np.zeros(len(span) + 1, np.int64)
     some = span[:, 1] > span[:, 0]
     left, right = np.where(some, span[:, 0] - AROUND, cols), np.where(some, span[:, 1] + AROUND + 1, 0)

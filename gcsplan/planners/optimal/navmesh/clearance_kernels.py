@@ -1,4 +1,4 @@
-"""The excess of a lattice's nodes over what may be flown, cell by cell where it is wanted."""
+"""Kernels for the nodes of a lattice: their places, their terrain heights, and their excess over a cap."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gcsplan.planners.compiled import device, kernel
 Ints = NDArray[np.int32]
 
 SPARE = 0.999
-"""What part of a way is taken for it: cells beside each other are not quite as large."""
+"""Share of a distance that is counted, because neighbouring cells differ slightly in size."""
 
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] b1[,] i8 f8 f8 f8 f8[,] b1 i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i1[]")
@@ -22,12 +22,13 @@ def fill(
     more: float, beside: float, cap: float, cones: Floats, low: bool, around: Ints, excess: Floats, floor: Floats,
     under: Floats, fine_x: Floats, fine_y: Floats, diagonal: NDArray[np.int8],
 ) -> None:  # fmt: skip
-    """Cut each ``wanted`` (rows - 1, cols - 1) cell into ``fineness`` parts a side and give their nodes values.
+    """Cut each ``wanted`` (rows - 1, cols - 1) cell into ``fineness`` parts a side and compute the values of the nodes.
 
-    ``floor`` is ``top`` + ``more`` + ``beside`` times how steep it is: for bounds (``low``) what it rises at least
-    within that way of all places next to a node, for paths ``steep``. ``excess`` is what it is over ``cap`` and over
-    ``cones`` (K, 4: x, y, height, slope), which are too low rather than too high between nodes, inf at the other nodes
-    of ``around`` (see `blank`); ``under`` the ground. ``diagonal``: the way to cut a cell so that triangles never lie
+    ``floor`` is ``top`` + ``more`` + ``beside`` times a slope: for paths ``steep`` (rows, cols); for bounds (``steep``
+    is empty) the least slope that holds within ``beside``, which is shortened, of all places next to the node.
+    ``excess`` is the floor minus the lower of ``cap`` and the ``cones`` (K, 4: x, y, height, slope), which are lowered
+    so that, between nodes, they are too low rather than too high; it is inf at the other nodes of ``around`` (see
+    `blank`). ``under`` is the ground. ``diagonal``: which diagonal to cut a cell along so that its triangles never lie
     above (``low``), or never below, the bilinear patch.
     """
     rows, cols = wanted.shape
@@ -44,7 +45,7 @@ def fill(
             side = math.sqrt(square)
             ex, ey, nx, ny = x[j, i + 1] - x[j, i], y[j, i + 1] - y[j, i], x[j + 1, i] - x[j, i], y[j + 1, i] - y[j, i]
             across, along = math.sqrt(ex * ex + ey * ey), math.sqrt(nx * nx + ny * ny)
-            # So far along one axis and the other is no farther than `beside`, were they not at right angles.
+            # Steps along the two axes whose squares add up to near² lead no farther than `beside`, even if askew.
             near = SPARE * beside / (1.0 + abs(ex * nx + ey * ny) / (across * along))
             for q in range(fineness + 1):
                 v = q / fineness
@@ -55,7 +56,7 @@ def fill(
                     if q < fineness and p < fineness:
                         diagonal[jj * fine_cols + ii] = way
                     if excess[jj, ii] < math.inf:
-                        continue  # a cell beside this one knew as much
+                        continue  # done for a neighbouring cell
                     height = _mix(top, j, i, a, b, c, d)
                     if math.isnan(height):
                         continue
@@ -78,7 +79,8 @@ def fill(
 
 @device
 def _rises(top: Floats, row: float, col: float, rows: float, cols: float, along: float, across: float) -> float:
-    """How steeply a surface rises in some one direction, at least, everywhere as few rows and columns from a place."""
+    """A lower bound of a surface's slope in one and the same direction, everywhere within ``rows`` and ``cols`` of a
+    place; 0 where a cell is unknown or missing. ``along``, ``across``: metres of a row and of a column."""
     least_e = least_n = math.inf
     most_e = most_n = -math.inf
     for j in range(math.floor(row - rows), math.floor(row + rows) + 1):
@@ -93,7 +95,7 @@ def _rises(top: Floats, row: float, col: float, rows: float, cols: float, along:
                 u = max(col - cols - i, 0.0) if k == 0 else min(col + cols - i, 1.0)
                 e, n = (b - a) * (1.0 - v) + (c - d) * v, (d - a) * (1.0 - u) + (c - b) * u
                 least_e, most_e, least_n, most_n = min(least_e, e), max(most_e, e), min(least_n, n), max(most_n, n)
-    # Of all slopes that there may be, the least is nearest to none.
+    # Of each component's range, the least slope is the one nearest to 0.
     e, n = max(least_e, -most_e, 0.0) / across, max(least_n, -most_n, 0.0) / along
     return math.sqrt(e * e + n * n)
 
@@ -103,8 +105,8 @@ def lay(
     corner_x: Floats, corner_y: Floats, step: int, ax: float, ay: float, bx: float, by: float, most: float, x: Floats,
     y: Floats, inside: NDArray[np.bool_],
 ) -> None:  # fmt: skip
-    """Places of a lattice's nodes, bilinear between every ``step``-th; ``inside`` (rows - 1, cols - 1) the cells of
-    whose corners none is farther than ``most`` from (ax, ay) and (bx, by) together."""
+    """Compute the places of a lattice's nodes, bilinear between every ``step``-th; clear ``inside`` (rows - 1,
+    cols - 1) at cells with a corner whose distances to (ax, ay) and (bx, by) add up to more than ``most``."""
     rows, cols = x.shape
     for j in range(rows):
         v, b = (j % step) / step, j // step
@@ -123,8 +125,8 @@ def lay(
 
 @device
 def blank(value: Floats, around: Ints, at_first: float) -> None:
-    """Set ``value`` (rows, cols) at the nodes that are looked at: ``around`` (rows, 2) of each row the first, and that
-    after the last. Others are never read, and memory that is never touched costs nothing."""
+    """Set ``value`` (rows, cols) to ``at_first`` at the nodes that are looked at. ``around`` (rows, 2): first column of
+    each row, and that after the last. Others are never read, and memory that is never touched costs nothing."""
     for j in range(len(around)):
         for i in range(around[j, 0], around[j, 1]):
             value[j, i] = at_first
@@ -132,18 +134,18 @@ def blank(value: Floats, around: Ints, at_first: float) -> None:
 
 @device
 def _on_border(z: Floats, over: NDArray[np.int64], j: int, i: int) -> float:
-    """The height of the node that is j rows north of and i columns east of a corner; beyond the end, the end's."""
+    """The height of the node j rows north and i columns east of the south-west corner; that of the border beyond it."""
     return float(z[over[3] - min(j, over[3] - over[1]), over[0] + min(i, over[2] - over[0])])
 
 
 @kernel("f8[,] i8[] i8 f8[,] f8[,]")
 def pool(z: Floats, over: NDArray[np.int64], stride: int, low: Floats, high: Floats) -> None:
-    """Every ``stride``-th node of a terrain model, rows going north, lowered (``low``) and raised (``high``) until
-    bilinear patches between those left lie nowhere above, and nowhere below, the bilinear patches between all.
+    """Heights of every ``stride``-th node of a terrain model, rows going north, lowered (``low``) and raised (``high``)
+    until the bilinear patches between them lie nowhere above, and nowhere below, the terrain model's own patches.
 
-    ``over``: its first and last column and row (col0, row0, col1, row1). Beyond those all is as high as there. The
-    difference of the two is bilinear in each small cell, so it is greatest at a node. Unknown nodes (NaN) shut every
-    patch that they lie in for ``high`` (inf), and are passed over for ``low``.
+    ``over``: first and last column and row to use (col0, row0, col1, row1); beyond them, heights are those of the
+    border. The difference of large and small patches is bilinear in each small cell, so it is greatest at a node. An
+    unknown node (NaN) shuts every patch that it lies in for ``high`` (inf), and is ignored for ``low``.
     """
     rows, cols = low.shape
     for j in range(rows):
@@ -177,7 +179,7 @@ def pool(z: Floats, over: NDArray[np.int64], stride: int, low: Floats, high: Flo
 
 @device
 def _mix(z: Floats, j: int, i: int, a: float, b: float, c: float, d: float) -> float:
-    """Bilinear; a weight of 0 does not carry an unknown neighbour's NaN over."""
+    """Interpolate in cell (j, i) with the bilinear weights a to d; a weight of 0 keeps an unknown node's NaN out."""
     out = 0.0
     if a != 0.0:
         out += a * z[j, i]

@@ -1,4 +1,9 @@
-"""How high a path can be near its ends, where a bound may hold nodes down to that."""
+"""Climb cones: how high a path can be near the ends of a leg, so that a bound may exclude what is higher.
+
+At a node, a path is at most as high as the end's altitude plus the slope times a length: that of a free track to the
+node, and the length that the path has to spare. `look_around` finds the nodes that are higher and measures straight
+lines to them, `walk_around` measures tracks to those out of sight, and `hold_down` raises the excess of the nodes.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +21,13 @@ from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
 Ints = NDArray[np.int32]
 
 BESIDE = 5
-"""How many nodes around those that a cone could hold down must be known, too."""
+"""Nodes on each side of those that a cone could shut for which the distance must be known, too."""
 FROM_END = -1
-"""In place of the node that a node was reached from in a straight line."""
+"""Value of ``root`` where the straight line to a node begins at the end of the leg, not at a node."""
 LONG = 40.0
-"""Cells after which a straight way goes on from the node it has come to: most of the work is to look along it."""
+"""Cells after which a straight line is ended at the node it has reached: checking long lines is most of the work."""
 SHUT = 3
-"""What is known of a node that lies in a wall."""
+"""Value of ``seen`` at a node that lies in a wall."""
 
 
 @kernel("i4[,] f8[,] f8[,] f8[,] i4[] f8[,] f8[,] f8[,] f8[] i1[,] f8[,]")
@@ -30,17 +35,17 @@ def look_around(
     around: Ints, excess: Floats, floor: Floats, lift: Floats, of: Ints, values: Floats, x: Floats, y: Floats,
     cone: Floats, seen: NDArray[np.int8], away: Floats,
 ) -> int:  # fmt: skip
-    """Find the nodes near an end that are too high for what can be climbed to from there, and those around them.
+    """Find the nodes near an end that are higher than a path can climb to from there, and those around them.
 
-    ``cone``: x, y, column, row, height, slope, cap. ``seen`` (rows, cols, zeros) is 1 at nodes that the end sees over
-    cells which are free as a whole; ``away`` how far they are; -1 or -2 at others that want to be known. Returns
-    how many of those are free. ``around``: see `clearance_kernels.blank`; ``lift``: what zones are higher than the
-    floor that may have to be flown over.
+    ``cone``: x, y, column, row, height, slope, cap. Sets ``seen`` (rows, cols, zeros before) to 1 at nodes that the end
+    sees across wholly free cells, with their distance in ``away`` (else inf), and to -1 or -2 at others whose distance
+    is needed. Returns how many of those are free and in no wall. ``around``: see `clearance_kernels.blank`; ``lift``:
+    by how much zones that may have to be flown over are higher than the floor.
     """
     left, right, low, high = _box(x, y, cone)
     missing = 0
     blank(away, around, math.inf)
-    # Only where the cone could be a wall, and some nodes around that, anything needs to be known.
+    # Distances are needed only at nodes that the cone could shut, and at some nodes around those.
     if right < left or not _mark(around, excess, floor, lift, x, y, cone, left, right, low, high, seen):
         return 0
     for j in range(low, high + 1):
@@ -59,10 +64,11 @@ def walk_around(
     around: Ints, excess: Floats, lift: Floats, of: Ints, x: Floats, y: Floats, cone: Floats, seen: NDArray[np.int8],
     away: Floats, missing: int, way: Floats, root: Ints, done: NDArray[np.int8], heap: Floats, ids: Ints,
 ) -> None:  # fmt: skip
-    """Ways to the nodes that are ``missing`` after `look_around`: from node to node, straight from farther back where
-    that is free (lazy Theta*: Nash, Koenig and Tovey, AAAI 2010). They are somewhat longer than the shortest.
+    """Measure tracks to the ``missing`` nodes that `look_around` left: from node to node, or straight from a node
+    farther back where that line is free (lazy Theta*: Nash, Koenig and Tovey, AAAI 2010).
 
-    Room for the kernel: ``way``, ``root``, ``done`` (rows, cols; the last zeros), ``heap``, ``ids`` (8 rows cols,).
+    They are somewhat longer than the shortest. Sets ``away``, and ``seen`` to 2. Work arrays: ``way``, ``root``,
+    ``done`` (rows, cols; the last zeros before), ``heap``, ``ids`` (8 rows cols,).
     """
     left, right, low, high = _box(x, y, cone)
     nx = excess.shape[1]
@@ -84,7 +90,7 @@ def walk_around(
         from_end = at == FROM_END
         col, row = (cone[2], cone[3]) if from_end else (float(at % nx), float(at // nx))
         if not _sees(excess, lift, of, col, row, i, j, from_end):
-            # Not straight from there, then: from the best of those around it.
+            # The line from its root is not free: reach it from the best of its neighbours instead.
             way[j, i] = np.inf
             for q in range(max(j - 1, low), min(j + 1, high) + 1):
                 for p in range(max(i - 1, left), min(i + 1, right) + 1):
@@ -123,20 +129,20 @@ def hold_down(
     around: Ints, excess: Floats, floor: Floats, lift: Floats, either: NDArray[np.int8], of: Ints, values: Floats,
     x: Floats, y: Floats, cone: Floats, lone: bool, seen: NDArray[np.int8], away: Floats,
 ) -> None:  # fmt: skip
-    """Hold nodes near an end to what can be climbed to from there, where a bound may.
+    """Raise the excess of nodes near an end to the floor minus the altitude that a path can climb to; for bounds only.
 
-    No path short enough to matter is higher at a node than the cone's height plus its slope times a way to it. A node
-    counts only if the ways to all around it are known. ``lone``: no other end's cone comes near this one's; ``lift``,
-    ``either``: see `zone_kernels.lift_lids`.
+    No path short enough to matter is higher at a node than the cone's height plus its slope times the length of a free
+    track to the node. A node is changed only if such lengths to it and to all nodes around it are known. ``lone``: no
+    other end's cone comes near this one's; ``lift``, ``either``: see `zone_kernels.lift_lids`.
     """
     left, right, low, high = _box(x, y, cone)
     height, slope, cap = cone[4], cone[5], cone[6]
     ny, nx = excess.shape
-    # The wall's own nodes, as far away as the farthest of those beside them that are free says.
+    # Nodes in a wall count as far away as by way of their farthest free neighbour.
     for j in range(low, high + 1):
         for i in range(max(left, around[j, 0]), min(right + 1, around[j, 1])):
             unknown = seen[j, i] < 0 and away[j, i] == math.inf and excess[j, i] < math.inf
-            # Under a zone that is too high by now one may fly as before: how far that is, is not known.
+            # A zone that is now too high to fly over may still be flown under; the length of that track is unknown.
             over = not _open(excess, lift, j, i) and (either[j, i] == 0 or excess[j, i] > 0.0)
             if unknown and (over or _walled(of, values, excess.shape, j, i)):
                 seen[j, i] = SHUT
@@ -158,9 +164,10 @@ def hold_down(
                     straight = straight and seen[j + q, i + p] == 1
             if not known:
                 continue
-            # Between nodes that are not seen, ways may be longer than between linear values by half a cell.
+            # Between nodes that are not seen, lengths may exceed the interpolated ones by half a cell's diagonal.
             top = height + slope * (away[j, i] + (0.0 if straight else 0.5 * diagonal))
-            # Cones are hollow, so a linear function over the cell lies below; but not where cap and cone meet, or two.
+            # A cone is convex, so interpolated excess is never too high over a cell, except where the cone meets the
+            # cap or another cone: there a margin is subtracted.
             if lone and top < cap - 8.0 * spare:
                 excess[j, i] = max(excess[j, i], floor[j, i] - top)
             elif top < cap + 4.0 * spare:
@@ -169,7 +176,7 @@ def hold_down(
 
 @device
 def _box(x: Floats, y: Floats, cone: Floats) -> tuple[int, int, int, int]:
-    """First and last column and row that a cone reaches below its cap; the last column is before the first if none."""
+    """First and last column, first and last row that a cone reaches below its cap; (0, -1, 0, -1) if there is none."""
     ny, nx = x.shape
     i0, j0 = min(max(int(cone[2]), 0), nx - 2), min(max(int(cone[3]), 0), ny - 2)
     step_x = math.sqrt((x[j0, i0 + 1] - x[j0, i0]) ** 2 + (y[j0, i0 + 1] - y[j0, i0]) ** 2)
@@ -183,7 +190,7 @@ def _box(x: Floats, y: Floats, cone: Floats) -> tuple[int, int, int, int]:
 
 @device
 def _open(excess: Floats, lift: Floats, j: int, i: int) -> bool:
-    """Whether a node may be flown over, and over zones that may have to be."""
+    """Whether a node can be flown over, together with the zones there that may have to be flown over."""
     return bool(excess[j, i] + lift[j, i] <= 0.0)
 
 
@@ -192,7 +199,7 @@ def _mark(
     around: Ints, excess: Floats, floor: Floats, lift: Floats, x: Floats, y: Floats, cone: Floats, left: int,
     right: int, low: int, high: int, seen: NDArray[np.int8],
 ) -> bool:  # fmt: skip
-    """Set ``seen`` to -1 at nodes over a cone, and to that or -2 at `BESIDE` around them; whether there are any."""
+    """Set ``seen`` to -1 at nodes above a cone, and to -1 or -2 at `BESIDE` nodes around; return whether any are."""
     wide, found = BESIDE, False
     for j in range(low, high + 1):
         last = -wide - 1
@@ -215,7 +222,7 @@ def _mark(
 
 @device
 def _steps(excess: Floats, lift: Floats, of: Ints, i: int, j: int, p: int, q: int) -> bool:
-    """Whether one may step from a free node (j, i) to the one beside it (q, p)."""
+    """Whether a track may lead from a free node (j, i) straight to its neighbour (q, p)."""
     ny, nx = excess.shape
     if not _open(excess, lift, q, p):
         return False
@@ -232,7 +239,7 @@ def _steps(excess: Floats, lift: Floats, of: Ints, i: int, j: int, p: int, q: in
 
 @device
 def _walled(of: Ints, values: Floats, shape: tuple[int, int], j: int, i: int) -> bool:
-    """Whether a node lies in a wall, whichever cell one comes from."""
+    """Whether a node lies in a wall in every cell around it."""
     ny, nx = shape
     for k in range(4):
         jj, ii = j - (k >> 1), i - ((k ^ (k >> 1)) & 1)
@@ -246,8 +253,8 @@ def _behind(
     excess: Floats, lift: Floats, of: Ints, values: Floats, x: Floats, y: Floats, seen: NDArray[np.int8], away: Floats,
     i: int, j: int,
 ) -> float:  # fmt: skip
-    """The way to a node in a wall by the farthest of the free nodes around it; inf where that is not known, 0 where
-    none is free: nothing there can be flown anyway."""
+    """The length of a track to a node in a wall by way of its farthest free neighbour; inf if that is not known, 0 if
+    no neighbour is free: nothing there can be flown anyway."""
     most = 0.0
     for b in range(max(j - 1, 0), min(j + 1, excess.shape[0] - 1) + 1):
         for a in range(max(i - 1, 0), min(i + 1, excess.shape[1] - 1) + 1):
@@ -260,13 +267,13 @@ def _behind(
 
 @device
 def _sees(excess: Floats, lift: Floats, of: Ints, col: float, row: float, i: int, j: int, ends: bool) -> bool:
-    """Whether the straight line from a place (in cells; ``ends``: an end's) to a node meets only cells that are free
-    as a whole."""
+    """Whether the straight line from a place (``col``, ``row``) to node (j, i) meets only wholly free cells. ``ends``:
+    the place is the end of a leg."""
     nx = excess.shape[1]
     du, dv = i - col, j - row
     u, v = col, row
     ci, cj = int(math.floor(u)), int(math.floor(v))
-    # The node's own cell on this side of the line.
+    # The last cell of the line before it reaches the node.
     end_i = i - 1 if du > 0.0 else i
     end_j = j - 1 if dv > 0.0 else j
     for _ in range(abs(end_i - ci) + abs(end_j - cj) + 3):
@@ -274,7 +281,7 @@ def _sees(excess: Floats, lift: Floats, of: Ints, col: float, row: float, i: int
             return False
         if of[cj * (nx - 1) + ci] > 0:
             return False
-        # The end's own cell may be free in part: it lies on the floor more often than not.
+        # The end's own cell may be free only in part: more often than not, the end lies on the floor.
         if not (ends and ci == int(math.floor(col)) and cj == int(math.floor(row))) and not (
             _open(excess, lift, cj, ci) and _open(excess, lift, cj, ci + 1)
             and _open(excess, lift, cj + 1, ci) and _open(excess, lift, cj + 1, ci + 1)
@@ -282,7 +289,7 @@ def _sees(excess: Floats, lift: Floats, of: Ints, col: float, row: float, i: int
             return False
         if ci == end_i and cj == end_j:
             return True
-        # To the next cell: the nearer of the two edges ahead.
+        # Go to the next cell across the nearer of the two edges ahead.
         tu = (ci + (1 if du > 0.0 else 0) - col) / du if du != 0.0 else math.inf
         tv = (cj + (1 if dv > 0.0 else 0) - row) / dv if dv != 0.0 else math.inf
         if tu < tv:

@@ -1,4 +1,4 @@
-"""Between which altitudes each cell of a mesh can be flown through, by the ground below and by what zones leave."""
+"""The altitudes at which each cell of a mesh can be flown through, by the ground below and the zones."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ Ints = NDArray[np.int32]
 
 
 def ranges(mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
-    """(cells,) the lowest and the highest altitude, ``top_m`` at most, that can be flown at in each cell of a mesh for
-    bounds that is as fine as its plane; the wrong way round where there is none."""
+    """(cells,) the lowest and the highest altitude, at most ``top_m``, that can be flown at in each cell; lowest above
+    highest where there is none. ``mesh`` must be for bounds and as fine as its plane."""
     low = mesh.lowest().reshape(mesh.excess.shape[0] - 1, -1)
     high = np.full(low.shape, top_m)
     narrow_ranges(*_laid(mesh), low, high)
@@ -23,8 +23,11 @@ def ranges(mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
 
 
 def intervals(mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: float) -> tuple[Ints, Floats, Floats]:
-    """How many intervals each cell of such a mesh has (cells,), ``most`` at most, by what zones leave of what `ranges`
-    tells of it, and (cells, most) from where to where they go, ``spare_m`` wider."""
+    """Cut the range of each cell, ``low_m`` to ``high_m`` from `ranges`, into the altitude intervals that zones leave.
+
+    Returns the number of intervals (cells,), at most ``most``, and their lower and upper ends (cells, most), each
+    ``spare_m`` further out. ``mesh``: as for `ranges`.
+    """
     low, high = np.empty((len(low_m), most)), np.empty((len(low_m), most))
     low[:, 0], high[:, 0] = low_m - spare_m, high_m + spare_m
     count = (low_m <= high_m).astype(np.int32)
@@ -33,8 +36,8 @@ def intervals(mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: flo
 
 
 def _laid(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Ints, bool]:
-    """Ground and places of such a mesh's nodes, the shapes that are shut for certain and their boxes there, and
-    whether the ground is the terrain model's own."""
+    """What the zone kernels take: ground, x and y of the mesh's nodes, numbers and forms of the shapes that are
+    certainly shut, their boxes on the mesh, and whether the ground is the terrain model's own."""
     plane, (rows, cols) = mesh.plane, mesh.excess.shape
     ground = np.ascontiguousarray(plane.grounds[0][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols])
     boxes = plane.boxes(mesh.row, mesh.col, 1, rows, cols)

@@ -1,12 +1,12 @@
-"""The plane under a mission as a lattice of nodes, and what of it can be crossed below an altitude cap.
+"""The plane under a mission as a lattice of nodes, from which meshes of what is free below an altitude cap are made.
 
-The lattice is the terrain model's own, each cell cut into parts where more is wanted, because ground is bilinear in
-those cells and in no others: over a bilinear patch the two ways of cutting it into triangles give one linear surface
-that never lies above it and one that never lies below it. So every question has two answers: a mesh that holds
-every legal track (``low``: for bounds), and one in which every track is legal but for rounding (for paths).
+The lattice is the terrain model's own, each cell cut into parts where a finer one is needed, because ground is bilinear
+in those cells and in no others. A bilinear patch can be cut into two triangles along either diagonal: one gives a
+surface that never lies above the patch, the other one that never lies below it. So there are two kinds of mesh: one
+holds every legal track (``low``: for bounds), and in the other every track is legal but for rounding (for paths).
 
-In the plane the raster's lines are not quite straight. Here they are, between the corners of blocks so short that
-nothing moves by more than a few centimetres, or millimetres, for which a `Fit` makes up.
+In the plane the raster's lines are not quite straight. Here they are straight between the corners of blocks, so short
+that nothing moves by more than a few centimetres, or millimetres; the margins of a `Fit` make up for that.
 """
 
 from __future__ import annotations
@@ -26,18 +26,19 @@ from gcsplan.planners.problem import Problem
 
 Ints = NDArray[np.int32]
 Box = tuple[float, float, float, float]
-"""West, south, east, north; infinite: everywhere."""
+"""West, south, east, north, m; infinite: everywhere."""
 Reach = tuple[tuple[float, float], tuple[float, float], float]
-"""Two places, and how far from both together."""
+"""Two places, and the largest sum of the distances to both, m: an ellipse."""
 
 
 @dataclass(eq=False, slots=True)
 class Plane:
     """A lattice over a part of the terrain model: node (j, i) lies at ``x[j, i]``, ``y[j, i]``, north of (j - 1, i).
 
-    ``tops``, ``grounds`` (rows, cols) AMSL, NaN where unknown: for bounds and for paths;
-    ``inside`` (rows - 1, cols - 1) the cells that are looked at. A cell of the terrain model is ``parts`` cells wide
-    and long here, or each cell here ``stride`` of those; ``block`` cells lie on straight lines.
+    ``col0``, ``row1``: the terrain model's column and row at node (0, 0). ``tops``, ``grounds``: two arrays (rows,
+    cols) each, m AMSL, NaN where unknown, the first for bounds and the second for paths. ``inside`` (rows - 1,
+    cols - 1): the cells that are looked at. A cell of the terrain model is ``parts`` cells wide and long here, or a
+    cell here is ``stride`` of those; nodes lie on straight lines for ``block`` cells at a time.
     """
 
     problem: Problem
@@ -54,14 +55,15 @@ class Plane:
     shapes: Shapes
     fit: Fit
     known: dict[tuple[float, float], tuple[float, float]] = field(default_factory=dict)
-    """Places that were asked for, and where they lie on the lattice."""
+    """Places that `at` was called with, and their column and row on the lattice."""
     scratch: Scratch = field(default_factory=Scratch)
-    """Room for meshes that are no longer needed when the next one is made."""
+    """Buffers for meshes that are no longer needed when the next one is made."""
 
     def zones(
         self, low: bool, under: NDArray[np.bool_] | None, over: NDArray[np.bool_] | None
     ) -> tuple[Floats, Floats]:
-        """The shapes' numbers and forms; zones that may not be passed ``under``, or ``over``, changed."""
+        """The shapes' numbers and forms, for bounds (``low``) or for paths. Where ``under`` or ``over`` (zones,) is
+        false, the zone cannot be passed below its floor, or above its ceiling; None changes nothing."""
         zones, edges = self.shapes.low if low else self.shapes.high
         first, other = self.shapes.owner.T
         if under is not None or over is not None:
@@ -75,32 +77,33 @@ class Plane:
         return zones, edges
 
     def boxes(self, row: int, col: int, fineness: int, rows: int, cols: int) -> Ints:
-        """The shapes' boxes on a part of the lattice, cut finer, of so many nodes."""
+        """(K, 4) the shapes' boxes on a part of the lattice that begins at cell (``row``, ``col``), cut ``fineness``
+        times finer, of ``rows`` x ``cols`` nodes."""
         boxes = (self.shapes.boxes - np.array([col, col, row, row])) * fineness
         boxes = boxes + np.array([0, fineness - 1, 0, fineness - 1])
         return np.asarray(boxes.clip([0, -1, 0, -1], [cols, cols - 2, rows, rows - 2]), np.int32)
 
     def steep(self, row: int, col: int, last_row: int, last_col: int) -> Floats:
-        """The steepest slope of the cells around each node of a part of the lattice."""
+        """The steepest slope of the cells around each node of a part of the lattice, for paths."""
         less_row, less_col = min(row, 1), min(col, 1)
         part = np.s_[row - less_row : last_row + 1, col - less_col : last_col + 1]
         around = slopes(self.tops[1][part], self.x[part], self.y[part])
         return np.ascontiguousarray(around[less_row:, less_col:][: last_row - row, : last_col - col])
 
     def begins(self, other: Plane) -> tuple[int, int]:
-        """Row and column, counted in cells as large as its own from where another plane begins, at which it does."""
+        """Row and column at which this plane begins, counted in its own cells from where the other plane begins."""
         scale = self.parts / self.stride
         return round(scale * (other.row1 - self.row1)), round(scale * (self.col0 - other.col0))
 
     def at(self, place: tuple[float, float]) -> tuple[float, float]:
-        """Column and row of a place on this lattice."""
+        """Column and row of a place on this lattice, not rounded."""
         if place not in self.known:
             c, r = self.all_at(np.array([place]))[0].tolist()
             self.known[place] = c, r
         return self.known[place]
 
     def all_at(self, places: Floats) -> Floats:
-        """(N, 2) the same of places (N, 2)."""
+        """(N, 2) columns and rows of places (N, 2) on this lattice, not rounded."""
         at = self.problem.airspace.surface.grid(places[:, 0], places[:, 1])
         return self.parts / self.stride * np.stack([at[:, 0] - self.col0, self.row1 - at[:, 1]], axis=-1)
 
@@ -114,17 +117,17 @@ def make_plane(
     reach: Reach | None = None,
     fit: Fit = LOOSE,
 ) -> Plane:
-    """The lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
+    """Make the lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
 
-    ``parts``: into how many cells a side the terrain model's are cut; or ``stride``: how many become one, of lattices
-    that are ``whole`` cells of the terrain model wide and long, times some number. ``reach``: only what is no farther
-    from two places together is looked at.
+    ``parts``: how many cells a side each of the terrain model's is cut into; or ``stride``: how many of them a side
+    become one. The lattice is a multiple of ``whole`` cells of the terrain model wide and long. ``reach``: only cells
+    whose distances to two places add up to no more than that are looked at.
     """
     return _lattice(problem, extent(problem, box), parts, stride, whole, reach, fit)
 
 
 def extent(problem: Problem, box: Box) -> Extent:
-    """The terrain model's nodes that a box needs."""
+    """First and last columns and rows of the terrain model's nodes that cover a box."""
     surface = problem.airspace.surface
     rows, cols = surface.ground_m.shape
     west, south, east, north = box
@@ -141,10 +144,10 @@ def extent(problem: Problem, box: Box) -> Extent:
 def finer_plane(
     plane: Plane, cells: NDArray[np.bool_], parts: int, stride: int, fit: Fit
 ) -> tuple[Plane, NDArray[np.bool_]]:
-    """A finer lattice over some of a plane's cells, and which of its cells these are; see `make_plane`."""
+    """Make a finer lattice over some of a plane's ``cells``; return it and those cells on it. See `make_plane`."""
     cols = plane.problem.airspace.surface.ground_m.shape[1]
     row, col, last_row, last_col = box_of(cells)
-    span = plane.stride / plane.parts  # a cell's width in the terrain model's
+    span = plane.stride / plane.parts  # a cell's width, in cells of the terrain model
     col0, col1 = plane.col0 + math.floor(span * col), min(plane.col0 + math.ceil(span * last_col), cols - 1)
     row0, row1 = max(plane.row1 - math.ceil(span * last_row), 0), plane.row1 - math.floor(span * row)
     finer = _lattice(plane.problem, (col0, row0, col1, row1), parts, stride, plane.stride, None, fit)
@@ -152,7 +155,7 @@ def finer_plane(
 
 
 def box_of(wanted: NDArray[np.bool_]) -> tuple[int, int, int, int]:
-    """First row and column, and those after the last, of what is true; the first cell where nothing is."""
+    """First row and column that hold a true value, and those after the last; (0, 0, 1, 1) if nothing is true."""
     rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if not len(rows):
         return 0, 0, 1, 1
@@ -160,7 +163,7 @@ def box_of(wanted: NDArray[np.bool_]) -> tuple[int, int, int, int]:
 
 
 def on_finer(plane: Plane, cells: NDArray[np.bool_], finer: Plane) -> NDArray[np.bool_]:
-    """(rows - 1, cols - 1) a plane's cells on a finer lattice that lies over all of them."""
+    """(rows - 1, cols - 1) which cells of a finer lattice lie in a plane's ``cells``, all of which it must cover."""
     ratio = plane.stride * finer.parts // (plane.parts * finer.stride)
     row, col, last_row, last_col = box_of(cells)
     first_row, first_col = (ratio * first - more for first, more in zip((row, col), finer.begins(plane), strict=True))
@@ -174,7 +177,7 @@ def on_finer(plane: Plane, cells: NDArray[np.bool_], finer: Plane) -> NDArray[np
 def _lattice(
     problem: Problem, over: Extent, parts: int, stride: int, whole: int, reach: Reach | None, fit: Fit
 ) -> Plane:
-    """The lattice over an `extent`."""
+    """Make the lattice over an `extent`."""
     surface = problem.airspace.surface
     col0, _, _, row1 = over
     grounds = nodes(surface.ground_m, over, parts, stride, whole)

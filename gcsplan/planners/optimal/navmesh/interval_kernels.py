@@ -1,7 +1,7 @@
-"""Altitude intervals: what zones leave of the altitudes over a cell; and what is carried from one to another.
+"""Kernels for altitude intervals: cut them out of the altitudes over a cell, and carry values from one to another.
 
-From an interval a path gets to those over the cells around that hold an altitude of its own; never to another over the
-same cell, for a zone that covers all of it is between them.
+From an interval a path can enter those intervals over the neighbouring cells that share an altitude with it. It never
+enters another one over the same cell, because a zone that covers the whole cell lies between them.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ def cut_intervals(
     ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, exact: bool, spare: float,
     count: Ints, low: Floats, high: Floats,
 ) -> None:  # fmt: skip
-    """Cut the intervals of each cell, ``count`` (cells,) of them from ``low`` to ``high`` (cells, most), by what is
-    shut for certain over all of it, but for ``spare`` at either side of a zone.
+    """Cut away, from the ``count`` (cells,) intervals of each cell, ``low`` to ``high`` (cells, most), the altitudes
+    that a zone certainly shuts over the whole cell, except for ``spare`` metres at its top and bottom.
 
-    One that would be cut in two where there is room for no more is left as it is. ``exact``: as in `narrow_ranges`.
+    An interval that would become two is left whole if ``low`` has no column left. ``exact``: as in `narrow_ranges`.
     """
     for z in range(len(zones)):
         if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):
@@ -42,10 +42,10 @@ def cut_intervals(
 
 @device
 def _cut(low: Floats, high: Floats, cell: int, count: int, bottom: float, top: float) -> int:
-    """Take what is between two altitudes out of a cell's intervals; returns how many are left."""
+    """Cut the altitudes from ``bottom`` to ``top`` out of a cell's intervals; return how many intervals there are."""
     most, n = low.shape[1], 0
     while n < count:
-        if low[cell, n] > bottom and high[cell, n] < top:  # nothing is left of it: the last one takes its place
+        if low[cell, n] > bottom and high[cell, n] < top:  # nothing of it remains: the last one takes its place
             count -= 1
             low[cell, n], high[cell, n] = low[cell, count], high[cell, count]
             continue
@@ -66,11 +66,12 @@ def spread(
     first: NDArray[np.int64], cell: NDArray[np.int64], cols: int, low: Floats, high: Floats, own: Floats, most: Floats,
     sources: NDArray[np.int64], begin: float, out: Floats, keys: Floats, ids: Ints, stack: NDArray[np.int64],
 ) -> None:  # fmt: skip
-    """The least that something can be in each interval which begins as ``begin``, and on its way only grows.
+    """Compute the least value in each interval (``out``) of a quantity that never falls along a path.
 
-    ``first`` (cells + 1,) of each cell's intervals, ``cell`` (N,) theirs, ``cols`` cells in a row. ``own`` (N,): it is
-    that at least in an interval; ``most`` (N,): no interval is entered with more. ``out`` (N,), infinite before, stays
-    so where nothing gets to. ``keys``, ``ids``, ``stack`` (N + 1,): room to work in.
+    It begins as ``begin`` in the intervals ``sources``, is at least ``own`` (N,) in an interval, and must be at most
+    ``most`` (N,) to enter one. ``first`` (cells + 1,): each cell's first interval; ``cell`` (N,): each interval's cell;
+    ``cols``: cells in a row; ``low``, ``high`` (N,): altitudes. ``out`` (N,), infinite before, stays so where no path
+    leads. ``keys``, ``ids``, ``stack`` (N + 1,): work arrays.
     """
     rows = (len(first) - 1) // cols
     size = waiting = 0
@@ -80,7 +81,7 @@ def spread(
         if out[s] == np.inf and value <= most[s]:
             out[s] = value
             size = push(keys, ids, size, value, s)
-    # Values leave in order, so the first that gets to an interval is the least.
+    # Values are taken in rising order, so the first that reaches an interval is its least.
     while size > 0 or waiting > 0:
         if waiting > 0:
             waiting -= 1

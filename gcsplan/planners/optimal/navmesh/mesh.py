@@ -1,4 +1,4 @@
-"""A mesh of convex free pieces: shortest ways over it, and how far everything is that a way could meet."""
+"""A mesh of convex free pieces: shortest tracks over it, and lower bounds of distances to all that a track may meet."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE
 Ints = NDArray[np.int32]
 
 BENT_M = LOOSE.bent_m
-"""Most that a raster's line may bow between the corners of a block."""
+"""Metres that a raster's line may bow between the corners of a block, at most."""
 ASIDE = 0.25
-"""How far beside where it is said to be a place may lie on a lattice, in cells, at most."""
+"""Cells that a place may lie beside its computed position on a lattice, at most."""
 MOST_OPENED, ANYHOW, OF_PORTAL = 3_000_000, 100_000, 64
-"""Intervals that are looked at before a search is given up: in all, and, beyond some, for each portal. Where the goal
-is farther than the limit, and there are many ways around many corners, they would be many times that."""
+"""Intervals that a search may open before it is given up: at most `MOST_OPENED`, and at most `ANYHOW` plus `OF_PORTAL`
+per portal. If the goal is farther than the limit, and many tracks lead around many corners, it would open many more."""
 NODE_BYTES = 200.0
-"""What an opened interval takes, with those that it leaves unopened."""
+"""Bytes of an opened interval, with those that it yields and that are never opened."""
 
 
 @dataclass(eq=False, slots=True)
 class Mesh(Portals):
-    """The pieces of a plane's free cells, see `mesh_kernels`; ``row``, ``col``: the plane's cell that it begins at."""
+    """The pieces of a plane's free cells, see `mesh_kernels`; ``row``, ``col``: the plane's cell where it begins."""
 
     plane: Plane
     fineness: int
@@ -43,50 +43,50 @@ class Mesh(Portals):
     piece: Ints
 
     def lowest(self) -> Floats:
-        """(cells,) the lowest floor of each; -inf where a corner is not looked at."""
+        """(cells,) the lowest floor at each cell's corners; -inf if one of them is not looked at."""
         f = np.where(np.isposinf(self.excess), -np.inf, self.floor)
         return np.minimum(np.minimum(f[:-1, :-1], f[:-1, 1:]), np.minimum(f[1:, :-1], f[1:, 1:])).ravel()
 
     def straight_to(self, place: Place) -> Floats:
-        """(cells,) metres that no way from a place to each is shorter than; of meshes as fine as their plane."""
+        """(cells,) a lower bound of the distance from a place to each cell, m; for meshes as fine as their plane."""
         return self.middles_from(place) - 0.5 * self._widths().ravel() - BENT_M
 
     def middles_from(self, place: Place) -> Floats:
-        """(cells,) metres straight from a place to the middle of each; of meshes as fine as their plane."""
+        """(cells,) straight distance from a place to each cell's middle, m; for meshes as fine as their plane."""
         x, y = (at - own for at, own in zip(self.places(), place, strict=True))
         middle = (0.25 * (z[:-1, :-1] + z[:-1, 1:] + z[1:, :-1] + z[1:, 1:]) for z in (x, y))
         return np.asarray(np.hypot(*middle).ravel())
 
     def half_m(self) -> float:
-        """No place of any cell is farther from its middle; of meshes as fine as their plane."""
+        """Metres that any place of any cell is from the cell's middle, at most; for meshes as fine as their plane."""
         return 0.5 * float(self._widths().max()) + BENT_M
 
     def _widths(self) -> Floats:
-        """(rows - 1, cols - 1) metres between opposite corners."""
+        """(rows - 1, cols - 1) metres between opposite corners of each cell, along the longer diagonal."""
         x, y = self.places()
         across = np.hypot(x[1:, 1:] - x[:-1, :-1], y[1:, 1:] - y[:-1, :-1])
         other = np.hypot(x[1:, :-1] - x[:-1, 1:], y[1:, :-1] - y[:-1, 1:])
         return np.asarray(np.maximum(across, other))
 
     def places(self) -> tuple[Floats, Floats]:
-        """(rows, cols) x and y of the plane's nodes that the mesh is over; of meshes as fine as their plane."""
+        """(rows, cols) x and y of the plane's nodes that the mesh covers; for meshes as fine as their plane."""
         rows, cols = self.excess.shape
         part = np.s_[self.row : self.row + rows, self.col : self.col + cols]
         return np.ascontiguousarray(self.plane.x[part]), np.ascontiguousarray(self.plane.y[part])
 
     def over_plane(self, cells: Bools) -> Bools:
-        """The same of all the plane's cells: false elsewhere; of meshes as fine as their plane."""
+        """Extend a mask of the mesh's cells to all the plane's, false elsewhere; for meshes as fine as their plane."""
         out = np.zeros(self.plane.inside.shape, np.bool_)
         out[self.row : self.row + cells.shape[0], self.col : self.col + cells.shape[1]] = cells
         return out
 
     def of_plane(self, cells: Bools) -> Bools:
-        """That part of all the plane's cells that the mesh is over."""
+        """The part that the mesh covers of a mask of all the plane's cells."""
         rows, cols = self.excess.shape
         return cells[self.row : self.row + rows - 1, self.col : self.col + cols - 1]
 
     def cells_at(self, place: Place) -> NDArray[np.int64]:
-        """The cells that a place may lie in; of meshes as fine as their plane."""
+        """The numbers of the cells that a place may lie in, rising; for meshes as fine as their plane."""
         rows, cols = self.excess.shape
         c, r = self.plane.at(place)
         i, j = (
@@ -96,7 +96,7 @@ class Mesh(Portals):
         return np.array(sorted(found), np.int64)
 
     def pieces_at(self, place: Place) -> list[int]:
-        """The free pieces that a place lies in, or next to where its own is not free."""
+        """The free pieces at a place: in its own cell, and in cells no farther than a thousandth of a cell."""
         found: list[int] = []
         rows, cols = self.excess.shape
         c, r = self.plane.at(place)
@@ -116,15 +116,18 @@ class Mesh(Portals):
     def track(
         self, start: Place, goal: Place, limit_m: float = math.inf, guide: Guide | None = None
     ) -> GroundTrack | None:
-        """The shortest track that is shorter than ``limit_m``. ``guide``: distances to ``goal`` over a mesh that leaves
-        no less room. Raises Exhausted."""
+        """The shortest track, None if none is shorter than ``limit_m``. ``guide``: distances to ``goal`` over a mesh
+        that is free wherever this one is. Raises Exhausted."""
         return self._search(start, goal, limit_m, -1.0, guide, None)
 
     def flood(
         self, start: Place, goal: Place, limit_m: float, slack: float, guide: Guide | None = None
     ) -> tuple[GroundTrack | None, Guide]:
-        """The same, and how far every piece is from ``start`` at least, as far as tracks to ``goal`` lead that are
-        shorter than ``limit_m`` and than the shortest with ``slack`` (as a part of it) added."""
+        """The shortest track as in `track`, and lower bounds of the distance from ``start`` to the pieces.
+
+        They cover all pieces that a track to ``goal`` may meet if it is shorter than ``limit_m`` and than 1 + ``slack``
+        times the shortest.
+        """
         met = np.full(len(self.joins), np.inf)
         track = self._search(start, goal, limit_m, slack, guide, met)
         entered = np.full(self.pieces, np.inf)
@@ -152,8 +155,8 @@ class Mesh(Portals):
 
 @dataclass(eq=False, slots=True)
 class Guide:
-    """``met`` (portals,), ``entered`` (pieces,): no way from ``place``, where a search began, to a portal or to the
-    entrance of a piece is shorter; inf: none was looked for."""
+    """Lower bounds of the distance from ``place``, where a search began, to each portal (``met`` (portals,)) and to the
+    entrance of each piece (``entered`` (pieces,)), m; inf where the search did not come."""
 
     mesh: Mesh
     place: Place
@@ -161,8 +164,8 @@ class Guide:
     entered: Floats
 
     def over(self, finer: Mesh) -> Floats:
-        """The same for the pieces of a mesh on the same lattice, or one that is some times finer."""
-        # A finer lattice's meshes begin at corners of coarse cells.
+        """(pieces,) the lower bounds for a mesh on the same lattice, or on one finer by a whole factor."""
+        # Meshes on a finer lattice begin at corners of coarse cells.
         share = finer.plane.parts * self.mesh.plane.stride // (self.mesh.plane.parts * finer.plane.stride)
         ratio = finer.fineness * share // self.mesh.fineness
         out = np.full(finer.pieces, np.inf)
@@ -175,18 +178,20 @@ class Guide:
         return out
 
     def reach(self, place: Place, limit_m: float) -> Bools:
-        """(rows - 1, cols - 1) the plane's cells that ways shorter than ``limit_m`` from here to a place may meet."""
+        """(rows - 1, cols - 1) the plane's cells that tracks shorter than ``limit_m`` from this guide's own place to
+        another ``place`` may meet."""
         x, y = self.mesh.places()
         out = np.zeros((x.shape[0] - 1, x.shape[1] - 1), np.bool_)
         in_reach(self.mesh.piece, self.entered, x, y, *place, limit_m + BENT_M, out)
         return self.mesh.over_plane(out)
 
     def between(self, other: Guide, limit_m: float) -> Bools:
-        """(rows - 1, cols - 1) the plane's cells that ways no longer than ``limit_m`` from here to where another
-        search over the same mesh began may enter.
+        """(rows - 1, cols - 1) the plane's cells that tracks from this guide's place to the place of another guide over
+        the same mesh may enter, if they are no longer than ``limit_m``.
 
-        Such a way meets the portal through which it enters a piece, and is no shorter than the ways there from both its
-        ends. It may leave through the same one: a shortest way does so where finer walls stand that are not known here.
+        Such a track meets the portal through which it enters a piece, so it is no shorter than the sum of the distances
+        from both places to that portal. It may leave through the same portal: a shortest track does so where a finer
+        mesh has walls that this one does not know.
         """
         mesh = self.mesh
         met = np.zeros(mesh.pieces, np.bool_)
@@ -196,5 +201,5 @@ class Guide:
         return mesh.over_plane(out.reshape(mesh.excess.shape[0] - 1, -1))
 
     def cells(self) -> Floats:
-        """(cells,) how far the mesh's cells are at least."""
+        """(cells,) the lower bound of the distance to each of the mesh's cells, m."""
         return np.asarray(np.append(self.entered, np.inf)[self.mesh.piece].min(axis=1))

@@ -1,11 +1,11 @@
-"""The free part of a plane, cut into convex pieces and the portals between them.
+"""Kernels that cut the free part of a plane into convex pieces and find the portals between them.
 
 Nodes lie on a lattice, each with an *excess*: the plane is free where the excess is not above 0. A cell is two
-triangles, the excess is linear in each, and so are walls that a cell has of its own: what all of them leave free of a
-triangle is convex. Cells that are free as a whole are joined along their row into one long piece, a *run*; runs end
-where the lattice bends (every ``block`` columns), so that every piece is convex.
+triangles. In each, the excess is linear, and so are the *walls* that the cell has of its own (zones); therefore the
+part of a triangle that all of them leave free is convex. Wholly free cells are joined along their row into one long
+piece, a *run*; runs end where the lattice bends (every ``block`` columns), so that every piece is convex.
 
-Only the portals are kept, the parts of edges that two pieces share: walls are where none is.
+Only the portals are stored, the parts of edges that two pieces share: where there is no portal, there is a wall.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ Ints = NDArray[np.int32]
 
 
 OPEN = -1e-9
-"""A node with less excess than this is free all around."""
+"""Excess, m, above which a wall may stand at a node; a node with less is free all around."""
 
 NEXT, WALL = 4, 5
-"""Where a wall's row tells the number of the cell's next one (0 after its last), and how long rows are."""
+"""Column of a wall's row with the number of the cell's next wall (0 after its last), and the length of such a row."""
 
 
 @device
 def _cut(p: float, q: float, t: Floats) -> bool:
-    """Leave that of the part ``t`` of an edge where a linear function, p to q over 0 to 1, is not above 0."""
+    """Shrink the part ``t`` of an edge to where a linear function, p at 0 and q at 1, is not above 0; return whether
+    anything remains."""
     if p > 0.0:
         if q > 0.0:
             return False
@@ -42,7 +43,8 @@ def _cut(p: float, q: float, t: Floats) -> bool:
 
 @device
 def _cut_own(of: Ints, values: Floats, k: int, start: int, end: int, t: Floats) -> bool:
-    """Leave that of the part ``t`` of cell k's edge, from corner to corner, where none of its own walls stands."""
+    """Shrink the part ``t`` of an edge of cell k, from corner ``start`` to corner ``end``, to where none of the cell's
+    own walls stands; return whether anything remains."""
     n = of[k]
     while n > 0:
         if not _cut(values[n - 1, start], values[n - 1, end], t):
@@ -56,13 +58,13 @@ def make_pieces(
     excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], around: Ints, span: Ints, piece: Ints,
     block: int,
 ) -> int:  # fmt: skip
-    """Number the pieces: ``piece`` (cells, 2), the lower and the upper triangle's, -1 where nothing is free.
+    """Number the pieces in ``piece`` (cells, 2: lower and upper triangle, -1 where nothing is free); return how many.
 
-    ``span`` (rows - 1, 2) the first column, and that after the last, of the cells of a row that may be free; ``around``
-    see `clearance_kernels.blank`;
-    ``of`` (cells,) number from 1 of the row in ``values`` (K, 5) of a cell's first own wall, or 0: excess at
-    this node, the one in the next column, in the next column and row, and in the next row, and the number of its next
-    wall; ``diagonal`` (cells,) 0 from this node to the opposite one, 1 the other.
+    ``span`` (rows - 1, 2): first column, and that after the last, of the cells of a row that may be free; ``around``:
+    see `clearance_kernels.blank`. ``of`` (cells,): number, from 1, of the row in ``values`` (K, 5) of a cell's first
+    own wall; 0: it has none. Such a row holds the wall's excess at this node, at the one in the next column, in the
+    next column and row, and in the next row, and the number of the cell's next wall. ``diagonal`` (cells,): 0 cuts a
+    cell from this node to the opposite one, 1 along the other diagonal. ``block``: columns after which a run ends.
     """
     count = 0
     ny, nx = excess.shape
@@ -79,7 +81,7 @@ def make_pieces(
             while True:
                 if not (a <= 0.0 and b <= 0.0 and c <= 0.0 and d <= 0.0):
                     whole = False
-                    # Infinite excess, or none, is unknown ground: the whole cell is shut.
+                    # Infinite or NaN excess means unknown ground: the whole cell is shut.
                     known = a < np.inf and b < np.inf and c < np.inf and d < np.inf
                     lower = lower and known and min(a, min(b, c if diagonal[k] == 0 else d)) < 0.0
                     upper = upper and known and min(c, min(d, a if diagonal[k] == 0 else b)) < 0.0
@@ -103,7 +105,7 @@ def make_pieces(
 
 @device
 def _side(piece: Ints, diagonal: NDArray[np.int8], k: int, right: bool) -> int:
-    """The piece at the left or right side of a cell."""
+    """The piece at the right side of a cell, or at the left (not ``right``)."""
     return piece[k, 0 if (diagonal[k] == 0) == right else 1]
 
 
@@ -112,7 +114,8 @@ def _put(
     ends: Floats, names: NDArray[np.int64], joins: Ints, n: int, room: int, x0: float, y0: float, x1: float, y1: float,
     v0: int, v1: int, left: int, right: int,
 ) -> int:  # fmt: skip
-    """Keep a portal from (x0, y0) to (x1, y1) with one piece at its left and one at its right."""
+    """Store portal n, from (x0, y0) to (x1, y1), with the pieces at its left and right, if there is room; return
+    n + 1."""
     if n < room:
         ends[n, 0], ends[n, 1], ends[n, 2], ends[n, 3] = x0, y0, x1, y1
         names[n, 0], names[n, 1] = v0, v1
@@ -122,7 +125,7 @@ def _put(
 
 @device
 def stands(of: Ints, values: Floats, cell: int, corner: int, above: float) -> bool:
-    """Whether one of a cell's own walls is higher than ``above`` at a corner."""
+    """Whether one of a cell's own walls exceeds ``above`` at a corner."""
     n = of[cell]
     while n > 0:
         if values[n - 1, corner] > above:
@@ -133,7 +136,7 @@ def stands(of: Ints, values: Floats, cell: int, corner: int, above: float) -> bo
 
 @device
 def _is_corner(excess: Floats, of: Ints, values: Floats, piece: Ints, nx: int, ny: int, j: int, i: int) -> bool:
-    """Whether a node may lie on a wall, or something around it is not free."""
+    """Whether a node may lie on a wall or touches something that is not free, so that a track may turn there."""
     if i == 0 or j == 0 or i == nx - 1 or j == ny - 1 or excess[j, i] > OPEN:
         return True
     for k in range(4):
@@ -145,7 +148,7 @@ def _is_corner(excess: Floats, of: Ints, values: Floats, piece: Ints, nx: int, n
 
 @device
 def _name(excess: Floats, of: Ints, values: Floats, piece: Ints, j: int, i: int) -> int:
-    """A node's name; negative where no wall can stand."""
+    """A node's name; negative where no wall can stand, so that no track turns there."""
     ny, nx = excess.shape
     name = 8 * (j * nx + i)
     return name if _is_corner(excess, of, values, piece, nx, ny, j, i) else -1 - name
@@ -156,16 +159,17 @@ def make_portals(
     excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], span: Ints, piece: Ints,
     x: Floats, y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats,
 ) -> int:  # fmt: skip
-    """Every portal once: ``ends`` (room, 4) from x, y to x, y; ``names`` (room, 2) of its ends; ``joins`` (room, 2)
-    the pieces at its left and right. Returns how many there are; room for fewer is filled.
+    """Find every portal once: ``ends`` (room, 4) from x, y to x, y; ``names`` (room, 2) of its ends; ``joins``
+    (room, 2) the pieces at its left and right. Returns how many there are, of which only the first ``room`` are stored.
 
-    A name is unique to a place; it is not negative if a wall may stand there, so that a path may turn.
+    A name is unique to a place. It is not negative if a wall may stand there, so that a track may turn. ``t`` (2,) is
+    a work array.
     """
     n = 0
     ny, nx = excess.shape
     room = len(ends)
     for j in range(ny):
-        # Along the row: pieces below (row j - 1) and above (row j).
+        # Portals along row j of nodes, between pieces below it (row j - 1 of cells) and above it (row j).
         x0 = y0 = was_t = 0.0
         v0 = was = 0
         was_below = was_above = -1
@@ -201,7 +205,7 @@ def make_portals(
                 was, was_below, was_above, was_t = i, below, above, t[1]
         if j == ny - 1:
             break
-        # Within the row: sides and diagonals of its cells.
+        # Portals within row j of cells: sides and diagonals.
         for i in range(span[j, 0], span[j, 1]):
             k = j * (nx - 1) + i
             if i > 0:
@@ -251,7 +255,8 @@ def sort_portals(
     start: Ints,
     order: Ints,
 ) -> None:
-    """``order`` (2 N,) the portals of piece p at start[p] : start[p + 1]; ``start`` (pieces + 1,) is zeros."""
+    """List the portals of each piece p in ``order`` (2 N,), at start[p] : start[p + 1]; ``start`` (pieces + 1,) must
+    be zeros."""
     pieces = len(start) - 1
     for n in range(len(joins)):
         for k in range(2):
@@ -273,9 +278,10 @@ def least_of_cells(
     piece: Ints, value: Floats, cols: int, fine_piece: Ints, fine_span: Ints, fine_cols: int, ratio: int, row: int,
     col: int, out: Floats,
 ) -> None:  # fmt: skip
-    """For each piece of a finer mesh (``out``, inf before) the least value of the coarse pieces in its cells.
+    """Find, for each piece of a finer mesh, the least value of the coarse pieces in its cells (``out``, inf before).
 
-    ``cols``, ``fine_cols``: cells in a row; ``row``, ``col``: the coarse cell that the finer mesh begins at.
+    ``cols``, ``fine_cols``: cells in a row; ``ratio``: fine cells along a side of a coarse one; ``row``, ``col``: the
+    coarse cell at which the finer mesh begins.
     """
     for q in range(len(fine_span)):
         j = q // ratio + row
@@ -299,7 +305,7 @@ def least_of_cells(
 
 @kernel("i4[,] f8[] f8[]")
 def least_of_portals(joins: Ints, met: Floats, entered: Floats) -> None:
-    """For each piece (``entered``, inf before) the least of its portals' values."""
+    """Find the least value ``met`` of each piece's portals (``entered``, inf before)."""
     for n in range(len(joins)):
         for k in range(2):
             p = joins[n, k]
@@ -312,8 +318,8 @@ def within(
     joins: Ints, from_start: Floats, from_goal: Floats, limit: float, met: NDArray[np.bool_], piece: Ints,
     out: NDArray[np.bool_],
 ) -> None:  # fmt: skip
-    """The cells (``out``, all false) of pieces that ways no longer than ``limit`` may enter, through portals that such
-    ways meet. ``met`` (pieces,): true for the pieces of both ends alone."""
+    """Mark the cells (``out``, all false before) of pieces that tracks no longer than ``limit`` may enter: those at
+    portals that such tracks meet, and those where ``met`` (pieces,) is true before, at both ends of the tracks."""
     for n in range(len(joins)):
         if from_start[n] + from_goal[n] <= limit:
             met[joins[n, 0]] = met[joins[n, 1]] = True
@@ -327,8 +333,8 @@ def within(
 def in_reach(
     piece: Ints, entered: Floats, x: Floats, y: Floats, at_x: float, at_y: float, limit: float, out: NDArray[np.bool_]
 ) -> None:
-    """The cells (``out``, all false) whose pieces are ``entered`` after no more than ``limit`` less the straight way
-    from a place to the cell."""
+    """Mark the cells (``out``, all false before) for which ``entered`` of their pieces plus the straight distance from
+    the cell to the place (``at_x``, ``at_y``) is at most ``limit``."""
     ny, nx = x.shape
     for j in range(ny - 1):
         for i in range(nx - 1):

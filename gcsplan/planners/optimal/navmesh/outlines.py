@@ -1,11 +1,11 @@
 """Zones as outlines in the plane: the exact shortest track around those that can be passed neither over nor under.
 
-A zone grows by what must be kept from it, with its corners round. A polygon inside that shape gives a bound, and one
+A zone is grown by the distance to keep from it, with round corners. A polygon inside that shape gives a bound, and one
 around it gives a path; their arcs are drawn more finely where a track touches them. The free plane between the
 polygons is cut into triangles, and Polyanya finds the shortest track over those (`polyanya`).
 
-Zones are added one by one: the shortest track past the zones that are known is a bound for all of them, and as soon as
-it meets no other zone it is the answer. So the work follows the zones that matter, however many there are.
+Zones are added one by one: the shortest track past the zones known so far is a bound for all of them, and as soon as
+it meets no other zone it is the answer. So the work depends on the zones that matter, however many there are.
 """
 
 from __future__ import annotations
@@ -27,28 +27,29 @@ from gcsplan.world.zones import Circle, Zone
 Ints = NDArray[np.int32]
 
 COARSE = 4
-"""Chords of a quarter circle of every arc at first."""
+"""Chords per quarter circle of every arc, at first."""
 OFF_M, OFF_OUTER_M, OFF_OUTER = 5e-3, 0.1, 6e-4
-"""How far chords may be off where a track comes near: for bounds; and for paths, of which each chord is a leg, or that
-part of the radius where that is more."""
+"""Metres that chords may be off their arc where a track comes near: `OFF_M` for bounds; for paths, of which each chord
+is a leg, `OFF_OUTER_M` or the share `OFF_OUTER` of the radius, whichever is more."""
 NEAR = 1.03
-"""Where a track comes nearer than that times what it must keep, coarse arcs may stand in its way that fine ones do not,
-or leave a slit that fine ones shut: chords of `COARSE` are off by two percent of the radius."""
+"""Arcs are drawn finely where a track comes nearer than this times the distance to keep: there, coarse arcs may block
+what fine ones leave free, or leave a slit that fine ones shut; chords of `COARSE` are off by 2 % of the radius."""
 ROUNDS = 300
-"""Times that a track is looked for with more zones, or finer arcs."""
+"""Times that a track is searched for, each time with more zones or finer arcs, at most."""
 MOST_CORNERS = 12_000
-"""Corners of all outlines of one mesh: beyond this the triangulation takes seconds."""
+"""Corners of all outlines of one mesh, at most: with more, the triangulation takes seconds."""
 BEYOND_M = 1.0
-"""How far the mesh reaches beyond the outlines and the places."""
+"""Metres that the mesh reaches beyond the outlines and the places."""
 MOST_OPENED = 1_000_000
+"""Search nodes that Polyanya may open over one mesh."""
 
 
 @dataclass(eq=False, slots=True)
 class Outline:
-    """One zone grown by ``reach_m``: its polygon for paths (``outer``) or for bounds, drawn as finely as is asked.
+    """One zone grown by ``reach_m``: its polygon for paths (``outer``) or for bounds.
 
-    ``sectors``: of a circle, those that are drawn finely, each as wide as a coarse chord; ``fine``: whether the corners
-    of a polygon are.
+    ``sectors``: those of a circle that are drawn finely, each as wide as a coarse chord; ``fine``: whether the corners
+    of a polygon are drawn finely.
     """
 
     zone: Zone
@@ -62,21 +63,21 @@ class Outline:
 
     @property
     def shape(self) -> shapely.Geometry:
-        """The polygon, or several where a hair less than a zone is in parts; perhaps empty."""
+        """The polygon; several, or an empty one, if a zone made smaller by ``hair_m`` falls into parts or vanishes."""
         if self._shape is None:
             self._shape = self._disc() if isinstance(self.zone.shape, Circle) else self._grown(self.zone.shape.vertices)
         return self._shape
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """West, south, east, north of a box that holds the shape, however it is drawn."""
+        """West, south, east, north of a box that contains the shape, however finely it is drawn."""
         west, south, east, north = self.zone.bounds
         radius = max(east - west, north - south)
         more = (self.reach_m + self.hair_m + (self.scale - 1.0) * radius) * NEAR + (NEAR - 1.0) * radius
         return west - more, south - more, east + more, north + more
 
     def refine(self, track: Floats) -> bool:
-        """Draw the arcs finely where a track (N, 2) comes so near that it matters; whether anything changes."""
+        """Draw the arcs finely where a track (N, 2) comes so near that it matters; return whether anything changes."""
         shape = self.zone.shape
         if not isinstance(shape, Circle):
             if self.fine or self.reach_m <= self.hair_m:
@@ -91,7 +92,7 @@ class Outline:
             off = np.vstack([a + t.clip(0.0, 1.0)[:, None] * d, track]) - middle
             off = off[np.hypot(*off.T) < NEAR * radius]
             angles = np.arctan2(off[:, 1], off[:, 0]) % (2.0 * math.pi)
-            # A track that turns at a corner may turn in the sector beside it when that is drawn finely.
+            # A track that turns at a corner between two sectors may turn in either once they are drawn finely.
             at = {math.floor((x + more) / WIDTH) % (4 * COARSE) for x in angles.tolist() for more in (-1e-3, 1e-3)}
             new = at - self.sectors
             self.sectors |= new
@@ -107,7 +108,7 @@ class Outline:
         return shapely.Polygon(np.array([circle.east_m, circle.north_m]) + corners)
 
     def _angles(self, radius: float, sectors: Iterable[int]) -> Floats:
-        """Where the chords of a circle begin, rising; some ``sectors`` drawn finely."""
+        """Angles (rad, rising) at which the chords of a circle begin, those in ``sectors`` drawn finely."""
         off_m = max(OFF_OUTER_M, OFF_OUTER * radius) if self.outer else OFF_M
         step = math.sqrt(8.0 * off_m / max(radius, 1e-3))
         parts = max(math.ceil(WIDTH / step), 2)
@@ -115,7 +116,7 @@ class Outline:
         return np.sort(np.concatenate([np.arange(4 * COARSE) * WIDTH, *more]))
 
     def _grown(self, vertices: Floats) -> shapely.Geometry:
-        """The polygon with its edges and corners grown, each edge by itself: `shapely.buffer` smooths what it grows."""
+        """The polygon grown edge by edge, with round corners: `shapely.buffer` would smooth what it grows."""
         bare = shapely.Polygon(vertices)
         reach = self.reach_m + (self.hair_m if self.outer else -self.hair_m)
         if reach <= 0.0:
@@ -123,7 +124,7 @@ class Outline:
         angle = self._angles(reach, range(4 * COARSE) if self.fine else ())
         following = np.roll(vertices, -1, axis=0)
         turn = np.arctan2(*(following - vertices).T[::-1])
-        # Each edge with half a circle around both its ends is convex: the hull of two circles' corners.
+        # An edge with half a circle around each of its ends is convex: the hull of the two circles' corners.
         parts = [
             shapely.MultiPoint(np.vstack([p + corners, q + corners])).convex_hull
             for p, q, first in zip(vertices, following, turn.tolist(), strict=True)
@@ -140,19 +141,19 @@ def _around(angle: Floats, radius: float, *, outer: bool) -> Floats:
     """(N, 2) corners of a circle's polygon with chords from angle to angle: inside it, or (``outer``) around it."""
     if not outer:
         return radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    # Where neighbouring tangents meet: as near to the circle as the chords are short.
+    # Corners lie where neighbouring tangents meet: the shorter the chords, the nearer to the circle.
     half = 0.5 * np.diff(np.append(angle, angle[0] + 2.0 * math.pi))
     return radius * np.stack([np.cos(angle + half), np.sin(angle + half)], axis=-1) / np.cos(half)[:, None]
 
 
 class Triangles(Portals):
-    """The part of the free plane between polygons that holds two places, in triangles, as far as the shortest track
-    between them can go."""
+    """The part of the free plane between polygons that holds two places, cut into triangles; it reaches as far as the
+    shortest track between them can go."""
 
     __slots__ = ("corner",)
 
     def __init__(self, part: shapely.Polygon) -> None:
-        """Raises Exhausted where the triangles are not that part: then nothing is known."""
+        """Raises Exhausted if the triangles' area is not the part's: then nothing is known."""
         corner = shapely.get_coordinates(shapely.get_parts(shapely.constrained_delaunay_triangles(part)))
         corner = corner.reshape(-1, 4, 2)[:, :3]
         u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
@@ -179,7 +180,7 @@ class Triangles(Portals):
         super().__init__(start, np.ascontiguousarray(ends), names, joins, of_piece, named)
 
     def pieces_at(self, place: Place) -> list[int]:
-        """The triangles that a place lies in, or on the border of."""
+        """The triangles in which, or on whose border, a place lies."""
         d = np.array(place) - self.corner
         e = np.roll(self.corner, -1, axis=1) - self.corner
         left = (e[..., 0] * d[..., 1] - e[..., 1] * d[..., 0]) / np.maximum(np.hypot(e[..., 0], e[..., 1]), 1e-12)
@@ -187,7 +188,7 @@ class Triangles(Portals):
 
 
 def _shortest(a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> GroundTrack | None:
-    """The shortest track past some polygons; None where they part the places. Raises Exhausted."""
+    """The shortest track around some polygons; None if they separate the places. Raises Exhausted."""
     places = np.array([a, b])
     bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
     box = shapely.box(*(bounds[:, :2].min(axis=0) - BEYOND_M), *(bounds[:, 2:].max(axis=0) + BEYOND_M))
@@ -202,10 +203,11 @@ def _shortest(a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> GroundTr
 
 
 class Solids:
-    """Zones that nobody enters, and the shortest tracks around them; what a track met is known to the next one.
+    """Zones that no track may enter, and the shortest tracks around them; zones that one track met are known to the
+    next search.
 
-    ``outer``: for paths, which keep ``hair_m`` more from every zone; else for bounds, which keep so much less. Raises
-    Exhausted where the meshes, or the work, would be beyond bounds.
+    ``outer``: for paths, which keep ``hair_m`` more from every zone; else for bounds, which keep that much less. Raises
+    Exhausted if the meshes, or the work, would be too large.
     """
 
     def __init__(
@@ -217,14 +219,15 @@ class Solids:
         self._known: set[int] = set()
 
     def look_along(self, track: Floats, which: NDArray[np.bool_]) -> None:
-        """Know the zones that a track (N, 2) meets, and their outlines finely there, before any track is looked for."""
+        """Add the zones, out of ``which`` (zones,), that a track (N, 2) comes near, and draw their outlines finely
+        there, before the first search."""
         line = shapely.LineString(track)
         for k in self._tree.query(line).tolist():
             if which[k] and self.outlines[k].refine(track):
                 self._known.add(k)
 
     def shortest(self, a: Place, b: Place, which: NDArray[np.bool_]) -> GroundTrack | None:
-        """The shortest track from ``a`` to ``b`` past those zones; None where they enclose one of the places."""
+        """The shortest track from ``a`` to ``b`` around the zones ``which`` (zones,); None if they separate the two."""
         for _ in range(ROUNDS):
             known = [k for k in sorted(self._known) if which[k]]
             track = self._past(a, b, known)
@@ -232,7 +235,7 @@ class Solids:
                 return None
             line = shapely.LineString(track.points)
             near = [k for k in self._tree.query(line).tolist() if which[k]]
-            # Coarse arcs lie inside the true ones, or outside: what a track passes so near is drawn finely first.
+            # Coarse arcs lie inside or outside the true ones: draw those that the track passes near finely first.
             finer = [k for k in near if self.outlines[k].refine(track.points) and k in self._known]
             unknown = (k for k in near if k not in self._known)
             met = {k for k in unknown if shapely.relate_pattern(self.outlines[k].shape, line, "T********")}

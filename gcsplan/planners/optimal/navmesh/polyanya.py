@@ -1,12 +1,13 @@
-"""Shortest paths in the plane, exact on a mesh of convex pieces: Polyanya (Cui, Harabor, Grastien, IJCAI 2017).
+"""Exact shortest tracks over a mesh of convex pieces: Polyanya (Cui, Harabor, Grastien, IJCAI 2017).
 
-A search node is an interval on a portal together with the last corner of the path, its *root*: the whole interval is
-seen from there. Pushed through the piece behind, it becomes an interval for each portal that it sees; where an end
-of the interval is a corner of a wall, the path may turn there, and what lies beyond in the piece is reached from it.
+A search node is an interval on a portal and the last corner of the track, its *root*, from which the whole interval is
+seen. To open a node is to project its interval through the piece behind the portal, onto the piece's other portals:
+each of them that the root sees yields a new interval. If an end of the interval is a corner of a wall, the track may
+turn there, and that corner is the root of the intervals on the portals that the old root does not see.
 
-Two things keep their number down, and take no shortest path away. Intervals of one root that meet on a portal are
-made one again before they are pushed on; so that they meet, nodes are taken in bands of about equal promise, and in a
-band by how near they are. And an interval is dropped where another root reaches all of it for less.
+Two measures keep the number of nodes down and lose no shortest track. Intervals of one root that meet on a portal are
+merged before they are opened; so that they do meet, nodes are opened in bands of about equal estimated length, and
+nearest first within a band. And an interval is dropped if another root reaches all of it at less cost.
 """
 
 from __future__ import annotations
@@ -52,11 +53,11 @@ Ints = NDArray[np.int32]
 Names = NDArray[np.int64]
 
 BAND = 0.005
-"""How wide a band of promise is, as a part of the straight way to the goal."""
+"""Width of a band of estimated lengths, as a share of the straight distance to the goal."""
 BANDS = 1e8
-"""In metres more than any way; what it leaves of a number's precision orders the nodes of a band."""
+"""Weight of the band's number in a heap key: metres, more than any track. The digits below it order a band's nodes."""
 MOST_TURNS = 8
-"""No more pieces than this meet at one place; who passes more of them turns in a circle around it."""
+"""Pieces that meet at one place, at most: a track that passes more of them turns in a circle around it."""
 
 
 @kernel(
@@ -69,17 +70,19 @@ def search(
     slack: float, most: int, remaining: Floats, met: Floats,
     node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats,
 ) -> int:  # fmt: skip
-    """The shortest path from any source to the goal; its corners in ``out``; how many, or why not.
+    """Find the shortest track from any source to the goal; its corners, from the goal back, are in ``out``.
 
-    ``order`` (start[p] : start[p + 1]) lists the portals of piece p. ``sources_at`` (K, 3) x, y, cost so far, each in
-    piece ``sources_piece`` (K,); a goal in any of ``goal_piece``. ``best``, ``origin`` (names,), ``first`` (2 *
-    portals,) and ``widest`` (portals,) zeros; ``span`` (portals, 2); ``node`` (room, 8), ``link`` (room, 6), ``name``
-    (room, 3), ``heap``, ``ids`` (room,), ``out`` (any, 3). ``remaining`` (pieces,): no way on from a piece's entrance
-    is shorter. ``slack`` >= 0: go on after the goal is reached, as far as that much (as a part of the length) beyond
-    it; ``met`` (portals,), inf, receives the least cost at which each is met; both may be empty. Returns the number of
-    corners, ends included, with ``out[0, 2]`` the source's number and ``out[1, 2]`` the length; 0: no path of less than
-    ``limit``; -1: no room left; -2: more than ``most`` nodes were opened, paths shorter than ``out[0, 0]`` all of them.
-    ``out[2, 2]`` is how many were opened.
+    Returns the number of corners, ends included, with the source's number in ``out[0, 2]`` and the length in
+    ``out[1, 2]``; 0: no track is shorter than ``limit``; -1: too little room in the arrays; -2: stopped after ``most``
+    nodes, when all tracks shorter than ``out[0, 0]`` had been looked at. ``out[2, 2]``: number of nodes opened.
+
+    ``start``, ``ends``, ``names``, ``joins``, ``order``: see `Portals`. ``sources_at`` (K, 3): x, y, cost so far, each
+    in piece ``sources_piece`` (K,); the goal is in any of ``goal_piece``. ``remaining`` (pieces,): lower bound of the
+    distance from a piece's entrance to the goal. ``slack`` >= 0: go on when the goal is reached, up to 1 + ``slack``
+    times the length. ``met`` (portals,), inf before, receives the least cost at which each portal is met. ``remaining``
+    and ``met`` may be empty. Work arrays: ``best``, ``origin`` (names,), ``first`` (2 * portals,), ``widest``
+    (portals,), all zeros; ``span`` (portals, 2), ``node`` (room, 8), ``link`` (room, 6), ``name`` (room, 3), ``heap``,
+    ``ids`` (room,); ``out`` (any, 3).
     """
     room = len(heap)
     gx, gy = goal[0], goal[1]
@@ -88,7 +91,7 @@ def search(
     flood, guided = len(met) > 0, len(remaining) > 0
     far, shortest = limit, np.inf
     band = max(BAND * math.sqrt((gx - sources_at[0, 0]) ** 2 + (gy - sources_at[0, 1]) ** 2), 1e-3)
-    # What a node pushes is listed here as from, to and root; sources push all portals of their piece.
+    # Each round opens one node, or one source: a source sees all portals of its piece.
     current, key = -1, 0.0
     source = 0
     while True:
@@ -144,7 +147,7 @@ def search(
         width_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
         width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
         if width_l < SAME_M or width_r < SAME_M:
-            all_round = True  # the root is a corner of this convex piece
+            all_round = True  # the root is a corner of this convex piece and sees all of it
             if turns >= MOST_TURNS:
                 continue
             turns += 1
@@ -163,7 +166,7 @@ def search(
                 va = vb = np.int64(-1)
             else:
                 p = order[at]
-                # From its right end a to its left end b, as seen from inside.
+                # The portal goes from its right end a to its left end b, as seen from inside the piece.
                 forward = joins[p, 0] == piece
                 if forward:
                     behind = joins[p, 1]
@@ -177,7 +180,7 @@ def search(
                     continue
             t0, t1, off = 0.0, 1.0, 0.0
             at_a = at_b = 0.0
-            along = -1  # the end at which a portal begins that the root sees edge-on
+            along = -1  # nearer end (0: a, 1: b) of a portal that the root sees edge-on; -1: it does not
             if not to_goal:
                 ex, ey = bx - ax, by - ay
                 long = math.sqrt(ex * ex + ey * ey)
@@ -185,13 +188,13 @@ def search(
                     at_a = math.sqrt((rx - ax) ** 2 + (ry - ay) ** 2)
                     at_b = math.sqrt((rx - bx) ** 2 + (ry - by) ** 2)
                     if min(at_a, at_b) <= SAME_M and not all_round:
-                        continue  # back to the root along an edge, and round and round
+                        continue  # leads back to the root along an edge, in a circle
                     if min(at_a, at_b) > SAME_M and max(at_a, at_b) >= long:
-                        # Nothing behind it is seen from here; whoever goes on behind it turns at its end, or at a
-                        # portal's that is nearer to the root.
+                        # Nothing behind the portal is seen from here. A track that goes on behind it turns at its
+                        # nearer end, or at the end of another portal that is nearer to the root.
                         along = 0 if at_a < at_b else 1
                         if not all_round:
-                            # Nor is its near end, where the view through the interval does not reach that far round.
+                            # The nearer end itself is not seen if it lies beside the view through the interval.
                             ux, uy = (ax - rx, ay - ry) if along == 0 else (bx - rx, by - ry)
                             if (qx - rx) * uy - (qy - ry) * ux < -SAME_M * width_r or (lx - rx) * uy - (
                                 ly - ry
@@ -200,7 +203,7 @@ def search(
             if along >= 0:
                 t0, t1 = 1.0, 0.0
             elif not all_round:
-                # Signed distances off the two rays; beyond a ray is beyond what the root sees.
+                # Signed distances from the rays through the interval's two ends: between them the root sees.
                 ra = ((qx - rx) * (ay - ry) - (qy - ry) * (ax - rx)) / width_r
                 rb = ((qx - rx) * (by - ry) - (qy - ry) * (bx - rx)) / width_r
                 la = ((lx - rx) * (ay - ry) - (ly - ry) * (ax - rx)) / width_l
@@ -214,7 +217,7 @@ def search(
                 elif lb > SAME_M:
                     t1 = min(max(la / (la - lb), 0.0), 1.0)
             for part in range(3):
-                # 0: what is seen; 1: right of it, round the right end; 2: left of it, round the left end.
+                # 0: the part seen; 1: right of that, by a turn at the right end; 2: left of it, by a turn at the left.
                 x0, y0, x1, y1, n0, n1 = ax, ay, bx, by, va, vb
                 nx, ny, ncost, nroot = rx, ry, cost, root
                 s0, s1 = 0.0, 1.0
@@ -251,8 +254,8 @@ def search(
                     if ncost + 1.0 > best[nroot] + SAME_M:
                         continue
                 elif nroot >= 0:
-                    # Who comes as dear from elsewhere has nothing to add: along a straight wall with many corners that
-                    # would double the ways at each.
+                    # The same corner at the same cost from another root adds nothing; along a straight wall with many
+                    # corners, it would double the number of tracks at each.
                     if best[nroot] == 0.0 or ncost + 1.0 < best[nroot] - SAME_M:
                         best[nroot], origin[nroot] = ncost + 1.0, root
                     elif ncost + 1.0 > best[nroot] + SAME_M or origin[nroot] != root:
@@ -274,7 +277,7 @@ def search(
                         other = widest[p] - 1
                         if beaten(node, other, nx, ny, ncost, off, x0, y0, x1, y1):
                             continue
-                        # As wide, and cheaper at its ends: what comes later is held to this one.
+                        # Equally wide, and it costs less than the other's root: compare later ones with this one.
                         wider = s0 == span[p, 0] and s1 == span[p, 1] and ncost + off < node[other, COST]
                     else:
                         wider = widest[p] == 0 or s1 - s0 > span[p, 1] - span[p, 0]
@@ -305,7 +308,7 @@ def search(
     if reached < 0:
         out[2, 2] = opened
         return 0
-    # Corners from the goal back.
+    # List the corners from the goal back.
     current = reached
     length = node[current, COST] + node[current, AHEAD]
     out[0, 0], out[0, 1] = gx, gy

@@ -1,4 +1,4 @@
-"""Intervals on portals and the roots that see them: what `polyanya` searches over."""
+"""The search nodes of `polyanya`, intervals on portals and the roots that see them, and the heap that orders them."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ Names = NDArray[np.int64]
 ROOT_X, ROOT_Y, COST, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, AHEAD = range(8)
 PIECE, CAME, PARENT, TURNS, PORTAL, NEXT = range(6)
 LEFT, RIGHT, ROOT = range(3)
+"""Columns of the arrays ``node``, ``link`` and ``name``, a row of which is one search node."""
 
 SAME_M = 1e-6
-"""Places nearer than this are one."""
+"""Metres: places nearer to each other than this are one."""
 GONE = -2
-"""The piece of a node that needs not be looked at any more."""
+"""Value in column `PIECE` of a node that need not be opened any more."""
 
 
 @device
 def push(heap: Floats, ids: Ints, size: int, key: float, item: int) -> int:
+    """Add an item to a binary heap with the least key first; return the new size."""
     k = size
     while k > 0:
         up = (k - 1) >> 1
@@ -38,6 +40,7 @@ def push(heap: Floats, ids: Ints, size: int, key: float, item: int) -> int:
 
 @device
 def pop(heap: Floats, ids: Ints, size: int) -> int:
+    """Remove the first item, (heap[0], ids[0]), of a binary heap; return the new size."""
     size -= 1
     key, item = heap[size], ids[size]
     k = 0
@@ -57,24 +60,25 @@ def pop(heap: Floats, ids: Ints, size: int) -> int:
 
 @device
 def ahead_of(rx: float, ry: float, lx: float, ly: float, qx: float, qy: float, gx: float, gy: float) -> float:
-    """The shortest way from a root through an interval to the goal, nothing else in the way."""
+    """The shortest distance from a root r through an interval (left end l, right end q) to the goal g, if nothing else
+    is in the way."""
     ex, ey = qx - lx, qy - ly
     side_r = ex * (ry - ly) - ey * (rx - lx)
     side_g = ex * (gy - ly) - ey * (gx - lx)
     if abs(side_r) <= SAME_M * math.sqrt(ex * ex + ey * ey):
-        # Seen edge-on, left and right may be the wrong way round.
+        # The interval is seen edge-on, so its left and right ends may be swapped.
         to_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
         to_q = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
         if max(to_l, to_q) < math.sqrt(ex * ex + ey * ey):
             return math.sqrt((gx - rx) ** 2 + (gy - ry) ** 2)
         by_l = to_l + math.sqrt((gx - lx) ** 2 + (gy - ly) ** 2)
         return min(by_l, to_q + math.sqrt((gx - qx) ** 2 + (gy - qy) ** 2))
-    if side_r * side_g > 0.0:  # on the same side: the goal's mirror image
+    if side_r * side_g > 0.0:  # root and goal on the same side: mirror the goal
         square = ex * ex + ey * ey
         if square > 0.0:
             gx, gy = gx + 2.0 * side_g * ey / square, gy - 2.0 * side_g * ex / square
     dx, dy = gx - rx, gy - ry
-    if dx * (ly - ry) - dy * (lx - rx) < 0.0:  # the left end lies right of the straight way
+    if dx * (ly - ry) - dy * (lx - rx) < 0.0:  # the left end lies right of the straight line
         return math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2) + math.sqrt((gx - lx) ** 2 + (gy - ly) ** 2)
     if dx * (qy - ry) - dy * (qx - rx) > 0.0:
         return math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2) + math.sqrt((gx - qx) ** 2 + (gy - qy) ** 2)
@@ -83,7 +87,7 @@ def ahead_of(rx: float, ry: float, lx: float, ly: float, qx: float, qy: float, g
 
 @device
 def off_of(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """How far a point is from a segment."""
+    """The distance from a point p to the segment from a to b."""
     ex, ey = bx - ax, by - ay
     square = ex * ex + ey * ey
     t = 0.0
@@ -94,7 +98,7 @@ def off_of(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> 
 
 @device
 def place_on(ends: Floats, p: int, x: float, y: float) -> float:
-    """Where on a portal a place is, as a part of it."""
+    """Where along portal p a place is, from 0 to 1."""
     ex, ey = ends[p, 2] - ends[p, 0], ends[p, 3] - ends[p, 1]
     square = ex * ex + ey * ey
     if square <= SAME_M * SAME_M:
@@ -105,9 +109,10 @@ def place_on(ends: Floats, p: int, x: float, y: float) -> float:
 
 @device
 def join(node: Floats, link: Ints, name: Names, first: Ints, list_of: int, current: int) -> bool:
-    """Make the interval of a node one with those on its portal that touch it and have the same root; whether any do.
+    """Merge into a node's interval those on its portal that touch it and have the same root; return whether any do.
 
-    Those are gone; so are from the list (numbers from 1) those that have been looked at.
+    Merged nodes become `GONE`. All nodes that are `GONE`, and the node itself, leave the portal's list, which begins at
+    ``first[list_of]`` (index + 1; 0: empty).
     """
     joined, again = False, True
     while again:
@@ -142,9 +147,10 @@ def join(node: Floats, link: Ints, name: Names, first: Ints, list_of: int, curre
 def beaten(
     node: Floats, other: int, rx: float, ry: float, cost: float, off: float, ax: float, ay: float, bx: float, by: float
 ) -> bool:
-    """Whether another node ``other``, whose interval holds this one from a to b, reaches every place of it for less.
+    """Whether another node, ``other``, reaches every place of an interval from a to b at less cost than its own root.
 
-    ``off``: how far the root is from the interval at least.
+    The other's interval contains this one. ``rx``, ``ry``, ``cost``: this one's root and the cost there; ``off``: least
+    distance from that root to the interval.
     """
     ox, oy, known = node[other, ROOT_X], node[other, ROOT_Y], node[other, COST]
     to_a = known + math.sqrt((ax - ox) ** 2 + (ay - oy) ** 2)
@@ -153,6 +159,6 @@ def beaten(
         return True
     if known < cost:
         return bool(known + math.sqrt((rx - ox) ** 2 + (ry - oy) ** 2) < cost - SAME_M)
-    # The places that are nearer to one of two points by some length are convex: the ends tell of all between.
+    # Places that are nearer to one of two points by some length form a convex set: both ends in it prove all between.
     own_a, own_b = math.sqrt((ax - rx) ** 2 + (ay - ry) ** 2), math.sqrt((bx - rx) ** 2 + (by - ry) ** 2)
     return bool(to_a < cost + own_a - SAME_M and to_b < cost + own_b - SAME_M)

@@ -1,4 +1,4 @@
-"""Convex pieces of the plane, the portals between them, and the shortest tracks over those: `polyanya`, with memory."""
+"""The portals between convex pieces of the plane, and shortest tracks through them: `polyanya` and its memory."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Place = tuple[float, float]
 MOST_CORNERS = 1 << 14
 """Corners of a track, at most."""
 FIRST_NODES, NODES_OF_PIECE = 1 << 19, 8
-"""Search nodes that memory is asked for at first: so many, or that many for each piece. What is not touched costs
-nothing; where they do not suffice, the search begins again with four times as many."""
+"""Search nodes that memory is first allocated for: `FIRST_NODES`, or `NODES_OF_PIECE` for each piece if that is more.
+Untouched memory costs nothing; if there is too little, the search begins again with four times as much."""
 
 
 class Exhausted(Exception):
-    """A search was given up; all tracks shorter than ``seen_m`` had been looked at, and none led to the goal."""
+    """A search was given up: all tracks shorter than ``seen_m`` were looked at, and none of them leads to the goal."""
 
     def __init__(self, seen_m: float) -> None:
         super().__init__(f"no track of less than {seen_m:.1f} m, and too much to look at beyond")
@@ -32,7 +32,7 @@ class Exhausted(Exception):
 
 @dataclass(eq=False, slots=True)
 class GroundTrack:
-    """A line in the plane: ``points`` (N, 2) and its length."""
+    """A track: its ``points`` (N, 2) and its length."""
 
     points: Floats
     length_m: float
@@ -40,9 +40,9 @@ class GroundTrack:
 
 @dataclass(eq=False, slots=True)
 class Portals:
-    """Portals as `polyanya.search` wants them: ``order`` (start[p] : start[p + 1]) lists those of piece p; ``ends``
-    (portals, 4), ``names`` (portals, 2) of both ends, all less than ``named``, ``joins`` (portals, 2) the pieces at the
-    left and at the right."""
+    """Portals as `polyanya.search` takes them: ``order[start[p] : start[p + 1]]`` lists those of piece p; ``ends``
+    (portals, 4) is x, y of both ends, ``names`` (portals, 2) the names of both, all less than ``named``, and ``joins``
+    (portals, 2) the pieces at the left and at the right."""
 
     start: Ints
     ends: Floats
@@ -69,9 +69,9 @@ class Portals:
         remaining: Floats | None = None,
         met: Floats | None = None,
     ) -> tuple[GroundTrack | None, float]:
-        """The shortest track that is shorter than ``limit_m``, and how many search nodes were opened, ``most`` at most.
+        """The shortest track, None if none is shorter than ``limit_m``, and the number of search nodes opened.
 
-        ``slack``, ``remaining``, ``met``: see `polyanya.search`. Raises Exhausted where more would have to be opened.
+        ``slack``, ``remaining``, ``met``: see `polyanya.search`. Raises Exhausted if that needs more than ``most``.
         """
         if not len(start_pieces) or not len(goal_pieces):
             return None, 0.0

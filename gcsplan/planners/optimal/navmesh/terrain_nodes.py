@@ -1,4 +1,4 @@
-"""The terrain model's nodes as a lattice of the plane has them: heights for bounds and for paths, slopes, places."""
+"""The values of a lattice's nodes from the terrain model: heights for bounds and for paths, slopes, and places."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Extent = tuple[int, int, int, int]
 
 
 def slopes(z: Floats, x: Floats, y: Floats) -> Floats:
-    """(rows, cols) steepest slope of the cells around each node."""
+    """(rows, cols) the steepest slope (m per m) of the cells around each node."""
     z = np.where(np.isfinite(z), z, np.nan)
     across = math.dist((x[0, 0], y[0, 0]), (x[0, 1], y[0, 1]))
     along = math.dist((x[0, 0], y[0, 0]), (x[1, 0], y[1, 0]))
@@ -30,8 +30,8 @@ def slopes(z: Floats, x: Floats, y: Floats) -> Floats:
 
 
 def nodes(z: Floats, over: Extent, parts: int, stride: int, whole: int) -> tuple[Floats, Floats]:
-    """Heights at a lattice's nodes for bounds and for paths, rows going north, from the terrain model's, as far as it
-    is ``over``."""
+    """Heights at a lattice's nodes for bounds and for paths, rows going north, from the terrain model's heights ``z``;
+    the lattice covers the extent ``over``. ``parts``, ``stride``, ``whole``: see `grid.make_plane`."""
     col0, row0, col1, row1 = over
     if stride == 1 and whole == 1:
         finer = _finer(z[row0 : row1 + 1, col0 : col1 + 1][::-1], parts)
@@ -39,18 +39,18 @@ def nodes(z: Floats, over: Extent, parts: int, stride: int, whole: int) -> tuple
     cells = [-(-n // whole) * whole // stride for n in (row1 - row0, col1 - col0)]
     low, high = (np.empty((cells[0] + 1, cells[1] + 1)) for _ in range(2))
     pool(np.ascontiguousarray(z), np.array(over), stride, low, high)
-    # Beyond the border bounds may do as they like, and paths may not go.
+    # Beyond the border, paths may not go; for bounds, its heights go on.
     high[(row1 - row0) // stride + 1 :] = np.inf
     high[:, (col1 - col0) // stride + 1 :] = np.inf
     return low, high
 
 
 def _finer(z: Floats, parts: int) -> Floats:
-    """Bilinear values ``parts`` times as close."""
+    """Interpolate heights bilinearly at nodes ``parts`` times as close."""
     if parts == 1:
         return np.ascontiguousarray(z)
     u = np.arange(parts) / parts
-    for _ in range(2):  # along the rows, then, turned, along the columns
+    for _ in range(2):  # along the rows; then, transposed, along the columns
         wide = np.empty((z.shape[0], (z.shape[1] - 1) * parts + 1))
         wide[:, :-1] = (z[:, :-1, None] * (1.0 - u) + z[:, 1:, None] * u).reshape(len(z), -1)
         wide[:, ::parts] = z  # a weight of 0 must not carry an unknown neighbour's NaN over
@@ -63,7 +63,7 @@ def places(
     reach: tuple[tuple[float, float], tuple[float, float], float] | None = None,
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:  # fmt: skip
     """(rows, cols) x and y of a lattice's nodes, bilinear between the corners of blocks of ``span`` cells, and
-    (rows - 1, cols - 1) which cells are as near as ``reach`` (two places, metres from both together) allows."""
+    (rows - 1, cols - 1) which cells lie within ``reach``: two places, and the largest sum of distances to both, m."""
     rows, cols = shape
     step = min(span, max(rows, cols))
     c = np.arange(0, cols + step, step)

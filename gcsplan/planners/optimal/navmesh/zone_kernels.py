@@ -1,4 +1,4 @@
-"""Zones laid on a lattice: cells that they shut, as a whole or in part, get walls of their own."""
+"""Kernels that lay zones on a lattice: cells that a zone shuts, wholly or in part, get walls of their own."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ Ints = NDArray[np.int32]
 
 EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
 PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, NUMBERS = range(10, 17)
+"""Columns of the array ``zones``, and their number; those with a 2 are of the second zone of a pair that cross."""
 BESIDE = 2.0
-"""Datum of a level over all ground within reach, for paths; 1 is over that below, 0 none."""
+"""Datum of a level over all ground within reach, for paths; 1: over the ground below; 0: AMSL."""
 MOST_BESIDE = 6
-"""Nodes that are looked at for that, a side and at most; of more every second, third … is."""
+"""Nodes on each side that are looked at for `BESIDE`, at most; of more, only every second, third … is."""
 
 
 @device
 def depth(zones: Floats, edges: Floats, z: int, x: float, y: float) -> float:
-    """How far a point is inside a zone's convex shape: concave, above 0 inside."""
+    """How far, m, a point is inside a zone's convex shape: a concave function, above 0 inside."""
     if zones[z, RADIUS] >= 0.0:
         return zones[z, RADIUS] - math.sqrt((x - zones[z, EAST]) ** 2 + (y - zones[z, NORTH]) ** 2)
     depth = np.inf
@@ -35,7 +36,7 @@ def depth(zones: Floats, edges: Floats, z: int, x: float, y: float) -> float:
 
 @device
 def _within(edges: Floats, k: int, x: float, y: float) -> float:
-    """How far a point is inside a disc or a half-plane."""
+    """How far, m, a point is inside form k, a disc or a half-plane."""
     if edges[k, 3] > 0.0:
         return edges[k, 0] - math.sqrt((x - edges[k, 1]) ** 2 + (y - edges[k, 2]) ** 2)
     return edges[k, 0] - edges[k, 1] * x - edges[k, 2] * y
@@ -43,14 +44,14 @@ def _within(edges: Floats, k: int, x: float, y: float) -> float:
 
 @device
 def level(zones: Floats, z: int, level: int, ground: float) -> float:
-    """A level of a zone where the ground is so high; its datum is told two numbers further on."""
+    """The altitude of a zone's level (`BOTTOM`, …) over ground of altitude ``ground``; its datum is two columns on."""
     return zones[z, level] + (ground if zones[z, level + 2] > 0.0 else 0.0)
 
 
 @device
 def _level_at(zones: Floats, z: int, at: int, ground: Floats, up: Floats, down: Floats, j: int, i: int) -> float:
-    """The same at a node, of a datum `BESIDE`, too: ``up``, ``down`` how far the ground rises and falls within
-    reach."""
+    """The altitude of a zone's level at a node, also of datum `BESIDE`: ``up``, ``down`` are how far the ground rises
+    and falls within reach."""
     value = level(zones, z, at, ground[j, i])
     if zones[z, at + 2] < BESIDE:
         return value
@@ -61,7 +62,7 @@ def _level_at(zones: Floats, z: int, at: int, ground: Floats, up: Floats, down: 
 def _open(
     zones: Floats, z: int, floors: Floats, excess: Floats, ground: Floats, up: Floats, down: Floats, j: int, i: int
 ) -> bool:
-    """Whether there is an altitude to fly at, over a zone, under it, or between the two of a pair."""
+    """Whether an altitude is free at a node: over a zone, under it, or between the two of a pair."""
     floor, allowed = floors[j, i], floors[j, i] - excess[j, i]
     bottom, top = (
         _level_at(zones, z, BOTTOM, ground, up, down, j, i), _level_at(zones, z, TOP, ground, up, down, j, i)
@@ -86,14 +87,16 @@ def stamp_zones(
     exact: bool, up: Floats, down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, low: bool,
     of: Ints, values: Floats,
 ) -> int:  # fmt: skip
-    """Give cells that zones shut walls of their own: how deep in the shape they lie. Returns how many walls there are.
+    """Give the cells that zones shut walls of their own; return how many walls there are.
 
-    ``zones`` (Z, NUMBERS), ``boxes`` (Z, 4) first and last column and row of the cells each may touch; ``around``,
-    ``span``, ``of``, ``values`` as in `mesh_kernels`. ``low``: only what is shut for certain; else all that may be
-    shut.
+    A wall's values are how deep the cell's corners lie in the shape, or how far its top is above what is allowed, m.
+    ``zones`` (Z, NUMBERS); ``boxes`` (Z, 4): first and last column, first and last row of the cells each may touch;
+    ``around``, ``span``, ``of``, ``values``: as in `mesh_kernels`. ``low``: only what is certainly shut; else all that
+    may be shut.
 
-    For paths, ``reach`` is within which a zone's ground tells its levels: at each node (``up``, ``down``, room for it)
-    as ``steep`` (of the nodes of a lattice ``fineness`` times coarser) lets it be, or, ``exact``, as nodes are.
+    For paths, ground within ``reach`` decides levels of datum `BESIDE`. How far it rises and falls at each node
+    (``up``, ``down``: work arrays) is guessed from ``steep``, the slopes at the nodes of a lattice ``fineness`` times
+    coarser, or, if ``exact``, read from the nodes around.
     """
     for j in range(len(span)):
         for i in range(around[j, 0], min(around[j, 1], excess.shape[1] - 1)):
@@ -136,7 +139,7 @@ def stamp_zones(
                 deepest = max(max(west, east), max(north_east, north_west))
                 shallowest = min(min(west, east), min(north_east, north_west))
                 if shallowest > 0.0 and zones[z, PAIR] == 0.0 and not under and zones[z, TOP] < np.inf:
-                    # The whole cell is under a lid, which is what must be flown over: bilinear, as ground is.
+                    # The zone covers the whole cell and can only be flown over: its top is bilinear, as the ground is.
                     twist = _twist(floor, ground, j, i) if zones[z, TOP_AGL] > 0.0 else 0.0
                     for k in range(4):
                         jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
@@ -158,7 +161,7 @@ def stamp_zones(
 
 @device
 def _looks_beside(zones: Floats, z: int) -> bool:
-    """Whether a level is told by what is within reach."""
+    """Whether a level of a zone depends on ground within reach: its datum is `BESIDE`."""
     if zones[z, PAIR] > 0.0 and max(zones[z, TOP_2_AGL], zones[z, BOTTOM_2_AGL]) >= BESIDE:
         return True
     return bool(max(zones[z, TOP_AGL], zones[z, BOTTOM_AGL]) >= BESIDE)
@@ -168,7 +171,8 @@ def _looks_beside(zones: Floats, z: int) -> bool:
 def _guess_beside(
     around: Ints, steep: Floats, fineness: int, boxes: Ints, z: int, reach: float, up: Floats, down: Floats
 ) -> None:
-    """How far the ground rises and falls within reach of a zone's nodes, at most."""
+    """Set ``up`` and ``down`` at a zone's nodes to the most that ground of slope ``steep`` rises and falls within
+    reach."""
     for j in range(boxes[z, 2], boxes[z, 3] + 2):
         for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
             jj, ii = min(j // fineness, len(steep) - 2), min(i // fineness, steep.shape[1] - 2)
@@ -184,8 +188,9 @@ def _look_beside(
     around: Ints, excess: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
     z: int, reach: float, up: Floats, down: Floats,
 ) -> None:  # fmt: skip
-    """How far, up and down, that ground of a zone differs from the ground below a node which is within reach, by which
-    the zone is grown; by what is known of other nodes, or not at all where there is none."""
+    """Set ``up`` and ``down`` at nodes to how far the zone's own ground within reach rises above, and falls below, the
+    ground there. The zone is grown by ``reach``, so its own ground is where it is deeper than that. Only nodes with
+    known ground count; 0 if there is none."""
     row, col = min(boxes[z, 2], len(x) - 2), min(boxes[z, 0], x.shape[1] - 2)
     col = min(max(col, around[row, 0]), x.shape[1] - 2)
     across = math.sqrt((x[row, col + 1] - x[row, col]) ** 2 + (y[row, col + 1] - y[row, col]) ** 2)
@@ -222,9 +227,9 @@ def lift_lids(
     around: Ints, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
     cap: float, rim: float, lift: Floats, either: NDArray[np.int8],
 ) -> None:  # fmt: skip
-    """By how much the zones over each node of ``around`` (``lift``) are higher than its floor that can be flown over
-    below ``cap``, no deeper in them than ``rim``: who does not get past that does not get farther in. ``either``
-    (zeros): 1 where one of them can be flown under, too."""
+    """Set ``lift`` at each node of ``around`` to how far, m, zones there that can be flown over below ``cap`` are
+    higher than the floor; 0 where there is none. Only nodes at most ``rim`` deep in a zone count: a path that does not
+    get past those gets no farther in. Set ``either`` (zeros before) to 1 where one of them can be flown under, too."""
     blank(lift, around, 0.0)
     for z in range(len(zones)):
         if zones[z, PAIR] > 0.0 or zones[z, TOP] == np.inf:
@@ -241,7 +246,7 @@ def lift_lids(
 
 @device
 def over_ground(zones: Floats, z: int) -> bool:
-    """Whether a level of a zone past which one may fly is told over ground."""
+    """Whether a zone has a level over ground (AGL) past which a path may fly."""
     under_agl = zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0
     return bool(under_agl or (zones[z, TOP] < np.inf and zones[z, TOP_AGL] > 0.0))
 
@@ -250,8 +255,9 @@ def over_ground(zones: Floats, z: int) -> bool:
 def shut_over(
     ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, z: int, j: int, i: int
 ) -> tuple[float, float]:
-    """Up to which altitude, and from which on, one may fly somewhere in a cell that lies in a zone as a whole.
-    Everywhere, the two infinite and the wrong way round, where it does not lie in it, or that is not known."""
+    """The altitudes (bottom, top) that a zone shuts everywhere over a cell which lies wholly in it: below and above
+    them, some place of the cell may be free. (inf, -inf), so nothing is shut, if it does not lie wholly in the zone, or
+    that is not known."""
     bottom, top = -np.inf, np.inf
     for k in range(4):
         jj, ii = j + (k >> 1), i + (k & 1)
@@ -269,13 +275,13 @@ def narrow_ranges(
     ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, exact: bool, low: Floats,
     high: Floats,
 ) -> None:  # fmt: skip
-    """Raise the lowest, and lower the highest, altitude that can be flown at somewhere in each cell (rows - 1,
-    cols - 1), where zones leave one way past them alone. Where they leave none both are infinite, the wrong way round.
+    """Raise the lowest, and lower the highest, altitude that can be flown at somewhere in each cell (``low``, ``high``:
+    (rows - 1, cols - 1)) where a zone can be passed on one side only; inf and -inf where it can be passed on neither.
 
-    ``exact``: whether the ground's nodes are the terrain model's own, or a part of its cells'; levels over others are
-    not known.
+    ``exact``: whether the lattice's cells are the terrain model's own, or parts of them. Over other lattices, levels
+    over ground are not known.
     """
-    for _ in range(2):  # what one zone leaves may shut another's way
+    for _ in range(2):  # what one zone shuts may leave one side of another only
         for z in range(len(zones)):
             if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):
                 continue
@@ -293,7 +299,7 @@ def narrow_ranges(
 
 @device
 def _put(of: Ints, values: Floats, cell: int, wall: Floats, count: int) -> int:
-    """Give a cell a wall (its corners' values come first), if it stands anywhere; returns how many walls there are."""
+    """Store a cell's wall, its values at the corners, if it is above 0 at any; return how many walls there are."""
     if max(max(wall[0], wall[1]), max(wall[2], wall[3])) <= 0.0:
         return count
     for k in range(4):
@@ -305,8 +311,8 @@ def _put(of: Ints, values: Floats, cell: int, wall: Floats, count: int) -> int:
 
 @device
 def _twist(floor: Floats, ground: Floats, j: int, i: int) -> float:
-    """How far the ground's patch may lie from its triangles in a cell that is cut as the floor wants it; 0 where the
-    floor is as twisted."""
+    """Metres that the ground's bilinear patch may lie from its triangles in a cell that is cut to suit the floor; 0 if
+    the floor is the ground plus a constant."""
     same = floor[j, i] - ground[j, i]
     for q in range(1, 4):
         jj, ii = j + (q >> 1), i + ((q ^ (q >> 1)) & 1)
@@ -320,12 +326,13 @@ def _in_part(
     excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, of: Ints, values: Floats, wall: Floats,
     least: float, j: int, i: int, count: int,
 ) -> int:  # fmt: skip
-    """Shut the part of a cell that certainly lies in a zone and can be passed neither over nor under it there.
+    """Shut the part of a cell that certainly lies in a zone where it can be passed neither over nor under.
 
-    ``wall``: how deep its corners lie in the zone, ``least`` at least. What tells that is the least of functions that
-    are concave, or linear and not above the bilinear ones, in either triangle; a linear function between its corners
-    lies nowhere above it. Where the ground is not what floors are measured from, its patch may be cut the wrong way,
-    and nothing is said of what is below a level over it. Returns how many walls there are.
+    ``wall``: how deep the cell's corners lie in the zone; ``least``: the least of these. A place is shut if the minimum
+    of depth and heights is above 0. In either triangle, each of these is concave, or linear and not above the bilinear
+    function; so linear values between the corners are nowhere above the minimum. If floors are not measured from the
+    ground, the ground's patch may be cut along the wrong diagonal: the top is lowered by `_twist`, and a zone that can
+    be passed under a floor over ground shuts nothing. Returns how many walls there are.
     """
     spare, under = 0.0, zones[z, UNDER] > 0.0
     if zones[z, TOP_AGL] > 0.0 or (under and zones[z, BOTTOM_AGL] > 0.0):
@@ -338,14 +345,14 @@ def _in_part(
         shut = level(zones, z, TOP, g) - floor[jj, ii] + excess[jj, ii] - spare
         if under:
             shut = min(shut, floor[jj, ii] - level(zones, z, BOTTOM, g))
-        # All of the cell is inside, if its corners are.
+        # The whole cell is inside if its corners are, so depth does not matter then.
         wall[k] = shut if least > 0.0 else min(shut, wall[k])
     return _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
 
 
 @device
 def _meets(zones: Floats, z: int, x: Floats, y: Floats, j: int, i: int) -> bool:
-    """Whether a disc reaches into the box around a cell."""
+    """Whether a disc reaches into the bounding box of a cell."""
     west, east = min(x[j, i], x[j + 1, i]), max(x[j, i + 1], x[j + 1, i + 1])
     south, north = min(y[j, i], y[j, i + 1]), max(y[j + 1, i], y[j + 1, i + 1])
     dx = zones[z, EAST] - min(max(zones[z, EAST], west), east)
@@ -358,8 +365,8 @@ def _more_between(
     zones: Floats, edges: Floats, z: int, depths: Floats, deepest: float, shallowest: float, x: Floats, y: Floats,
     j: int, i: int,
 ) -> float:  # fmt: skip
-    """How much deeper in a shape a place of a cell may lie than is linear between its corners: what is concave lies
-    above that. -inf where all of the cell surely lies outside."""
+    """How far, m, the depth at a place of a cell may exceed the linear value between its corners, for depth is concave.
+    -inf if all of the cell surely lies outside."""
     dx, dy = x[j + 1, i + 1] - x[j, i], y[j + 1, i + 1] - y[j, i]
     square = dx * dx + dy * dy
     if zones[z, RADIUS] >= 0.0:
@@ -377,8 +384,8 @@ def _more_between(
 
 @device
 def _is_kinked(zones: Floats, edges: Floats, z: int, depths: Floats, x: Floats, y: Floats, j: int, i: int) -> bool:
-    """Whether the least of a shape's linear functions is not linear over a cell, whose corners lie so deep in it: then
-    no one edge binds at all four."""
+    """Whether the least of a zone's linear functions is not linear over a cell: no single edge binds at all four
+    corners, whose ``depths`` are known."""
     for k in range(int(zones[z, FIRST]), int(zones[z, LAST])):
         alone = True
         for q in range(4):

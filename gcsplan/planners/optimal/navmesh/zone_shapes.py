@@ -1,4 +1,4 @@
-"""Zones as the lattice wants them: discs and convex polygons, a hair smaller for bounds, a hair larger for paths."""
+"""Zones as the lattice takes them: discs and convex polygons, slightly smaller for bounds and larger for paths."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ Ints = NDArray[np.int32]
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Metres: how far a lattice's nodes may lie beside the terrain model's (``bent_m``); and for this and for rounding,
-    by how much a bound's floors and zones are lower and smaller (``spare_m``), a path's higher and larger (``hair_m``).
-    """
+    """Margins in metres: how far a lattice's nodes may lie beside the terrain model's (``bent_m``); and, to make up for
+    that and for rounding, by how much floors are lower and zones smaller for bounds (``spare_m``), higher and larger
+    for paths (``hair_m``)."""
 
     bent_m: float
     spare_m: float
@@ -44,19 +44,20 @@ class Fit:
 
 
 TOUCH_M = 1e-6
-"""By so little too high is not too high, where nothing but the arithmetic is inexact."""
+"""Metres of overlap in height that are allowed where only the arithmetic is inexact."""
 
 LOOSE, CLOSE = Fit(0.03, 0.05, 0.07), Fit(0.003, 0.01, 0.07)
-"""As long as rows of cells may be pieces, and where slits a few centimetres wide count."""
+"""`LOOSE` lets long rows of cells be one piece; `CLOSE` is for where slits a few centimetres wide count."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Shapes:
-    """Convex parts of zones, and crossings of two: ``low`` and ``high`` (numbers (K, NUMBERS), forms (E, 4)) for bounds
-    and for paths.
+    """Convex parts of zones, and crossings of two parts: numbers (K, NUMBERS) and forms (E, 4), ``low`` for bounds and
+    ``high`` for paths.
 
-    A form is a half-plane a - b x - c y > 0, or a disc (radius, x, y, 1). ``boxes`` (K, 4) first and last column and
-    row of the cells that each part may touch, ``owner`` (K, 2) its zones, ``cells`` how many cells all boxes have.
+    A form is a half-plane a - b x - c y > 0, or a disc (radius, x, y, 1). ``boxes`` (K, 4): first and last column,
+    first and last row of the cells that each part may touch; ``owner`` (K, 2): indices of its zones (twice the same,
+    or both of a crossing); ``cells``: number of cells in all boxes.
     """
 
     low: tuple[Floats, Floats]
@@ -67,12 +68,12 @@ class Shapes:
 
 
 def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Shapes:
-    """The zones that reach into a lattice of nodes ``x``, ``y`` (rows, cols).
+    """Make the shapes of the zones that reach into a lattice of nodes ``x``, ``y`` (rows, cols).
 
-    Levels over ground are those over the zone's own ground, which tells what may be flown beside it too. There, a level
-    is known by the ground below but for what that rises within reach. So such a zone is laid down twice: as it is, and
-    grown, with levels moved by so much: the most that it rises anywhere, or, for paths, there, where cells are no
-    smaller than that.
+    A level over ground (AGL) counts from the ground in the zone itself, also where it limits flight beside the zone,
+    within reach. There, the ground below gives the level with an error of as much as the ground rises within reach. So
+    such a zone is laid down twice: as it is, and grown by the reach with its levels moved by that rise. The rise is the
+    most anywhere at the zone, or, for paths on cells no smaller than the reach, what it is around each node (`BESIDE`).
     """
     air, limits = problem.airspace, problem.limits
     reach = air.beside_m(limits)
@@ -80,10 +81,9 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     box = float(x.min()), float(y.min()), float(x.max()), float(y.max())
     found: list[tuple[int, Zone, Floats | None]] = []
     moved: list[float] = []
-    """By how much levels over ground are moved; 0: by nothing, and the zone is not grown."""
+    """Metres by which each part's levels over ground are moved; 0: they are not, and a part with such is not grown."""
     for number, zone in enumerate(air.zones):
         west, south, east, north = zone.bounds
-        # A zone above or below all that may be flown stands in nobody's way.
         if west - reach > box[2] or east + reach < box[0] or south - reach > box[3] or north + reach < box[1]:
             continue
         parts: list[Floats | None] = [None]
@@ -105,7 +105,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
             for level, at, more in ((zone.floor, BOTTOM, -1.0), (zone.ceiling, TOP, 1.0)):
                 if level is not None:
                     over_ground = level.datum == "agl"
-                    # What is told in AMSL is not rounded: a zone may be as high as the ceiling.
+                    # For paths, AMSL levels get no margin for rounding: a zone may be exactly as high as the ceiling.
                     off = sign * off_m if over_ground or sign < 0.0 else -TOUCH_M
                     row[at] = level.value_m + more * (limits.altitude_error_m + off)
                     row[at + 2] = over_ground
@@ -126,7 +126,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
                 forms.append(_half_planes(part, grow, inner=sign < 0.0))
                 bounds[k] = np.concatenate([part.min(axis=0) - grow, part.max(axis=0) + grow])
         for k, (a, b) in enumerate(pairs, len(found)):
-            # Where two zones cross, an altitude that suits the one may not suit the other.
+            # Where two zones cross, an altitude that is free of one may lie in the other.
             rows[k] = rows[a]
             rows[k, [RADIUS, PAIR]] = -1.0, 1.0
             rows[k, BOTTOM_2 : TOP_2_AGL + 1] = rows[b, BOTTOM : TOP_AGL + 1]
@@ -145,12 +145,13 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
 
 
 def _follows(zone: Zone) -> bool:
-    """Whether a level of a zone follows the ground."""
+    """Whether the floor or the ceiling of a zone follows the ground (AGL)."""
     return any(level is not None and level.datum == "agl" for level in (zone.floor, zone.ceiling))
 
 
 def _rise(problem: Problem, zone: Zone, reach: float, box: tuple[float, float, float, float]) -> float:
-    """How much the ground under a zone may differ from that at a place within reach; 0 where its levels are fixed."""
+    """Metres by which the ground under a zone may differ from the ground at a place within reach, at most; 0 if neither
+    floor nor ceiling follows the ground."""
     if reach <= 0.0 or not _follows(zone):
         return 0.0
     surface = problem.airspace.surface
@@ -168,13 +169,13 @@ def _rise(problem: Problem, zone: Zone, reach: float, box: tuple[float, float, f
 
 
 def _crossing(found: list[tuple[int, Zone, Floats | None]], reach: float) -> list[tuple[int, int]]:
-    """Pairs of parts that may cross, of zones that each alone may be passed above or below."""
+    """Pairs of parts that may cross, of two zones each of which, by itself, may be passed above or below."""
     some = [k for k, (_, zone, _) in enumerate(found) if zone.floor is not None or zone.ceiling is not None]
     out = []
     for n, a in enumerate(some):
         for b in some[n + 1 :]:
             p, q = found[a][1], found[b][1]
-            # Both over, or both under, is passed as the higher (lower) of the two.
+            # Two that can both be passed only above (or only below) are passed as the higher (lower) of them.
             one_way = (p.floor is None and q.floor is None) or (p.ceiling is None and q.ceiling is None)
             if found[a][0] == found[b][0] or one_way:
                 continue
@@ -186,7 +187,8 @@ def _crossing(found: list[tuple[int, Zone, Floats | None]], reach: float) -> lis
 
 
 def _half_planes(part: Floats, reach: float, *, inner: bool) -> Floats:
-    """A convex polygon grown by ``reach``, round at its corners: a polygon inside that shape, or around it."""
+    """(E, 4) half-planes of a convex polygon grown by ``reach``, with round corners: they form a polygon inside that
+    shape (``inner``), or around it."""
     rows = []
     d = np.roll(part, -1, axis=0) - part
     normal = np.stack([d[:, 1], -d[:, 0]], axis=-1) / np.hypot(*d.T)[:, None]
@@ -195,19 +197,19 @@ def _half_planes(part: Floats, reach: float, *, inner: bool) -> Floats:
         middle = n + normal[k - 1]
         size = float(np.hypot(*middle))
         if reach > 0.0 and size > 1e-9:
-            # Across the corner: the chord of its arc from inside, the tangent from outside.
+            # One more edge across the corner: the chord of its arc (inner), or the tangent to it.
             m = middle / size
             rows.append((m @ p + reach * (0.5 * size if inner else 1.0), m[0], m[1], 0.0))
     return np.array(rows)
 
 
 def convex_parts(vertices: Floats) -> list[Floats]:
-    """Convex polygons, counter-clockwise, that make up a simple polygon."""
+    """Split a simple polygon into convex polygons, counter-clockwise."""
     d = np.roll(vertices, -1, axis=0) - vertices
     turn = d[:, 0] * np.roll(d[:, 1], -1) - d[:, 1] * np.roll(d[:, 0], -1)
     if (turn >= 0.0).all() and math.isclose(_turns(d), 1.0, abs_tol=0.1):
         return [vertices]
-    import shapely  # most missions have no polygons
+    import shapely  # imported here: most missions have no polygons
 
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.Polygon(vertices)))
     rings = [np.asarray(t.exterior.coords)[:-1] for t in triangles]
@@ -215,14 +217,15 @@ def convex_parts(vertices: Floats) -> list[Floats]:
 
 
 def _turns(d: Floats) -> float:
-    """How often a closed way with steps ``d`` turns round."""
+    """Full turns of a closed line with steps ``d`` (N, 2), counter-clockwise."""
     e = np.roll(d, -1, axis=0)
     angle = np.arctan2(d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0], (d * e).sum(axis=1))
     return float(angle.sum() / (2.0 * np.pi))
 
 
 def _cells(bounds: Floats, x: Floats, y: Floats) -> Ints:
-    """Columns and rows of the cells whose nodes' box may meet each of ``bounds`` (K, 4); clipped to the lattice."""
+    """(K, 4) first and last column, first and last row of the cells whose nodes' bounding box may meet each of
+    ``bounds`` (K, 4: west, south, east, north); clipped to the lattice."""
     rows, cols = x.shape
     west, east = x.min(axis=0), x.max(axis=0)
     south, north = y.min(axis=1), y.max(axis=1)
