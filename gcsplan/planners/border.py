@@ -1,7 +1,7 @@
-"""The border of the terrain that was looked at: what a path that leaves it must cost, and whether any path can.
+"""The border of the loaded terrain: the least cost of a path that crosses it, and whether any path can.
 
-A surface is a window of the terrain that a mission knows (`Surface.goes_on`). What is found out within the window holds
-for all paths if those that cross its border cost no less.
+A surface is a window of the terrain that a mission knows (`Surface.goes_on`). A bound or a proof found within the
+window holds for all paths if every path that crosses the border costs at least as much.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Zone
 
 PIECES = 8
-"""Straight pieces of one side of a window, which the plane bends."""
+"""Straight pieces that approximate one side of a window; in the plane a side is curved."""
 INSET_CELLS = 1.0
-"""Cells at the border that count as beyond it, besides what a path keeps to unknown ground."""
+"""Cells along the border that count as beyond it, in addition to the distance that paths keep from unknown ground."""
 TOUCH_M = 0.01
-"""What zones are taken for smaller by, where it is asked whether they shut a place in."""
+"""Metres by which zones are shrunk in the test whether they enclose a place."""
 
 
 def goes_on(problem: Problem) -> bool:
-    """Whether the terrain goes on beyond the surface, in a way that may matter to ``problem``.
+    """Whether the terrain goes on beyond the surface and a path there could matter to ``problem``.
 
-    Over flat ground it does not where no zone lies across the border: the parts of a path beyond it can be laid along
-    the border, at the same heights and no longer, and as long as they were by waving beside it.
+    Over flat ground it does not matter if no zone lies across the border: the parts of a path beyond the border can be
+    laid along it at the same altitudes and no longer, or as long as before by zigzagging beside it.
     """
     surface = problem.airspace.surface
     if not any(surface.goes_on):
@@ -54,8 +54,8 @@ def goes_on(problem: Problem) -> bool:
 
 
 def exit_cost(problem: Problem) -> float:
-    """What a path that leaves the surface where the terrain goes on costs at least, metres or joules by the objective;
-    inf where it goes on nowhere that matters."""
+    """The least cost of a path that leaves the surface where the terrain goes on, metres or joules by the objective;
+    inf if `goes_on` is false."""
     if not goes_on(problem):
         return math.inf
     lines, bow_m = border(problem)
@@ -74,10 +74,10 @@ def exit_cost(problem: Problem) -> float:
 
 
 def within_m(problem: Problem) -> float:
-    """Metres from the straight way to the nearest border where the terrain goes on; inf without one."""
+    """Metres from the straight track to the nearest border where the terrain goes on; inf without one."""
     if not goes_on(problem):
         return math.inf
-    import shapely  # for words alone
+    import shapely  # needed for messages only
 
     lines, _ = border(problem)
     terminals = terminals_of(problem)
@@ -86,7 +86,8 @@ def within_m(problem: Problem) -> float:
 
 
 def margin_for(problem: Problem, cost: float) -> float:
-    """How far around the terminals a path may lead that costs ``cost``; inf for all costs."""
+    """Metres around the terminals within which every path of at most ``cost`` lies, with the distance kept from unknown
+    ground; inf if ``cost`` is infinite or metres along the track cost nothing."""
     if math.isinf(cost):
         return math.inf
     legs = [math.dist(a, b) for a, b in pairwise(terminals_of(problem))]
@@ -100,8 +101,8 @@ def margin_for(problem: Problem, cost: float) -> float:
 
 
 def border(problem: Problem) -> tuple[Floats, float]:
-    """(K, 2, 2) lines of the plane that every path crosses which leaves the surface where the terrain goes on, and how
-    far the true ones may bow away from them, metres."""
+    """(K, 2, 2) lines that every path crosses which leaves the surface where the terrain goes on; and by how many
+    metres the true, curved border may bow away from them."""
     surface = problem.airspace.surface
     rows, cols = surface.ground_m.shape
     keep = np.full(2, _reach_m(problem.airspace, problem.limits)) / _least_step_m(surface)
@@ -120,17 +121,17 @@ def border(problem: Problem) -> tuple[Floats, float]:
 
 
 def enclosed(problem: Problem) -> bool:
-    """True if start, vias and goal are shut off from each other, and at least one of each two from the border: then no
-    ground beyond joins them.
+    """Whether walls separate two terminals from each other and at least one of them from the border: then no path can
+    join them, not even over terrain beyond the surface.
 
-    Walls are ground over max AMSL, cell by cell, and zones that can be passed neither over nor under, by their shapes.
+    Walls are cells whose ground is over max AMSL, and the shapes of zones that can be passed neither over nor under.
     """
     return _by_ground(problem) or _by_zones(problem)
 
 
 def _by_ground(problem: Problem) -> bool:
-    """The same for cells of the raster alone: one is shut if its lowest corner with min AGL is over max AMSL, or if one
-    is unknown. Cells that touch at a corner are joined."""
+    """`enclosed` by cells of the raster alone. A cell is shut if its lowest corner plus min AGL is over max AMSL, or if
+    a corner is unknown. Cells that touch at a corner are joined. Also true if a terminal lies in a shut cell."""
     from scipy.ndimage import label
 
     surface, limits = problem.airspace.surface, problem.limits
@@ -143,7 +144,7 @@ def _by_ground(problem: Problem) -> bool:
     rows, cols = top.shape
     at = surface.grid(*np.array(terminals_of(problem)).T)
     cells = np.clip(np.floor(at).astype(int), 0, [cols - 2, rows - 2])
-    # What keeps off the border is not seen to reach it: a few cells more are looked at.
+    # Paths keep `reach` away from the border, so a strip of that width and two more cells counts as the border.
     reach = _reach_m(problem.airspace, limits) / _least_step_m(surface)
     c, r = (min(math.ceil(v) + 2, n - 1) for v, n in zip(reach, (cols, rows), strict=True))
     west, north, east, south = surface.goes_on
@@ -155,8 +156,8 @@ def _by_ground(problem: Problem) -> bool:
 
 
 def _by_zones(problem: Problem) -> bool:
-    """The same for zones alone, over ground of any height."""
-    import shapely  # where no path was found alone
+    """`enclosed` by zones alone, over ground of any height."""
+    import shapely  # needed only where no path was found
 
     air, limits = problem.airspace, problem.limits
     top = math.inf if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
@@ -177,18 +178,19 @@ def _by_zones(problem: Problem) -> bool:
     for terminal in shapely.points(terminals_of(problem)):
         at = [k for k, p in enumerate(free) if p.intersects(terminal)]
         if not at:
-            return False  # in a wall by rounding alone: its refusal is another one
+            return False  # the terminal is in a wall, but only by rounding: `check_ends` has passed it
         numbers.add(-1 if any(leaves[k] for k in at) else at[0])
     return len(numbers) > 1
 
 
 def _is_wall(zone: Zone, top_m: float) -> bool:
+    """Whether a zone reaches from the ground to above ``top_m`` AMSL everywhere."""
     high = zone.ceiling
     return zone.floor is None and (high is None or (high.datum == "amsl" and high.value_m > top_m))
 
 
 def _shape(zone: Zone, reach_m: float) -> Any:
-    """A zone grown by ``reach_m``, or a little less: chords lie within their arcs."""
+    """The polygon of a zone grown by ``reach_m``; slightly too small, because chords lie inside their arcs."""
     import shapely
 
     if isinstance(zone.shape, Circle):
@@ -198,26 +200,26 @@ def _shape(zone: Zone, reach_m: float) -> Any:
 
 
 def _bounds(zone: Zone, air: Airspace, limits: Limits) -> tuple[float, float, float, float]:
-    """A zone's box with all that paths keep from it."""
+    """West, south, east, north of a zone's box, grown by the distance that paths keep from the zone."""
     west, south, east, north = zone.bounds
     more = _reach_m(air, limits) + (air.scale - 1.0) * max(east - west, north - south)
     return west - more, south - more, east + more, north + more
 
 
 def _reach_m(air: Airspace, limits: Limits) -> float:
-    """What paths keep from unknown ground, and a little."""
+    """Metres that paths keep from unknown ground, with one percent and `TOUCH_M` added."""
     return air.beside_m(limits) * 1.01 + TOUCH_M
 
 
 def _least_step_m(surface: Surface) -> Floats:
-    """(2,) the shortest column and row steps of a surface, metres."""
+    """(2,) the shortest column step and row step of a surface, metres; a lower bound."""
     rows, cols = surface.ground_m.shape
     at = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
     return np.asarray(0.999 * np.min([surface.grid.metres_per_cell(*p) for p in at.tolist()], axis=0))
 
 
 def _past(a: Floats, b: Floats, lines: Floats) -> float:
-    """The shortest way from ``a`` over one of ``lines`` (K, 2, 2) to ``b``: straight to the line, mirrored on."""
+    """Length of the shortest track from ``a`` via one of ``lines`` (K, 2, 2) to ``b``, by reflection at the line."""
     p, d = lines[:, 0], lines[:, 1] - lines[:, 0]
     length = np.maximum(np.hypot(*d.T), 1e-9)
     u = d / length[:, None]

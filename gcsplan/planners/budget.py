@@ -1,9 +1,9 @@
-"""What one plan may take: counted work, counted bytes, and the clock as a last stop.
+"""The limits of one plan: counted work, counted bytes, and the clock as a last stop.
 
-Work is counted in seconds of a plain processor, by the sizes of what is worked on (`RATES`), so that the same question
-stops at the same place on every machine and beside any load. A budget in seconds buys a part of itself in counted work
-(`COUNTED`): a machine that is that much slower, or that busy, still ends within it. The clock stops only a plan that is
-slower yet; then the result depends on the machine and says so (``stopped_by: time``).
+Work is counted in seconds of a plain processor, computed from the sizes of what is processed (`RATES`). So the same
+problem stops at the same point on every machine and under any load. A budget in seconds allows only a part of itself as
+counted work (`COUNTED`), so a machine that is slower or busier by that factor still finishes in time. The clock stops
+only a plan that is slower still; the result then depends on the machine and says so (``stopped_by: time``).
 """
 
 from __future__ import annotations
@@ -28,23 +28,22 @@ RATES = {
     "sighted": 1e-6,
     "walked": 0.7e-6,
 }
-"""Counted seconds of a lattice's node made ready, a mesh's portal and an interval opened on one, a call of the exact
-check with what is made of it, a leg under it, a piece of ground that it cuts beside a leg, a cell of terrain that the
-leg crosses, a piece of a tube, a place whose
-floor is read, a corner of an outline triangulated, a label of the lattice search, a point of a line that is pulled, for
-each size of move, and a node that an end of a leg is looked at from, or walked to. Rounded from a fit over plans of all
-kinds."""
+"""Counted seconds of each unit of work, rounded from a fit over plans of all kinds: ``node`` prepared of a lattice,
+``portal`` of a mesh, interval ``opened`` on a portal, call of the exact ``check`` with the use of its result, ``leg``
+checked, piece of ground ``cut`` beside a leg, ``cell`` of terrain that a leg crosses, ``piece`` of a tube, ``place`` whose floor is read, ``corner`` of an
+outline triangulated, ``label`` of the lattice search, point of a line to ``pull`` (for each size of move), node
+``sighted`` from an end of a leg, and node ``walked`` to from there."""
 COUNTED = 0.4
-"""What part of the budget's seconds may be spent as counted work."""
+"""Part of the budget's seconds that may be spent as counted work."""
 FIRST, FIRST_S = 3.0, 0.5
-"""How many times ``budget_s`` the search for a first path may take, and how many seconds on top."""
+"""The search for a first path may take this many times ``budget_s``, and this many seconds more."""
 SPARE_S = 0.5
-"""Taken off the clock's last stop, for what is under way when it comes."""
+"""Seconds subtracted from the clock's last stop, for the work in progress when it comes."""
 
 
 @dataclass(eq=False)
 class Budget:
-    """Of one plan: seconds and megabytes that are allowed, and what has been spent."""
+    """Seconds and megabytes that one plan may take, and the counted work spent so far."""
 
     seconds: float
     megabytes: float
@@ -52,18 +51,18 @@ class Budget:
     spent: float = 0.0
     """Counted seconds so far."""
     clocked_out: bool = False
-    """Whether the clock stopped something, so that another run may end elsewhere."""
+    """Whether the clock stopped a search, so that another run may end differently."""
     ran_out: bool = False
     """Whether counted work ran out."""
     _first_s: float | None = None
     _first_spent: float = 0.0
 
     def spend(self, what: str, count: float) -> None:
-        """Count work: so many of what `RATES` names."""
+        """Count ``count`` units of the work ``what``, a key of `RATES`."""
         self.spent += RATES[what] * count
 
     def found_first(self) -> None:
-        """From here on the budget counts for what comes after the first path."""
+        """Start the budget for improvements: call when the first path is found; later calls do nothing."""
         if self._first_s is None:
             self._first_s, self._first_spent = time.perf_counter(), self.spent
 
@@ -80,13 +79,14 @@ class Budget:
 
     @property
     def deadline_s(self) -> float:
-        """The clock's last stop, as `time.perf_counter` gives it."""
+        """The clock's last stop, on the scale of `time.perf_counter`."""
         if self._first_s is None:
             return self.begun_s + FIRST * self.seconds + FIRST_S
         return self._first_s + max(self.seconds - SPARE_S, 0.5 * self.seconds)
 
     def goes_on(self, part: float = 1.0) -> bool:
-        """Whether there is work and time left; ``part`` of what is allowed after the first path may be spent by now."""
+        """Whether counted work and time are left; records which of them ran out. ``part``: the part of the counted work
+        after the first path that may be spent by now."""
         allowed = COUNTED * self.seconds
         if self.left <= (1.0 - part) * allowed:
             self.ran_out = True
@@ -97,7 +97,7 @@ class Budget:
         return True
 
     def fits(self, seconds: float, megabytes: float) -> bool:
-        """Whether so much counted work and memory is left."""
+        """Whether that many counted seconds and megabytes are left."""
         return seconds <= self.left and megabytes <= self.left_mb
 
     @property
@@ -107,5 +107,5 @@ class Budget:
 
     @classmethod
     def endless(cls) -> Budget:
-        """For a problem that nobody set limits for."""
+        """A budget without limits."""
         return cls(math.inf, math.inf)

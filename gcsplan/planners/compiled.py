@@ -1,4 +1,4 @@
-"""Kernels of lattice, optimal and profile: plain functions, marked, that run as machine code. See `gcsplan.native`."""
+"""Kernels of lattice, optimal and profile: decorated plain functions that run as machine code; see `gcsplan.native`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ UNIT = Unit(
 )
 
 device = UNIT.device
-"""A function that only kernels call; nothing is allocated in it."""
+"""Decorator of a function that only kernels call; it allocates nothing."""
 
 kernel = UNIT.kernel
-"""What Python calls. Nothing is allocated in it: Python hands in the room and comes back with more if it is short."""
+"""Decorator of a function that Python calls. It allocates nothing: Python passes in the arrays to work in, and calls
+again with larger ones if they are too small."""

@@ -1,6 +1,6 @@
-"""What would help where there is no path: one thing is changed at a time, and the changed problem is planned.
+"""What would help where there is no path: change one limit at a time and plan the changed problem.
 
-A limit's value is reported only if the planner found a path with it. `Trials` bounds number and time of the plans.
+A limit's value is reported only if the planner found a path with it. `Trials` bounds the number and time of the plans.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from gcsplan.world.zones import Circle, Zone
 Place = tuple[float, float]
 
 NAMES, SINGLES = 5, 8
-"""No-fly zones that are named, and that are tried alone, at most."""
+"""Most no-fly zones that are named in a message, and that are removed one at a time."""
 STEEPEST_DEG, STEEPEST_TURNING_DEG = 90.0, 45.0
-"""No climb limit; and what the mission file allows a fixed wing at most."""
+"""Climb angle that means no limit; and the largest that the mission file allows a fixed wing."""
 ROUNDED_M = 0.05
-"""What the rounding of way points to whole centimetres may take from a ceiling, with room to spare."""
+"""Metres that rounding way points to whole centimetres may cost below a ceiling; generous."""
 LEVEL = Level(math.inf, 40_000)
-"""Lattice on which the height of the lowest pass is guessed."""
+"""Lattice on which the altitude of the lowest pass is estimated."""
 PIECES = 2_000
-"""Places along one leg at which the floor is read, at most."""
+"""Most places along one leg at which the ground is read."""
 
 
 def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
-    """``bare``, the refusal of ``problem``, and what would help: that is planned with ``plan`` before it is reported.
+    """The refusal ``bare`` of ``problem``, extended by what would help; every cure is planned before it is reported.
 
-    ``plan`` returns a solution of a changed problem or raises NoMission. The time is looked at between two plans, and
-    when one reports progress: a planner that keeps ``budget_s`` keeps the whole short.
+    ``plan`` returns a solution of a changed problem or raises NoMission. The clock is read between two plans and
+    whenever a plan reports progress, so the whole stays short if the planner keeps ``budget_s``.
     """
     if not bare.untried:
         return bare
     trials = Trials(problem, plan)
-    # Searches in the plane prove that ceilings and zones shut every path; of climbs they know little.
+    # The searches in the plane can prove that ceilings and zones shut every path; they know little of climb limits.
     order = LIFTS if bare.reason == "infeasible" else LIFTS[::-1]
     lifts = [lift for lift in order if lift.binds(problem)]
     cures: list[Cure] = []
@@ -66,7 +66,7 @@ def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
     if untried:
         words.append(f"not tried in {trials.share_s:.0f} s: without {_list([lift.name for lift in untried], 'or')}")
     shown = next((cure for cure in cures if cure.place is not None), None)
-    if bare.east_m is not None and bare.north_m is not None:  # what the search itself ran into comes first
+    if bare.east_m is not None and bare.north_m is not None:  # the place that stopped the search itself comes first
         shown = Cure("", (bare.east_m, bare.north_m), bare.place_of)
     return Refusal(
         "; ".join(words),
@@ -76,12 +76,12 @@ def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
     )
 
 
-# -- what may be lifted --------------------------------------------------------------------------------------------
+# -- limits that may be lifted --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Cure:
-    """What helps, in words, and the place where."""
+    """A change that helps, in words for the message, and the place that it concerns."""
 
     words: str
     place: Place | None = None
@@ -90,13 +90,13 @@ class Cure:
 
 @dataclass(frozen=True, slots=True)
 class Lift:
-    """A limit, or the zones: whether it ``binds`` at all, the problem without it, and what of it would do."""
+    """A limit, or all zones: whether it ``binds`` in a problem at all, the problem without it, the cure to report."""
 
     name: str
     binds: Callable[[Problem], bool]
     lifted: Callable[[Problem], Problem]
     cure: Callable[[Trials, Floats], Cure]
-    """From a path without it."""
+    """From a path (N, 3) without the limit: finds the least change of it that suffices."""
 
 
 def _limited(problem: Problem, **changed: float | None) -> Problem:
@@ -127,7 +127,8 @@ def _ceiling(trials: Trials, path: Floats) -> Cure:
 
 
 def _lowest_pass(problem: Problem, enough: float) -> float:
-    """Whole metres: the lowest max_amsl_m under which a coarse lattice without climb limits holds a way; a guess."""
+    """Estimate the lowest max_amsl_m that would do, in whole metres and at most about ``enough``: the lowest one under
+    which a coarse lattice without climb limits has a route."""
     free = _limited(problem, max_amsl_m=None, max_climb_deg=STEEPEST_DEG, max_descent_deg=STEEPEST_DEG)
     router = Router.at(free, LEVEL)
     low = max(float(problem.limits.max_amsl_m or 0.0) - problem.limits.altitude_error_m, 0.0)
@@ -164,7 +165,7 @@ def _steepest_deg(problem: Problem) -> float:
 
 
 def _metres_over(given: float, needed_m: float) -> float:
-    """Whole metres that hold what is needed, and are more than is given."""
+    """The least whole metres that are at least ``needed_m`` (plus `ROUNDED_M`) and more than ``given``."""
     return float(max(math.ceil(needed_m + ROUNDED_M), math.floor(given) + 1))
 
 
@@ -186,7 +187,8 @@ def _above_ground(trials: Trials, path: Floats) -> Cure:
 
 
 def _fewer_zones(trials: Trials, path: Floats) -> Cure:
-    """Zones that a path without any breaks into: which of them alone, or else all of them, must go."""
+    """Find which zones must go, among those that a path planned without zones enters: one of them alone, or else all of
+    them."""
     problem, zones = trials.problem, trials.problem.airspace.zones
     broken = problem.airspace.examine(Legs.of_path(path, problem.limits), problem.limits).violations
     crossed = sorted({v.zone for v in broken if v.zone >= 0})
@@ -213,7 +215,7 @@ def _fewer_zones(trials: Trials, path: Floats) -> Cure:
 
 
 def _together(trials: Trials, lifts: Sequence[Lift]) -> Cure:
-    """What must be lifted together, where nothing alone helps."""
+    """Find which limits must be lifted together where lifting any one of them alone does not help."""
     names = _list([lift.name for lift in lifts], "or")
     if not lifts:
         return Cure("no limit and no zone is in the way: unknown ground, or the edge of the known terrain, is")
@@ -250,7 +252,7 @@ LIFTS = (
         _climbing,
     ),
 )
-"""What is tried, in this order where it is proved that there is no path; else from the last to the first."""
+"""The limits that are lifted: in this order where it is proved that there is no path, else from last to first."""
 
 
 # -- words ---------------------------------------------------------------------------------------------------------
@@ -264,18 +266,18 @@ def floor_words(limits: Limits) -> str:
 
 
 def rounded_up(metres: float) -> float:
-    """To a tenth, never down: what is set to the value must do."""
+    """``metres`` rounded up to a tenth, never down: a limit that is set to the reported value must do."""
     return float(np.ceil(metres * 10.0 - 1e-6)) / 10.0
 
 
 def _list(names: Sequence[str], last: str = "and") -> str:
-    """``a, b and c``; no more than `NAMES`."""
+    """The names as ``a, b and c``; if they are many, the first `NAMES` and how many more."""
     shown = [*names[:NAMES], f"{len(names) - NAMES} more"] if len(names) > NAMES + 1 else list(names)
     return f" {last} ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
 
 
 def _over_highest_ground(problem: Problem, path: Floats) -> tuple[float, Place]:
-    """Where a path has the highest ground under it, and its altitude there."""
+    """The path's altitude AMSL over the highest ground under it, and that place (east_m, north_m)."""
     step_m = 0.25 * float(problem.airspace.surface.grid.metres_per_cell(*problem.start[:2]).min())
     pieces = [path[:1]]
     for a, b in pairwise(path):

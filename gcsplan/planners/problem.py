@@ -1,4 +1,4 @@
-"""What every planner is asked, what it answers, and the refusal where it has no answer."""
+"""The input of every planner (`Problem`), its result (`Solution`), and its refusal where there is no result."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from gcsplan.world.path import Path
 Objective = Literal["length", "energy"]
 
 ENDS_M = 25.0
-"""Bounds over a line are conservative, in rough ground by this much at worst; so whether start and goal themselves are
-legal is not read from them."""
+"""Metres by which floors and ceilings over a line, which are conservative, are too strict in rough ground at worst. So
+they do not decide whether start and goal themselves are legal (`refusal.check_ends` does)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Via:
-    """A point to pass; ``amsl_m`` None leaves its height free."""
+    """A point that the path must pass; ``amsl_m`` None leaves its altitude free."""
 
     east_m: float
     north_m: float
@@ -36,7 +36,7 @@ class Via:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Said now and then while planning: seconds since the call, best cost so far, bound (either may be None)."""
+    """A progress report of a plan: seconds since the call, best cost so far, lower bound (either may be None)."""
 
     elapsed_s: float
     cost: float | None
@@ -46,15 +46,14 @@ class Progress:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Problem:
-    """From ``start`` to ``goal`` (east_m, north_m, amsl_m), past ``via`` in order.
+    """Find a path from ``start`` to ``goal`` (east_m, north_m, amsl_m) that passes every ``via`` in order.
 
-    ``limits`` already hold the margins for wire rounding, so a path that `Airspace.examine` passes under them
-    passes the final check too. Metres only: a planner never sees a degree. ``options`` are what only some planners
-    know: the swarms' ``encoding``, ``cost``, ``points``, ``population``, ``iterations``, ``evaluations`` and
-    ``parameters``.
+    ``limits`` already include the margins for wire rounding, so a path that passes `Airspace.examine` under them passes
+    the final check too. Metres only: a planner never sees a degree. ``options`` are keys that only some planners know:
+    the swarms' ``encoding``, ``cost``, ``points``, ``population``, ``iterations``, ``evaluations``, ``parameters``.
 
-    ``widen(margin_m, budget_mb)``: the same question over more terrain, at least so far around all terminals (inf:
-    twice as far as here) if memory allows; None where it does not, or where there is no more; `Surface.goes_on` tells
+    ``widen(margin_m, budget_mb)``: the same problem over more terrain, at least ``margin_m`` around all terminals (inf:
+    twice as far as here) if memory allows; None if it does not, or if there is no more terrain; `Surface.goes_on` shows
     which.
     """
 
@@ -77,7 +76,7 @@ class Problem:
     widen: Callable[[float, float], Problem | None] | None = None
 
     def leg_costs(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(...) cost of straight legs between points (..., 3), as `cost` sums them."""
+        """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""
         d = end - start
         flat = np.hypot(d[..., 0], d[..., 1])
         if self.objective == "energy":
@@ -85,7 +84,7 @@ class Problem:
         return np.asarray(np.hypot(flat, d[..., 2]))
 
     def legal(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(N,) whether straight legs from ``start`` (N, 3) to ``end`` pass the exact check; counted as work."""
+        """(N,) whether straight legs from ``start`` (N, 3) to ``end`` (N, 3) pass the exact check; counted as work."""
         if not len(start):
             return np.zeros(0, np.bool_)
         grid = self.airspace.surface.grid
@@ -98,7 +97,7 @@ class Problem:
         return legal
 
     def floors(self, east_m: NDArray[np.float64], north_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Lowest legal altitudes over places, as `Airspace.floor_amsl` has them; counted as work."""
+        """Lowest legal altitudes AMSL over places, see `Airspace.floor_amsl`; counted as work."""
         self.budget.spend("place", np.size(east_m))
         return self.airspace.floor_amsl(east_m, north_m, self.limits)
 
@@ -111,8 +110,8 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One search of a plan: its name, seconds by the clock and megabytes by count, and by how many percent the best
-    path became cheaper and the bound higher through it. ``refused``: it did not fit into what was left."""
+    """The record of one search of a plan: name, seconds by the clock, megabytes by count, and by how many percent it
+    made the best path cheaper and the lower bound higher. ``refused``: it did not fit into the rest of the budget."""
 
     name: str
     s: float
@@ -124,14 +123,14 @@ class Step:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
-    """A path that `Airspace.examine` passes, and what is known about the best one.
+    """A path that passes `Airspace.examine`, and a lower bound of the best one.
 
-    ``lower_bound`` holds for every feasible path of the stated model, in the objective's unit; None where the
-    planner has none. ``stopped_by``: gap, exhausted, budget, evaluations, time. ``notes`` are said to the user.
-    ``flown``: the track that ``path``'s points are flown by on, where there is a turn radius; None where corners are
-    flown as they are. Of planners that search by samples: ``raw_violations``, how many limits the exact check found
-    broken in the result of the search itself, and whether it was ``repaired``; None of all others.
-    ``problem``: what was answered, where that is the problem over more terrain than it was asked for.
+    ``lower_bound`` holds for every feasible path of the stated model, in the objective's unit; None if the planner has
+    none. ``stopped_by``: gap, exhausted, budget, evaluations, time. ``notes`` are shown to the user. ``flown``: the
+    path on arcs that the aircraft flies past ``path``'s points, if there is a turn radius; None if corners are flown as
+    they are. For planners that search by samples: ``raw_violations``, the number of limits that the exact check found
+    broken in the search's own result, and whether it was ``repaired``; None for all others. ``problem``: the problem
+    that was solved, if that is the original one over more terrain.
     """
 
     path: Path
@@ -148,10 +147,10 @@ class Solution:
 
 
 class Refusal(NoMission):
-    """No mission, and where: ``east_m``, ``north_m`` of the binding place, None where there is no one place.
+    """There is no mission: why, and ``east_m``, ``north_m`` of the binding place, None if there is no single place.
 
-    ``place_of``: what is at that place, where the message does not say so.
-    ``untried``: another limit, or fewer zones, may help, and none has been tried yet (`refusal.with_cures` does).
+    ``place_of``: what is at that place, if the message does not say so.
+    ``untried``: another limit, or fewer zones, may help, and none has been tried yet (`cures.with_cures` does so).
     """
 
     def __init__(
@@ -171,10 +170,10 @@ class Refusal(NoMission):
 
 
 def terminals_of(problem: Problem) -> list[tuple[float, float]]:
-    """Start, every via, goal: (east_m, north_m)."""
+    """(east_m, north_m) of the start, every via, and the goal."""
     return [problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]]
 
 
 def straight_way_m(problem: Problem) -> float:
-    """Metres of the straight track from terminal to terminal."""
+    """Length in metres of the straight track from terminal to terminal."""
     return sum(math.dist(a, b) for a, b in pairwise(terminals_of(problem)))

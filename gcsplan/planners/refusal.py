@@ -1,7 +1,7 @@
-"""Why there is no path: ends that break a limit by themselves, and the refusal after a search in vain.
+"""Why there is no path: terminals that break a limit by themselves, and the refusal after a search without success.
 
-A planner's own refusal says only whether there is no path, which is then proved, or none was found; what would help is
-tried out by `cures`.
+A planner's own refusal says only whether it is proved that there is no path, or that none was found; `cures` then tries
+out what would help.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from gcsplan.world.limits import Limits
 
 
 class NoPath(Refusal):
-    """A search found no path over the terrain that it looked at; over more of it there may be one."""
+    """A search found no path over the loaded terrain; over more terrain there may be one."""
 
 
 def explain(problem: Problem, *, proved: bool | None = None, plan: Plan | None = None) -> Refusal:
-    """The refusal for a problem whose ends are legal and for which there is no path; ``proved``: that is known.
+    """The refusal for a problem whose terminals are legal and for which no path was found.
 
-    Where the terrain goes on beyond the surface, it is proved only if no path can get there from both ends. With
-    ``plan``, the refusal says what would help, see `with_cures`; without, whoever receives it may ask for that.
+    ``proved``: whether it is proved that there is none; where the terrain goes on beyond the surface, `enclosed`
+    decides that instead. With ``plan``, the refusal says what would help, see `with_cures`; without it, the caller may
+    add that later.
     """
     words = "no path was found"
     if goes_on(problem):
@@ -41,7 +42,8 @@ def explain(problem: Problem, *, proved: bool | None = None, plan: Plan | None =
 
 
 def check_ends(problem: Problem) -> None:
-    """Raise Refusal if start, a via or the goal breaks a limit by itself."""
+    """Raise Refusal if start, a via or the goal breaks a limit by itself, or if all are one place with nothing to fly,
+    or if two in a row are one place at different altitudes (except a climb from start to goal without vias)."""
     terminals = terminals_of(problem)
     heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
     names = ["the start", *(f"via point {k + 1}" for k in range(len(problem.via))), "the goal"]
@@ -98,7 +100,7 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
             continue
         bottom, top, *over_ground = levels_of(limits, zone).tolist()
         ground = float(air.surface.ground_at(*place)) if any(over_ground) else 0.0
-        # Where the ground is unknown a level over it is no way past.
+        # Over unknown ground, a zone's floor or ceiling AGL cannot be evaluated, so the zone has no open side there.
         if over_ground[0]:
             bottom = -math.inf if math.isnan(ground) else bottom + ground
         if over_ground[1]:

@@ -1,4 +1,4 @@
-"""The table of all planners: what each is, where it comes from, and how to call it. Cheap to import."""
+"""The table of all planners: what each one is, its source, and how to call it. Cheap to import."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from gcsplan.errors import unknown_name
 from gcsplan.planners.problem import Problem, Solution
 
 VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
-"""Those of a swarm's ``parameters`` that tell of the flight volume's six sides, metres of the plane and AMSL."""
+"""Keys of a swarm's ``parameters`` for the six sides of the flight volume, metres in the plane and metres AMSL."""
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One planner; ``module`` holds its ``plan`` and is imported on the first call only.
+    """One planner; ``module`` holds its ``plan`` and is imported only on the first call.
 
-    ``paper`` is its source, empty where it is our own; ``defaults`` its parameters as `Problem` has them, or of a
-    swarm (``optimiser``, a name of `gcsplan.optimisers.registry`) as ``Problem.options`` has them.
+    ``paper`` is its source, empty if it is gcsplan's own. ``optimiser`` names a swarm's optimiser in
+    `gcsplan.optimisers.registry`, empty otherwise. ``defaults`` are fields of `Problem`; for a swarm, keys of
+    ``Problem.options``.
     """
 
     name: str
@@ -31,7 +32,7 @@ class Entry:
     optimiser: str = ""
 
     def plan(self, problem: Problem) -> Solution:
-        """A safe path for ``problem``. Raises NoMission where none exists or was found."""
+        """A safe path for ``problem``. Raises NoMission if none exists or none was found."""
         run = import_module(self.module).plan
         if self.optimiser:
             return cast(Solution, run(problem, self.optimiser, self.defaults))
@@ -39,7 +40,7 @@ class Entry:
 
 
 def _swarm(name: str, summary: str, paper: str, system: Mapping[str, object], **own: object) -> Entry:
-    """A row for an optimiser with its paper's encoding and cost, ``own`` defaults on top."""
+    """The table's row for an optimiser: its paper's encoding and cost (``system``), then its ``own`` defaults."""
     return Entry(
         name=name,
         summary=summary,
@@ -56,7 +57,7 @@ _MSFOA_PAPER = "Shi et al. 2020, Applied Sciences 10, 2822"
 _ABO_PAPER = "Li et al. 2024, adaptive budgerigar optimization"
 _IB_ABC_PAPER = "Tan et al. 2023, Robotica 41, 1244-1257"
 
-# What each paper searches: D where it is silent (the number of points of MSFOA and IB-ABC).
+# The search space of each paper. D, our decision where the paper is silent: the number of points of MSFOA and IB-ABC.
 _KRILL: Mapping[str, object] = {"encoding": "box", "cost": "krill", "points": 5, "population": 50, "iterations": 100}
 _SSGWO: Mapping[str, object] = {"encoding": "box", "cost": "ssgwo", "points": 30, "population": 30, "iterations": 500}
 _MSFOA: Mapping[str, object] = {"encoding": "box", "cost": "msfoa", "points": 5, "population": 100, "iterations": 200}
@@ -102,7 +103,7 @@ def names() -> tuple[str, ...]:
 
 
 def get(name: str) -> Entry:
-    """The planner called ``name``. Raises InputError that names the nearest known one."""
+    """The planner called ``name``. Raises InputError, which suggests the nearest known name, if there is none."""
     entry = TABLE.get(name)
     if entry is None:
         raise unknown_name(f"there is no planner {name!r}", name, TABLE)

@@ -1,7 +1,7 @@
-"""A legal path made shorter and simpler by many small moves at once, each put to the exact check.
+"""Make a legal path shorter and simpler by many small moves at once; every move must pass the exact check.
 
-Most of the work is the exact check's, so nothing is put to it twice: what is known of a move holds until a point that
-it depends on has moved, and the second leg of a move is looked at only where the first is legal.
+Most of the work is the exact check, so no leg is checked twice for the same move: the result for a move stays valid
+until a point that it depends on moves, and the second leg of a move is checked only if the first is legal.
 """
 
 from __future__ import annotations
@@ -18,17 +18,19 @@ Ints = NDArray[np.intp]
 Marks = NDArray[np.int8]
 
 PARTS = np.array([1.0, 0.5, 0.22, 0.1, 0.04, 0.015])
-"""How far a point is moved towards the line between its neighbours, as parts of the way."""
+"""How far a point is moved towards the line between its neighbours, as parts of the distance to that line."""
 ROUNDS = 24
+"""Most rounds of moves; each round moves the points of odd and then of even index."""
 LITTLE = 2e-6
-"""A round of moves that gains no more, as a part of the cost, is the last."""
+"""A round that gains at most this part of the cost is the last."""
 
 OPEN, LEGAL, SHUT = 0, 1, 2
-"""What is known of a choice: nothing, that its legs are legal, or that one is not."""
+"""State of a choice: not checked, all its legs are legal, or one of them is not."""
 
 
 def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, Bools]:
-    """Move free points towards the lines between their neighbours, in space and in the plane, as far as is legal."""
+    """Move free points towards the lines between their neighbours as far as is legal: in space, in the plane alone, or
+    in altitude alone. Returns the points (N, 3) and ``pinned`` (N,), which of them are terminals, unchanged."""
     cost = _cost(problem, points)
     points = points.copy()
     still = np.zeros(len(points), np.bool_)
@@ -43,9 +45,9 @@ def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, B
 
 
 def _move(problem: Problem, points: Floats, pinned: Bools, still: Bools, parity: int) -> None:
-    """Move every second point to the cheapest of its legal places, in place.
+    """Move every second point to the cheapest of its legal places; changes ``points``.
 
-    ``still`` (N,) points that have no cheaper one, which is so until a neighbour moves; kept up to date.
+    ``still`` (N,): points without a cheaper legal place, until they or a neighbour move; updated here.
     """
     at = np.arange(1 + parity, len(points) - 1, 2)
     at = at[~(pinned[at] | still[at])]
@@ -56,7 +58,7 @@ def _move(problem: Problem, points: Floats, pinned: Bools, still: Bools, parity:
     flat = (chord[:, :2] ** 2).sum(axis=1)
     t = ((here - before)[:, :2] * chord[:, :2]).sum(axis=1) / np.maximum(flat, 1e-12)
     foot = before + np.clip(t, 0.0, 1.0)[:, None] * chord
-    aims = np.stack([foot, foot, here], axis=1)  # (n, 3, 3): in space, in the plane alone, in height alone
+    aims = np.stack([foot, foot, here], axis=1)  # (n, 3, 3): in space, in the plane alone, in altitude alone
     aims[:, 1, 2], aims[:, 2, 2] = here[:, 2], foot[:, 2]
     places = here[:, None, None] + PARTS[None, None, :, None] * (aims - here[:, None])[:, :, None]
     places = places.reshape(len(at), -1, 3)
@@ -79,12 +81,12 @@ def _move(problem: Problem, points: Floats, pinned: Bools, still: Bools, parity:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Choices:
-    """Ways to do with one point less, a row for each stretch of a path (N, 3): N - 2 with one point inside, then N - 3
-    with two.
+    """The choices to remove one point, a row for each stretch of a path (N, 3): first the N - 2 stretches with one
+    inner point, then the N - 3 with two.
 
-    ``first``, ``last`` (R,): points that a stretch begins and ends with; ``mids`` (R, 12, 3): places for the one point
-    inside instead of two, where ``allowed`` (R, 12). With one point inside there is one choice, to leave it out: then
-    the place is that of ``first``.
+    ``first``, ``last`` (R,): indices of the points at which a stretch begins and ends. ``mids`` (R, 12, 3): places of
+    the one point that may replace two inner ones; valid where ``allowed`` (R, 12). For a stretch with one inner point
+    the only choice is to leave it out; its place is then that of ``first``.
     """
 
     first: Ints
@@ -94,13 +96,13 @@ class _Choices:
 
 
 def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tuple[Floats, Bools]:
-    """Fewer points: one left out, or two made one where their outer legs meet, all of it for ``worth`` at most."""
+    """Remove points: leave one out, or replace two by one (see `_choices`), cheapest first. All removals together may
+    cost at most ``worth``. Returns the points and which of them are ``pinned`` (those stay)."""
     spent = 0.0
     came_from, marks = np.full(len(points), -1), np.zeros((0, 12), np.int8)
     while len(points) > 2:
         choices = _choices(points, pinned)
         first, last, mids = choices.first, choices.last, choices.mids
-        # Costs of what is now, and of what would be instead.
         now = np.concatenate([[0.0], np.cumsum(problem.leg_costs(points[:-1], points[1:]))])
         extra = problem.leg_costs(points[first][:, None], mids) + problem.leg_costs(mids, points[last][:, None])
         extra -= (now[last] - now[first])[:, None]
@@ -130,9 +132,10 @@ def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tupl
 
 
 def _choices(points: Floats, pinned: Bools) -> _Choices:
-    """Of a path's points all that could be done with one less; see `_Choices`.
+    """All choices to remove one point of a path; see `_Choices`.
 
-    One place instead of two points: either's, the middle, or where the outer legs meet, at three heights each.
+    Two points may be replaced by one at the place of either, midway, or where the outer legs meet; each place at three
+    altitudes: those of both points and the mean.
     """
     n = len(points)
     one, two = np.arange(n - 2), np.arange(n - 3)
@@ -161,9 +164,10 @@ def _choices(points: Floats, pinned: Bools) -> _Choices:
 
 
 def _still_known(marks: Marks, came_from: Ints) -> Marks:
-    """What is known of the choices of a path whose points were those of the path before, or are new (-1).
+    """The states of a path's choices that remain valid from the path before.
 
-    ``marks``: of the choices of the path before; nothing is known of a stretch with a new or another point in it.
+    ``came_from`` (N,): index of each point in the path before, -1 if it is new; ``marks``: the states of that path's
+    choices. A stretch whose points are not the same ones in a row is `OPEN` again.
     """
     n, before = len(came_from), (len(marks) + 5) // 2
     known = np.zeros((2 * n - 5, 12), np.int8)
@@ -176,7 +180,7 @@ def _still_known(marks: Marks, came_from: Ints) -> Marks:
 
 
 def _look(problem: Problem, points: Floats, choices: _Choices, asked: Bools, marks: Marks) -> None:
-    """Put the choices that are ``asked`` for (R, 12) to the exact check, and mark them."""
+    """Run the exact check on the choices where ``asked`` (R, 12), and record the result in ``marks`` (R, 12)."""
     row, column = np.nonzero(asked)
     first, last, place = choices.first[row], choices.last[row], choices.mids[row, column]
     legal = np.ones(len(row), np.bool_)

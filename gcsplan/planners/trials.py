@@ -1,4 +1,4 @@
-"""Plans of changes to a problem for which there is no path: bounded in number and time."""
+"""Plans of changed versions of a problem for which no path was found, bounded in number and time."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 Plan = Callable[[Problem], Solution]
 
 TRIES = 32
-"""Plans of changed problems, at most."""
+"""Most plans of changed problems."""
 SHARE, LEAST_S = 0.3, 1.0
-"""No plan begins after this part of ``budget_s``, or after this time where that is more."""
+"""No plan begins after this part of ``budget_s``, or after this many seconds if that is more."""
 GRACE_S = 1.0
-"""A plan that goes on for so long beyond that is stopped as soon as the planner reports progress."""
+"""A plan that runs this many seconds beyond that time is stopped at its next progress report."""
 PARTS = 12
-"""One plan's ``budget_s`` is this part of that time."""
+"""The ``budget_s`` of one plan is that time divided by this number."""
 VALUES = 9
-"""Values of one limit that are tried, at most."""
+"""Most values of one limit that are tried."""
 ANY_PERCENT = 1e6
-"""Gap with which the first path is good enough."""
+"""Wanted gap so large that the first path is good enough."""
 HIGHEST_M, LEAST_DEG = 9500.0, 0.05
-"""No higher ceiling and no smaller climb limit is tried."""
+"""The highest ceiling, metres, and the smallest climb limit, degrees, that are tried."""
 
 
 class Trials:
-    """Plans of changes to one problem: at most `TRIES`, and none begun later than a share of ``budget_s``."""
+    """Plans of changed versions of one problem: at most `TRIES`, and none begun after ``share_s`` seconds."""
 
     def __init__(self, problem: Problem, plan: Plan) -> None:
         self.problem, self._plan = problem, plan
@@ -38,11 +38,11 @@ class Trials:
         self._begun_s = time.perf_counter()
         self._left = TRIES
         self.stopped = False
-        """Whether the last plan was stopped: nothing is known of its problem."""
+        """Whether the last plan was stopped, so that it is not known whether its problem has a path."""
 
     @property
     def spent(self) -> bool:
-        """Whether nothing more is tried."""
+        """Whether no further plan is to be begun."""
         return self.stopped or self._left <= 0 or time.perf_counter() - self._begun_s >= self.share_s
 
     def _watch(self, progress: Progress) -> None:
@@ -51,7 +51,8 @@ class Trials:
             raise Refusal("no mission: no path was found in the time for it", reason="not_found")
 
     def path(self, changed: Problem, what: str) -> Floats | None:
-        """(N, 3) points of a path of a changed problem; None where the planner refuses. ``what`` is changed."""
+        """(N, 3) points of a path of a changed problem; None if the planner refuses. ``what`` names the change in
+        progress reports."""
         self._left -= 1
         if self.problem.progress is not None:
             words = f"no path; tries {what}"
@@ -64,7 +65,10 @@ class Trials:
         return solution.path.points
 
     def least(self, name: str, at: Callable[[float], Problem], given: float, enough: float, values: Values) -> Least:
-        """The least value over ``given`` that was found to do, beginning with ``enough``, which may or may not."""
+        """The least value over ``given`` with which a path was found; ``at(value)`` is the problem with it.
+
+        The first value tried is ``enough``, which need not suffice; ``name`` of the limit, for progress reports.
+        """
         bad, good, found = given, enough, Least()
         for _ in range(VALUES):
             value = good if found.path is None else values.between(bad, good)
@@ -82,20 +86,22 @@ class Trials:
 
 @dataclass(slots=True)
 class Least:
-    """The least value that did, with its path, and the largest under it that did not; NaN, None: there is none."""
+    """The least value with which a path was found, that path, and the largest value below it without one; NaN and None
+    where there is none."""
 
     value: float = math.nan
     path: Floats | None = None
     in_vain: float = math.nan
 
     def words(self, given: str) -> str:
-        """What was given, and what does not do."""
+        """The bracketed words of a message: the value that was ``given``, and the one that does not suffice."""
         return f"({given}" + ("" if math.isnan(self.in_vain) else f", with {self.in_vain:g} none is found") + ")"
 
 
 @dataclass(frozen=True, slots=True)
 class Values:
-    """Which values of a limit are tried: ``between`` two, the first of which does not do, and ``beyond`` the last."""
+    """The next values of a limit to try: ``between(bad, good)`` after an insufficient and a sufficient one, or
+    ``beyond(given, value)`` after ``value`` was insufficient and none has sufficed; never more than ``most``."""
 
     between: Callable[[float, float], float]
     beyond: Callable[[float, float], float]
@@ -103,7 +109,8 @@ class Values:
 
 
 def metres_from(guess: float) -> Values:
-    """Whole metres: no lower than a ``guess``, and close to it rather than half-way; 0: nobody knows."""
+    """Values in whole metres: none lower than ``guess``, and a quarter of the interval above the insufficient value
+    instead of half-way; ``guess`` 0: unknown."""
     part = 0.25 if guess > 0.0 else 0.5
     return Values(
         between=lambda bad, good: float(max(math.floor(bad + part * (good - bad)), math.floor(bad) + 1, guess)),
@@ -112,7 +119,7 @@ def metres_from(guess: float) -> Values:
     )
 
 
-# From the side that does: values just over the given one are those that take a planner longest to refuse.
+# Climb limits are approached from the sufficient side: planners take longest to refuse values just over the given one.
 DEGREES = Values(
     between=lambda bad, good: bad if good <= 1.1 * bad else two_digits(max(0.5 * good, math.sqrt(bad * good))),
     beyond=lambda given, value: two_digits(2.0 * value),
@@ -121,6 +128,6 @@ DEGREES = Values(
 
 
 def two_digits(value: float) -> float:
-    """``value`` rounded up to two digits that count."""
+    """``value`` rounded up to two significant digits."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return round(math.ceil(value / unit - 1e-9) * unit, 9)

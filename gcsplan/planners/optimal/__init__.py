@@ -1,1 +1,1 @@
-"""The planner `optimal`: paths below altitude caps, and a bound that no path can beat; `planner` is its door."""
+"""The planner `optimal`: paths below altitude caps, and a bound that no path can beat; its entry point is `planner`."""

@@ -1,8 +1,8 @@
-"""The least energy between altitude caps: what no path that goes as high as this, and no higher, can do without.
+"""A lower bound of energy from pairs of altitude caps, for paths whose highest point lies between the two.
 
-A path whose highest point lies between two caps flies a track that is legal below the upper one, and climbs at least
-to the lower. So the shortest track below the upper cap and the climb to the lower are a bound for all such paths;
-intervals of caps are halved until none of them can hold anything better than what was found.
+Such a path flies a track that is legal below the upper cap, and climbs at least to the lower cap. So the shortest track
+below the upper cap plus the climb to the lower one is a bound for all such paths. Intervals between caps are halved
+until none of them can hold a better path than the best one found.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from gcsplan.planners.problem import Problem
 
 MOST_CAPS = 40
 NARROW_M = 0.25
-"""Caps nearer to each other are not told apart."""
+"""Metres; an interval between two caps that is narrower is not halved."""
 
 
 @dataclass(slots=True)
 class Layer:
-    """Paths whose highest point lies between ``low_m`` and ``high_m``: tracks of ``track_m`` at least, as far as was
-    looked at with that ``care``."""
+    """Paths whose highest point lies between ``low_m`` and ``high_m``. Their tracks are at least ``track_m`` long, a
+    bound that was computed with ``care`` (0 or 1)."""
 
     low_m: float
     high_m: float
@@ -30,7 +30,8 @@ class Layer:
     care: int = 0
 
     def cost(self, rise: Callable[[float], float], vertical: float, horizontal: float) -> float:
-        """No such path costs less; ``rise`` metres are climbed and descended in all by one that touches a height."""
+        """A lower bound of the energy of such paths. ``rise(amsl_m)``: least metres climbed and descended in all by a
+        path that reaches an altitude; ``vertical``, ``horizontal``: joules per metre."""
         return vertical * rise(self.low_m) + horizontal * self.track_m
 
 
@@ -43,10 +44,10 @@ def search_caps(
     gap: float,
     in_time: Callable[[], bool],
 ) -> float:
-    """Split the cheapest layer until it costs no less than the best path, but for ``gap`` (a part). Returns the bound.
+    """Split the cheapest layer until its cost is within ``gap`` (a part) of the best path's. Returns the lower bound.
 
-    ``track_m(cap, care)`` bounds tracks below a cap; more care costs more and tells more (0 or 1). ``try_at(cap)``
-    looks for a path below a cap.
+    ``track_m(cap, care)``: a lower bound of tracks below a cap; care 1 costs more and bounds better than care 0.
+    ``try_at(cap)`` looks for a path below a cap; ``best()``: cost of the best path; ``in_time()``: whether to go on.
     """
     for _ in range(MOST_CAPS):
         layers.sort(key=cost_of)
@@ -69,7 +70,7 @@ def search_caps(
 
 
 def above_all(problem: Problem) -> float:
-    """An altitude above everything that could be in the way."""
+    """An altitude AMSL, metres, above all ground, zone ceilings and terminals, with at least 100 m to spare."""
     surface, limits = problem.airspace.surface, problem.limits
     high = float(np.nanmax(surface.top_m))
     tops = [0.0]

@@ -1,4 +1,4 @@
-"""How large the cells of a leg's lattices are: as small as leg and zones want them, and no more than memory allows."""
+"""The cell sizes of a leg's lattices: as small as leg and zones need them, and as many cells as memory allows."""
 
 from __future__ import annotations
 
@@ -13,23 +13,25 @@ from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle
 
 COARSE_M = 100.0
-"""Cells of the first look are no larger, if the terrain model's are not."""
+"""Largest cells wanted for the first-look lattice, metres, unless the terrain model's own are larger."""
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
-"""Cells are cut until they are about as wide, or that part of the leg, but into no more parts a side."""
+"""Cells of the finer lattice are about as wide as the smaller of `FINE_M` metres and the leg's length / `FINE_PARTS`;
+but a cell is cut into at most `MOST_FINE` parts a side."""
 LEAST_M = 1.0
-"""Cells are cut no smaller: walls of zones are drawn between nodes where they are, and ground is straight in there."""
+"""Smallest cells, metres: zone walls are drawn at their true place between nodes, and the ground within a cell is
+straight, so smaller cells gain nothing."""
 MOST_FIRST, NODE_BYTES = 1.5e6, 400.0
-"""Nodes of the first look's lattice, at most, and what one takes with its mesh and a search over that."""
+"""Most nodes of the first-look lattice, and bytes of one with its mesh and a search over it."""
 BOX_NODE_BYTES = 50.0
-"""What a node of the finer lattice takes, looked at or not."""
+"""Bytes of a node in the box of the finer lattice, whether it is searched or not."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """``parts``: a side that the terrain model's cells are cut into, where they are large beside leg or zones; or
-    ``stride``: how many become one in the first look, and ``fine_stride`` in the finer lattice. ``ratio``: how many
-    parts a side the first look's cells are cut into where it matters, in its own lattice (``cut``) or in the finer one.
-    ``nodes``: of the first look, about."""
+    """``parts``: parts a side into which the terrain model's cells are cut, if they are large compared with leg or
+    zones; or ``stride``: terrain cells a side that are merged into one in the first-look lattice, and ``fine_stride``
+    in the finer lattice. ``ratio``: parts a side into which first-look cells are cut where it matters, within their own
+    lattice (``cut``) or by the finer lattice. ``nodes``: of the first-look lattice, about."""
 
     parts: int
     stride: int
@@ -45,7 +47,7 @@ class Cells:
 
 
 def choose(problem: Problem, place: tuple[float, float], straight_m: float, box: Box) -> Cells:
-    """The cells for a leg that begins at ``place``, ``straight_m`` long, over a box."""
+    """The cell sizes for a leg of ``straight_m`` metres that begins at ``place``, for lattices over a box."""
     surface = problem.airspace.surface
     size = surface.grid.metres_per_cell(*place)
     col0, row0, col1, row1 = extent(problem, box)
@@ -54,7 +56,7 @@ def choose(problem: Problem, place: tuple[float, float], straight_m: float, box:
     wanted_m = max(_wanted_m(problem, straight_m), LEAST_M, math.sqrt(area_m2 / most))
     cell_m, finest_m = float(size.max()), max(min(FINE_M, straight_m / FINE_PARTS), LEAST_M)
     parts = max(1, round(cell_m / wanted_m))
-    # Between nodes that are left out heights are guessed, so few are better kept.
+    # Merged cells only bound the heights between their nodes, so cells are merged only if that saves many nodes.
     fine_stride = 1 if parts > 1 or finest_m < 2.0 * cell_m else round(finest_m / cell_m)
     stride = fine_stride * max(1, round(wanted_m / cell_m / fine_stride))
     if parts > 1 or stride < 3:
@@ -66,7 +68,7 @@ def choose(problem: Problem, place: tuple[float, float], straight_m: float, box:
 
 
 def _wanted_m(problem: Problem, straight_m: float) -> float:
-    """How large cells may be for the first look."""
+    """Cell width for the first look, metres, from the length of the leg and the sizes of the zones."""
     least, most = straight_m / 250.0, min(straight_m / 60.0, COARSE_M)
     radii = [
         z.shape.radius_m
@@ -78,7 +80,8 @@ def _wanted_m(problem: Problem, straight_m: float) -> float:
 
 
 def fits_memory(problem: Problem, cells: NDArray[np.bool_], beside: int, ratio: int) -> bool:
-    """Whether a lattice ``ratio`` times finer over the box of some cells, and ``beside`` more, fits into memory."""
+    """Whether a lattice ``ratio`` times finer over the box of ``cells``, widened by ``beside`` cells on each side, fits
+    into memory."""
     row, col, last_row, last_col = box_of(cells)
     nodes = (last_row - row + 2 * beside) * (last_col - col + 2 * beside) * ratio**2
     return nodes * BOX_NODE_BYTES <= 1e6 * problem.budget.left_mb

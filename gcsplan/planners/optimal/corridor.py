@@ -1,4 +1,4 @@
-"""What tracks from terminal to terminal that are short enough may meet of the plane."""
+"""Corridors (the cells that short enough tracks between two terminals may meet), and tracks joined at terminals."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.mesh import Guide
 
 Spare = tuple[float, float]
-"""Metres that a path may fly in laps near its start and near its goal."""
+"""Metres that a path may fly in laps near its start, and near its goal."""
 PinnedTrack = tuple[Floats, Bools, Floats]
-"""A track (N, 2), which of its points are terminals, and their altitudes (NaN free)."""
+"""A track (N, 2), which of its points are terminals (N,), and their altitudes (N,) AMSL (NaN where free)."""
 
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """A terminal: where, and how high; None where its height is free."""
+    """A terminal: its place and altitude; None if its altitude is free."""
 
     east_m: float
     north_m: float
@@ -32,23 +32,23 @@ class End:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Corridor:
-    """(rows - 1, cols - 1) the cells of a leg's lattice that tracks of some length may enter, and how far the goal is
-    from there at least."""
+    """The ``cells`` (rows - 1, cols - 1) of a leg's lattice that tracks up to some length may enter, and the ``guide``
+    with lower bounds of their distance to the goal."""
 
     cells: Bools
     guide: Guide
 
     def within(self, cells: Bools) -> Corridor:
-        """That part of it which lies in some of the guide's mesh's cells."""
+        """The part of the corridor in ``cells`` of the guide's mesh."""
         return Corridor(self.cells & self.guide.mesh.over_plane(cells), self.guide)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Nearby:
-    """What tracks shorter than ``limit_m`` may meet, and how far that is from start and goal.
+    """The cells that tracks shorter than ``limit_m`` may meet; guides from the start (``away``) and goal (``left``).
 
-    Of all cells of the guides' mesh (cells,) the lowest and the highest altitude that can be flown at, and how long
-    ways there and on are at least.
+    For all cells of the guides' mesh (cells,): the lowest and the highest altitude that can be flown at, and lower
+    bounds of the track from the start to the cell (``away_m``) and from there to the goal (``left_m``).
     """
 
     limit_m: float
@@ -61,7 +61,7 @@ class Nearby:
 
 
 def joined(ways: list[Floats], heights: list[float | None]) -> PinnedTrack:
-    """One track of those from terminal to terminal (N, 2), of which the ``heights`` of all but the ends are told."""
+    """Join the tracks of all legs (N, 2) into one; ``heights``: altitudes of the inner terminals, None where free."""
     points = np.vstack([ways[0], *(w[1:] for w in ways[1:])])
     pinned, pin_m = np.zeros(len(points), np.bool_), np.full(len(points), math.nan)
     pinned[0] = pinned[-1] = True

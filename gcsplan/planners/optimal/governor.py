@@ -1,7 +1,8 @@
-"""The one loop of a plan: searches for paths and bounds, and who chooses between them.
+"""The one loop of a plan: the searches for paths and bounds, and the governor that chooses between them.
 
-A search says by itself whether it applies, and how much work and memory it takes, before it starts. The governor takes
-the one that promises most for its cost, refuses what does not fit into what is left of the budget, and keeps a record.
+Before it starts, each search states whether it applies and how much work and memory it takes. The governor runs the
+search that promises most for its cost, refuses a search that does not fit into the rest of the budget, and keeps a
+record.
 """
 
 from __future__ import annotations
@@ -17,21 +18,22 @@ from gcsplan.planners.problem import Step
 Size = tuple[float, float]
 """Counted seconds and megabytes."""
 LEAST_S = 1e-3
-"""No search is taken to cost less."""
+"""Least counted seconds that a search is assumed to cost."""
 MOST_STEPS = 200
+"""Most searches of one plan, refused ones included."""
 AGAIN = 0.02
-"""What part of the gap a better path must have closed before a search runs once more."""
+"""Part of the gap that a better path must have closed before a search runs once more."""
 NEARER = 0.45
-"""What part of the wanted gap is near enough for searches that are cheap and mostly help."""
+"""Part of the wanted gap down to which cheap searches that mostly help (``Search.nearer``) still run."""
 
 
 @dataclass(eq=False, slots=True)
 class Search:
     """One source of paths or bounds.
 
-    ``share``: the part of the gap that it closes, about, as measured by ``gcsplan bench``; a first path is worth all.
-    ``applies``: whether it may help where things stand; ``size``: what it takes; ``again``: whether it may run once
-    more after a better path came.
+    ``share``: the part of the gap that it closes on average, measured by ``gcsplan bench``; a first path counts as all
+    of it. ``applies``: whether it may help now; ``size``: what it takes; ``again``: whether it may run once more after
+    a better path was found.
     """
 
     name: str
@@ -41,12 +43,12 @@ class Search:
     run: Callable[[], object]
     again: bool = False
     nearer: bool = False
-    """Whether it is worth its cost even where the gap is small enough, see `NEARER`."""
+    """Whether it is worth its cost even if the gap is already as small as wanted; see `NEARER`."""
     seen: float | None = field(default=None)
-    """What the best path cost when it ran last; None: it has not run yet."""
+    """Cost of the best path when the search ran last; None: it has not run yet."""
 
     def is_open(self, incumbent: Incumbent) -> bool:
-        """Whether it may run now."""
+        """Whether the search may run now."""
         if self.seen is not None:
             better = self.seen - incumbent.cost > AGAIN * (incumbent.cost - incumbent.bound)
             if not (self.again and better):
@@ -55,9 +57,9 @@ class Search:
 
 
 def govern(incumbent: Incumbent, searches: list[Search], without: Collection[str] = ()) -> None:
-    """Run searches until path and bound are as near as wanted, none is left, or the budget is spent.
+    """Run searches until the gap is as small as wanted, no search is left, or the budget is spent.
 
-    ``without``: names of searches that are left out.
+    ``without``: names of searches to leave out.
     """
     left = [s for s in searches if s.name not in without]
     budget = incumbent.budget

@@ -1,4 +1,4 @@
-"""The best path so far, the highest lower bound, and the budget: what every search of a plan shares."""
+"""The incumbent: best path so far, highest lower bound, and budget, which all searches of a plan share."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ from gcsplan.planners.simplify import fewer, polished
 from gcsplan.world.path import Path
 
 LITTLE, WORTH = 5e-6, 2e-5
-"""What fewer way points may cost, as a part: on the way, and at last."""
-STEEP = 0.15
-"""Rise of a path, as a part of its track's length, from which a cap tells little: what is passed low must be flown
-around, what is passed high need not."""
+"""Part of the cost that removing way points may add: during the searches, and for the final path."""
 HOPE = 1.5
-"""A path is simplified if it would be the best so far by gaining that times what one of its kind has gained yet."""
+"""A path is simplified only if it would become the best by gaining this many times the most that simplifying gained for
+a path of its kind so far."""
+STEEP = 0.15
+"""Rise of a path, as a part of its track's length, from which it counts as steep: one cap for the whole track says
+little then, since a zone that is passed low must be flown around, and one that is passed high need not."""
 
 
 class Incumbent:
-    """Best path, bound and budget of one problem; ``laps``: paths may fly laps where a path without is known."""
+    """Best path, bound and budget of one problem; ``laps``: paths may fly laps even if a path without laps is known."""
 
     def __init__(self, problem: Problem, laps: bool = True) -> None:
         self.problem, self.laps = problem, laps
@@ -38,14 +39,14 @@ class Incumbent:
         self.judge = Judge(problem)
         self.best: Floats | None = None
         self.pinned: Bools | None = None
-        """(N,) which points of the best path are terminals; None where that is not known."""
+        """(N,) which points of the best path are terminals; None if that is not known."""
         self.cost = math.inf
         self.bound = straight_bound(problem) * (1.0 - 1e-12)
         self.first_s = math.inf
         self.proved_infeasible = False
         """Whether it is proved that there is no path."""
         self.unsettled: Unsettled | None = None
-        """Why the last track that was looked at closely holds no path."""
+        """Why no path was found over the last track whose profile was settled under the exact check."""
         self.steps: list[Step] = []
         self._gained: dict[tuple[bool, bool], float] = {}
         self._simplified: set[tuple[bool, bytes]] = set()
@@ -54,7 +55,7 @@ class Incumbent:
     # ------------------------------------------------------------------------------------------------- paths
 
     def take_along(self, terminals: PinnedTrack, *, fine: bool = True) -> bool:
-        """Look for a path over a track; True if it is the best so far."""
+        """Look for a path over a track; return whether it is the best so far."""
         track = make_track(self.problem, *terminals)
         flown = fly(self.problem, track)
         if not isinstance(flown, Flown) and flown.kind != "pinched":
@@ -63,7 +64,7 @@ class Incumbent:
         return found is not None and self.take_simpler(*found, fine=fine, longer=False)
 
     def take_longer(self, terminals: PinnedTrack, fine: bool) -> bool:
-        """Look for a path over a track, with laps where it is too steep; True if it is the best so far."""
+        """Look for a path over a track, with laps where it is too steep; return whether it is the best so far."""
         track = make_track(self.problem, *terminals)
         flown = fly(self.problem, track)
         if isinstance(flown, Flown) and (found := self.exact(track, flown)) is not None:
@@ -72,7 +73,8 @@ class Incumbent:
         return found is not None and self.take_simpler(*found, fine=fine, longer=True)
 
     def exact(self, track: Track, flown: Flown | Obstruction) -> tuple[Floats, Bools] | None:
-        """Way points over a track that the exact check passes: of this profile, or of one drawn with more care."""
+        """Way points over a track that pass the exact check, and which must stay: of the profile ``flown``, or else of
+        one that `settle` draws from floors read point by point. None, with `unsettled` set, if neither passes."""
         if isinstance(flown, Flown):
             found = way_points(self.problem, track, flown)
             if not self.judge.violations(found[0]):
@@ -82,9 +84,10 @@ class Incumbent:
         return None if isinstance(careful, Unsettled) else careful
 
     def take_simpler(self, points: Floats, pinned: Bools, *, fine: bool, longer: bool) -> bool:
-        """Simplify a path and keep it, if it is the best so far; not where there is no hope of that.
+        """Simplify a path and keep it if it is then the best so far; do nothing if that is unlikely (`HOPE`).
 
-        ``fine``, ``longer``: its kind, whether its track is of the fine lattice, and whether it was made longer.
+        ``fine``, ``longer``: the kind of path, that is, whether its track is of the fine lattice and whether the track
+        was made longer. Returns whether the path was kept.
         """
         self._first()
         cost = self.problem.cost(Path(points))
@@ -101,7 +104,8 @@ class Incumbent:
         return self.take(points, pinned)
 
     def take(self, points: Floats, pinned: Bools | None = None) -> bool:
-        """Keep a path that the exact check passes, if it is the best so far; ``pinned`` (N,) its terminals."""
+        """Keep a path that passes the exact check if it is the best so far, and return whether it is; ``pinned`` (N,):
+        which points are terminals."""
         cost = self.problem.cost(Path(points))
         if cost >= self.cost:
             return False
@@ -111,7 +115,8 @@ class Incumbent:
         return True
 
     def offer(self, found: tuple[Floats, Bools] | None) -> bool:
-        """The same of a path that a search made of legs that it checked one by one, if it found any."""
+        """`take` a path that a search made from legs it checked one by one, if it found one and the path as a whole
+        passes the exact check."""
         return found is not None and not self.judge.violations(found[0]) and self.take(*found)
 
     def _first(self) -> None:
@@ -122,30 +127,31 @@ class Incumbent:
     # ------------------------------------------------------------------------------------------------- bounds
 
     def raise_bound(self, cost: float) -> None:
-        """A new bound, in metres or joules by the objective."""
-        # The bound's own arithmetic is rounded.
+        """Raise the lower bound to ``cost``, metres or joules by the objective, if that is higher."""
+        # The factor covers rounding in the bound's own arithmetic.
         self.bound = max(self.bound, min(cost * (1.0 - 1e-9), self.cost))
         self.tell("bound")
 
     def raise_track_bound(self, track_m: float) -> None:
-        """The bound that no track is shorter than so many metres."""
+        """Raise the lower bound to the least cost of paths whose tracks are at least ``track_m`` metres long."""
         self.raise_bound(self.least(track_m))
 
     def least(self, track_m: float) -> float:
-        """What a path costs at least whose track is so long."""
+        """The least cost of a path whose track is at least ``track_m`` metres long."""
         p = self.problem
         if p.objective == "energy":
             return p.horizontal_j_per_m * track_m + p.vertical_j_per_m * self.rise(-math.inf)
-        # Straight in the plane of track and height: no path over that track from height to height is shorter.
+        # A straight line over the unrolled track: no path over it between the first and last altitude is shorter.
         return math.hypot(track_m, abs(self.known_m[-1] - self.known_m[0]))
 
     def rise(self, touched_m: float) -> float:
-        """Metres climbed and descended in all, at least, by a path that touches a height."""
+        """The least metres climbed and descended in all by a path that reaches the altitude ``touched_m`` AMSL."""
         least = sum(abs(b - a) for a, b in pairwise(self.known_m))
         return least + 2.0 * max(touched_m - max(self.known_m), 0.0)
 
     def longest(self, else_m: float) -> float:
-        """No track of a path that is better than the best is longer; ``else_m`` where nothing is known of it."""
+        """An upper bound, metres, of the track length of every path better than the best; ``else_m`` if none is
+        known."""
         p = self.problem
         if self.best is None or (p.objective == "energy" and p.horizontal_j_per_m == 0.0):
             return else_m
@@ -157,20 +163,20 @@ class Incumbent:
 
     @property
     def gap(self) -> float:
-        """How far the best path is above the bound, as a part of it."""
+        """By how much the best path's cost exceeds the bound, as a part of the bound."""
         return (self.cost - self.bound) / max(self.bound, 1e-9)
 
     def done(self) -> bool:
-        """Whether path and bound are as near as wanted."""
+        """Whether the gap is as small as wanted."""
         return self.gap <= self.wanted
 
     def goes_on(self) -> bool:
-        """Whether a better path is wanted, and there is work left for it."""
+        """Whether the gap is larger than wanted, and budget is left to close it."""
         return not self.done() and self.budget.goes_on()
 
     @property
     def is_steep(self) -> bool:
-        """Whether the best path rises by `STEEP` of its track's length or more: a world about as high as it is wide."""
+        """Whether the best path rises by at least `STEEP` of its track's length."""
         if self.best is None:
             return False
         track_m = float(np.hypot(*np.diff(self.best[:, :2], axis=0).T).sum())
@@ -183,13 +189,13 @@ class Incumbent:
         return math.isfinite(limits.max_climb_slope) or math.isfinite(limits.max_descent_slope)
 
     def tell(self, phase: str, cost: float | None = None) -> None:
-        """Report progress."""
+        """Report progress with ``cost``, or else with the best path's cost if there is a path."""
         if self.problem.progress is not None:
             known = self.cost if cost is None and self.best is not None else cost
             self.problem.progress(Progress(self.budget.elapsed_s, known, self.bound, phase))
 
     def solution(self) -> Solution:
-        """The best path, with as few way points as are worth it, and the bound."""
+        """The best path, with as few way points as `WORTH` allows, and the bound."""
         assert self.best is not None
         if self.pinned is not None:
             self.best, self.pinned = fewer(self.problem, self.best, self.pinned, WORTH * self.cost)

@@ -1,9 +1,9 @@
-"""The plane between two terminals: shortest tracks below an altitude cap, and how long any track must be at least.
+"""The plane between two terminals: shortest tracks below an altitude cap, and lower bounds of every track's length.
 
 The lattice is cut to an ellipse of detours around the terminals, and widened when that is not enough. A flood from the
-far terminal, over all that may be free below the highest cap, tells every later search how far it still is: lower caps
-and finer lattices only leave less room. So the fine lattices, too, need to be looked at only along the few tracks that
-may be short enough.
+goal over all cells that may be free below the highest cap gives every later search lower bounds of the distance that is
+left: lower caps and finer lattices only make tracks longer. So the fine lattices, too, need to be searched only in the
+corridor of the few tracks that may be short enough.
 """
 
 from __future__ import annotations
@@ -26,43 +26,44 @@ from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
 from gcsplan.planners.problem import Problem
 
 DETOURS, LEAST_DETOUR = (1.25, 2.5, math.inf), 1.02
-"""How long tracks may be, in times the straight way, before the lattice must be widened; and how long they may be in
-the narrowest one."""
+"""Lengths of tracks, in multiples of the straight track, that each lattice holds before it is widened; and the length
+that the narrowest lattice holds."""
 MUCH = 0.5
-"""What part of the terrain model is so much that all of it may be looked at as well."""
+"""A lattice that needs more than this part of the terrain model's nodes is made over all of it."""
 MOST_NODES, MOST_BESIDE, LARGE = 16e6, 6e6, 4e6
-"""Nodes of the finest lattice, at most, in the box around a corridor: so many, and fewer beside a terrain model of more
-nodes than that, to need no more than half a gigabyte besides."""
+"""Most nodes of the finest lattice in the box around a corridor: the first number; the second if the terrain model has
+at least `LARGE` nodes, so that the lattice needs no more than half a gigabyte besides it."""
 MOST_ALONE = 50_000
-"""Cells of the finer lattice that may be looked at each alone in four parts."""
+"""Most cells of the finer lattice that `refine` cuts again, into four parts for ``cut`` 2."""
 LEARNT = 10
-"""Times that a track is looked for where nodes alone are as high as the exact check has them."""
+"""Most searches for one track over nodes that are only as high as in the exact check; see ``shut`` of `track`."""
 BESIDE = 8
-"""How many cells more the finer lattice is over than those that are asked for: later tracks may lie beside them."""
+"""Cells that the finer lattice extends beyond the requested ones, because later tracks may lie beside them."""
 MUCH_LONGER, ROUGHLY = 1.1, 3
-"""Where tracks may be so many times as long as is known, cells for their bound are so many times larger."""
+"""If tracks may be this many times as long as the known bound, cells for their bound are this many times larger."""
 RAISED, WORTHWHILE = 4, 0.05
-"""Times that walls are raised near the ends, and by what part of the way to spare it must have helped to go on."""
+"""Most times that walls near the ends are raised for one bound; and the part of the spare metres by which a round must
+raise the bound for another to follow."""
 
 
 Lacking = tuple[Floats, float]
-"""A place (2,) at which a track lacked so many metres of height."""
+"""A place (2,) at which a track lacked altitude, and by how many metres."""
 
 
 class Leg:
-    """One leg of a problem, from terminal to terminal, under caps of at most ``top_m``."""
+    """One leg of a problem, from terminal to terminal, under caps of at most ``top_m`` AMSL."""
 
     def __init__(self, problem: Problem, start: End, goal: End, top_m: float) -> None:
         self.problem, self.start, self.goal, self.top_m = problem, start, goal, top_m
         self.straight_m = math.dist(start.place, goal.place)
         self.length_m = math.inf
-        """A lower bound of every track's length below the highest cap; inf: there is none, proved."""
+        """A lower bound of every track's length below the highest cap; inf: it is proved that there is no track."""
         self.seen = False
         """Whether the leg was flooded."""
         self.reach_m = 0.0
-        """Tracks shorter than this lie within the lattice, and within what the flood has seen."""
+        """Tracks shorter than this, in metres, lie within the lattice and within the flooded cells."""
         self.farthest = math.inf
-        """No ways are looked for that may be more times as long as the straight one."""
+        """Most times as long as the straight track that tracks may be for which the lattice is widened."""
         self.plane: Plane
         self._twin: tuple[Plane, Bools] | None = None
         self._detour = 0.0
@@ -74,18 +75,18 @@ class Leg:
         self._reached: tuple[Nearby, Reached] | None = None
         self.cells_of = choose(problem, start.place, self.straight_m, self._box(DETOURS[0]))
         self.closer = 1
-        """Into how many parts a side the finer lattice's cells are cut once more, see `refine`."""
+        """Parts a side into which the finer lattice's cells are cut once more; see `refine`."""
 
     @property
     def lower_m(self) -> float:
-        """No track is shorter, as far as is known."""
+        """The best known lower bound of every track's length, metres."""
         return self.length_m if self.seen else self.straight_m
 
     def flood(self, slack: float, within_m: float = math.inf) -> None:
-        """Look at all that is free below the highest cap, as far as tracks ``slack`` longer than the shortest lead, and
-        no farther than tracks of ``within_m``.
+        """Flood all cells that are free below the highest cap, as far as tracks lead that are longer than the shortest
+        by at most ``slack`` (a part of it), and no longer than ``within_m``. Sets `length_m` and `reach_m`.
 
-        Widens the lattice until that track lies within it.
+        Widens the lattice until those tracks lie within it.
         """
         self._ahead = self._close = self._reached = None
         self.closer = 1
@@ -114,7 +115,7 @@ class Leg:
             try:
                 way, self._guide = self._mesh.flood(a, b, within, slack)
             except Exhausted as given_up:
-                # What was seen is as good as a flood that was asked to go no farther.
+                # The searched part is the same as a finished flood with a shorter limit.
                 self.length_m = self.reach_m = given_up.seen_m * (1.0 - 1e-9)
                 self._guide = self._mesh.flood(a, b, self.reach_m, slack)[1]
                 return
@@ -138,8 +139,9 @@ class Leg:
         exact: bool = False,
         roughly: bool = False,
     ) -> tuple[ClearanceGrid, Guide]:
-        """What to make a mesh of, finer ``within`` a corridor, or else the first look's for tracks shorter than
-        ``limit_m``; and how far the goal is."""
+        """The clearance grid, and a guide with distances to the goal: on the finer lattice ``within`` a corridor, or
+        else on the first-look lattice for tracks shorter than ``limit_m``. ``roughly``: cells are `ROUGHLY` times
+        larger; the other arguments are those of `ClearanceGrid`. Raises Exhausted."""
         if within is None:
             plane, fineness, guide = self.plane, 1, self._guide
             cells = guide.reach(self.start.place, limit_m)
@@ -168,13 +170,13 @@ class Leg:
         over: Bools | None = None,
         shut: Sequence[Lacking] | None = None,
     ) -> GroundTrack | None:
-        """The shortest track of which the mesh for paths holds that it is legal below ``cap_m``, if it is shorter than
-        ``limit_m``, and than `reach_m`.
+        """The shortest track that is legal below ``cap_m`` by the mesh for paths, if it is shorter than ``limit_m`` and
+        `reach_m`; None if there is none or the search is exhausted.
 
-        ``within``: on the finer lattice there; else on that of the first look. ``spare_m``: metres that may be added
-        near start and goal to climb. ``under``, ``over`` (zones,): which zones may be passed so; None for all.
-        ``shut``: nodes are as high as the exact check has them, though what is between them may be shut by a little,
-        and higher where tracks lacked height before.
+        ``within``: the corridor to search on the finer lattice; None: the first-look lattice. ``spare_m``: metres that
+        may be added near start and goal to climb. ``under``, ``over`` (zones,): which zones may be passed below, above;
+        None for all. ``shut``: if not None, nodes are only as high as in the exact check, which may miss a little
+        between nodes, and are raised at these places, where earlier tracks lacked altitude.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
@@ -191,9 +193,9 @@ class Leg:
         return None
 
     def bound(self, cap_m: float, within: Corridor | None, limit_m: float, climbs: bool = False) -> float:
-        """A lower bound of every track's length below ``cap_m``; ``limit_m``, or `reach_m`, if it is more.
+        """A lower bound of every track's length below ``cap_m``, at most ``limit_m`` and `reach_m`.
 
-        ``climbs``: near the ends hold tracks to what they can climb to, if they are shorter than ``limit_m``.
+        ``climbs``: near the ends, allow only altitudes that tracks shorter than ``limit_m`` can climb to.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         known = self.length_m
@@ -212,7 +214,7 @@ class Leg:
             if way is None:
                 return limit
             self.last_track = way.points
-            # Ways are longer between the walls that the cones raised, so there is less to spare for a climb: again.
+            # The cones raised walls, tracks got longer, and less length is left to climb with: tighten the cones again.
             enough = not cones or way.length_m < known + WORTHWHILE * spare or not self.problem.budget.goes_on()
             known = max(known, way.length_m)
             if enough:
@@ -220,11 +222,11 @@ class Leg:
         return known
 
     def refine(self, limit_m: float, parts: int, cut: int) -> bool:
-        """Look anew, at each cell of the finer lattice alone, at what tracks shorter than ``limit_m`` may meet; where
-        they are few, at each of their ``cut`` parts a side.
+        """Compute the corridor of tracks shorter than ``limit_m`` again, with each cell of the finer lattice as a piece
+        of its own; if they are few, with each cell cut into ``cut`` parts a side.
 
-        No longer ones are known after that. `track` and `bound` cut the cells of such corridors into ``parts`` a side.
-        False, and nothing is done, where that would be too many.
+        Afterwards `reach_m` is at most ``limit_m``, and `track` and `bound` cut the finer lattice's cells into
+        ``parts`` a side. Returns False and changes nothing if that takes too many nodes, or was done before.
         """
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
@@ -240,7 +242,7 @@ class Leg:
         if self.cells_of.fine_stride > 1 or np.count_nonzero(wanted) * self.cells_of.ratio**2 > MOST_ALONE:
             cut = 1
         finer = cut * (self.cells_of.parts * self.cells_of.cut if self.cells_of.stride == 1 else self.cells_of.parts)
-        # Nodes lie elsewhere by as much as the other lattice is bent.
+        # The nodes of the two lattices may differ in place by `LOOSE.bent_m`.
         more = limit + 2.0 * LOOSE.bent_m
         found = self._each_cell(
             *finer_plane(self.plane, wanted, finer, self.cells_of.fine_stride, CLOSE), more, close.away
@@ -251,16 +253,17 @@ class Leg:
         return True
 
     def corridor(self, limit_m: float) -> Corridor:
-        """What tracks shorter than ``limit_m``, and than `reach_m`, may meet."""
+        """The corridor of tracks shorter than ``limit_m`` and `reach_m`."""
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
         return Corridor(close.away.between(close.left, limit), close.left)
 
     def cells(self, limit_m: float) -> tuple[Floats, Floats, Floats, Floats]:
-        """Of the cells that tracks shorter than ``limit_m`` may meet (and more): the lowest and the highest altitude
-        that can be flown at, ways there and on."""
-        if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that the flood did not
-            return np.full(1, -math.inf), np.full(1, math.inf), np.zeros(1), np.zeros(1)  # of those nothing is known
+        """(K,) each, for the cells that tracks shorter than ``limit_m`` may meet (or more cells): the lowest and the
+        highest altitude that can be flown at, and least metres from the start to the cell and from there to the goal.
+        One cell without any limits if ``limit_m`` is beyond `reach_m`."""
+        if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that were not flooded
+            return np.full(1, -math.inf), np.full(1, math.inf), np.zeros(1), np.zeros(1)
         close = self._closer(min(limit_m, self.reach_m))
         near = self._near(close, limit_m)
         if self._reached is not None and self._reached[0] is close and limit_m <= close.limit_m:
@@ -269,7 +272,8 @@ class Leg:
         return close.low_m[near], close.high_m[near], close.away_m[near], close.left_m[near]
 
     def intervals(self, limit_m: float) -> AltitudeIntervals:
-        """Those that tracks shorter than ``limit_m``, and than `reach_m`, may enter by what they climb and descend."""
+        """The altitude intervals that tracks shorter than ``limit_m`` and `reach_m` may enter within the climb and
+        descent limits."""
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
         if self._reached is None or self._reached[0] is not close:
@@ -294,15 +298,16 @@ class Leg:
         return self._reached[1].within(limit, self._near(close, limit))
 
     def _near(self, close: Nearby, limit_m: float) -> Bools:
-        """(cells,) what tracks no longer than ``limit_m`` may meet."""
+        """(cells,) which cells of the guides' mesh tracks no longer than ``limit_m`` may meet."""
         return close.left.mesh.of_plane(close.away.between(close.left, limit_m)).ravel()
 
     def _closer(self, limit_m: float) -> Nearby:
-        """A look at each cell alone, for tracks shorter than ``limit_m``; at whole pieces where that is too much."""
+        """Distances and altitudes cell by cell, for tracks shorter than ``limit_m``; by whole mesh pieces if that is
+        too much work."""
         if self._close is None or limit_m > self._close.limit_m:
             away, left = self._from_start(), self._guide
             found = self._each_cell(self.plane, away.between(left, limit_m), limit_m, away)
-            if found is None:  # pieces are as near as their entrances
+            if found is None:  # every cell of a piece is as near as the piece's entrance, or as the straight line
                 mesh = left.mesh
                 ends = (away, self.start), (left, self.goal)
                 ways = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
@@ -311,8 +316,8 @@ class Leg:
         return self._close
 
     def _each_cell(self, plane: Plane, wanted: Bools, limit_m: float, ahead: Guide) -> Nearby | None:
-        """Each of the ``wanted`` cells of a lattice alone; None where that is too much to look at. ``ahead``: from the
-        start, over a mesh that leaves no less room."""
+        """Flood the ``wanted`` cells of a lattice, each as a piece of its own; None if that is too much work.
+        ``ahead``: distances from the start over a mesh that has at least the same free cells."""
         mesh = mesh_of(plane, self.top_m, True, 1, wanted, single=True)
         a, b = self.start.place, self.goal.place
         try:
@@ -323,7 +328,7 @@ class Leg:
         return Nearby(limit_m, away, left, *ranges(mesh, self.top_m), away.cells(), left.cells())
 
     def _over(self, cells: Bools) -> tuple[Plane, Bools]:
-        """The finer lattice over some cells, and perhaps more, and which of its cells these are."""
+        """The finer lattice over ``cells`` of the first-look lattice, or over more, and which of its cells they are."""
         if self._twin is None or (cells & ~self._twin[1]).any():
             row, col, last_row, last_col = box_of(cells)
             wide = np.zeros(cells.shape, np.bool_)
@@ -333,7 +338,7 @@ class Leg:
         return plane, on_finer(self.plane, cells, plane)
 
     def _from_start(self) -> Guide:
-        """Distances from the start over the coarse mesh, as far as the flood from the goal has seen."""
+        """Distances from the start over the coarse mesh, as far as the flood from the goal went."""
         if self._ahead is None:
             mesh = self._guide.mesh
             try:
@@ -343,7 +348,8 @@ class Leg:
         return self._ahead
 
     def _cones(self, climb: float, descent: float, at_start_m: float, at_goal_m: float) -> list[Cone]:
-        """Height and slope of what can be reached near the ends, by paths with so many metres to spare there."""
+        """Cones of the altitudes that can be reached near the ends by paths with ``at_start_m``, ``at_goal_m`` metres
+        to spare there; none where an end's altitude is free or the slope is not limited."""
         ends = ((self.start, climb, at_start_m), (self.goal, descent, at_goal_m))
         return [
             (end.east_m, end.north_m, end.amsl_m + slope * spare_m, slope)
@@ -352,6 +358,7 @@ class Leg:
         ]
 
     def _lattice(self, detour: float) -> Plane:
+        """The first-look lattice for tracks of ``detour`` times the straight track."""
         reach = None
         if math.isfinite(detour):
             a, b = self.start.place, self.goal.place
@@ -362,7 +369,7 @@ class Leg:
         )
 
     def _box(self, detour: float) -> Box:
-        """What tracks may meet that are so many times as long as the straight way."""
+        """The box that contains all tracks of at most ``detour`` times the straight track; infinite for inf."""
         if math.isinf(detour):
             return -math.inf, -math.inf, math.inf, math.inf
         (x0, y0), (x1, y1), d = self.start.place, self.goal.place, self.straight_m
@@ -370,6 +377,6 @@ class Leg:
         return min(x0, x1) - more, min(y0, y1) - more, max(x0, x1) + more, max(y0, y1) + more
 
     def _is_most(self, detour: float) -> bool:
-        """Whether a lattice for such tracks is so large that one might as well look at everything."""
+        """Whether a lattice for such tracks needs more than the part `MUCH` of the terrain model's nodes."""
         col0, row0, col1, row1 = extent(self.problem, self._box(detour))
         return (col1 - col0) * (row1 - row0) > MUCH * self.problem.airspace.surface.ground_m.size

@@ -1,4 +1,4 @@
-"""Level ground cut into cells: a terrain model of two by two nodes has none that a lattice could look at alone."""
+"""Level ground cut into cells: a terrain model of two by two nodes is a single cell, too coarse for a lattice."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.surface import GridMap, Surface
 
 FEW = 64
-"""Nodes of a terrain model, at most, that are replaced where all are alike."""
+"""A level terrain model of at most this many nodes is replaced."""
 NODES = 65
-"""Along each side of what replaces it."""
+"""Nodes along each side of the terrain model that replaces it."""
 MARGIN = 0.02
-"""Beyond what paths can reach, as a part of that."""
+"""Part by which the new model extends beyond the places that paths can reach."""
 
 
 def in_window(incumbent: Incumbent) -> Problem:
-    """The incumbent's problem over ground that is cut into cells, as far as a better path could go; the same problem
-    where its terrain model is no level one."""
+    """The incumbent's problem with its level ground cut into cells, over the area that a better path could reach; the
+    unchanged problem if its terrain model is not level or has many nodes."""
     problem = incumbent.problem
     surface = problem.airspace.surface
     ground, top = surface.ground_m, surface.top_m
@@ -35,7 +35,7 @@ def in_window(incumbent: Incumbent) -> Problem:
     if math.isfinite(length_m):
         places = np.array(terminals_of(problem))
         straight = float(np.hypot(*np.diff(places, axis=0).T).sum())
-        # No place of a track that long is farther from all terminals than this.
+        # No place of a track of that length is farther outside the terminals' box.
         reach = 0.5 * (length_m - straight) * (1.0 + MARGIN) + 0.5 * straight * MARGIN
         reach = max(reach, 0.5 * math.sqrt(max(length_m**2 - straight**2, 0.0)) * (1.0 + MARGIN)) + 1.0
         low, high = np.maximum(low, places.min(axis=0) - reach), np.minimum(high, places.max(axis=0) + reach)

@@ -1,4 +1,4 @@
-"""Tracks over the lattices of a problem's legs, and the bounds that those give; see `planner`."""
+"""Tracks over the lattices of a problem's legs, and the lower bounds that follow from them; see `planner`."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Flown, fly, make_track
 
 SLACKS = (0.008, 0.15, 0.6)
-"""How much longer than the shortest the tracks are that are looked at, as a part of it, until a path is known."""
+"""While no path is known, tracks longer than the shortest by these parts of it are searched, in turn."""
 ZONES_SHUT = 8
-"""Tracks that are looked at below a cap where a zone can be passed neither over nor under on the first."""
+"""Most tracks that are tried below a cap if a zone can be passed neither over nor under on the first."""
 PAST = 12
-"""Tracks past what is in the way that are looked at."""
+"""Most tracks past obstacles that are tried on the first-look lattice."""
 DARED_M, PINCHED_M = (0.05, 0.1, 0.2, 0.4), 1.0
-"""By how much more than it lacked the nodes beside a track through a slit are raised, one after the other, and what it
-may lack for another to be looked for."""
+"""Metres by which the nodes beside a track through a slit are raised, in turn, beyond the altitude that it lacked; and
+the most it may lack for another track to be searched."""
 PROVED = 1e-8
-"""A smaller gap, as a part, is that of rounding: the best path is proved the best."""
+"""A gap, as a part, that is smaller is due to rounding: the best path is proved optimal."""
 NODE_S, NODE_MB = 2e-6, 3e-4
-"""Counted seconds and megabytes of a node that is looked at, with what a search over it keeps."""
+"""Counted seconds and megabytes of a searched node, with what a search keeps of it."""
 SMALL = 50.0
-"""A world is small where the straight lines between terminals are so many cells of the terrain model long, at most."""
+"""A world is small if the straight line of each leg is at most this many cells of the terrain model long."""
 
 
 class PlaneSearch:
-    """The legs of one problem in the plane; what is found goes to the incumbent.
+    """The legs of one problem in the plane; paths and bounds go to the incumbent.
 
-    ``problem``: the incumbent's own, or the same over other cells.
+    ``problem``: the incumbent's own (None), or the same problem over other cells.
     """
 
     def __init__(self, incumbent: Incumbent, problem: Problem | None = None) -> None:
@@ -51,16 +51,19 @@ class PlaneSearch:
         ends = [End(*place, z) for place, z in zip(places, heights, strict=True)]
         self.legs = [Leg(problem, a, b, self.top_m) for a, b in pairwise(ends) if math.dist(a.place, b.place) > 1e-3]
         self.by_intervals = False
-        """Whether bounds ask where tracks can get to by what they climb and descend on their way."""
+        """Whether bounds of length use altitude intervals: what a track can climb and descend to on its way."""
         zones = len(problem.airspace.zones)
         self._open = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
         self.choice = self._open
-        """With what shut the last tracks were found that had to go past something."""
+        """The choice of open zone sides with which the last path past obstacles was found."""
 
     def terminals(
         self, choice: Choice, cap_m: float, fine: bool, shut: Sequence[Lacking] | None = None
     ) -> PinnedTrack | None:
-        """The shortest track of a choice below a cap, from terminal to terminal; see `Leg.track`."""
+        """The shortest track below a cap with a choice of zone sides, through all terminals; None if a leg has none.
+
+        ``fine``: on the finer lattice; ``shut``: see `Leg.track`.
+        """
         ways = []
         for leg in self.legs:
             limit = self.limit(leg)
@@ -75,13 +78,13 @@ class PlaneSearch:
     # -------------------------------------------------------------------- paths
 
     def first_looks(self, slacks: tuple[float, ...] = SLACKS) -> Iterator[None]:
-        """Look for the first path, over tracks that are so much longer than the shortest at most, once for each; the
-        legs are flooded so far. Ends where there is no path, proved, or one was found."""
+        """Look for a first path over tracks that are longer than the shortest by at most each of ``slacks`` in turn;
+        the legs are flooded that far. Ends when a path is found, or when it is proved that there is none."""
         for slack in slacks:
             if not self.flood(slack):
                 return
             self.raise_tracks()
-            # Tracks that the first look misses are short, or there are no others.
+            # Tracks that only the finer lattice shows are nearly the shortest; in the last round nothing else is left.
             patient = slack in (slacks[0], slacks[-1])
             if self.try_below(self.top_m, fine=False) or (patient and self.try_below(self.top_m, fine=True)):
                 return
@@ -90,8 +93,8 @@ class PlaneSearch:
             yield
 
     def flood(self, slack: float) -> bool:
-        """Look how far all is from the goals, for tracks so much longer than the shortest; False where a leg has none,
-        proved."""
+        """Flood all legs, for tracks longer than the shortest by at most the part ``slack``. Returns False if it is
+        proved that a leg has no track."""
         for leg in self.legs:
             leg.flood(slack)
             if math.isinf(leg.length_m):
@@ -100,8 +103,8 @@ class PlaneSearch:
         return True
 
     def reach_longest(self) -> bool:
-        """Look at whatever is not longer than the best path, where there is one; False where that proves it the best,
-        or that there is none."""
+        """Flood the legs as far as tracks lead that are no longer than the best path, if there is one. Returns False if
+        that proves it optimal, or if there is no path and that is proved."""
         incumbent = self.incumbent
         if incumbent.best is None:
             return all(leg.seen for leg in self.legs) or self.flood(SLACKS[-1])
@@ -116,7 +119,7 @@ class PlaneSearch:
         return incumbent.gap > PROVED
 
     def try_below(self, cap_m: float, *, fine: bool, shut: Sequence[Lacking] | None = None) -> bool:
-        """Look for a path below a cap; True if it is the best so far."""
+        """Look for a path below a cap; return whether it is the best so far. ``shut``: see `Leg.track`."""
         incumbent = self.incumbent
         incumbent.unsettled = None
         terminals = self.terminals(self.choice, cap_m, fine, shut)
@@ -124,7 +127,7 @@ class PlaneSearch:
             return False
         track = make_track(incumbent.problem, *terminals)
         flown = fly(incumbent.problem, track)
-        if isinstance(flown, Flown) or flown.kind == "pinched":  # by centimetres, or tracks would not lead there
+        if isinstance(flown, Flown) or flown.kind == "pinched":  # by centimetres: cells shut what lacks more
             found = incumbent.exact(track, flown)
             if found is not None or isinstance(flown, Flown):
                 return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)
@@ -132,8 +135,8 @@ class PlaneSearch:
         return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=terminals)
 
     def narrow_passage(self) -> bool:
-        """Look for a path through what is open for the exact check alone: a lattice keeps as much beside its tracks as
-        the ground may rise there. True if it is the best so far."""
+        """Look for a path through slits that only the exact check finds open, because a lattice also reserves what the
+        ground may rise beside a track. Returns whether the path is the best so far."""
         shut: list[Lacking] = []
         for more_m in DARED_M:
             if self.try_below(self.top_m, fine=True, shut=shut):
@@ -153,10 +156,11 @@ class PlaneSearch:
         cap_m: float | None = None,
         given: PinnedTrack | None = None,
     ) -> bool:
-        """Look for tracks past what is in the way, at ``most`` of them; True if a path over one is the best so far.
+        """Try at most ``most`` tracks past obstacles; return whether a path over one of them is the best so far.
 
-        ``cap_m``: below that cap, the first, which needs no laps where a path is known, from a ``given`` track on;
-        else, ``first``, the first, or the best, with metres to spare for laps near the ends.
+        With ``cap_m``: search below that cap, begin with the track ``given`` if there is one, stop at the first better
+        path, and use no laps if a path is known. Without: spare metres for laps near the ends are allowed, and the
+        search stops at the first better path only if ``first``.
         """
         incumbent = self.incumbent
         laps = incumbent.climbs and (incumbent.best is None or (incumbent.laps and cap_m is None))
@@ -167,7 +171,7 @@ class PlaneSearch:
         if cap_m is None:
             roots = [replace(c, most_m=(spare_m, spare_m)) for c in dict.fromkeys([self._open, self.choice])]
             if laps:
-                roots.append(self.choice)  # a climb far from the ends takes laps there, and none near them
+                roots.append(self.choice)  # a climb far from the ends needs laps there, not near the ends
         found = search.run(roots, most, first=first or cap_m is not None, laps=laps, given=given)
         if found is not None:
             self.choice = replace(found, least_m=(0.0, 0.0), most_m=(0.0, 0.0))
@@ -176,25 +180,25 @@ class PlaneSearch:
     # -------------------------------------------------------------------- bounds
 
     def size(self, looks: float) -> tuple[float, float]:
-        """Counted seconds and megabytes of so many looks at the lattices of all legs."""
+        """Counted seconds of ``looks`` searches over the lattices of all legs, and megabytes of the largest lattice."""
         nodes = sum(leg.cells_of.nodes for leg in self.legs)
         return looks * nodes * NODE_S, max((leg.cells_of.nodes for leg in self.legs), default=0.0) * NODE_MB
 
     def longest(self) -> float:
-        """No track of a path that is better than the best is longer."""
+        """An upper bound, metres, of the track length of every path better than the best."""
         return self.incumbent.longest(sum(leg.reach_m for leg in self.legs))
 
     def limit(self, leg: Leg) -> float:
-        """The same for one leg, the others as short as they can be."""
+        """`longest` for one leg: what remains if the other legs are as short as possible."""
         return self.longest() - sum(other.lower_m for other in self.legs if other is not leg)
 
     def raise_tracks(self) -> None:
-        """What the shortest tracks alone tell of the cost."""
+        """Raise the lower bound of the cost to that of the shortest tracks."""
         self.incumbent.raise_track_bound(sum(leg.lower_m for leg in self.legs))
 
     @property
     def is_small(self) -> bool:
-        """Whether every leg is so short that a search among few places costs little beside all else."""
+        """Whether every leg is so short (`SMALL`) that a search among few places costs little."""
         cell_m = float(self.problem.airspace.surface.grid.metres_per_cell(*self.problem.start[:2]).max())
         short = [leg for leg in self.legs if leg.straight_m <= SMALL * cell_m]
         return len(short) == len(self.problem.via) + 1  # legs from a place to itself are not among the legs

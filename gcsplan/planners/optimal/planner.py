@@ -1,23 +1,23 @@
 """The default planner: the shortest tracks in the plane below an altitude cap, and a bound that holds for every path.
 
-**The idea.** Where nothing but ground, zones and a ceiling is in the way, flying is a question of the plane. Fix an
-altitude cap: what ground and zones leave below it are walls in the plane, and the best ground track is the shortest
-one between them, which can be found exactly (`polyanya`): around the zones' own outlines (`outline_tracks`), and on a
-lattice of the terrain model's cells (`plane_search`). Over a given track, floor and ceiling are a tube, and the best
-altitude profile is a taut string through it, one pass (`taut_string`). The exact check has the last word.
+**The idea.** Where only ground, zones and a ceiling are in the way, planning is a problem in the plane. Fix an altitude
+cap: ground and zones that cannot be passed below it are walls in the plane, and the best ground track is the shortest
+one between them. It can be found exactly (`polyanya`): around the zones' own outlines (`outline_tracks`), and on a
+lattice of the terrain model's cells (`plane_search`). Over a given track, floor and ceiling form a tube, and the best
+altitude profile is a taut string through it, found in one pass (`taut_string`). The exact check has the last word.
 
 **The bound.** The same search between walls that *certainly* stand (outlines inside the zones; a linear surface that
-lies nowhere above the ground) gives a length that no track below the cap can beat. A path is longer than its track, by
-what it must climb: between which heights every track that is short enough must be after so many metres is known too
-(`climb_bound`). For energy the cap itself is what costs: caps are searched from both sides until no height between two
-of them can hold anything better (`cap_search`). Close to the ends a path can be no higher than it has had track to
-climb, which moves the walls (`clearance`); and all along only those altitudes between zones can be flown at which can
-be climbed to, and back from, on a track that is short enough (`altitude_intervals`).
+lies nowhere above the ground) gives a length that no track below the cap can beat. A path is longer than its track by
+its climb: the altitudes of every short enough track after so many metres are bounded too (`climb_bound`). For energy
+the cap itself has a price: caps are searched from both sides until no altitude between two of them can hold a better
+path (`cap_search`). Close to its ends a path can be only as high as the track flown so far lets it climb, which moves
+the walls (`clearance`); and everywhere only those altitudes between zones count that a short enough track can climb to
+and return from (`altitude_intervals`).
 
 **Where that does not hold**, under a maximum AGL, or where the climb limit binds far from the ends, paths are searched
-on a lattice of reachable altitudes (`lattice`); the bound of the plane is true there as well.
+on a lattice of reachable altitudes (`lattice`); the bound from the plane is valid there as well.
 
-All of these are searches that the governor chooses among (`governor`); `searches` is the table of them.
+Each of these is a search that the governor can choose (`governor`); `searches` is the table of them.
 """
 
 from __future__ import annotations
@@ -46,27 +46,27 @@ BAND_NOTE = "the lower bound knows ground, zones and ceilings, but not the room 
 
 
 def plan(problem: Problem) -> Solution:
-    """A path from start to goal that `Airspace.examine` passes, and a cost that no such path can beat.
+    """A path from start to goal that passes `Airspace.examine`, and a cost that no such path can beat.
 
-    The first path is found at once, then path and bound are improved until they are ``gap_percent`` apart, the budget
-    is spent, or nothing more is known to do. Deterministic: stops on counted work; the clock is a last stop. With
-    ``turn_radius_m`` the path's points are way points to be flown by, on arcs of that radius, and it is the flown track
-    that is legal. ``options``: ``without``, names of searches to do without. Raises Refusal (a NoMission) that names
-    the binding constraint where no path is found, and says whether that is proved.
+    Finds a first path, then improves path and bound until they are ``gap_percent`` apart, the budget is spent, or no
+    search is left to try. Deterministic: stops on counted work; the clock is a last stop. With ``turn_radius_m`` the
+    path's points are fly-by way points, passed on arcs of that radius, and the flown path is the legal one.
+    ``options``: ``without``, names of searches to leave out. If no path is found, raises Refusal (a NoMission), which
+    names the binding constraint and says whether it is proved that there is no path.
     """
     problem = replace(problem, budget=Budget(problem.budget_s, problem.budget_mb))
     return plan_over(problem, _within)
 
 
 def _within(problem: Problem) -> Solution:
-    """The same over the problem's surface alone."""
+    """`plan` over the problem's surface alone."""
     if problem.turn_radius_m > 0.0:
         return _turning(problem)
     return _sharp(problem)
 
 
 def search(problem: Problem, laps: bool = True) -> Searches:
-    """Everything that is known about the best path of a problem, and where it was looked for."""
+    """Run all searches on a problem; the result, with best path and bound, is in the ``incumbent`` of what returns."""
     incumbent = Incumbent(problem, laps)
     incumbent.tell("search")
     searches = Searches(incumbent)
@@ -75,6 +75,7 @@ def search(problem: Problem, laps: bool = True) -> Searches:
 
 
 def _sharp(problem: Problem, laps: bool = True) -> Solution:
+    """`_within` for paths with sharp corners. Raises Refusal."""
     check_ends(problem)
     if all(math.dist(terminals_of(problem)[0], x) < 1e-3 for x in terminals_of(problem)):
         return plan_band(problem, Incumbent(problem).tell, problem.budget.begun_s)  # a climb on the spot
@@ -89,10 +90,11 @@ def _sharp(problem: Problem, laps: bool = True) -> Solution:
 
 
 def _turning(problem: Problem) -> Solution:
-    """A path with sharp corners, laid on arcs; with more room around it where that is needed."""
+    """`_within` for a turn radius: a path with sharp corners, rounded to arcs; planned again with more clearance where
+    the arcs need it. Raises Refusal."""
     from gcsplan.planners.turns.planner import rounded, with_more_clearance  # few missions have wings
 
-    # Laps are short and have sharp corners: what they gain is lost again on the arcs.
+    # Laps are short and have sharp corners: rounding them to arcs loses what they gain.
     sharp = _sharp(replace(problem, turn_radius_m=0.0), laps=False)
     points = sharp.path.points
 
@@ -122,7 +124,7 @@ def _turning(problem: Problem) -> Solution:
 
 
 def _terminals(problem: Problem, points: Floats) -> NDArray[np.bool_]:
-    """Which points of a path are its ends and vias."""
+    """(N,) which points of a path are its terminals."""
     terminals = np.array(terminals_of(problem))
     away = np.hypot(*(points[:, None, :2] - terminals[None]).transpose(2, 0, 1)).min(axis=1)
     return np.asarray(away < 1e-3)

@@ -1,9 +1,9 @@
-"""Planning over a window of the terrain, and over more of it where the window's border is what binds.
+"""Planning over a window of the terrain, and over a larger one where the window's border limits the result.
 
-A bound, or a proof that there is no path, is found for paths within the window. It holds for all paths over the terrain
-that the mission knows if those that leave the window cost no less, which the way to its border and back tells. Where it
-does not, more terrain is looked at, until memory, time or the terrain ends; then the bound is that of the paths that
-leave, and a refusal says how far was looked.
+A bound, or a proof that there is no path, is found for paths within the window. It holds for all paths over the
+mission's terrain if those that leave the window cost at least as much; the track to the border and on to the goal gives
+their least cost. Otherwise more terrain is loaded, until memory, time or the terrain ends. Then the bound is the least
+cost of the paths that leave, and a refusal says how far from the straight track the terrain was searched.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from gcsplan.world.airspace import Legs
 Window = Callable[[Problem], Solution]
 
 MOST_WINDOWS = 12
-"""Each is twice as wide as the one before at least: the last is wider than a frame can be."""
+"""Most windows of one plan. Each is at least twice as wide as the one before, so the last is wider than any frame."""
 
 
 def plan_over(problem: Problem, plan_window: Window) -> Solution:
-    """What ``plan_window`` finds over the problem's surface, with a bound for all terrain; over more of it where paths
-    beyond the border could be better by more than the wanted gap, or where there are none within.
+    """The solution of ``plan_window`` over the problem's surface, with a bound for all terrain. Plans over more terrain
+    if paths beyond the border could be better by more than the wanted gap, or if there are none within it.
 
-    ``plan_window`` raises what `refusal.explain` gives where there is no path. The solution's ``problem`` is that of
-    the window its path was found in. Raises Refusal.
+    ``plan_window`` raises the refusal of `refusal.explain` if it finds no path. The solution's ``problem`` is that of
+    its window; None for the first window. Raises Refusal.
     """
     begun = time.perf_counter()
     best: Solution | None = None
@@ -70,7 +70,7 @@ def plan_over(problem: Problem, plan_window: Window) -> Solution:
 
 
 def _reported(now: Problem, begun: float, leaving: float) -> Callable[[Progress], None] | None:
-    """Where progress is reported, if anywhere: seconds since ``begun``, and bounds that hold beyond the border too."""
+    """The problem's ``progress``, if any, with seconds since ``begun`` and bounds that hold beyond the border, too."""
     report = now.progress
     if report is None:
         return None
@@ -83,7 +83,8 @@ def _reported(now: Problem, begun: float, leaving: float) -> Callable[[Progress]
 
 
 def widened(now: Problem, cost: float) -> Problem | None:
-    """The same problem over terrain that paths of up to ``cost`` lie within; None where there is none to be had."""
+    """The same problem over terrain that contains all paths of up to ``cost``; None if no more can be loaded, or if an
+    end is not legal there."""
     if now.widen is None or not goes_on(now):
         return None
     wide = now.widen(margin_for(now, cost), now.budget_mb)
@@ -93,19 +94,20 @@ def widened(now: Problem, cost: float) -> Problem | None:
     wide = replace(now, airspace=wide.airspace, limits=wide.limits, start=ends[0], goal=ends[1], widen=wide.widen)
     try:
         check_ends(wide)
-    except Refusal:  # an end that is legal by a hair here is not there
+    except Refusal:  # an end that is barely legal here may not be legal there
         return None
     return wide
 
 
 def _end(old: tuple[float, float, float], new: tuple[float, float, float]) -> tuple[float, float, float]:
-    """An end in a wider window, where the ground may lie elsewhere by as much as its map to the plane is off."""
+    """An end in a wider window: the old place, at the higher of both altitudes, if it moved by less than 1 mm and rises
+    by less than 0.1 m; else the new one. The windows' maps to the plane differ, so the ground under an end may, too."""
     same = math.dist(old[:2], new[:2]) < 1e-3 and new[2] - old[2] < 0.1
     return (*old[:2], max(old[2], new[2])) if same else old
 
 
 def held_to_border(problem: Problem, found: Solution, leaving: float) -> Solution:
-    """``found`` with the bound that holds for paths which leave the surface, too, and cost ``leaving`` at least."""
+    """``found`` with a bound that also holds for paths that leave the surface, which cost at least ``leaving``."""
     if found.lower_bound is None or found.lower_bound <= leaving:
         return found
     cost = problem.cost(found.path)
@@ -121,14 +123,15 @@ def held_to_border(problem: Problem, found: Solution, leaving: float) -> Solutio
 
 
 def binds(problem: Problem, found: Solution, leaving: float) -> bool:
-    """Whether the bound is that of paths which leave the surface, and too low."""
+    """Whether paths that leave the surface set the bound, and the gap is larger than wanted because of them."""
     if found.lower_bound is None:
         return False
     return found.lower_bound >= leaving and problem.cost(found.path) - leaving > problem.gap_percent / 100.0 * leaving
 
 
 def better(now: Problem, best: Solution | None, found: Solution) -> Solution:
-    """The better of two paths, the other one found over less terrain; in the wider world if it is legal there."""
+    """The better of two solutions: ``found`` over the present terrain, or ``best`` over less terrain. If the path of
+    ``best`` is cheaper, it is returned with the bound of ``found`` if it is legal here, else with its own."""
     if best is None or now.cost(found.path) <= now.cost(best.path):
         return found
     points, limits = best.path.points, now.limits

@@ -1,1 +1,1 @@
-"""Sources of bounds: what no path can be shorter or cheaper than."""
+"""Sources of lower bounds: lengths and energies that no path can beat."""

@@ -1,11 +1,12 @@
-"""Which intervals a track that is short enough can get to, and on from, by what it can climb and descend.
+"""Which altitude intervals a short enough track can reach, and continue from to the goal, within the climb limits.
 
-Flown for s metres of its track, a path that climbs no steeper than c and descends no steeper than d is at z, and
-z - c s only falls, z + d s only rises. So does s - r, r metres straight from the start, and s + t, t metres straight
-to the goal. In an interval a path is no higher than that is, and has flown no less than the shortest way there. So
-the most, or the least, that each of these can be in an interval is that of the way there whose worst interval is best,
-and is found as shortest ways are. Where by these no altitude of an interval can be had in time, nor from there the
-goal's, it is shut; and what is shut leaves others less. Where nothing is left, no track is so short.
+After s metres of its track a path is at altitude z. If it climbs no steeper than c and descends no steeper than d, then
+z - c s never rises and z + d s never falls. Nor do s - r and s + t ever fall, where r and t are the straight distances
+from the start and to the goal. In an interval, z lies within it and s is at least the shortest track to it; so each
+interval limits these four quantities. The extreme value of each on arrival is that of the chain of intervals whose
+worst member is best, found like a shortest path. An interval is shut if by these values no altitude in it can be
+reached in time, or the goal cannot be reached from it; shut intervals restrict the others. If none is left, no track is
+that short.
 """
 
 from __future__ import annotations
@@ -23,18 +24,18 @@ from gcsplan.world.limits import Limits
 Ints = NDArray[np.int64]
 
 MOST = 4
-"""Intervals over one cell, at most; zones that would make more are as if they were not."""
+"""Most intervals over one cell; zones that would make more are ignored."""
 SPARE_M = 1e-3
-"""By how much intervals are wider, and ends higher and lower, than they are: for rounding, and for what touches."""
+"""Metres by which intervals and the altitudes of the ends are widened, for rounding and for intervals that touch."""
 KEPT = 4
-"""Lengths of which all intervals are kept, at most."""
+"""Most track lengths for which all intervals are cached."""
 ROUNDS, WORTHWHILE = 4, 0.01
-"""Times that what is shut is taken account of, and what part of the intervals must have been shut to go on."""
+"""Most rounds of shutting intervals, and the part of the intervals that a round must shut for another to follow."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Terminal:
-    """Where a track begins or ends: the cells that the place may lie in, and how high; None where that is free."""
+    """Where a track begins or ends: the cells that the place may lie in, and its altitude; None if that is free."""
 
     cells: Ints
     amsl_m: float | None
@@ -42,12 +43,12 @@ class Terminal:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AltitudeIntervals:
-    """Altitude intervals of a lattice's cells, and what is known of tracks shorter than some length that enter them.
+    """Altitude intervals of a lattice's cells, and bounds for the tracks up to some length that enter them.
 
-    ``shape`` rows and columns of cells; ``cell`` (N,) rising, whose interval each is. Of the intervals (N,): the lowest
-    and the highest altitude there; how long the ways there and on are at least; and how far the cells' middles are
-    straight from ``start`` and ``goal``, of which no other place of theirs is nearer or farther by more than
-    ``half_m``.
+    ``shape``: rows and columns of cells; ``cell`` (N,), rising: the cell of each interval. For each interval (N,):
+    ``low_m`` and ``high_m``, the lowest and the highest altitude; ``away_m`` and ``left_m``, least metres of track from
+    the start to it and from it to the goal; ``from_start_m`` and ``to_goal_m``, straight metres between the cell's
+    middle and ``start``, ``goal``. No place of a cell is nearer or farther than its middle by more than ``half_m``.
     """
 
     shape: tuple[int, int]
@@ -64,13 +65,13 @@ class AltitudeIntervals:
 
     @property
     def cells(self) -> Bools:
-        """(rows, cols) those that have one."""
+        """(rows, cols) which cells have an interval."""
         out = np.zeros(self.shape, np.bool_)
         out.ravel()[self.cell] = True
         return out
 
     def only(self, which: Bools) -> AltitudeIntervals:
-        """Some of them."""
+        """The intervals ``which`` (N,) selects."""
         return replace(
             self,
             cell=self.cell[which],
@@ -83,8 +84,9 @@ class AltitudeIntervals:
         )
 
     def reached(self, limits: Limits, limit_m: float) -> AltitudeIntervals:
-        """Those that tracks shorter than ``limit_m`` may enter, and what of them; none where there is no such track."""
-        # An angle that is exceeded by less than its float noise is kept.
+        """The intervals, or the parts of them, that tracks shorter than ``limit_m`` may enter; none if it is proved
+        that there is no such track."""
+        # The slopes are raised by the rounding of the angle, so that a path exactly at the limit counts.
         up, down = (k + 1e-8 * (1.0 + k * k) for k in (limits.max_climb_slope, limits.max_descent_slope))
         now = self.only((self.away_m + self.left_m <= limit_m) & (self.low_m <= self.high_m))
         for _ in range(ROUNDS):
@@ -95,7 +97,7 @@ class AltitudeIntervals:
         return now
 
     def _back(self) -> AltitudeIntervals:
-        """The same for who comes from the goal."""
+        """The same intervals with start and goal exchanged."""
         return replace(
             self,
             away_m=self.left_m,
@@ -107,7 +109,8 @@ class AltitudeIntervals:
         )
 
     def _there(self, up: float, down: float, limit_m: float) -> AltitudeIntervals:
-        """What is left of them, and how long the ways there are, by what climbs and descends from the start."""
+        """The intervals that can be reached from the start with slopes of at most ``up`` and ``down``; ``low_m``,
+        ``high_m`` and ``away_m`` are narrowed accordingly."""
         if not len(self.cell):
             return self
         first = np.searchsorted(self.cell, np.arange(self.shape[0] * self.shape[1] + 1))
@@ -145,9 +148,10 @@ class AltitudeIntervals:
 
 
 class Reached:
-    """Altitude intervals that tracks shorter than some lengths may enter; what is known of longer ones helps.
+    """Cache of the altitude intervals that tracks up to several lengths may enter; each starts from those of a longer
+    length.
 
-    ``every``: what tracks shorter than ``limit_m`` may meet.
+    ``every``: the intervals that tracks shorter than ``limit_m`` may meet.
     """
 
     def __init__(self, every: AltitudeIntervals, limits: Limits, limit_m: float) -> None:
@@ -156,12 +160,13 @@ class Reached:
         self._asked: set[float] = set()
 
     def known(self, limit_m: float, near: Bools) -> AltitudeIntervals:
-        """Those that tracks so long may enter, as far as is known by now, of cells that are ``near`` (cells,)."""
+        """The intervals that tracks shorter than ``limit_m`` may enter by the results so far, of the cells that are
+        ``near`` (cells,)."""
         found = self._known[min(m for m in self._known if m >= limit_m)]
         return found.only(near[found.cell])
 
     def within(self, limit_m: float, near: Bools) -> AltitudeIntervals:
-        """The same of one length, looked at."""
+        """`known`, computed for this very length."""
         if limit_m in self._asked and limit_m in self._known:
             return self._known[limit_m]
         self._asked.add(limit_m)

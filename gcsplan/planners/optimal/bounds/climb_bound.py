@@ -1,8 +1,8 @@
-"""How much longer than its ground track a path must be: heights that no short track avoids.
+"""How much longer than its ground track a path must be: altitudes that no short track avoids.
 
-Every track shorter than some length is, after s metres, in one of the cells that are no farther than s from where it
-began and no farther than what is left from where it ends. The lowest floor of those cells is a floor for the altitude
-after s metres, whatever the track; a taut string over it is shorter than every path.
+After s metres, every track shorter than some length is in one of the cells that are no farther than s from its start
+and no farther than the remaining length from its goal. The lowest floor of those cells is a floor for the altitude
+after s metres, whatever the track. A taut string over these floors is no longer than any path.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.profile.taut_string import Blocked, Profile, taut_string
 
 STEPS = 400
-"""Places along a leg at which the floor is looked up."""
+"""Steps along a leg between the places at which the floor is read."""
 
 
 def altitude_ranges(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats, Floats]:
-    """Places along a leg (M,), the floor and the ceiling there (M,), for tracks as long as ``track_m`` at least.
+    """Metres along a leg (M,), and floor and ceiling there (M,), for all tracks of ``track_m`` to ``limit_m`` metres.
 
-    Tracks of more than ``limit_m`` are not asked about. A longer track is squeezed into ``track_m`` by moving its
-    points towards its start by what it is longer at most; the floor is the least, the ceiling the greatest within that.
+    A longer track is mapped to ``track_m`` by moving its points towards its start by at most what it is longer. So the
+    floor at a place is the lowest, and the ceiling the highest, within that distance.
     """
     low, high, away, left = leg.cells(limit_m)
     met = np.isfinite(away) & np.isfinite(left) & (low <= high)
@@ -38,8 +38,8 @@ def altitude_ranges(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, F
 
 
 def _least(value: Floats, first: NDArray[np.intp], last: NDArray[np.intp], size: int) -> Floats:
-    """For each of ``size`` places the least ``value`` of the ranges first : last that hold it; inf where none does."""
-    # Ranges as two overlapping blocks of a power of two, laid down from the largest blocks to single places.
+    """(size,) the least ``value`` of all ranges ``first`` : ``last`` that contain a place; inf if none does."""
+    # Each range is two overlapping blocks whose size is a power of two; minima pass from larger blocks to smaller ones.
     keep = last > first
     value, first, last = value[keep], first[keep], last[keep]
     levels = max(size, 1).bit_length()
@@ -55,22 +55,22 @@ def _least(value: Floats, first: NDArray[np.intp], last: NDArray[np.intp], size:
 
 
 def rise_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> float:
-    """No path over tracks of at least ``tracks_m`` and at most ``limits_m`` metres is shorter in space.
+    """A lower bound of the length in space of paths over tracks of ``tracks_m`` to ``limits_m`` metres, leg by leg.
 
-    Climb limits are not in it: they only make paths longer.
+    It ignores climb limits, which only make paths longer.
     """
     found = _string(legs, tracks_m, limits_m)
     return found.length_m if isinstance(found, Profile) else sum(tracks_m)
 
 
 def climb_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> float:
-    """No path over such tracks climbs and descends less in all."""
+    """A lower bound of the metres climbed and descended in all by paths over such tracks."""
     found = _string(legs, tracks_m, limits_m)
     return found.vertical_m if isinstance(found, Profile) else 0.0
 
 
 def _string(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> Profile | Blocked:
-    """The tautest profile between what is known of such tracks' floors and ceilings."""
+    """The taut string between the floors and ceilings of such tracks (`altitude_ranges`)."""
     places, lows, highs = [np.zeros(1)], [np.full(1, -np.inf)], [np.full(1, np.inf)]
     begin = 0.0
     for k, (leg, track_m, limit_m) in enumerate(zip(legs, tracks_m, limits_m, strict=True)):

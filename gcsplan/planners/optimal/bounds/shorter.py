@@ -1,7 +1,7 @@
-"""Bounds of length and energy from the plane: is any path cheaper than something between bound and best path?
+"""Lower bounds of length and energy from the plane: is any path cheaper than a value between bound and best path?
 
-The tracks that short are few, near their ends they can have climbed only so far, and on their way they must climb so
-much. What is answered with no is a bound; else the bound of those that are shorter halves what is left.
+Few tracks are that short, they can climb only little near their ends, and they must climb to the ground on the way. If
+no path is cheaper, the value is the new bound. Otherwise the bound of the paths that are shorter narrows the interval.
 """
 
 from __future__ import annotations
@@ -15,25 +15,26 @@ from gcsplan.planners.optimal.cap_search import Layer, search_caps
 from gcsplan.planners.optimal.plane_search import PlaneSearch
 
 CLOSER, LEFT, SURE, FLAT = 8, 0.05, 0.4, 0.12
-"""Times that what lies between path and bound is cut, at most, and what part of the gap is not worth it, or what part
-of that where it is known how bounds rise; where it is cut first where path and bound are far apart."""
+"""Most cuts of the interval between bound and best path; the part of the gap below which an interval is not cut; the
+part of that for the expected gain, where it is known how bounds rise; and the part of the interval at which it is first
+cut if path and bound are far apart."""
 FALLS = -0.25
-"""By how much a bound of shorter paths falls with each metre that they may be longer, where that is not known."""
+"""Change of the bound of shorter paths per metre of their greatest length, assumed until two such bounds are known."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
-"""What part of what the longest tracks must climb shorter ones may have to, tried one after the other."""
+"""Parts of the extra length that climbing costs the longest tracks, tried in turn as that of shorter tracks."""
 PIECES = 4
-"""Into how many pieces the lengths of tracks that matter are cut, each of which must climb no less than a bound."""
+"""Pieces into which the range of track lengths is cut; each piece has its own bound of the climb."""
 NEARER = 0.45
-"""What part of the wanted gap is tried first, and worth a look even where the gap is small enough; a first path that is
-as near is good enough."""
+"""Part of the wanted gap that is tried first, even if the gap is already as small as wanted; below it, there is nothing
+left to do."""
 
 
 def halve(plane: PlaneSearch, *, far: bool = False) -> None:
-    """Raise the bound, up to the wanted gap if it can be, which is tried first if it is not ``far``: what lies between
-    is halved until it can be told how bounds rise with shorter paths."""
+    """Raise the lower bound of the length until the gap is as small as wanted, if possible; unless ``far``, the value
+    for that is tried first. The interval between bound and path is halved until two bounds predict the best cut."""
     incumbent = plane.incumbent
     low, high = incumbent.bound, incumbent.cost
-    shorter: list[tuple[float, float]] = []  # what was asked, and the bound of that, where it is known
+    shorter: list[tuple[float, float]] = []  # lengths that were tried, and the bounds of all paths shorter than them
     part = FLAT if far else 0.5
     for k in range(CLOSER):
         nearer = incumbent.cost / (1.0 + NEARER * incumbent.wanted)
@@ -57,8 +58,8 @@ def halve(plane: PlaneSearch, *, far: bool = False) -> None:
 
 
 def _meeting(shorter: list[tuple[float, float]], low: float, high: float) -> float:
-    """Where a length is the bound of all that is shorter, by the last two that were asked, or one, if that tells; else
-    inf."""
+    """The length that should equal the bound of all shorter paths, extrapolated from the last two lengths tried, or
+    from one with the slope `FALLS`; inf if that gives none between ``low`` and ``high``."""
     if not shorter or (len(shorter) == 1 and shorter[0][1] < shorter[0][0]):
         return math.inf
     (a, of_a), (b, of_b) = shorter[0], shorter[-1]
@@ -68,7 +69,8 @@ def _meeting(shorter: list[tuple[float, float]], low: float, high: float) -> flo
 
 
 def _bound_shorter(plane: PlaneSearch, longest_m: float) -> float:
-    """A bound of all paths shorter than ``longest_m``: their tracks on the fine lattice, then what they climb."""
+    """A lower bound of all paths shorter than ``longest_m``: from their tracks on the fine lattice, then their climb;
+    ``longest_m`` or more if there are none."""
     most_m = _longest_track(plane, longest_m)
     spare = most_m - sum(leg.length_m for leg in plane.legs)
     tracks = []
@@ -84,13 +86,13 @@ def _bound_shorter(plane: PlaneSearch, longest_m: float) -> float:
         tracks.append(leg.bound(plane.top_m, wanted, limit, True))
     if sum(tracks) >= most_m * (1.0 - 1e-12):
         return longest_m
-    # Each leg's limit is what the others leave, which is less now that they are known better.
+    # The length to spare is what the legs' bounds leave, which is less now that these are better.
     spare = max(most_m - sum(tracks), 0.0)
     return _least_of_pieces(plane, tracks, spare, partial(rise_bound, plane.legs))
 
 
 def _longest_track(plane: PlaneSearch, longest_m: float) -> float:
-    """No track of a path shorter than ``longest_m`` is longer than this, for it must climb as well."""
+    """An upper bound of the track length of paths shorter than ``longest_m``: less than that, because paths climb."""
     legs = plane.legs
     if len(legs) > 1:
         return longest_m
@@ -105,8 +107,8 @@ def _longest_track(plane: PlaneSearch, longest_m: float) -> float:
 def _least_of_pieces(
     plane: PlaneSearch, tracks_m: list[float], spare_m: float, cost: Callable[[list[float], list[float]], float]
 ) -> float:
-    """The least ``cost`` of paths whose tracks are longer than ``tracks_m`` by no more than ``spare_m`` in all, given
-    that of those between least and greatest lengths."""
+    """A lower bound of the cost of paths whose tracks are longer than ``tracks_m`` by at most ``spare_m`` in all.
+    ``cost``: that of paths with tracks between two lists of lengths, least and greatest, leg by leg."""
     found = math.inf
     for least, most in _pieces(tracks_m, spare_m):
         if plane.incumbent.least(sum(least)) >= found:
@@ -116,8 +118,9 @@ def _least_of_pieces(
 
 
 def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float], list[float]]]:
-    """The least and the greatest lengths of tracks that are longer by no more than ``spare_m``, cut into pieces: the
-    less lengths differ, the better it is known where on its way a track is. Of several legs that is not known."""
+    """Least and greatest track lengths, leg by leg, of `PIECES` pieces of the range from ``tracks_m`` to ``spare_m``
+    more. The less lengths differ, the better it is known where a track is after so many metres. Several legs make a
+    single piece, because it is not known how they share ``spare_m``."""
     if len(tracks_m) > 1:
         yield tracks_m, [track + spare_m for track in tracks_m]
         return
@@ -126,7 +129,7 @@ def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float]
 
 
 def raise_climb(plane: PlaneSearch) -> None:
-    """Raise a bound of energy by what tracks that are short enough must climb and descend, a few lengths at a time."""
+    """Raise the lower bound of the energy by what short enough tracks must climb and descend, piece by piece."""
     p, legs = plane.problem, plane.legs
     if plane.incumbent.gap <= NEARER * plane.incumbent.wanted or not plane.incumbent.budget.goes_on():
         return

@@ -1,1 +1,1 @@
-"""Sources of paths: searches beside the shortest track below a cap."""
+"""Sources of paths: searches other than that for the shortest track below a cap."""
