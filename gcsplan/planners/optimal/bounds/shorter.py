@@ -1,7 +1,8 @@
 """Lower bounds of length and energy from the plane: is any path cheaper than a value between bound and best path?
 
-Few tracks are that short, they can climb only little near their ends, and they must climb to the ground on the way. If
-no path is cheaper, the value is the new bound. Otherwise the bound of the paths that are shorter narrows the interval.
+Few tracks are that short, they can climb only little near their ends, and they must climb over the ground on their way.
+If no path is cheaper, the value is the new bound. Otherwise the value replaces the upper end of the interval that is
+left, and the bound of the cheaper paths its lower end.
 """
 
 from __future__ import annotations
@@ -108,7 +109,7 @@ def _least_of_pieces(
     plane: PlaneSearch, tracks_m: list[float], spare_m: float, cost: Callable[[list[float], list[float]], float]
 ) -> float:
     """A lower bound of the cost of paths whose tracks are longer than ``tracks_m`` by at most ``spare_m`` in all.
-    ``cost``: that of paths with tracks between two lists of lengths, least and greatest, leg by leg."""
+    ``cost(least, most)``: a lower bound for tracks between these lengths, leg by leg."""
     found = math.inf
     for least, most in _pieces(tracks_m, spare_m):
         if plane.incumbent.least(sum(least)) >= found:

@@ -1,8 +1,8 @@
-"""Paths along the ways of bounds, past what is shut there by little.
+"""Paths along the tracks of the lower bounds, past the stretches where the exact check shuts these.
 
-The way of a bound is as short as a way can be. Where the exact check shuts it, it does so for a few hundred metres at
-most, for metres or centimetres: beside it, between cells too large to show it, there may be a slit that is open. Each
-such stretch is a problem of its own, so small that its cells are a metre or two wide.
+The track of a bound is as short as a track can be. Where the exact check shuts it, the stretch is a few hundred metres
+long at most, and metres or centimetres are missing. Beside it there may be an open slit that the cells are too large to
+show. Each such stretch is planned as a problem of its own, so small that its cells are a metre or two wide.
 """
 
 from __future__ import annotations
@@ -25,30 +25,31 @@ from gcsplan.world.path import Path
 Point = tuple[float, float, float]
 
 STEP_M = 8.0
-"""Between places of a way at which the exact check is asked."""
+"""Metres between the places of a track at which the exact check's floor is read."""
 OPEN_M = 8.0
-"""Over the floor at both ends of a stretch: there the slit is over."""
+"""Metres from floor to cap at both ends of a stretch: where there are as many, the slit has ended."""
 UNDER_M = 0.5
-"""How far below the cap stretches begin and end."""
+"""Metres below the cap at which stretches begin and end, if there is room."""
 REACHED = 0.95
-"""What part of the way from or to a terminal is climbed on."""
+"""Part of the climb limit at which the track from or to a terminal is taken to climb."""
 APART_M = 1e-3
-"""Places nearer to each other are one."""
+"""Metres; places nearer to each other count as one."""
 SLACKS = (0.008, 0.15)
-"""How much longer than the shortest tracks of a stretch are, as a part; longer ones are no slits."""
+"""Parts by which tracks of a stretch may be longer than its shortest; tracks that are longer pass through no slit."""
 FARTHEST = 1.5
-"""How many times as long as the straight way tracks may be that are looked for between two places."""
+"""Most times as long as the straight track that tracks of a stretch may be."""
 BESIDE_M, WORTH = 10.0, 0.03
-"""How far from a path a way has left it; and what part of what both differ in must be gained there for a look."""
+"""Metres from the path beyond which a track has left it; and the least that a stretch must gain to be planned, as a
+part of what the longest useful track is longer than the bound's."""
 MOST = 24
-"""Stretches of a way, of which more are not looked at."""
+"""Most stretches of a track; a track with more is not tried."""
 AT_ONCE = 512
-"""Places whose distance from a track is worked out at once."""
+"""Places whose distance from a track is computed in one batch."""
 
 
 def follow(plane: PlaneSearch) -> bool:
-    """Where the ways of the last bounds leave the best path, or all along them where none is known, look for a path;
-    True if one is the best so far."""
+    """Look for a path along the tracks of the last bounds, where they leave the best path; all along them if no path is
+    known. Returns whether one is the best so far."""
     incumbent = plane.incumbent
     if incumbent.best is None:
         return _first(plane)
@@ -65,11 +66,11 @@ def follow(plane: PlaneSearch) -> bool:
 
 
 def _first(plane: PlaneSearch) -> bool:
-    """Look for a first path along the ways of all legs."""
+    """Look for a first path along the bounds' tracks of all legs; return whether one was found and is the best."""
     incumbent, parts = plane.incumbent, []
     before: Floats | None = None
     for leg in plane.legs:
-        leg.bound(plane.top_m, leg.corridor(leg.reach_m), leg.reach_m)  # whose way is nearer to what is open
+        leg.bound(plane.top_m, leg.corridor(leg.reach_m), leg.reach_m)  # its track is nearer to open slits
         at, s, places = _sampled(leg.last_track)
         start, goal = (_end(plane, leg, end, at[-1]) for end in (0.0, at[-1]))
         part = _along(plane, leg, [start if before is None else before, goal], places, s, at[-1])
@@ -82,7 +83,7 @@ def _first(plane: PlaneSearch) -> bool:
 
 
 def _end(plane: PlaneSearch, leg: Leg, along_m: float, whole_m: float) -> Floats:
-    """(3,) an end of a leg; where its height is free, as high as `_height` says."""
+    """(3,) an end of a leg, its start if ``along_m`` is 0; where its altitude is free, that of `_height`."""
     end = leg.start if along_m <= 0.0 else leg.goal
     if end.amsl_m is not None:
         return np.array([*end.place, end.amsl_m])
@@ -91,15 +92,16 @@ def _end(plane: PlaneSearch, leg: Leg, along_m: float, whole_m: float) -> Floats
 
 
 def _sampled(way: Floats) -> tuple[Floats, Floats, Floats]:
-    """Metres along a way of its vertices, and of places `STEP_M` apart, and those places (N, 2)."""
+    """Metres along a track of its vertices, metres along it (N,) of places at most `STEP_M` apart, and those places
+    (N, 2)."""
     at = distances(way)
     s = np.linspace(0.0, at[-1], math.ceil(at[-1] / STEP_M) + 1)
     return at, s, np.stack([np.interp(s, at, way[:, k]) for k in range(2)], axis=-1)
 
 
 def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
-    """(N, 3) a cheaper path of a leg than a known one, which it leaves where the way of the last bound does; None where
-    none was found."""
+    """(N, 3) a path of a leg that is cheaper than the known ``path``, which it leaves where the track of the last bound
+    does; None if none was found."""
     on_path = distances(path[:, :2])
     at, s, places = _sampled(leg.last_track)
     away, nearest = _nearest(places, path[:, :2])
@@ -125,9 +127,9 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
 def _along(
     plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float
 ) -> Floats | None:
-    """(N, 3) way points from one end to the other along a way, led past what is shut on it; None where that fails.
+    """(N, 3) way points from one of ``ends`` to the other along a track, past its shut stretches; None if that fails.
 
-    ``places`` (N, 2) of the way, ``s`` (N,) how far along it they are; ``whole_m`` how long all of it is.
+    ``places`` (N, 2) of the track, ``s`` (N,) metres along it; ``whole_m``: its whole length.
     """
     over = plane.problem.floors(places[:, 0], places[:, 1]) - plane.top_m
     stretches = _stretches(over)
@@ -143,7 +145,7 @@ def _along(
             goal = np.array([*places[last], height])
         part = replace(plane.problem, start=_point(start), goal=_point(goal), via=(), progress=None, objective="length")
         sub = Incumbent(part)
-        sub.first_s = 0.0  # a path for a piece is not the mission's first, with which the budget begins
+        sub.first_s = 0.0  # a path of a piece is not the mission's first path, which would start the next budget
         found = PlaneSearch(sub)
         for piece in found.legs:
             piece.farthest = FARTHEST
@@ -162,7 +164,7 @@ def _along(
 
 
 def _nearest(places: Floats, track: Floats) -> tuple[Floats, Floats]:
-    """(N,) how far places are from a track, and where on it that is, in metres along it."""
+    """(N,) distances of places from a track, and metres along the track (N,) of the points nearest to them."""
     a, d, s = track[:-1], np.diff(track, axis=0), distances(track)
     away, where = np.empty(len(places)), np.empty(len(places))
     for first in range(0, len(places), AT_ONCE):
@@ -177,7 +179,7 @@ def _nearest(places: Floats, track: Floats) -> tuple[Floats, Floats]:
 
 
 def _runs(some: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last of what is true, run by run."""
+    """First and last index of each run of true values."""
     change = np.flatnonzero(np.diff(np.concatenate([[False], some, [False]]).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in zip(change[::2], change[1::2], strict=True)]
 
@@ -188,7 +190,8 @@ def _point(place: Floats) -> Point:
 
 
 def _stretches(over: Floats) -> list[tuple[int, int]]:
-    """First and last of places, between which there is less room than `ROOM_M`, and somewhere none."""
+    """First and last index of each stretch with less than `OPEN_M` from floor to cap, and somewhere none; ``over``:
+    floor minus cap (N,)."""
     out: list[tuple[int, int]] = []
     tight = over > -OPEN_M
     for k in np.flatnonzero(over > 0.0).tolist():
@@ -200,8 +203,8 @@ def _stretches(over: Floats) -> list[tuple[int, int]]:
 
 
 def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float, over_m: float) -> float:
-    """How high a path goes on at a place: below the cap by half of what there is to spare, or less; that of the goal
-    there; and what can be reached from start and goal."""
+    """The altitude AMSL at which a path passes a place between two stretches: below the cap by `UNDER_M`, or by half of
+    what is free if that is less; no higher than can be reached from start and goal; at a terminal, the terminal's."""
     limits = plane.problem.limits
     z = plane.top_m - min(UNDER_M, max(-0.5 * over_m, 0.0))
     for terminal, way_m, slope in (

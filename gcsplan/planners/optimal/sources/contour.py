@@ -1,8 +1,9 @@
-"""Tracks that climb a slope aslant, where what is flown follows the ground closer than the climb limit is steep.
+"""Tracks that climb a slope aslant, where a path must follow ground that is steeper than the climb limit.
 
-Under a zone whose floor is a few metres over the lowest legal altitude there is no other way. The shortest track of the
-plane knows nothing of it: what can be climbed depends on the direction. So where path and bound stay apart, the lattice
-of reachable altitudes (`routes`) is searched among all tracks that may still be shorter, which leaves it fine nodes.
+Under a zone whose floor is a few metres over the lowest legal altitude, nothing else is possible. The shortest track in
+the plane ignores this, because whether a slope can be climbed depends on the direction. So where a gap remains between
+path and bound, the lattice of reachable altitudes (`routes`) is searched. It covers only tracks that may still be
+shorter than the best path's, so its nodes are dense.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ from gcsplan.planners.problem import Problem, straight_way_m
 from gcsplan.planners.profile.climb_laps import pins_of
 
 NODES = 60_000
-"""Of the lattice, about."""
+"""Nodes of the lattice, about."""
 
 
 def traverse(problem: Problem, longest_m: float) -> PinnedTrack | None:
-    """The best track on a lattice of reachable altitudes among those about as long as ``longest_m`` at most."""
+    """The best track on a lattice of reachable altitudes that holds tracks of up to about ``longest_m`` metres; None if
+    there is none."""
     router = Router.at(problem, Level(max(longest_m / straight_way_m(problem), 1.0), NODES))
     way = router.way(weight=climbing_weight(problem) if problem.objective == "energy" else 0.0)
     if way is None:
@@ -29,7 +31,7 @@ def traverse(problem: Problem, longest_m: float) -> PinnedTrack | None:
 
 
 def pulled_tight(problem: Problem, points: Floats, level: int, deadline_s: float) -> tuple[Floats, Bools] | None:
-    """Way points of a better line than a path's, and which are terminals, if one is found before ``deadline_s``; the
-    lines around it are those of a ``level`` of lattices."""
+    """Way points of a better line than the path ``points``, and which of them are terminals; None if none is found by
+    ``deadline_s`` (`time.perf_counter`). ``level``: index of the lattice in `LEVELS` that supplies other lines."""
     found = pulled(problem, points, LEVELS[level], deadline_s)
     return None if found is None else (found, pins_of(problem, found)[0])

@@ -1,13 +1,14 @@
-"""Tracks past what they can be flown neither over nor under, nor climb to: around it, or with laps on the way.
+"""Tracks past obstacles that they can pass neither over nor under, nor climb over in time: around them, or with laps.
 
-The mesh of a plane asks of each cell alone whether there is an altitude to pass it at. A track through it may still
-have no profile: where a zone is entered below its floor and left above its ceiling, or the climb limit binds far from
-the ends. Two things help. Sides of zones are shut, so that the track is another; or it is made longer, by laps, so that
-there is more way to climb. How much longer is chosen before the track is: with metres to spare near the ends the walls
-there, which stand because nothing can have climbed over them, are lower.
+The mesh of a plane decides for each cell alone whether there is an altitude at which to pass it. A track through it may
+still have no profile: if it enters a zone below its floor and leaves it above its ceiling, or if the climb limit binds
+far from the ends. Two changes help. Sides of zones (under, over) are shut, which gives another track; or laps make the
+track longer, so that it can climb more. The length of the laps is chosen before the track: walls near the ends stand
+because no path can have climbed over them yet, so with spare metres for laps there they are lower.
 
-So a node of the search is what is shut, and from which to which spare metres: no path of it is shorter than its
-shortest track with the most, and the least of them flown in laps. The node that may hold the least is looked at first.
+So a node of the search is a choice of open zone sides and a range of spare metres. No path of it is shorter than its
+shortest track for the most spare metres, plus the least spare metres in laps. The node with the lowest bound of the
+cost is searched first.
 """
 
 from __future__ import annotations
@@ -27,23 +28,24 @@ from gcsplan.planners.profile.exact import sampled_track
 from gcsplan.planners.profile.track import Closed, Lacking, distances, lacking
 
 LACKING_M, HAIR_M = 3.0, 0.2
-"""So little room is missing because cells are more lenient than the check, about terrain that is kept clear of
-sideways most of all: the same is looked at lower by what is missing, and a hair."""
+"""If a track lacks less than `LACKING_M` between floor and ceiling, cells may be more lenient than the exact check,
+mostly beside terrain with a horizontal clearance: the search repeats under a cap lowered by what is missing and
+`HAIR_M`."""
 TAKEN = 5
-"""Tracks that paths are looked for over, at most."""
+"""Most tracks over which paths are looked for."""
 MORE = 1.1
-"""A track that takes that times more laps than it may take near the ends does not take them there."""
+"""A track that takes more than this many times the spare metres near the ends in laps takes its laps elsewhere."""
 LITTLE = 1e-4
-"""What is not worth a look, as a part of the cost."""
+"""Part of the cost below which a gain is not worth a search."""
 NARROW = 0.04
-"""Spare metres that differ by less, as a part of what is between path and bound, are not told apart."""
+"""Ranges of spare metres are not split if they cost less than this part of the difference between path and bound."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Choice:
-    """``under``, ``over`` (zones,): which may be passed so; from ``least_m`` to ``most_m`` spare metres near the ends;
-    all of it so much ``lower_m`` than the highest altitude. ``tried``: zones that choices with more shut, and no fewer
-    spare metres, were made of before."""
+    """``under``, ``over`` (zones,): which zones may be passed below their floor, above their ceiling; ``least_m``,
+    ``most_m``: the range of spare metres near the ends; ``lower_m``: metres by which the cap is lowered. ``tried``:
+    zones for which choices with one side more shut, and no fewer spare metres, have been made before."""
 
     under: Bools
     over: Bools
@@ -54,14 +56,14 @@ class Choice:
 
 
 _Open = tuple[float, int, float, Choice, Lacking | None, PinnedTrack | None]
-"""What a path of a choice may cost, a number, how long its track is at least, the choice; what the track lacks, if that
-is known; and that track, where a path over it is to be looked for."""
+"""The least cost of a path of a choice (the key), a running number, the least length of its track, the choice; what the
+track lacks, if known; and the track itself, if a path over it is to be looked for."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DetourSearch:
-    """Tracks past what is in the way. ``terminals``: the shortest track of a choice's zones and most metres, from
-    terminal to terminal; ``fine``: whether that is of a fine lattice. What is found goes to the ``incumbent``."""
+    """A best-first search for tracks past obstacles; paths go to the ``incumbent``. ``terminals``: returns the shortest
+    track of a choice with its most spare metres, through all terminals; ``fine``: whether that is on a fine lattice."""
 
     incumbent: Incumbent
     terminals: Callable[[Choice], PinnedTrack | None]
@@ -70,10 +72,10 @@ class DetourSearch:
     def run(
         self, roots: list[Choice], most: int, *, first: bool, laps: bool, given: PinnedTrack | None = None
     ) -> Choice | None:
-        """Look at ``most`` tracks; the choice that the best path was found with, if one was.
+        """Try at most ``most`` tracks; return the choice with which the best path was found, None if none was better.
 
-        ``first``: the first that is better than what is known will do; ``laps``: whether it may have laps; ``given``:
-        the track of the first of the ``roots``, which the search begins with, if it is known.
+        ``first``: stop at the first path that is better than the best known; ``laps``: whether it may have laps;
+        ``roots``: the choices to begin with; ``given``: the track of the first of them, if it is known.
         """
         open_set: list[_Open] = []
         best: Choice | None = None
@@ -139,19 +141,20 @@ class DetourSearch:
                 hoped = min(hoped, lack.cost)
             self._closed(length_m, choice, lack.zones, push)
             if lack.laps_m > MORE * sum(choice.most_m):
-                flat.add((*sides, lack))  # with more to spare it is no other track
+                flat.add((*sides, lack))  # more spare metres give the same track
             else:
                 self._split(length_m, replace(choice, tried=choice.tried.union(lack.zones)), lack, hoped, push)
         return best
 
     def _may_help(self, length_m: float, choice: Choice) -> bool:
-        """Whether a choice whose track is so long may hold something that is better by more than a little."""
+        """Whether a choice whose track is at least ``length_m`` long may hold a path that is better by more than a
+        little."""
         cost = self.incumbent.cost
         little = min(NARROW * (cost - self.incumbent.bound), LITTLE * cost) if math.isfinite(cost) else 0.0
         return self.incumbent.least(length_m + sum(choice.least_m)) < cost - little
 
     def _closed(self, length_m: float, choice: Choice, zones: tuple[int, ...], push: Callable[..., None]) -> None:
-        """The same with a side of one of the ``zones`` shut."""
+        """Push, for each of the ``zones`` and each of its open sides, the choice with that side shut."""
         for zone in zones:
             levels, more = self.incumbent.problem.airspace.zones[zone], replace(choice, tried=frozenset())
             if zone not in choice.tried and levels.floor is not None and choice.under[zone]:
@@ -160,7 +163,8 @@ class DetourSearch:
                 push(length_m, replace(more, over=_without(choice.over, zone)))
 
     def _split(self, length_m: float, choice: Choice, lack: Lacking, hoped: float, push: Callable[..., None]) -> None:
-        """Fewer spare metres than this track takes, and as many; ``hoped``: what the best path is taken to cost."""
+        """Split the choice's range of spare metres, up to what this track takes, in two halves and push both; the upper
+        one has the same track. ``hoped``: expected cost of the best path."""
         most = _needed(self.incumbent.problem, choice, lack)
         wide = [b - a for a, b in zip(choice.least_m, most, strict=True)]
         k = int(np.argmax(wide))
@@ -173,7 +177,8 @@ class DetourSearch:
 
 
 def _needed(problem: Problem, choice: Choice, lack: Lacking) -> Spare:
-    """Spare metres with which a choice's track is the same: no more than it takes."""
+    """The spare metres near start and goal that a choice's track takes in laps, within the choice's range: with no more
+    than these the track stays the same."""
     limits = problem.limits
     climb = sum(why.by / limits.max_climb_slope for why in lack.steep if why.kind == "climb")
     descent = sum(why.by / limits.max_descent_slope for why in lack.steep if why.kind == "descent")
@@ -182,6 +187,7 @@ def _needed(problem: Problem, choice: Choice, lack: Lacking) -> Spare:
 
 
 def _without(which: Bools, zone: int) -> Bools:
+    """A copy of ``which`` with one zone set to False."""
     out = which.copy()
     out[zone] = False
     return out

@@ -1,8 +1,8 @@
-"""Tracks around the zones' own outlines: exact where zones alone are in the way, and a bound wherever they are.
+"""Tracks around the zones' own outlines: exact where only zones are in the way, and a lower bound everywhere.
 
-Zones that can be passed neither over nor under stand in the plane as they are (`outlines`). The shortest track around
-them is a bound for every path. A track past them, and past zones that are shut because the profile over it would cost
-more, gives paths (`detours`).
+Zones that can be passed neither over nor under are obstacles in the plane with their own outlines (`outlines`). The
+shortest track around them is a bound for every path. Tracks around them, and around zones whose sides are shut because
+passing over or under costs more, give paths (`detours`).
 """
 
 from __future__ import annotations
@@ -23,13 +23,15 @@ from gcsplan.planners.problem import terminals_of
 from gcsplan.world.zones import Zone
 
 TRACKS = 24
-"""Tracks that are looked at, at most."""
+"""Most tracks that are tried."""
 HAIR_M, HAIR_BENT_M = 2e-3, 0.07
-"""Kept from outlines for rounding; and where the terrain model's lines are bent in the plane, as the check has them."""
+"""Metres kept from outlines for rounding; and where the terrain model's lines are curved in the plane, as in the exact
+check."""
 
 
 class OutlineTracks:
-    """The plane of one problem with its zones alone; paths and bounds go to the incumbent."""
+    """The plane of one problem with its zones only; paths and bounds go to the incumbent. ``top_m``: highest altitude
+    AMSL at which zones may be passed over."""
 
     def __init__(self, incumbent: Incumbent, top_m: float) -> None:
         self.incumbent, self.problem = incumbent, incumbent.problem
@@ -39,10 +41,10 @@ class OutlineTracks:
         self.under, self.over = _sides(self.problem.airspace.zones, incumbent, top_m)
         self._solids: dict[bool, Solids] = {}
         self._hints: list[Floats] = []
-        """The tracks of the bound: paths may lead along them through slits that coarse outlines shut."""
+        """The tracks of the bound. Outlines are refined along them, so that paths find slits that coarse ones shut."""
 
     def terminals(self, choice: Choice) -> PinnedTrack | None:
-        """The shortest track past the zones that a choice shuts; None where there is none, or too much to look at."""
+        """The shortest track past the zones that a choice shuts; None if there is none or it takes too much work."""
         which = ~((choice.under & self.under) | (choice.over & self.over))
         try:
             tracks = self._tracks(which, outer=True)
@@ -53,7 +55,8 @@ class OutlineTracks:
         return joined(tracks, [z for _, _, z in self.legs[:-1]])
 
     def look(self) -> None:
-        """Raise the bound by the shortest track around what nobody passes, and look for paths."""
+        """Raise the bound to the shortest track around the zones that can be passed neither over nor under, or prove
+        that there is none; then look for paths."""
         incumbent = self.incumbent
         try:
             tracks = self._tracks(~(self.under | self.over), outer=False)
@@ -75,7 +78,8 @@ class OutlineTracks:
         DetourSearch(incumbent, self.terminals, False).run(roots, TRACKS, first=False, laps=laps)
 
     def _tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
-        """The shortest track of each leg past some zones; None where one has none. Raises Exhausted."""
+        """The shortest track of each leg past the zones ``which`` (zones,); None if a leg has none. ``outer``: outlines
+        for paths instead of bounds. Raises Exhausted."""
         if outer not in self._solids:
             air, limits = self.problem.airspace, self.problem.limits
             hair_m = HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M
@@ -94,7 +98,7 @@ class OutlineTracks:
 
 
 def _sides(zones: tuple[Zone, ...], incumbent: Incumbent, top_m: float) -> tuple[Bools, Bools]:
-    """(zones,) which may perhaps be passed under, and over, somewhere."""
+    """(zones,) which zones can perhaps be passed under, and which over, at some place."""
     limits, surface = incumbent.problem.limits, incumbent.problem.airspace.surface
     high = float(np.nanmax(surface.ground_m)) if any(_over_ground(z) for z in zones) else 0.0
     low = float(np.nanmin(surface.ground_m))
@@ -103,7 +107,7 @@ def _sides(zones: tuple[Zone, ...], incumbent: Incumbent, top_m: float) -> tuple
     for k, zone in enumerate(zones):
         if zone.floor is not None:
             room = zone.floor.value_m - limits.altitude_error_m - lowest
-            # Over ground, the same ground bears the zone's floor and what may be flown lowest, but for what is beside.
+            # A floor AGL and the lowest legal altitude count from the same ground, except for ground within clearance.
             beside = high - low if incumbent.problem.airspace.beside_m(limits) > 0.0 else 0.0
             under[k] = room - (low if zone.floor.datum == "amsl" else -beside) >= -0.1
         if zone.ceiling is not None:
