@@ -203,8 +203,9 @@ def _stretches(over: Floats) -> list[tuple[int, int]]:
 
 
 def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float, over_m: float) -> float:
-    """The altitude AMSL at which a path passes a place between two stretches: below the cap by `UNDER_M`, or by half of
-    what is free if that is less; no higher than can be reached from start and goal; at a terminal, the terminal's."""
+    """The altitude AMSL at which a path passes a place between two stretches: below the cap by `UNDER_M`, or by half
+    the height from floor to cap if that is less; no higher than can be reached from start and goal; at a terminal, the
+    terminal's."""
     limits = plane.problem.limits
     z = plane.top_m - min(UNDER_M, max(-0.5 * over_m, 0.0))
     for terminal, way_m, slope in (
