@@ -1,1 +1,1 @@
-"""Paths by A* over a lattice of reachable altitudes, for a maximum AGL and for slopes; `planner` is its door."""
+"""Paths by A* over a lattice of reachable altitudes, for a maximum AGL and climb limits; the entry is `planner`."""

@@ -1,8 +1,8 @@
-"""Samples of the room around a way, on which tracks are pulled tight at a hundred trials a millisecond.
+"""Floors and ceilings sampled around a track, on which tracks are pulled tight at 100 trials per millisecond.
 
-Floors and ceilings are `Airspace`'s own, on a raster along a corridor; zones that are flown over or under are part of
-them, the others are walls. What comes out is not yet proved: `exact` puts it to the exact check, and `Guide.narrow`
-tells the raster where it was wrong.
+Floors and ceilings are those of `Airspace`, on a raster along a corridor. Zones that are flown over or under are part
+of them, all others are walls. The result is not proved legal: `profile.exact` checks it, and `Guide.learn` and
+`Guide.narrow` correct the raster where it was wrong.
 """
 
 from __future__ import annotations
@@ -22,24 +22,27 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
 
 SHUT_M = 1e5
-"""Floor where there is no room at all; kernels are spared infinities."""
+"""Floor, in metres, where no altitude is free; finite, so that kernels need not handle infinities."""
 MOST_NODES = 150_000
 FINEST_PART, COARSEST_M = 0.45, 40.0
-"""Spacing of the raster in parts of the ground's cells, and at most."""
+"""Spacing of the raster: as a part of the terrain's cells, and at most in metres."""
 MARGIN_M = 0.3
-"""Kept from floor and ceiling on the raster, for what lies between samples."""
+"""Metres kept from floor and ceiling of the raster, for ground between samples."""
 SLOPE_PART = 0.999
 PENALTY = 50.0
-"""What a metre too high or too steep costs, in metres of track."""
+"""Cost, in metres of track, of each metre that is missing for a track to be legal."""
 AROUND_M = 2000.0
-"""A move is judged over so much of the track to each side."""
+"""A move is evaluated over this many metres of the track to each side."""
 ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Line:
-    """A track as the guide has it: ``points`` (N, 2), which are ``pinned``, their altitudes ``pin_m`` (NaN free),
-    ``amsl_m`` (N,) of the profile at the vertices; ``cost``, and the metres that are ``missing`` for it to be legal."""
+    """A track evaluated by the guide.
+
+    ``points`` (N, 2); ``pinned`` (N,) vertices that stay; ``pin_m`` (N,) their altitudes, NaN where free; ``amsl_m``
+    (N,) altitude of the profile at the vertices; ``cost``; ``missing``: metres that it lacks to be legal.
+    """
 
     points: Floats
     pinned: NDArray[np.bool_]
@@ -50,13 +53,14 @@ class Line:
 
     @property
     def value(self) -> float:
-        """Cost with what is missing, to compare."""
+        """Cost for comparisons: increased by 1000 times itself for each missing metre."""
         return self.cost * (1.0 + 1e3 * self.missing)
 
 
 @dataclass(eq=False, slots=True)
 class Guide:
-    """Rasters ``floor_m``, ``ceiling_m`` (rows, cols) from (``west_m``, ``south_m``), rows going north; walls."""
+    """Rasters ``floor_m``, ``ceiling_m`` (rows, cols) from (``west_m``, ``south_m``), rows going north, and the walls:
+    ``circles`` (C, 3) east, north, radius; ``edges`` (E, 4) of polygons. ``work``: working arrays of the kernel."""
 
     problem: Problem
     west_m: float
@@ -71,12 +75,14 @@ class Guide:
     slope_part: float = SLOPE_PART
 
     def strict(self) -> None:
-        """Keep more from floor, ceiling and the steepest slope from now on: the exact check was stricter."""
+        """Keep 0.3 m more from floor and ceiling, and 0.5 % more from the steepest slope, after the exact check refused
+        a line that was legal here."""
         self.margin_m += 0.3
         self.slope_part -= 0.005
 
     def learn(self, samples: Floats) -> None:
-        """Correct the rasters where places (K, 4), east, north, floor, ceiling, are known to have less room."""
+        """Raise the floor and lower the ceiling, by up to 10 m, where ``samples`` (K, 4) of east, north, floor, ceiling
+        are stricter than the rasters."""
         x, y = (samples[:, 0] - self.west_m) / self.step_m, (samples[:, 1] - self.south_m) / self.step_m
         rows, cols = self.floor_m.shape
         i, j = np.clip(np.floor(x).astype(int), 0, cols - 2), np.clip(np.floor(y).astype(int), 0, rows - 2)
@@ -92,7 +98,10 @@ class Guide:
             raster += sign * more
 
     def pull(self, line: Line, steps_m: Floats, gain_m: float, rounds: int = ROUNDS) -> Line:
-        """The line made cheaper by moves of ``steps_m``, each for a gain of ``gain_m`` metres of track."""
+        """Make a line cheaper by moves of ``steps_m`` metres, each of which must gain ``gain_m`` metres of track.
+
+        A line of too many points is returned as it is.
+        """
         p, n = self.problem, len(line.points)
         energy = p.objective == "energy"
         unit = p.horizontal_j_per_m if energy else 1.0
@@ -141,7 +150,7 @@ class Guide:
         )
 
     def narrow(self, place: Floats, by_m: float, ceiling: bool = False) -> None:
-        """Raise the floor (lower the ceiling) by ``by_m`` around a place, where the exact check found less room."""
+        """Raise the floor (or lower the ceiling) by ``by_m`` at nodes around a place that the exact check refused."""
         i, j = math.floor((place[0] - self.west_m) / self.step_m), math.floor((place[1] - self.south_m) / self.step_m)
         rows, cols = slice(max(j, 0), max(j + 2, 0)), slice(max(i, 0), max(i + 2, 0))
         if ceiling:
@@ -151,14 +160,18 @@ class Guide:
 
 
 def line_of(points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> Line:
-    """A line that nothing is known of yet."""
+    """A line that is not evaluated yet."""
     return Line(points, pinned, pin_m, np.zeros(len(points)), math.inf, math.inf)
 
 
 def make_guide(
     problem: Problem, ways: list[Floats], radius_m: float, over: dict[int, bool], finest_m: float = COARSEST_M
 ) -> Guide:
-    """The guide within about ``radius_m`` of ``ways`` (N, 2). ``over``: zones known to be flown over (or under)."""
+    """The guide within about ``radius_m`` of some tracks ``ways`` (N, 2).
+
+    ``over``: zones known to be flown over (True) or under (False). ``finest_m``: most metres between nodes, unless the
+    raster would have more than `MOST_NODES`.
+    """
     air, limits = problem.airspace, problem.limits
     everything = np.vstack(ways)
     west, south = (float(x) for x in everything.min(axis=0) - radius_m)
@@ -204,7 +217,7 @@ def make_guide(
 
 
 def _near(problem: Problem, zone: Zone, x: Floats, y: Floats, step: float) -> tuple[NDArray[np.intp], ...] | None:
-    """Rows and columns of the nodes within reach of a zone and three quarters of a step; None where there are none."""
+    """Rows and columns of the nodes within reach of a zone plus three quarters of a step; None if there are none."""
     w, s, e, n = zone.bounds
     reach = problem.airspace.beside_m(problem.limits) + 0.75 * step + 1.0
     i = np.flatnonzero((x > w - reach) & (x < e + reach))
@@ -221,7 +234,10 @@ def _passed(
     problem: Problem, zone: Zone, over: bool | None, x: Floats, y: Floats, jj: NDArray[np.intp], ii: NDArray[np.intp],
     floor: Floats, ceiling: Floats,
 ) -> bool:  # fmt: skip
-    """Make the way over (under) a zone a part of the rasters; False where there is none: the zone is a wall."""
+    """Raise the floor over a zone, or lower the ceiling to below it, whichever leaves more altitude free.
+
+    Return False and change nothing if the zone can be passed neither over nor under: it is a wall.
+    """
     error = problem.limits.altitude_error_m
     capacity = []
     for upper, level in ((True, zone.ceiling), (False, zone.floor)):
@@ -248,7 +264,7 @@ def _passed(
 
 
 def _level(problem: Problem, level: Level, upper: bool, east: Floats, north: Floats) -> Floats:
-    """Altitude that clears a level which follows the ground within reach."""
+    """Altitude that clears, over (``upper``) or under it, a level of a zone that follows the ground within reach."""
     limits, air = problem.limits, problem.airspace
     if upper:
         wide = replace(limits, min_agl_m=0.0)

@@ -1,9 +1,8 @@
-"""The world as a search sees it: a square lattice of nodes with floors, ceilings and zones on its edges.
+"""The world as the lattice search sees it: a square lattice of nodes with floors, ceilings and zones on its edges.
 
-Floors and ceilings are those of `Airspace` on a lattice of half the spacing, so that every edge knows its ends
-and its middle; zones are tested against the whole line of an edge. A guide, never a judge: what comes out of a
-search is tested exactly along its line, and `Lattice.raise_floor` tells the next search what the exact test knew
-better.
+Floors and ceilings are those of `Airspace` on a lattice of half the spacing, so that they are known at the ends and
+in the middle of every edge; zones are tested against the whole line of an edge. The lattice only guides: the result of
+a search is checked exactly along its line, and `Lattice.raise_floor` corrects the lattice for the next search.
 """
 
 from __future__ import annotations
@@ -24,10 +23,10 @@ from gcsplan.world.zones import Circle, Level, Zone
 Ints = NDArray[np.int64]
 
 STEPS = np.array([(1, 0), (0, 1), (1, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1)], dtype=np.int64)
-"""Half of the 16 directions; edge ``node * 8 + k`` goes from ``node`` by ``STEPS[k]``."""
+"""Half of the 16 directions, in nodes (east, north); edge ``node * 8 + k`` goes from ``node`` by ``STEPS[k]``."""
 
 LINK_DOORS = 9
-"""Places at which an edge between a terminal and a node is looked at."""
+"""Places along an edge between a terminal and a node at which floor and ceiling are read."""
 
 
 @dataclass(eq=False, slots=True)
@@ -35,8 +34,9 @@ class Lattice:
     """Node (i, j) lies at (west_m + i·step_m, south_m + j·step_m) and has the number ``j·nx + i``.
 
     ``floor_m``, ``ceiling_m``, ``ground_m`` (2·ny − 1, 2·nx − 1): AMSL on the half lattice, the ground only where a
-    zone asks for it. Bands (altitudes that a zone forbids on an edge, from ``band_low`` to ``band_high``; ``band_agl``
-    (B, 2) which of the two are over ground) of edge e stand at ``band_at[e] : band_at[e + 1]``, low first.
+    zone needs it. A band is the altitudes that a zone forbids on an edge, from ``band_low`` to ``band_high``;
+    ``band_agl`` (B, 2): which of the two count from the ground. Bands of edge e are at
+    ``band_at[e] : band_at[e + 1]``, lowest first. ``reach_m``: distance kept from zones in the plane.
     """
 
     west_m: float
@@ -54,18 +54,18 @@ class Lattice:
     reach_m: float
 
     def node_places(self, nodes: Ints) -> Floats:
-        """(K, 2) places of nodes."""
+        """Places (K, 2) of nodes."""
         j, i = np.divmod(nodes, self.nx)
         return np.stack([self.west_m + i * self.step_m, self.south_m + j * self.step_m], axis=-1)
 
     def raise_floor(self, place: Floats, by_m: float) -> None:
-        """Raise the floor by ``by_m`` around a place, where the exact test found less room than the samples did."""
+        """Raise the floor by ``by_m`` around a place where the exact check was stricter than the samples."""
         half = 0.5 * self.step_m
         i, j = round((place[0] - self.west_m) / half), round((place[1] - self.south_m) / half)
         self.floor_m[max(j - 1, 0) : max(j + 2, 0), max(i - 1, 0) : max(i + 2, 0)] += by_m
 
     def shut(self, place: Floats, radius_m: float) -> None:
-        """Leave no room within ``radius_m`` of a place."""
+        """Close all altitudes within ``radius_m`` of a place."""
         half = 0.5 * self.step_m
         x, y = (place[0] - self.west_m) / half, (place[1] - self.south_m) / half
         rows, cols = self.floor_m.shape
@@ -74,10 +74,10 @@ class Lattice:
 
 
 def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_m: float, detour: float) -> Lattice:
-    """A lattice over ``box`` (west, south, east, north), of places whose detour from end to end is in bounds.
+    """A lattice over ``box`` (west, south, east, north), limited to places that need no longer detour than ``detour``.
 
-    A place where (way from a terminal to it and on to the next) is longer than ``detour`` times the straight way is
-    left out for every pair of neighbouring terminals; ``inf`` keeps the whole box.
+    A place is kept if the track from a terminal to it and on to the next terminal is at most ``detour`` times the
+    straight track between the two (plus four steps), for any pair of neighbouring terminals; ``inf`` keeps all.
     """
     west, south, east, north = box
     nx = max(2, math.ceil((east - west) / step_m) + 1)
@@ -102,7 +102,7 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
 
 
 def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: NDArray[np.bool_], beside_m: float) -> Floats:
-    """The ground where it is ``wanted`` and a zone with a level over ground may come near; 0 elsewhere."""
+    """Ground altitude where ``wanted`` and within ``beside_m`` of the box of a zone with a level AGL; 0 elsewhere."""
     asked = np.zeros(wanted.shape, np.bool_)
     for zone in problem.airspace.zones:
         if any(isinstance(level, Level) and level.datum == "agl" for level in (zone.floor, zone.ceiling)):
@@ -112,7 +112,7 @@ def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: NDArray[np.
             asked[rows, cols] = wanted[rows, cols]
     ground = np.zeros(wanted.shape)
     jj, ii = np.nonzero(asked)
-    # Where the ground is unknown nobody flies, whatever zones there are.
+    # Unknown ground has an infinite floor, so its altitude does not matter here.
     ground[jj, ii] = _known(problem.airspace.surface.ground_at(x[ii], y[jj]), 0.0)
     return ground
 
@@ -131,7 +131,7 @@ def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_
 def _edge_bands(
     air: Airspace, limits: Limits, reach: float, west: float, south: float, step: float, ground: Floats
 ) -> tuple[Ints, Floats, Floats, NDArray[np.bool_]]:
-    """Every (edge, low, high, which of them are over ground) of every zone, by edge and then by low."""
+    """Edge, low, high and (B, 2) which of these are AGL, of every band of every zone; sorted by edge, then by low."""
     ny, nx = (ground.shape[0] + 1) // 2, (ground.shape[1] + 1) // 2
     edges: list[Ints] = []
     levels: list[Floats] = []
@@ -160,7 +160,7 @@ def _edge_bands(
 
 
 def levels_of(limits: Limits, zone: Zone) -> Floats:
-    """(4,) lowest and highest altitude that a zone forbids, errors added; and of each 1 if it is over ground."""
+    """Lowest and highest altitude that a zone forbids, altitude errors included, and of each 1 if it is AGL: (4,)."""
     out = np.array([-np.inf, np.inf, 0.0, 0.0])
     for k, (level, error) in enumerate(
         ((zone.floor, -limits.altitude_error_m), (zone.ceiling, limits.altitude_error_m))
@@ -171,9 +171,9 @@ def levels_of(limits: Limits, zone: Zone) -> Floats:
 
 
 def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) -> NDArray[np.bool_]:
-    """(K,) True where a segment ``a``–``b`` (K, 2) comes within ``reach_m`` of a zone's shape in the plane.
+    """Whether segments ``a``–``b`` (K, 2) come within ``reach_m`` of a zone's shape in the plane: (K,).
 
-    A circle's radius is in real metres, ``scale`` metres of the plane each at most.
+    A circle's radius is in real metres; a real metre is at most ``scale`` metres of the plane.
     """
     shape = zone.shape
     if isinstance(shape, Circle):
@@ -186,7 +186,7 @@ def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) ->
 
     polygon = shapely.Polygon(shape.vertices)
     shapely.prepare(polygon)
-    # A line without length is near nothing to shapely: a micrometre makes it one.
+    # To shapely a line of no length is near nothing: lengthen it by a micrometre.
     far = np.where((a == b).all(axis=1, keepdims=True), b + 1e-6, b)
     return np.asarray(shapely.dwithin(polygon, shapely.linestrings(np.stack([a, far], axis=1)), reach_m))
 
@@ -197,7 +197,7 @@ def _known(ground: Floats, unknown: float) -> Floats:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Links:
-    """Edges between terminals and nodes, a row for each way between the bands: ``node`` (K,), ``length_m`` (K,),
+    """Edges between a terminal and nodes, one row for each gap between bands: ``node`` (K,), ``length_m`` (K,),
     ``low_m``, ``high_m`` (K, LINK_DOORS) from the terminal to the node."""
 
     node: Ints
@@ -207,9 +207,10 @@ class Links:
 
 
 def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float], amsl_m: float | None) -> Links:
-    """Links from a terminal at ``amsl_m`` (None: any height) to the nodes around it (within 2.1 steps).
+    """Links from a terminal at ``amsl_m`` (None: any altitude) to the nodes within 2.1 steps of it.
 
-    Whether the terminal itself is legal is judged elsewhere: its door here always holds ``amsl_m``.
+    Whether the terminal itself is legal is checked elsewhere: its own door is widened to ``amsl_m`` if that lies less
+    than `ENDS_M` outside.
     """
     x, y = (place[0] - lattice.west_m) / lattice.step_m, (place[1] - lattice.south_m) / lattice.step_m
     jj, ii = (a.ravel() for a in np.mgrid[math.floor(y) - 2 : math.ceil(y) + 3, math.floor(x) - 2 : math.ceil(x) + 3])
@@ -251,8 +252,8 @@ def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float], a
 
 
 def gaps(bands: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
-    """What closed altitude intervals are left at all of several doors (D,) over some of the forbidden ``bands`` and
-    under the others, from below; the bands in the order in which they begin at the first door."""
+    """Closed altitude intervals, lowest first, that are free at all of several doors (D,): each lies over some of the
+    forbidden ``bands`` and under the others. Bands are ordered by their lowest altitude at the first door."""
     shape = np.shape(bands[0][0]) if bands else (LINK_DOORS,)
     order = sorted(bands, key=lambda band: float(np.ravel(band[0])[0]))
     lows = [np.full(shape, -np.inf)]

@@ -1,10 +1,10 @@
 """Planning where a maximum AGL or the climb limit binds: between a floor and a ceiling that both follow the ground.
 
-There the cap trick of the plane planner does not hold: whether ground can be crossed depends on the direction, and a
-steep slope is climbed by traversing it. So ways are searched on a lattice with the altitudes that can be reached
-(`routes`), pulled tight on samples of the room around them (`corridor_raster`), first of all until they hold and then
-until no move makes them cheaper, and put to the exact check (`exact`). Ways around the first one, and kicks that throw
-it out of its bed, are what finds the better ones.
+The cap search of the plane planner does not apply here: whether ground can be crossed depends on the direction, and a
+steep slope is climbed aslant. So tracks are searched on a lattice with the altitudes that can be reached (`routes`),
+then pulled tight on samples of floor and ceiling around them (`corridor_raster`), first until they are legal and then
+until no move makes them cheaper, and finally checked exactly (`profile.exact`). Better tracks are found by closing
+parts of the first one, and by kicks that move a line out of its local optimum.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ Tell = Callable[[str, float | None], None]
 
 COARSE_STEPS = (0.03, 0.015, 0.007, 0.0035)
 FINE_STEPS = (0.01, 0.004, 0.0015, 0.0006)
-"""Moves of a pull, as parts of the straight way."""
+"""Sizes of the moves of a pull, as parts of the straight track."""
 COARSE_GAIN, FINE_GAIN, WORTH = 5e-5, 1e-5, 3e-5
-"""Least gain worth a move, and what fewer way points may cost, as parts of the straight way."""
+"""Least gain of a coarse and a fine move, and what fewer way points may cost, as parts of the straight track."""
 CORRIDOR, CORRIDOR_STEPS = 0.08, 8.0
-"""Half the width of the corridor around a way: parts of the straight way, and at least so many lattice steps."""
+"""Half the width of the corridor around a track: as a part of the straight track, and at least in lattice steps."""
 NARROW, FINE_M = 0.02, 12.0
-"""The same of the corridor around a line that is nearly done, and the spacing of the raster there."""
+"""The same around a nearly finished line, as a part of the straight track; spacing of the raster there, in metres."""
 MENDS, SEARCHES = 6, 6
-"""Pulls of one line that the exact check refuses; searches on one lattice where none of its ways could be mended."""
+"""Most exact checks of one line, with a repair after each refusal; most searches on one lattice for a legal track."""
 MOST_OPENED = 200_000
-"""Labels taken up on one lattice, beyond which it is given up: they wind up and down to gain height."""
+"""Labels expanded on one lattice after which it is given up; such searches wind up and down to gain height."""
 DETOURS, DETOUR_STEPS = (0.2, 0.4, 0.6, 0.8), 4.0
-"""Where along the first way a disc is shut to find others, and its radius in lattice steps."""
+"""Where along the first track a disc is closed to find other tracks, as parts; its radius, in lattice steps."""
 WITHOUT = 3.0
-"""After that many times ``budget_s`` no further search for a first path begins."""
+"""No search for a first path begins later than this multiple of ``budget_s``."""
 KICKS = 10
 KICK_PARTS = (0.02, 0.05)
 
@@ -55,11 +55,10 @@ BOUND_NOTE = "the lower bound is the straight line from stop to stop: true, but 
 def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True, known: bool = False) -> Solution:
     """A path under a maximum AGL and the climb limit that `Airspace.examine` passes.
 
-    Start, goal and vias are known to be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
-    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s`` is a backstop for all that comes
-    after the first path, and `WITHOUT` times that where there is none. ``climbs``: may climb on the spot over start and
-    goal; ``known``: there is a path already, and one more try is all that another is worth. Raises Refusal where no
-    path is found.
+    Start, goal and vias must be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
+    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s`` is a last stop for all that comes
+    after the first path, and `WITHOUT` times that where there is none. ``climbs``: laps over start and goal are
+    allowed; ``known``: a path is known already, so only one search is made. Raises Refusal if no path is found.
     """
     bound = straight_bound(problem)
     terminals = terminals_of(problem)
@@ -86,7 +85,7 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
             found = with_climbs(problem, ends, lambda p: plan_band(p, tell, begun, climbs=False).path.points)
         if found is not None:
             best = found if best is None else min(best, found, key=lambda p: problem.cost(Path(p)))
-        # A way longer than the detours that this lattice holds may have a shorter rival outside it.
+        # A path longer than the detours that this lattice holds may have a shorter rival outside it: try the next one.
         if best is not None and (work.line is None or _flat(best) <= level.detour * way):
             first_s = min(first_s, time.perf_counter() - begun)
             tell("pull", problem.cost(Path(best)))
@@ -102,7 +101,7 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
 
 
 def _not_found(problem: Problem, router: Router | None) -> Refusal:
-    """The refusal after the last lattice: how finely it was searched, and what stopped the last track, and where."""
+    """The refusal after the last lattice: how fine that was, and what stopped the last track, and where."""
     words, place, at = "", None, ""
     if router is not None:
         words = f" on a grid of {router.lattice.step_m:.0f} m"
@@ -137,7 +136,7 @@ def _solution(
 
 
 def straight_bound(problem: Problem) -> float:
-    """No path costs less: straight from terminal to terminal, heights free where they are."""
+    """A lower bound of the cost: the straight line from terminal to terminal, free altitudes left free."""
     known: list[tuple[float, float]] = [(0.0, problem.start[2])]  # (metres along the track, altitude)
     way, last = 0.0, problem.start[:2]
     for v in problem.via:
@@ -157,13 +156,13 @@ def straight_bound(problem: Problem) -> float:
 
 
 def _run(problem: Problem, a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Metres of track that the rise from a to b takes at least."""
+    """Least metres of track that the climb or descent from ``a`` to ``b`` (metres along, altitude) needs."""
     limits, rise = problem.limits, b[1] - a[1]
     return max(rise / limits.max_climb_slope, -rise / limits.max_descent_slope)
 
 
 def _on_the_spot(problem: Problem) -> Floats:
-    """Way points from start to goal where both are one place."""
+    """Way points (N, 3) from start to goal where both are at one place; raises Refusal if no laps fit."""
     place, low, high = problem.start[:2], problem.start[2], problem.goal[2]
     found = None if problem.via else climb_tracks(problem, place, low, high)
     if found is None:
@@ -181,7 +180,7 @@ def _on_the_spot(problem: Problem) -> Floats:
 
 
 def straight(problem: Problem, way_m: float) -> Floats | None:
-    """Way points straight from terminal to terminal, where that is legal."""
+    """Way points (N, 3) straight from terminal to terminal; None if that is not legal."""
     terminals = np.array(terminals_of(problem))
     pin_m = np.array([math.nan, *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via), math.nan])
     pinned = np.ones(len(terminals), bool)
@@ -201,9 +200,9 @@ def _flat(points: Floats) -> float:
 
 
 def pulled(problem: Problem, points: Floats, level: Level, deadline_s: float) -> Floats | None:
-    """Way points of a better line than a path's, at best: of the one that is pulled from it, and of others around it.
+    """Way points of the best line found from a path (N, 3): the line pulled from its track, and others around it.
 
-    Zones are passed over, or under, as that path (N, 3) passes them.
+    Zones are passed over or under as that path passes them. The result need not be cheaper; None if it is not legal.
     """
     way = straight_way_m(problem)
     work = _Work.at(problem, level, way)
@@ -216,7 +215,7 @@ def pulled(problem: Problem, points: Floats, level: Level, deadline_s: float) ->
 
 
 def _sides(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> dict[int, bool]:
-    """Of the zones that a path meets, whether it passes over them."""
+    """For each zone within reach of a path, by index: whether the path passes over it."""
     track = make_track(problem, points[:, :2], pinned, pin_m)
     s = distances(track.points)
     over: dict[int, bool] = {}
@@ -228,7 +227,7 @@ def _sides(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: F
 
 
 class _Work:
-    """One lattice, the ways found on it, and the lines pulled from them."""
+    """One lattice, the tracks found on it, and the lines pulled from them."""
 
     def __init__(self, problem: Problem, router: Router, way_m: float) -> None:
         self.problem = problem
@@ -238,7 +237,7 @@ class _Work:
         self.line: Line | None = None
         self.judge = Judge(problem)
         self.over: dict[int, bool] = {}
-        """Zones that are known to be passed over, or under."""
+        """Zones known to be passed over (True) or under (False), by index."""
 
     @classmethod
     def at(cls, problem: Problem, level: Level, way_m: float) -> _Work:
@@ -246,7 +245,10 @@ class _Work:
         return cls(problem, Router.at(problem, level), way_m)
 
     def first(self, searches: int, deadline_s: float = math.inf) -> Floats | None:
-        """Way points of the first way that could be made to hold, of so many; none is searched after a deadline."""
+        """Way points of the first track that can be made legal, of ``searches`` at most; None if none can.
+
+        After each failure the lattice is corrected. No search begins after the deadline.
+        """
         for _ in range(searches):
             if self.router.opened > MOST_OPENED or time.perf_counter() > deadline_s:
                 return None
@@ -271,7 +273,8 @@ class _Work:
         return None
 
     def improve(self, deadline_s: float, tell: Tell) -> tuple[Floats | None, bool]:
-        """Way points of the best line found from several ways and kicks, and whether time ran out."""
+        """Way points of the best line from several tracks and kicks (None if it is not legal), and whether time ran
+        out."""
         assert self.line is not None
         assert self.guide is not None
         ways = self._others(deadline_s)
@@ -317,7 +320,10 @@ class _Work:
         return np.array(parts) * self.way_m
 
     def _mend(self, line: Line) -> tuple[tuple[Floats, NDArray[np.bool_]] | Unsettled, Line]:
-        """Settle a line; where the exact check refuses, tell the guide, and pull it into what is left of the room."""
+        """Make way points of a line; after each refusal by the exact check, correct the guide and pull the line again.
+
+        Return the way points, or why there are none, and the line as last pulled.
+        """
         found: tuple[Floats, NDArray[np.bool_]] | Unsettled
         guide = make_guide(self.problem, [line.points], NARROW * self.way_m, self.over, FINE_M)
         line = guide.pull(line, self._steps(FINE_STEPS), FINE_GAIN * self.way_m, rounds=3)
@@ -338,7 +344,7 @@ class _Work:
         return found, line
 
     def _others(self, deadline_s: float) -> list[Floats]:
-        """Other ways over the lattice: with a price on climbing, and past a disc that is shut on the first."""
+        """Other tracks over the lattice: with a price on climbing (energy), and around discs closed on the first."""
         assert self.line is not None
         router, p = self.router, self.problem
         if router.opened > MOST_OPENED // 4:
@@ -360,7 +366,7 @@ class _Work:
         return ways
 
     def _kicked(self, line: Line, rng: np.random.Generator) -> Line:
-        """The line with a bump to one side."""
+        """The line with a random bump to one side."""
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line.points, axis=0).T))])
         at, side = rng.uniform(0.05, 0.95) * s[-1], rng.choice([-1.0, 1.0]) * rng.uniform(*KICK_PARTS) * self.way_m
         half = rng.uniform(0.04, 0.15) * s[-1]
@@ -381,7 +387,7 @@ class _Work:
 
 
 def plan(problem: Problem) -> Solution:
-    """`plan_band` by itself."""
+    """Plan by `plan_band` alone."""
     from gcsplan.planners.problem import Progress
 
     begun = time.perf_counter()

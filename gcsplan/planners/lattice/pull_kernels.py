@@ -1,11 +1,11 @@
-"""Kernels that pull a ground track tight over samples of the room above it.
+"""Kernels that pull a ground track tight over samples of floor and ceiling.
 
-A track is a few vertices; its room is sampled along its legs from two rasters (floor and ceiling); the best profile
-through the samples is a taut string (see `taut_string`), and its cost is the track's. Where there is none within
-the limits the cost counts what is missing, metre by metre, so that the same moves that shorten a track also mend
-one that does not hold yet. A guide: what comes out is judged exactly elsewhere.
+A track is a few vertices; floor and ceiling along its legs are sampled from two rasters. The best profile through the
+samples is a taut string (see `taut_string`), and its cost is the cost of the track. Where no profile keeps the limits,
+the metres that are missing are added to the cost, so the same moves that shorten a track also repair an illegal one.
+The result is a guide and is checked exactly elsewhere.
 
-All in one file, because numba's cache notices a change of the file that a kernel stands in and of no other.
+All kernels are in one file, because numba's cache notices changes only in the file that a kernel is in.
 """
 
 from __future__ import annotations
@@ -20,22 +20,23 @@ from gcsplan.planners.compiled import device, kernel
 MOST_POINTS = 400
 MOST_DOORS = 6000
 
-# Numbers that a kernel is told: by these places in `spec`.
+# Indices of the kernels' parameters in `spec`.
 WEST, SOUTH, PER_STEP, SPACING, MARGIN, UP, DOWN, VERTICAL, HORIZONTAL, ENERGY, PENALTY, REACH = range(12)
 
 
 @device
 def funnel(s, low, high, n, chain, at, z):  # type: ignore[no-untyped-def]
-    """Pull a string through doors 0 … n - 1, the first and last of no height; the number of its vertices.
+    """Pull a string through doors 0 … n - 1, the first and last of no height; return its number of vertices.
 
-    Their door numbers go to ``at``, their altitudes to ``z``. ``chain`` (4, n + 1) is room to work in: the chain to the
-    last door's high edge (it hangs under ceilings) and the one to its low edge, door numbers then altitudes.
+    Their door indices go to ``at``, their altitudes to ``z``. ``chain`` (4, n + 1) is a working array: the chain to the
+    high edge of the latest door (it hangs under ceilings) and the chain to its low edge, each door indices and
+    altitudes.
     """
     top = bottom = low[0]
     for i in range(1, n):
         top, bottom = max(top, low[i]), min(bottom, high[i])
     at[0], z[0], count = 0.0, low[0], 1
-    # Row 0, 1: the high chain; 2, 3: the low chain; head is the apex in both.
+    # Rows 0 and 1: the high chain; rows 2 and 3: the low chain; the head of both is the apex.
     head0 = tail0 = head1 = tail1 = 0
     chain[0, 0] = chain[2, 0] = 0.0
     chain[1, 0] = chain[3, 0] = low[0]
@@ -54,7 +55,7 @@ def funnel(s, low, high, n, chain, at, z):  # type: ignore[no-untyped-def]
                     break
                 t -= 1
             if t == head:
-                # The straight line may cross the other chain: then the apex walks along that chain.
+                # The straight line from the apex may cross the other chain: the apex then moves along that chain.
                 while ohead < otail:
                     sa, sb = s[int(chain[other, ohead])], s[int(chain[other, ohead + 1])]
                     za, zb = sign * chain[other + 1, ohead], sign * chain[other + 1, ohead + 1]
@@ -80,7 +81,7 @@ def funnel(s, low, high, n, chain, at, z):  # type: ignore[no-untyped-def]
 
 @device
 def walled(ax, ay, bx, by, circles, edges, reach):  # type: ignore[no-untyped-def]
-    """True where a leg meets a circle, or comes within ``reach`` of a polygon's edge."""
+    """True if a leg meets a circle, or comes within ``reach`` of a polygon's edge."""
     dx, dy = bx - ax, by - ay
     square = max(dx * dx + dy * dy, 1e-12)
     for k in range(len(circles)):
@@ -99,7 +100,7 @@ def walled(ax, ay, bx, by, circles, edges, reach):  # type: ignore[no-untyped-de
             return True
         near = math.inf
         for w in range(4):
-            # A corner against the other segment.
+            # Distance of each end of either segment from the other segment.
             if w < 2:
                 cx, cy = (px, py) if w == 0 else (qx, qy)
                 gx, gy, sq = dx, dy, square
@@ -115,10 +116,10 @@ def walled(ax, ay, bx, by, circles, edges, reach):  # type: ignore[no-untyped-de
 
 @device
 def evaluate(p, n, za, zb, floor, ceiling, circles, edges, spec, doors, chain, at, z, out_z):  # type: ignore[no-untyped-def]
-    """Cost of a track p[:n] flown from altitude ``za`` to ``zb``, and what is missing for it to be legal, in metres.
+    """Cost of a track p[:n] flown from altitude ``za`` to ``zb``, and the metres that it lacks to be legal.
 
-    A row of ``p`` is east, north, pinned, and the altitude at which to pass, NaN where free. ``out_z``: the altitudes
-    of the vertices.
+    A row of ``p`` is east, north, pinned, and the altitude at which to pass (NaN: free). ``out_z`` receives the
+    altitudes of the vertices; ``doors``, ``chain``, ``at`` and ``z`` are working arrays.
     """
     s, low, high, vertex = doors[0], doors[1], doors[2], doors[3]
     rows, cols = floor.shape
@@ -171,9 +172,9 @@ def evaluate(p, n, za, zb, floor, ceiling, circles, edges, spec, doors, chain, a
 
 @device
 def aim(move, turn, a, v, b, step, bend):  # type: ignore[no-untyped-def]
-    """What a move puts in the place of a vertex ``v`` between ``a`` and ``b``, or of the leg from ``a`` to ``v``.
+    """The points with which a move replaces a vertex ``v`` between ``a`` and ``b``, or the leg from ``a`` to ``v``.
 
-    Number of points (-1: no such move), the points, and 1 where they stand for the leg alone.
+    Return the number of points (-1: no such move), x and y of two points, and 1 if they replace the leg alone.
     """
     d1 = math.sqrt((v[0] - a[0]) ** 2 + (v[1] - a[1]) ** 2) + 1e-9
     ux, uy = (v[0] - a[0]) / d1, (v[1] - a[1]) / d1
@@ -216,12 +217,12 @@ def pull(  # type: ignore[no-untyped-def]
     p, pinned, pz, zs, count, za, zb, floor, ceiling, circles, edges, spec, steps, gain, rounds, around_m,
     doors, chain, at, z, cand, cand_z, total,
 ):  # fmt: skip
-    """Make the track p[:count] cheaper, in place, by moves of ``steps`` metres, largest first; the new count.
+    """Make the track p[:count] cheaper, in place, by moves of ``steps`` metres in turn; return the new count.
 
-    ``pinned``, ``pz`` (MOST_POINTS,): vertices that stay, and altitudes at which to pass them (NaN free). ``zs``: the
-    altitudes of the vertices come out here. A move is judged over a part of the track, ``around_m`` or three vertices
-    to each side, whose ends keep their altitudes, and is kept if it saves ``gain``. ``doors`` and on: see `workspace`;
-    the cost, what is missing, and the number of trials are left in ``total``.
+    ``pinned``, ``pz`` (MOST_POINTS,): vertices that stay, and altitudes at which to pass them (NaN: free). ``zs``
+    receives the altitudes of the vertices. A move is evaluated over a part of the track, ``around_m`` or three vertices
+    to each side, whose ends keep their altitudes, and is kept if it saves ``gain``. ``doors`` and what follows: see
+    `workspace`; ``total`` receives the cost, the missing metres and the number of trials.
     """
     trials = 0
     for phase in range(len(steps) + 1):
@@ -260,7 +261,7 @@ def pull(  # type: ignore[no-untyped-def]
                         if points < 0 or count + 1 >= len(p):
                             continue
                         i1 = i if leg else i + 1
-                    # The part of the track with the move made.
+                    # Write the part of the track after the move to `cand`.
                     n = 0
                     for k in range(w0, w1 + 1):
                         if move >= 0 and i0 < k < i1:
@@ -291,7 +292,7 @@ def pull(  # type: ignore[no-untyped-def]
                         continue
                     saved += base - value
                     base = value
-                    # Put it in; what comes after moves up or down.
+                    # Insert it, and shift all vertices after it.
                     more = n - (w1 - w0 + 1)
                     for q in range(count - 1 - w1):
                         k = count - 1 - q if more > 0 else w1 + 1 + q
@@ -312,7 +313,7 @@ def pull(  # type: ignore[no-untyped-def]
 
 
 def workspace() -> tuple[Floats, ...]:
-    """Room for `pull` to work in."""
+    """Working arrays of `pull`: its arguments from ``doors`` to ``total``."""
     return (
         np.empty((4, MOST_DOORS)),
         np.empty((4, MOST_DOORS + 1)),

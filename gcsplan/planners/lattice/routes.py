@@ -1,4 +1,4 @@
-"""Ways over a lattice, from terminal to terminal, and the tracks that they make."""
+"""Tracks over a lattice, from terminal to terminal."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Obstruction, Track, make_track
 
 SHUT_IN = 200
-"""An end from which no more labels than this are to be had is shut in."""
+"""An end is shut in if a search from it expands no more labels than this."""
 FORWARD, BACKWARD, MOST = 40_000, 60_000, 400_000
-"""Labels taken up by a search from the start; then, for a goal that is hard to come to, by one from the goal; then by
-one from the start again."""
+"""Most labels expanded by the first search from the start; by the next, backwards from a goal that is hard to reach;
+and by the last, from the start again."""
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """How widely and how finely to look: ``detour`` in times the straight way, about ``nodes`` nodes."""
+    """Extent and fineness of a lattice: ``detour`` in multiples of the straight track, about ``nodes`` nodes."""
 
     detour: float
     nodes: int
@@ -32,9 +32,9 @@ LEVELS = (Level(1.35, 25_000), Level(2.0, 60_000), Level(math.inf, 120_000), Lev
 
 
 def coverage(problem: Problem) -> tuple[float, float, float, float]:
-    """West, south, east, north of the ground that is known about."""
+    """West, south, east and north edge of the loaded terrain, in metres."""
     rows, cols = problem.airspace.surface.ground_m.shape
-    # Edges of a raster in degrees bow in the plane: their middles count too.
+    # The edges of a raster in degrees are curved in the plane, so their middles count too.
     c, r = np.meshgrid((0.0, 0.5 * (cols - 1), cols - 1.0), (0.0, 0.5 * (rows - 1), rows - 1.0))
     corners = problem.airspace.surface.grid.to_plane(c.ravel(), r.ravel())
     west, south = corners.min(axis=0)
@@ -43,11 +43,11 @@ def coverage(problem: Problem) -> tuple[float, float, float, float]:
 
 
 def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float, float], float]:
-    """Box and spacing of a lattice for ``level``."""
+    """Box (west, south, east, north) and spacing of a lattice for ``level``."""
     west, south, east, north = coverage(problem)
     terminals = np.array(terminals_of(problem))
     way = float(np.hypot(*np.diff(terminals, axis=0).T).sum())
-    # No ellipse of a detour reaches farther from its ends than this; a whole box reaches four ways at most.
+    # No ellipse of a finite detour reaches farther from its ends than this; without one: four times the straight track.
     out = (0.5 * (level.detour - 1.0) if math.isfinite(level.detour) else 4.0) * way + 1.0
     if math.isfinite(level.detour):
         out = max(out, 0.5 * way * math.sqrt(level.detour**2 - 1.0))
@@ -60,13 +60,13 @@ def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float,
 
 
 def climbing_weight(problem: Problem) -> float:
-    """Metres of track that cost as much energy as a metre of height."""
+    """Metres of track that cost as much energy as one metre of height."""
     return problem.vertical_j_per_m / max(problem.horizontal_j_per_m, 1e-9)
 
 
 @dataclass(eq=False, slots=True)
 class Router:
-    """A lattice with its terminals, and what the exact test last found on it."""
+    """A lattice with its terminals and links; ``last``, ``last_place``: what the exact check found last, and where."""
 
     problem: Problem
     lattice: Lattice
@@ -76,7 +76,7 @@ class Router:
     last: Obstruction | None = None
     last_place: Floats | None = field(default=None)
     opened: int = 0
-    """Labels that searches on this lattice have taken up."""
+    """Labels expanded by all searches on this lattice."""
     opened_last: int = 0
 
     @classmethod
@@ -90,7 +90,7 @@ class Router:
         return cls(problem, lattice, terminals, links)
 
     def way(self, cap_m: float = math.inf, weight: float = 0.0) -> Floats | None:
-        """(N, 2) places of the best way over the lattice under ``cap_m``, through every terminal; None if there is
+        """Places (N, 2) of the best track over the lattice under ``cap_m``, through every terminal; None if there is
         none."""
         direct = not self.problem.via
         found = self.labels(cap_m, weight, FORWARD if direct else MOST)
@@ -103,7 +103,7 @@ class Router:
         return found[0].places if found else None
 
     def _leg(self, here: int, there: int, cap_m: float, weight: float, most_opened: int) -> tuple[Label, ...]:
-        """How the one end is reached from the other: from the start (0), or backwards from the goal (-1)."""
+        """Labels at one end, searched from the other: from the start (``here`` 0), or backwards from the goal (-1)."""
         p = self.problem
         up, down = p.limits.max_climb_slope * self.climb_factor, p.limits.max_descent_slope * self.climb_factor
         heights = {0: p.start[2], -1: p.goal[2]}
@@ -128,7 +128,7 @@ class Router:
         return found.labels
 
     def labels(self, cap_m: float, weight: float, most_opened: int = MOST) -> tuple[Label, ...]:
-        """How the goal is reached, cheapest first."""
+        """Labels at the goal, through all vias, cheapest first."""
         p = self.problem
         z = p.start[2]
         labels: tuple[Label, ...] = (Label(0.0, z, z, z, z, np.array([self.terminals[0]])),)
@@ -160,7 +160,7 @@ class Router:
         return labels
 
     def cut_off(self) -> tuple[bool, bool]:
-        """Whether start, and goal, are shut in on this lattice: nothing leads away from them (to them) for long."""
+        """Whether the start, and the goal, is shut in on this lattice: a search from it ends after `SHUT_IN` labels."""
         p = self.problem
         up, down = p.limits.max_climb_slope * self.climb_factor, p.limits.max_descent_slope * self.climb_factor
         out = []
@@ -181,7 +181,7 @@ class Router:
         return out[0], out[1]
 
     def track_of(self, way: Floats) -> Track:
-        """The track over ``way``, its terminals pinned, its points on straight lines dropped."""
+        """The track along the places ``way`` (N, 2), with its terminals pinned and points on straight lines dropped."""
         pinned = np.zeros(len(way), bool)
         pin_m = np.full(len(way), np.nan)
         pinned[0] = pinned[-1] = True

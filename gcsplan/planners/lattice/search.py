@@ -1,12 +1,12 @@
 """A* over a lattice whose labels carry the altitudes that can be reached.
 
-A label at a node is a way to it with its cost and the interval of altitudes that the climb limits, floors,
-ceilings and zones passed so far leave open. A zone that splits the altitudes over an edge makes one label for
-each gap: over it, under it. A label dies only to one that costs no more and reaches as much.
+A label at a node is a track to it, with its cost and the interval of altitudes that can be reached there under the
+climb limits, floors, ceilings and zones passed so far. A zone that splits the altitudes over an edge makes one label
+for each gap: over it, under it. A label is dropped only for another that costs no more and reaches as much.
 
-For a price on climbing each label also keeps the altitudes that can be reached at its lowest cost; away from
-them a metre costs ``weight`` metres of track. That is the exact value of the cheapest profile over the way so far
-as long as climb limits do not bind.
+If climbing has a price, each label also keeps the altitudes that can be reached at its lowest cost; each metre away
+from them costs ``weight`` metres of track. This is the exact cost of the cheapest profile over the track so far, as
+long as climb limits do not bind.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ from gcsplan.planners.lattice.lattice import LINK_DOORS, STEPS, Lattice, Links
 Ints = NDArray[np.int64]
 
 LABELS_A_NODE = 8
-"""Most labels that a node keeps; beyond it a search is no longer complete, and says so."""
+"""Most labels that a node keeps; a search that drops more reports that it is not complete."""
 
 FIRST_CAPACITY = 32_768
-"""Labels to begin with."""
+"""Labels for which arrays are allocated at first."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Label:
-    """How a terminal is reached: ``cost``, reachable altitudes, those of lowest cost, and the places on the way."""
+    """A track to a terminal: its ``cost``, reachable altitudes from ``low_m`` to ``high_m``, those of lowest cost from
+    ``cheap_low_m`` to ``cheap_high_m``, and its ``places`` (N, 2)."""
 
     cost: float
     low_m: float
@@ -43,8 +44,8 @@ class Label:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Found:
-    """``labels`` at the goal, cheapest first (none: no way on this lattice); ``complete`` False where labels were
-    dropped, so that "none" proves nothing; ``opened`` counts labels taken up."""
+    """``labels`` at the goal, cheapest first (none: no track on this lattice); ``complete`` False if labels were
+    dropped, so that no labels prove nothing; ``opened``: number of labels expanded."""
 
     labels: tuple[Label, ...]
     complete: bool
@@ -68,17 +69,18 @@ def search(
     want: int = 1,
     most_opened: int = 600_000,
 ) -> Found:
-    """The cheapest ways from ``start``, reached as in ``starts``, to an altitude within ``goal_m`` at ``goal``.
+    """The cheapest tracks from ``start`` to an altitude within ``goal_m`` (lowest, highest) at ``goal``.
 
-    ``cap_m`` AMSL is flown under; ``weight`` metres of track for a metre of height; a label that reaches less than
-    ``spare_m`` more than another that costs no more is dropped; ``want`` labels at the goal at most.
+    ``starts``: labels at the start. ``cap_m``: highest altitude AMSL; ``weight``: price of a metre of height, in metres
+    of track; a label that reaches less than ``spare_m`` beyond another that costs no more is dropped; ``want``: most
+    labels at the goal; ``most_opened``: most labels expanded.
     """
     nodes = lattice.nx * lattice.ny
     here, there = nodes, nodes + 1
     links = (start_links, goal_links)
     node = np.concatenate([x.node for x in links])
     from_start = np.arange(len(node)) < len(start_links.node)
-    # Links run from the terminal to the node; towards the goal they are flown backwards.
+    # Links run from the terminal to the node; those of the goal are flown from the node to the terminal.
     low = np.vstack([start_links.low_m, goal_links.low_m[:, ::-1]])
     high = np.vstack([start_links.high_m, goal_links.high_m[:, ::-1]])
     source = np.where(from_start, here, node)
@@ -125,7 +127,8 @@ def _run(
     lattice: Lattice, starts: Floats, links: tuple[Ints, Ints, Floats, Floats, Floats], terms: Floats, want: int,
     most_opened: int,
 ) -> tuple[Ints, Floats, Ints, Ints]:  # fmt: skip
-    """Labels (their names and numbers), the state, and the labels at the goal, after as much room as it takes."""
+    """Run the kernel, with larger arrays as often as needed; return the labels (integers and numbers), the state, and
+    the indices of the labels at the goal."""
     nodes = lattice.nx * lattice.ny
     capacity = FIRST_CAPACITY
     name, value = np.zeros((capacity, 4), np.int64), np.empty((capacity, 5))

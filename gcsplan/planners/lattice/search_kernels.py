@@ -1,8 +1,8 @@
 """Kernel of `search`: A* over a lattice whose labels carry the altitudes that can be reached.
 
-Nothing is allocated here. A label is a row of numbers: cost, lowest and highest altitude, the same of those altitudes
-that can be had at the lowest cost, and a row of names: its node, the label it came from, the next label of its node,
-and 1 while it counts.
+Nothing is allocated here. A label is a row of numbers and a row of integers. The numbers: cost, lowest and highest
+reachable altitude, lowest and highest altitude that is reachable at the lowest cost. The integers: its node, the label
+that it came from, the next label of its node, and 1 until it is dropped.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from gcsplan.planners.compiled import device, kernel
 COST, LOW, HIGH, CHEAP_LOW, CHEAP_HIGH = range(5)
 AT, PARENT, NEXT, ALIVE = range(4)
 COUNT, SIZE, OPENED, REACHED, COMPLETE = range(5)
-"""Places in the state, which is kept between calls."""
+"""Indices in the state, which is kept between calls."""
 STEP, GOAL_X, GOAL_Y, GOAL_LOW, GOAL_HIGH, CAP, UP, DOWN, WEIGHT, SPARE = range(10)
-"""Places in what the search is told."""
+"""Indices in the parameters of the search (``terms``)."""
 
 DONE, SHORT = 0, 1
 AT_ONCE = 1024
-"""Most labels that one label leads to; so much room there must be."""
+"""Most labels that expanding one label can add; so many must be free before it is expanded."""
 
 
 @device
 def push(keys, ids, size, key, item):  # type: ignore[no-untyped-def]
-    """Put ``item`` into a heap in two arrays; equal keys leave in the order of their numbers."""
+    """Put ``item`` into a heap in two arrays; items of equal keys leave in the order of their numbers."""
     k = size
     while k > 0:
         up = (k - 1) >> 1
@@ -38,7 +38,7 @@ def push(keys, ids, size, key, item):  # type: ignore[no-untyped-def]
 
 @device
 def pop(keys, ids, size):  # type: ignore[no-untyped-def]
-    """Take the root, which the caller has read, out of a heap that is left with ``size`` items."""
+    """Remove the root, which the caller has read already, from a heap; ``size`` is the number of items left."""
     key, item = keys[size], ids[size]
     k = 0
     while 2 * k + 1 < size:
@@ -54,7 +54,7 @@ def pop(keys, ids, size):  # type: ignore[no-untyped-def]
 
 @device
 def through(v, run, low, high, terms):  # type: ignore[no-untyped-def]
-    """Carry a label's numbers over ``run`` metres through a door, in place; False where the door is out of reach."""
+    """Update a label's numbers over ``run`` metres and through a door, in place; False if the door is out of reach."""
     lo, hi = v[LOW], v[HIGH]
     if run > 0.0:
         lo -= terms[DOWN] * run
@@ -68,7 +68,7 @@ def through(v, run, low, high, terms):  # type: ignore[no-untyped-def]
     if terms[WEIGHT] == 0.0:
         a, b = lo, hi
     elif a > hi:
-        v[COST] += terms[WEIGHT] * (a - hi)  # all cheap altitudes are shut: the nearest open one costs the way to it
+        v[COST] += terms[WEIGHT] * (a - hi)  # no cheap altitude is open: pay for the height to the nearest open one
         a = b = hi
     elif b < lo:
         v[COST] += terms[WEIGHT] * (lo - b)
@@ -82,7 +82,7 @@ def through(v, run, low, high, terms):  # type: ignore[no-untyped-def]
 
 @device
 def farther(a, b, low, high):  # type: ignore[no-untyped-def]
-    """How far the farther of two altitudes is out of an interval."""
+    """How far the altitudes from ``a`` to ``b`` reach out of an interval, in metres; 0 if not at all."""
     x, y = low - a, b - high
     x = y if y > x else x
     return x if x > 0.0 else 0.0
@@ -90,7 +90,8 @@ def farther(a, b, low, high):  # type: ignore[no-untyped-def]
 
 @device
 def doors_of(x, y, dx, dy, k, floor, ceiling, ground, step, door):  # type: ignore[no-untyped-def]
-    """Doors (run, low, high, ground) of the edge from node (x, y) by (dx, dy), kind ``k``; their number."""
+    """Write the doors (run, low, high, ground) of the edge from node (x, y) by (dx, dy), ``STEPS[k]`` or its reverse;
+    return their number."""
     hx, hy = 2 * x, 2 * y
     flat = math.sqrt(float(dx * dx + dy * dy)) * step
     count = 3 if k < 4 else 5
@@ -101,7 +102,7 @@ def doors_of(x, y, dx, dy, k, floor, ceiling, ground, step, door):  # type: igno
             j, i = hy + part * dy, hx + part * dx
             door[q, 1], door[q, 2], door[q, 3] = floor[j, i], ceiling[j, i], ground[j, i]
         else:
-            # A quarter of the way lies between two half-lattice points, side by side across the short step.
+            # A quarter of the edge lies midway between two half-lattice points: take their mean.
             px, py = hx + (q // 2) * dx, hy + (q // 2) * dy
             if dx == 2 or dx == -2:
                 ax, ay, bx, by = px + dx // 2, py, px + dx // 2, py + dy
@@ -115,9 +116,10 @@ def doors_of(x, y, dx, dy, k, floor, ceiling, ground, step, door):  # type: igno
 
 @device
 def admit(to, v, value, name, first, held, most, terms):  # type: ignore[no-untyped-def]
-    """1 if a label with numbers ``v`` may stay at a node, 0 if another rules it, -1 if there is no room.
+    """1 if a label with numbers ``v`` may stay at a node, 0 if another dominates it, -1 if the node has too many.
 
-    Another rules it that reaches as much and costs no more at any altitude; those that it rules itself are dropped.
+    A label dominates another if it reaches as much and costs no more at any altitude. Labels that ``v`` dominates are
+    dropped.
     """
     weight, before, other = terms[WEIGHT], -1, first[to]
     while other >= 0:
@@ -154,12 +156,13 @@ def reach(  # type: ignore[no-untyped-def]
     floor, ceiling, ground, steps, band_at, band_low, band_high, band_agl, link_at, link_to, link_length, link_low,
     link_high, terms, want, most_opened, most_held, state, name, value, keys, ids, first, held, goals, v, door,
 ):  # fmt: skip
-    """Search until ``want`` labels have reached the goal; `DONE`, or `SHORT` where there must be more room to go on.
+    """Search until ``want`` labels have reached the goal; return `DONE`, or `SHORT` if it needs larger arrays to go on.
 
     ``floor``, ``ceiling``, ``ground`` (2·ny - 1, 2·nx - 1) on the half lattice; ``steps`` (8, 2); ``band_*``: see
-    `Lattice`; ``link_*``: of the terminals, by source (nodes, start, goal). ``terms``, ``state``: by the names above.
-    ``name`` (room, 4) and ``value`` (room, 5): the labels; ``keys``, ``ids`` (room,): the heap; ``first``, ``held``
-    (nodes + 2,): each node's labels; ``goals`` (want,). ``v`` (5,) and ``door`` (16, 4): room to work in.
+    `Lattice`; ``link_*``: links of the terminals, by source (nodes, start, goal). ``terms``, ``state``: see the indices
+    above. ``name`` (capacity, 4) and ``value`` (capacity, 5): the labels; ``keys``, ``ids`` (capacity,): the heap;
+    ``first``, ``held`` (nodes + 2,): first label and number of labels of each node; ``goals`` (want,) receives labels.
+    ``v`` (5,) and ``door`` (LINK_DOORS + 1, 4) are working arrays.
     """
     nx, ny = (floor.shape[1] + 1) // 2, (floor.shape[0] + 1) // 2
     nodes = nx * ny
@@ -216,7 +219,7 @@ def reach(  # type: ignore[no-untyped-def]
             else:
                 door[doors, 0], door[doors, 1], door[doors, 2] = 0.0, terms[GOAL_LOW], terms[GOAL_HIGH]
                 doors += 1
-            # Over some of the edge's bands and under the others is a way of its own.
+            # Each gap, over some of the edge's bands and under the others, makes a label of its own.
             for b in range(b0, b1 + 1):
                 for q in range(5):
                     v[q] = value[item, q]
@@ -243,7 +246,7 @@ def reach(  # type: ignore[no-untyped-def]
                     value[count, q] = v[q]
                 first[to] = count
                 held[to] += 1
-                # What is left is no shorter than the straight way, nor than the climb (descent) takes.
+                # The rest of the track is at least the straight line, and at least what the climb (descent) needs.
                 ahead, vertical = rest, 0.0
                 if terms[GOAL_LOW] > v[HIGH] and (terms[GOAL_LOW] - v[HIGH]) / terms[UP] > ahead:
                     ahead = (terms[GOAL_LOW] - v[HIGH]) / terms[UP]

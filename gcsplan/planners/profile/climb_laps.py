@@ -1,9 +1,9 @@
-"""Gaining or losing height near a place: straight there and back, or round and round, under the exact check.
+"""Laps: gaining or losing height near a place by legs out and back or by circles, under the exact check.
 
-Where the ground around start or goal rises faster than the climb limit allows, no straight way out exists, and the
-height is won first: by legs out and back again (turn radius 0) or by laps of a circle's polygon. Laps add length to a
-ground track, and length is all that a taut string lacks that is too steep; so `extend` puts them into a track where its
-profile fails, as long as it takes, and leaves the rest to the string.
+Where the ground around start or goal rises faster than the climb limit allows, no straight track leads out, and the
+vehicle must gain height first: on legs out and back (turn radius 0) or on laps of a polygon around a circle. Laps add
+length to a ground track, and length is what a profile lacks that is too steep. `extend` therefore inserts laps into a
+track where its profile is too steep, and draws the taut string over the longer track.
 """
 
 from __future__ import annotations
@@ -24,35 +24,35 @@ from gcsplan.world.path import Path
 
 DIRECTIONS = 12
 SHORTEST_M = 20.0
-"""No leg out and back is shorter, and no circle smaller: an autopilot flies it as a blur."""
+"""Shortest leg out and back, and smallest circle radius: an autopilot does not follow anything smaller."""
 MOST_LAPS = 64
 HIGHEST_M = 1000.0
-"""Nobody climbs over one place by more."""
+"""Most metres climbed over one place."""
 SIDES = 12
-"""Of a circle's polygon; an arc of the turn radius fits into each of its corners."""
+"""Sides of a circle's polygon; an arc of the turn radius fits into each of its corners."""
 ROUNDS = 6
-"""Laps are added to one track so often."""
+"""Most times that laps are added to one track."""
 TRIED, LOOKED_AT, FORGIVEN = 12, 9, 0.1
-"""Laps that a profile is drawn over, for one place that is too steep; points of each at which the ground is looked at
-before; and how much the ground may be too high there, as a part of what is to be climbed."""
+"""For one piece that is too steep: most laps over which a profile is drawn; points of each lap at which the floor is
+read first; and by how much the floor may be too high there, as a part of the missing height."""
 GENTLER = (1.0, 0.98, 0.94)
-"""What part of the climb limit laps make use of: a profile that just holds may not hold over every metre of ground."""
+"""Parts of the climb limit that laps are planned with, in turn: with the full limit the exact check may still fail."""
 FAR_M = 1e6
-"""Higher than everything."""
+"""An altitude above everything."""
 SPARE = 1.02
-"""Length beyond what the height takes."""
+"""Length of laps, as a multiple of the length that the height needs."""
 
 
 def climb_tracks(problem: Problem, place: tuple[float, float], from_amsl: float, to_amsl: float) -> Floats | None:
-    """(N, 3) way points from one altitude over ``place`` to another, up or down, that the exact check passes.
+    """Way points (N, 3) from one altitude over ``place`` to another, up or down, that pass the exact check.
 
-    The fewest laps that fit between floor, ceilings and zones; None where none were found.
+    Uses the fewest laps that fit between floor, ceilings and zones. None if none fit, or if the altitudes are equal.
     """
     if from_amsl == to_amsl:
         return None
     up = to_amsl > from_amsl
     slope = problem.limits.max_climb_slope if up else problem.limits.max_descent_slope
-    # Without a limit anything but straight up will do.
+    # With a limit steeper than 45 degrees, or none, laps still climb at 45 degrees.
     length = SPARE * abs(to_amsl - from_amsl) / min(slope, 1.0)
     part = replace(problem, start=(*place, from_amsl), goal=(*place, to_amsl), via=())
     judge = Judge(problem)
@@ -69,7 +69,10 @@ def climb_tracks(problem: Problem, place: tuple[float, float], from_amsl: float,
 
 
 def highest(problem: Problem, place: tuple[float, float], amsl_m: float, *, down: bool = False) -> float:
-    """About how high one can climb over ``place`` from ``amsl_m`` (``down``: descend to it), `HIGHEST_M` at most."""
+    """Highest altitude, roughly, to which laps over ``place`` can climb from ``amsl_m``.
+
+    With ``down``: from which they can descend to it. At most `HIGHEST_M` higher; found by bisection to 2 m or 3 %.
+    """
 
     def can(other_m: float) -> bool:
         return climb_tracks(problem, place, *((other_m, amsl_m) if down else (amsl_m, other_m))) is not None
@@ -87,10 +90,10 @@ def highest(problem: Problem, place: tuple[float, float], amsl_m: float, *, down
 
 
 def with_climbs(problem: Problem, ends: tuple[bool, bool], plan: Callable[[Problem], Floats]) -> Floats | None:
-    """(N, 3) way points that climb near the start, or come down near the goal, as high as need be; None if none do.
+    """Way points (N, 3) of a path that climbs in laps near the start, or descends near the goal; None if none is found.
 
-    ``ends``: whether to climb over the start, and to come down over the goal. ``plan`` gives the way points of a
-    problem whose ends are higher, or raises NoMission.
+    ``ends``: whether to climb over the start, and to descend over the goal. ``plan`` returns way points for a problem
+    with raised ends, or raises NoMission.
     """
     start, goal = problem.start, problem.goal
     z0 = highest(problem, start[:2], start[2]) if ends[0] else start[2]
@@ -105,7 +108,10 @@ def with_climbs(problem: Problem, ends: tuple[bool, bool], plan: Callable[[Probl
 
 
 def _lowered(problem: Problem, points: Floats) -> Floats | None:
-    """A path between raised ends, led down to the true ones: with as few laps as its track needs, or else all."""
+    """Connect a path between raised ends to the true ends; None if neither variant passes the exact check.
+
+    The cheaper of: only as many laps as its track needs, or laps all the way between the raised and the true ends.
+    """
     found: list[Floats] = []
     pinned, pin_m = pins_of(problem, points)
     judge = Judge(problem)
@@ -129,7 +135,7 @@ def _lowered(problem: Problem, points: Floats) -> Floats | None:
 
 
 def pins_of(problem: Problem, points: Floats) -> tuple[Bools, Floats]:
-    """Which of the points (N, 2 or more) are start, vias and goal, and the altitudes of the vias (NaN free)."""
+    """Which of the points (N, 2 or more) are start, vias and goal, and the altitudes of the vias (NaN: free)."""
     pinned, pin_m = np.zeros(len(points), bool), np.full(len(points), np.nan)
     pinned[[0, -1]] = True
     last = 0
@@ -143,10 +149,10 @@ def pins_of(problem: Problem, points: Floats) -> tuple[Bools, Floats]:
 
 
 def extend(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> tuple[Track, Flown] | None:
-    """The track (N, 2) with laps put in where its profile would be too steep, and that profile; None where none help.
+    """Insert laps into a track (N, 2) where its profile is too steep; return track and profile, None if no laps help.
 
-    ``pinned`` (N,) vertices that stay, ``pin_m`` (N,) their altitudes (NaN free), as in `Track`. A track that needs no
-    laps comes back as it is.
+    ``pinned`` (N,) vertices that stay, ``pin_m`` (N,) their altitudes (NaN: free), as in `Track`. A track that needs no
+    laps is returned without any.
     """
     track = sampled_track(problem, points, pinned, pin_m)
     lack = lacking(problem, track)
@@ -170,9 +176,10 @@ def with_laps(
     pin_m: Floats,
     exact: Callable[[Track, Flown], tuple[Floats, Bools] | None],
 ) -> tuple[Floats, Bools] | None:
-    """(M, 3) way points over a track (N, 2) with laps where it is too steep, and (M,) which of them must stay.
+    """Way points (M, 3) over a track (N, 2) with laps where it is too steep, and (M,) whether they must stay.
 
-    Some more laps where the ``exact`` check, which makes way points of a track and its profile, asks for it.
+    ``exact`` makes way points of a track and its profile, or returns None if the exact check refuses them; then longer
+    laps are tried (`GENTLER`). None if no laps help.
     """
     limits = problem.limits
     for part in GENTLER:
@@ -189,7 +196,10 @@ def with_laps(
 
 
 def climb_needed_deg(problem: Problem, track: Track) -> float | None:
-    """The climb (or descent) angle with which a track would hold, to a tenth of a degree; None where no angle helps."""
+    """Smallest limit of climb and descent angle under which a track is legal, rounded up to 0.1 degrees; None if none.
+
+    Climb and descent limits are both raised to it, and a limit that is already higher is kept.
+    """
     low = min(problem.limits.max_climb_deg, problem.limits.max_descent_deg)
 
     def holds(angle: float) -> bool:
@@ -210,7 +220,10 @@ def climb_needed_deg(problem: Problem, track: Track) -> float | None:
 
 
 def _lengthened(problem: Problem, track: Track, lack: Lacking) -> tuple[Track, Lacking] | None:
-    """The track with laps somewhere along its steepest piece: all that it takes, or else those that help most."""
+    """Insert laps along the piece that lacks most height: the first that are enough, otherwise those that help most.
+
+    Return the longer track and what it still lacks; None if no laps help.
+    """
     why, limits = lack.steep[0], problem.limits
     needed = why.by / (limits.max_climb_slope if why.kind == "climb" else limits.max_descent_slope)
     best: tuple[Track, Lacking] | None = None
@@ -228,8 +241,8 @@ def _lengthened(problem: Problem, track: Track, lack: Lacking) -> tuple[Track, L
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Detour:
-    """``inner`` (K, 2) points to be flown instead of a track's from ``s0_m`` to ``s1_m``; ``shape`` (M, 2) what they
-    look like, with both ends, if all of it is flown once."""
+    """``inner`` (K, 2): points that replace a track's from ``s0_m`` to ``s1_m``; ``shape`` (M, 2): the outline of the
+    detour, flown once, with both ends."""
 
     s0_m: float
     s1_m: float
@@ -238,8 +251,8 @@ class _Detour:
 
 
 def _promising(problem: Problem, track: Track, lack: Lacking, length_m: float) -> list[_Detour]:
-    """Ways to lengthen a track along its steepest piece: at most `TRIED`, that rise least, of those that zones leave
-    room for."""
+    """Detours along the piece that lacks most height: at most `TRIED` that clear all zones, first those whose floor
+    exceeds a steady climb least."""
     why, up = lack.steep[0], lack.steep[0].kind == "climb"
     slope = problem.limits.max_climb_slope if up else problem.limits.max_descent_slope
     low_s, high_s = (why.s0_m, why.s1_m) if up else (why.s1_m, why.s0_m)
@@ -253,7 +266,7 @@ def _promising(problem: Problem, track: Track, lack: Lacking, length_m: float) -
         for k in range(2)
     )
     floor = problem.airspace.floor_amsl(east.ravel(), north.ravel(), problem.limits).reshape(along.shape)
-    # As high as one has climbed to there, or must come down from.
+    # Altitude reached by climbing to where the detour begins, or from which the descent after it begins.
     amsl = np.array([low + slope * min(abs(d.s0_m - low_s), abs(d.s1_m - low_s)) for d in found])
     above = (floor - amsl[:, None] - slope * along).max(axis=1) - FORGIVEN * why.by
     out: list[_Detour] = []
@@ -267,7 +280,10 @@ def _promising(problem: Problem, track: Track, lack: Lacking, length_m: float) -
 
 
 def _detours(problem: Problem, track: Track, low_s: float, high_s: float, length_m: float) -> Iterator[_Detour]:
-    """Ways to make a piece of a track, that climbs (or comes down) to ``high_s``, longer: bends, then laps."""
+    """Yield detours that add ``length_m`` to the piece of a track between ``low_s`` and ``high_s``: bends, then laps.
+
+    ``low_s``, ``high_s``: where the piece is lowest and highest, metres along the track, in either order.
+    """
     middle = 0.5 * (low_s + high_s)
     if problem.turn_radius_m <= 0.0:
         for s0, s1 in ((low_s, high_s), (low_s, middle), (middle, high_s)):
@@ -292,15 +308,15 @@ def _detours(problem: Problem, track: Track, low_s: float, high_s: float, length
 
 
 def laps(problem: Problem, length_m: float, heading: float | None) -> Iterator[tuple[Floats, int]]:
-    """Ways out of a place and back to it, fewest legs first: (K, 2) points of one from the place, and how many of them.
+    """Yield laps out of a place and back to it, fewest first: the points (K, 2) of one lap, and the number of laps.
 
-    Together they are ``length_m`` long. The last point, the place itself, is left out. ``heading`` (radians from east,
-    anticlockwise) is how the track goes on; laps to its sides come first.
+    Points are relative to the place; the last one, the place itself, is left out. All laps together are ``length_m``
+    long. ``heading``: direction of the track there (radians from east, anticlockwise); laps to its sides come first.
     """
     radius = problem.turn_radius_m
     turns = [2.0 * math.pi * k / DIRECTIONS for k in range(DIRECTIONS)]
     if heading is not None:
-        # Out to the sides first: a track that comes back on itself would have to turn on the spot.
+        # Sideways first: a lap along the track would make it turn back on itself.
         turns = [heading + 0.5 * math.pi + t for t in turns]
     least = max(1.02 * radius / math.cos(math.pi / SIDES), SHORTEST_M)
     count = 1
@@ -320,19 +336,19 @@ def laps(problem: Problem, length_m: float, heading: float | None) -> Iterator[t
 
 
 def wound(one: Floats, count: int) -> Floats:
-    """One lap ``count`` times, through the place in between, which is the origin."""
+    """Repeat one lap ``count`` times, with the place itself (the origin) between laps."""
     return np.vstack([one, *([np.zeros((1, 2)), one] * (count - 1))])
 
 
 def _circle(radius_m: float, turn: float, sense: float) -> Floats:
-    """A polygon through the place, its middle in direction ``turn``, anticlockwise or the other way."""
+    """A polygon through the origin, its centre in direction ``turn``; ``sense``: 1 anticlockwise, -1 clockwise."""
     angles = turn + math.pi + sense * 2.0 * math.pi / SIDES * np.arange(1, SIDES)
     middle = np.array([math.cos(turn), math.sin(turn)])
     return np.asarray(radius_m * (middle + np.stack([np.cos(angles), np.sin(angles)], axis=-1)))
 
 
 def _fits(problem: Problem, shape: Floats, low_m: float = -FAR_M, high_m: float = FAR_M) -> bool:
-    """False where a way (N, 2) meets a zone, or ground, past which there is none, at any altitude or between two."""
+    """False if ground closes a track (N, 2) at all altitudes, or a zone closes it from ``low_m`` to ``high_m``."""
     tube = problem.airspace.tube(shape, problem.limits)
     if not (tube.floor_m <= tube.ceiling_m + 2.0 * ENDS_M).all():
         return False
@@ -340,19 +356,19 @@ def _fits(problem: Problem, shape: Floats, low_m: float = -FAR_M, high_m: float 
 
 
 def _heading(track: Track, s_m: float) -> float:
-    """How the track goes on from a place, or how it came where it ends."""
+    """Direction of the leg that leaves a place (radians from east); at the track's end, of the leg that arrives."""
     i = min(max(int(np.searchsorted(track.s_m, s_m + 1e-6, "right")) - 1, 0), len(track.points) - 2)
     d = track.points[i + 1] - track.points[i]
     return math.atan2(d[1], d[0])
 
 
 def _with_detour(problem: Problem, track: Track, detour: _Detour) -> Track:
-    """The track with a detour put in."""
+    """Insert a detour into a track."""
     before, after = track.s_m < detour.s0_m - 1e-3, track.s_m > detour.s1_m + 1e-3
     at = np.flatnonzero(~before & ~after)
     inner = detour.inner
     pins, heights = np.zeros(len(inner), bool), np.full(len(inner), np.nan)
-    for k in at[track.pinned[at]]:  # a place that stays is one end or the other; the goal comes last
+    for k in at[track.pinned[at]]:  # a pinned vertex moves to the nearer end of the detour; the goal to its last point
         last = track.s_m[k] - detour.s0_m > detour.s1_m - track.s_m[k] or not after.any()
         pins[-int(last)], heights[-int(last)] = True, track.pin_m[k]
     return sampled_track(

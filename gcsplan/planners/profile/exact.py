@@ -1,4 +1,4 @@
-"""From a track that was pulled on samples to way points that the exact check passes."""
+"""Turning a track into way points that pass the exact check."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_tr
 from gcsplan.world.airspace import Legs, Tube, Violation
 
 SAMPLE_M = 12.0
-"""Between places at which floor and ceiling over a track are read; its profile bends at these alone."""
+"""Metres between the samples of floor and ceiling along a track; the profile bends only at them, at pins and zones."""
 TIGHT_M, TIGHT_SAMPLE_M = 1.0, 1.0
-"""Where so little room, or less, is left between them, and how close they are read there."""
+"""Where ceiling minus floor is less than `TIGHT_M` metres, samples are `TIGHT_SAMPLE_M` metres apart."""
 SPARE_M = 0.05
-"""Kept from both where there is room: the exact check is quick where it need not cut hairs."""
+"""Metres kept from floor and ceiling where they are far enough apart: the exact check is fast away from its limits."""
 CORRECTIONS, CORRECTED_M = 24, 0.03
-"""How often a profile is corrected by what the exact check finds, and by how much beyond it."""
+"""Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unsettled:
-    """Why no profile over a track passes: the place (east, north), how many metres are missing, and of what.
+    """Why no profile over a track passes: the ``place`` (east, north), and what is missing there ``by`` metres.
 
-    ``samples`` (K, 4): east, north, floor, ceiling along the track, as far as they are known by now. ``span_m``: how
-    far along the track; ``zone``: its index, -1 where it is none.
+    ``samples`` (K, 4): east, north, floor, ceiling along the track, with all corrections so far. ``span_m``: length of
+    the piece that is too steep, along the track; ``zone``: index of the zone that is met, -1 if it is none.
     """
 
     place: Floats
@@ -42,18 +42,18 @@ class Unsettled:
 
 @dataclass(eq=False, slots=True)
 class Judge:
-    """The exact check of single legs, which remembers what it passed."""
+    """The exact check of single legs; it remembers the legs that passed."""
 
     problem: Problem
     passed: set[bytes] = field(default_factory=set)
 
     def violations(self, points: Floats) -> tuple[tuple[int, Violation], ...]:
-        """Leg and violation, of a path (N, 3)."""
+        """Violations of a path (N, 3), each with the index of its leg."""
         legs = np.hstack([points[:-1], points[1:]])
         new = np.array([k for k, leg in enumerate(legs) if leg.tobytes() not in self.passed], np.intp)
         if not len(new):
             return ()
-        self.problem.budget.spend("check", 3)  # of which the violations are written down
+        self.problem.budget.spend("check", 3)  # `examine` costs more than a yes or no: it reports violations
         self.problem.budget.spend("leg", len(new))
         found = self.problem.airspace.examine(self._legs(legs[new]), self.problem.limits).violations
         bad = {v.leg for v in found}
@@ -65,13 +65,13 @@ class Judge:
 
 
 def way_points(problem: Problem, track: Track, flown: Flown) -> tuple[Floats, NDArray[np.bool_]]:
-    """(N, 3) every vertex of the track and of its profile, and (N,) which of them must stay."""
+    """Way points (N, 3) at every vertex of the track and of its profile, and (N,) whether they must stay."""
     profile = flown.profile
     s = np.concatenate([track.s_m, profile.s_m])
     must = np.concatenate([track.pinned, np.zeros(len(profile.s_m), bool)])
     order = np.lexsort((~must, s))
     s, must = s[order], must[order]
-    # Vertices of both within a millimetre are one; the pinned one comes first.
+    # Vertices within a millimetre of each other become one; a pinned one decides its place.
     group = np.concatenate([[0], np.cumsum(np.diff(s) > 1e-3)])
     first = np.flatnonzero(np.concatenate([[True], np.diff(group) > 0]))
     pins = np.zeros(len(first), bool)
@@ -94,11 +94,12 @@ def way_points(problem: Problem, track: Track, flown: Flown) -> tuple[Floats, ND
 def settle(
     problem: Problem, judge: Judge, points: Floats, pinned: Bools, pin_m: Floats
 ) -> tuple[Floats, Bools] | Unsettled:
-    """(N, 3) way points over a track that the exact check passes, and (N,) which of them must stay.
+    """Way points (N, 3) over a track that pass the exact check, and (N,) whether they must stay.
 
-    The profile is drawn over floors read point by point, which are nearer to the truth than bounds over whole pieces
-    of the track; where the exact check finds that something rises between two points, both are raised, and the
-    profile is drawn anew.
+    The profile is drawn over floors sampled point by point, which are closer to the true ground than bounds over whole
+    pieces of the track. Where the exact check finds ground (or a maximum AGL) violated between two samples, the floor
+    (ceiling) of that piece is corrected and the profile drawn again, up to `CORRECTIONS` times. `Unsettled` if none
+    passes.
     """
     track = sampled_track(problem, points, pinned, pin_m)
     tube = track.tube
@@ -144,7 +145,7 @@ def settle(
 
 
 def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> Track:
-    """A track whose tube is read point by point; the zones' bands are exact."""
+    """A track whose tube is sampled point by point; the bands of zones are those of the exact tube."""
     exact = make_track(problem, points, pinned, pin_m)
     at = [np.zeros(1)]
     for a, b in zip(exact.s_m[:-1], exact.s_m[1:], strict=True):
@@ -153,7 +154,7 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
     s = np.concatenate(at)
     s[-1] = exact.tube.s_m[-1]
     floor, ceiling = _tube_at(problem, exact, s)
-    with np.errstate(invalid="ignore"):  # unknown ground: infinite on both sides
+    with np.errstate(invalid="ignore"):  # over unknown ground floor and ceiling are infinite
         apart_m = np.abs(ceiling - floor)
     tight = np.minimum(apart_m[:-1], apart_m[1:]) < TIGHT_M
     if tight.any():
@@ -174,7 +175,7 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
 
 
 def _tube_at(problem: Problem, track: Track, s_m: Floats) -> tuple[Floats, Floats]:
-    """Floor and ceiling at places along a track, zones left aside."""
+    """Floor and ceiling at places along a track, without zones."""
     east, north = (np.interp(s_m, track.s_m, track.points[:, k]) for k in range(2))
     air, limits = problem.airspace, problem.limits
     return np.asarray(problem.floors(east, north)), np.asarray(air.ceiling_amsl(east, north, limits))

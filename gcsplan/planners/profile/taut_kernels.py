@@ -1,4 +1,4 @@
-"""Kernels of the taut string and of the room it is pulled through."""
+"""Kernels of the taut string and of the doors through which it is pulled."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ def draw(
     at: Ints,
     chains: Floats,
 ) -> int:
-    """The funnel: the shortest paths to the last door's two edges, from the apex where they part.
+    """Pull the string by the funnel algorithm; return its number of vertices.
 
-    ``at``, ``chains`` (3, n + 1): in their first rows the places and altitudes of the string, in the others the chains
-    to the high edge (convex, hangs under ceilings) and to the low edge (concave, lies over floors).
+    The funnel is the shortest paths to the high and the low edge of the latest door, from the apex where they part.
+    ``at``, ``chains`` (3, n + 1): row 0 receives the door indices and altitudes of the string; row 1 holds the chain to
+    the high edge (convex, hangs under ceilings), row 2 the chain to the low edge (concave, lies over floors).
     """
     n = len(s)
-    # The string never leaves the range of what it must touch, so an edge beyond it is no edge: no infinities below.
+    # The string never leaves the range of altitudes that it must touch. Edges are clipped to it: no infinities below.
     top, bottom = max(z0, z1), min(z0, z1)
     for i in range(1, n - 1):
         top = max(top, low[i])
@@ -37,20 +38,20 @@ def draw(
     over[0] = under[0] = 0
     over_z[0] = under_z[0] = z0
     out[0], out_z[0], count = 0, z0, 1
-    over_head = over_tail = under_head = under_tail = 0  # head is the apex in both
+    over_head = over_tail = under_head = under_tail = 0  # the head of both chains is the apex
     for i in range(1, n):
         if i == n - 1:
             up = down = z1
         else:
             up, down = min(high[i], top), max(low[i], bottom)
-        # High edge: keep slopes rising along its chain.
+        # High edge: slopes must increase along its chain.
         t = over_tail
         while t > over_head and (over_z[t] - over_z[t - 1]) * (s[i] - s[over[t]]) >= (up - over_z[t]) * (
             s[over[t]] - s[over[t - 1]]
         ):
             t -= 1
         if t == over_head:
-            # The straight line may dive under the low chain: then the apex walks along that chain.
+            # The straight line from the apex may pass below the low chain: the apex then moves along that chain.
             h = under_head
             while h < under_tail and (under_z[h + 1] - under_z[h]) * (s[i] - s[under[h]]) > (up - under_z[h]) * (
                 s[under[h + 1]] - s[under[h]]
@@ -63,7 +64,7 @@ def draw(
             over[0], over_z[0] = under[h], under_z[h]
         over_tail = t + 1
         over[over_tail], over_z[over_tail] = i, up
-        # Low edge: keep slopes falling along its chain.
+        # Low edge: slopes must decrease along its chain.
         t = under_tail
         while t > under_head and (under_z[t] - under_z[t - 1]) * (s[i] - s[under[t]]) <= (down - under_z[t]) * (
             s[under[t]] - s[under[t - 1]]
@@ -82,7 +83,7 @@ def draw(
             under[0], under_z[0] = over[h], over_z[h]
         under_tail = t + 1
         under[under_tail], under_z[under_tail] = i, down
-    # Both chains end in (s[-1], z1) now and have no room between them beyond the apex.
+    # Both chains now end at (s[-1], z1) and coincide beyond the apex.
     for k in range(over_head + 1, over_tail + 1):
         if over[k] != out[count - 1]:
             out[count], out_z[count] = over[k], over_z[k]
@@ -98,7 +99,8 @@ def edge(
     highest: bool,
     out: Floats,
 ) -> None:
-    """A piecewise-linear function with jumps at rising places ``s``: the higher (lower) limit where it jumps."""
+    """Write a piecewise-linear function at rising ``s`` to ``out``; at a jump its higher limit, or lower if not
+    ``highest``. Piece k runs from ``at[k]`` to ``at[k + 1]``, with values ``value[k]`` at its two ends."""
     pieces = len(value)
     k = 0
     for i in range(len(s)):

@@ -1,10 +1,10 @@
 """The best altitude profile over a fixed ground track: a taut string through a tube, in one pass.
 
-A tube's floor and ceiling are linear between breakpoints and may jump there, so a profile is legal exactly when
-it passes every *door*, the span between floor and ceiling at a breakpoint, and is straight in between. The
-shortest such profile minimises the sum of any convex function of the slope: length, total climb and the steepest
-climb or descent at once (Barlow et al. 1972, ch. 1; the funnel is Lee and Preparata's, 1984). If it breaks a
-climb limit, every profile through those doors does.
+A tube's floor and ceiling are linear between breakpoints and may jump there. A profile that is straight between
+breakpoints is therefore legal exactly if it passes every *door*, the span between floor and ceiling at a breakpoint.
+The shortest such profile minimises the sum of any convex function of the slope: length, total climb and the steepest
+climb or descent at once (Barlow et al. 1972, ch. 1; the funnel is Lee and Preparata's, 1984). If it breaks a climb
+limit, so does every other profile through those doors.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from gcsplan.arrays import Floats
 from gcsplan.planners.profile.taut_kernels import draw
 
 NO_LIMIT = 1e12
-"""A slope that stands for infinite ones, which would make nothing of a step at one place."""
+"""Slope (rise over run) that stands for "no limit"; an infinite slope times a run of 0 would be NaN."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
-    """Vertices of a profile: ``s_m`` (K,) rising, metres along the track; ``amsl_m`` (K,)."""
+    """Vertices of an altitude profile: ``s_m`` (K,) rising, metres along the track; ``amsl_m`` (K,)."""
 
     s_m: Floats
     amsl_m: Floats
 
     @property
     def length_m(self) -> float:
-        """Length in the (s, altitude) plane, so of the path in space over a track of straight legs."""
+        """Length in the (s, altitude) plane; over a track of straight legs this is the length of the path in space."""
         return float(np.hypot(np.diff(self.s_m), np.diff(self.amsl_m)).sum())
 
     @property
     def vertical_m(self) -> float:
-        """Total climb plus total descent."""
+        """Total climb plus total descent, in metres."""
         return float(np.abs(np.diff(self.amsl_m)).sum())
 
     def at(self, s_m: Floats) -> Floats:
@@ -47,10 +47,10 @@ class Profile:
 
 @dataclass(frozen=True, slots=True)
 class Blocked:
-    """Why no profile passes: between ``s0_m`` and ``s1_m`` along the track.
+    """Why no profile is legal; the reason lies between ``s0_m`` and ``s1_m`` along the track.
 
-    ``pinched``: at one place the floor is ``by`` metres over the ceiling (the worst such place); ``climb`` or
-    ``descent``: the straight piece between must rise (drop) ``by`` metres more than the limit allows.
+    ``pinched``: at one place (the worst) the floor is ``by`` metres above the ceiling. ``climb`` or ``descent``: the
+    straight piece from ``s0_m`` to ``s1_m`` rises (drops) ``by`` metres more than the limit allows.
     """
 
     kind: Literal["pinched", "climb", "descent"]
@@ -60,7 +60,7 @@ class Blocked:
 
 
 def doors(floor_m: Floats, ceiling_m: Floats) -> tuple[Floats, Floats]:
-    """(M + 1,) lowest and highest altitude at each breakpoint of M pieces given by (M, 2) their ends."""
+    """Lowest and highest altitude (M + 1,) at each breakpoint of M pieces, whose values at both ends are (M, 2)."""
     low = np.empty(len(floor_m) + 1)
     high = np.empty(len(ceiling_m) + 1)
     low[0], low[-1] = floor_m[0, 0], floor_m[-1, 1]
@@ -82,8 +82,8 @@ def taut_string(
     """Pull a string from altitude ``start_m`` at ``s_m[0]`` to ``end_m`` at ``s_m[-1]`` through every door.
 
     ``s_m`` (n,) rises strictly, n >= 2; ``low_m``, ``high_m`` (n,) AMSL, infinite where unbounded; slopes are
-    rise over run, both positive. O(n). Touching a door's edge or a slope's limit is legal (the slope within 1e-9
-    of rise over run, for rounding).
+    rise over run, both positive. O(n). Touching a door's edge or a slope limit is legal; slopes may exceed their limit
+    by 1e-9 (rise over run), for rounding. `Blocked` if no profile is legal.
     """
     worst, gap = _pinch(low_m, high_m, start_m, end_m)
     if gap > 0.0 or not np.isfinite(gap):
@@ -100,9 +100,9 @@ def taut_string(
 
 
 def _pinch(low: Floats, high: Floats, z0: float, z1: float) -> tuple[int, float]:
-    """Index of the tightest door and by how much its floor is over its ceiling (negative: it is open).
+    """Index of the tightest door, and by how many metres its floor is above its ceiling (negative: it is open).
 
-    NaN in a door is a closed door: unknown is never room.
+    A door with NaN is closed: unknown altitudes are never free.
     """
     with np.errstate(invalid="ignore"):
         by = low - high
@@ -111,7 +111,7 @@ def _pinch(low: Floats, high: Floats, z0: float, z1: float) -> tuple[int, float]
     by[np.isnan(by)] = np.inf
     worst = int(np.argmax(by))
     gap = float(by[worst])
-    return worst, -1.0 if gap == -math.inf else gap  # -inf: every door open without end
+    return worst, -1.0 if gap == -math.inf else gap  # -inf: every door is unbounded
 
 
 def _pull(s: Floats, low: Floats, high: Floats, z0: float, z1: float) -> tuple[NDArray[np.int64], Floats]:

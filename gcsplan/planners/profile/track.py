@@ -1,7 +1,6 @@
-"""A ground track with its exact room above it, and the best altitude profile through that room.
+"""A ground track with the tube of free altitudes over it, and the best altitude profile through that tube.
 
-The tube comes from `Airspace.tube`, so what is decided here holds along the whole line and not at samples. A
-change of the track keeps the tube of what did not change: cut, join, and ask only for the new part.
+The tube comes from `Airspace.tube`, so results hold along the whole line, not only at samples.
 """
 
 from __future__ import annotations
@@ -22,27 +21,28 @@ from gcsplan.planners.profile.taut_string import NO_LIMIT, Blocked, Profile, tau
 from gcsplan.world.airspace import Tube
 
 KEEP_M = 1e-4
-"""Kept from floors and ceilings where there is room, so that rounding never decides."""
+"""Metres kept from floors and ceilings where they are far enough apart, so that rounding never decides."""
 
 CLOSE_M, CLOSE_STEP_M, CLOSE_SPARE_M = 60.0, 1.0, 0.03
-"""Where a tube shuts an end in: so far from it the floor is read point by point, so often, with so much to spare."""
+"""Where a tube shuts an end in: the floor is read again within so many metres of it, at so many metres apart, and
+raised by so many metres."""
 
 DEARER = 2e-4
-"""What way over or under zones is dearer by, as a part, that is worth to look for one past them."""
+"""Extra cost of passing over or under zones, as a part, from which on a track around the deepest is worth a search."""
 BESIDE_M = 1.0
-"""A piece of a profile that ends so near a zone ends there because of it."""
+"""A piece of a profile that ends within this many metres of a zone is taken to end there because of the zone."""
 
 BRANCHES = 64
 """Most over/under combinations that are tried for one track."""
 
 
 Sides = tuple[bool | None, ...]
-"""For each band of a tube: over it, under it, or not chosen."""
+"""For each band of a tube: True over it, False under it, None not chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class Obstruction:
-    """Why a track has no legal profile, where along it, and by how much (metres); ``zone`` -1: terrain or limits."""
+    """Why a track has no legal profile, where along it, and by how many metres; ``zone`` -1: terrain or limits."""
 
     kind: Literal["pinched", "climb", "descent", "zone"]
     s0_m: float
@@ -53,7 +53,7 @@ class Obstruction:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Flown:
-    """A legal profile over a track, what it costs, and for each band of the tube whether it is passed above."""
+    """A legal profile over a track, its cost, and for each band of the tube whether the profile passes over it."""
 
     profile: Profile
     cost: float
@@ -62,7 +62,8 @@ class Flown:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Track:
-    """``points`` (N, 2); ``pinned`` (N,) vertices that must stay; ``pin_m`` (N,) their altitude, NaN where free."""
+    """``points`` (N, 2); ``pinned`` (N,) vertices that must stay; ``pin_m`` (N,) their altitude, NaN where free;
+    ``s_m`` (N,) metres along the track, scaled so that it ends where the tube ends."""
 
     points: Floats
     pinned: NDArray[np.bool_]
@@ -71,17 +72,17 @@ class Track:
     tube: Tube
 
     def place(self, s_m: float) -> Floats:
-        """(2,) the point ``s_m`` along the track."""
+        """The point (2,) at ``s_m`` metres along the track."""
         return np.array([np.interp(s_m, self.s_m, self.points[:, 0]), np.interp(s_m, self.s_m, self.points[:, 1])])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Lacking:
-    """The profile over a track that would cost least if laps could be flown wherever it is too steep.
+    """The cheapest profile over a track if laps could be flown wherever it is too steep.
 
-    ``cost``: of that path; ``laps_m``: metres of laps in it; ``steep``: where they would have to be, the one that lacks
-    most first; ``zones``: which make it climb or descend there, or else, where ways over or under zones are dearer than
-    no zones, the one that is met deepest.
+    ``cost``: with laps; ``laps_m``: metres of laps; ``steep``: the pieces that need them, most missing height first;
+    ``zones``: those that force the climb or descent of the first such piece. Where nothing is too steep, but the
+    cost is higher than without zones (`DEARER`), ``zones`` holds the zone that is met deepest.
     """
 
     profile: Profile
@@ -93,22 +94,22 @@ class Lacking:
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """Why a track cannot be flown, however long: at the best of its worst places ``by`` metres of room are missing,
-    between what is passed there over and under; ``zones``: which of that are zones, as far as is known."""
+    """Why a track cannot be flown even with laps: the floor is ``by`` metres above the ceiling at its tightest place,
+    for the best choice of sides that was tried; ``zones``: those passed over or under there, as far as known."""
 
     by: float
     zones: tuple[int, ...]
 
 
 def distances(points: Floats) -> Floats:
-    """(N,) metres along a track (N, 2)."""
+    """Metres (N,) along a track (N, 2), from 0 at its first point."""
     d = np.diff(points, axis=0)
     return np.concatenate([[0.0], np.cumsum(np.hypot(d[:, 0], d[:, 1]))])
 
 
 def divided(points: Floats, step_m: float) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Legs of a track or path (N, 2 or 3) in equal parts, none longer than ``step_m``: of each part (K,) the leg, which
-    of that leg's it is, and how many those are."""
+    """Divide legs of a track or path (N, 2 or 3) into equal parts, none longer than ``step_m``; for each part (K,) its
+    leg, its index within that leg, and the number of parts of that leg."""
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     parts = np.maximum(np.ceil(length / step_m), 1.0).astype(np.intp)
     leg = np.repeat(np.arange(len(parts)), parts)
@@ -116,7 +117,7 @@ def divided(points: Floats, step_m: float) -> tuple[NDArray[np.intp], NDArray[np
 
 
 def make_track(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> Track:
-    """A track with its tube; points nearer than 1 mm to the one before are dropped (the pinned one is kept)."""
+    """A track with its tube; of points within 1 mm of the one before only one is kept, preferably the pinned one."""
     keep = np.ones(len(points), bool)
     last = 0
     for i in range(1, len(points)):
@@ -142,12 +143,12 @@ def fly(
     branches: int = BRANCHES,
     known: Sequence[tuple[float, float, float]] = (),
 ) -> Flown | Obstruction:
-    """The cheapest legal profile over ``track``, each band passed above or below as is cheaper.
+    """The cheapest legal profile over ``track``, with the cheaper side (over or under) of each band.
 
-    Best first over the sides of those bands only that the string runs into; bands it clears cost nothing. Before
-    the sides are tried one by one, all bands that are hit are passed on their nearer side at once; if that costs
-    less than ``below``, it is taken where ``branches`` is 0. A profile of ``below`` or more is not wanted: the
-    search stops there and reports what it ran into. ``known`` are doors (s_m, low_m, high_m) to pass besides.
+    A best-first search over the sides of bands, at most ``branches`` of them; only bands that the string runs into are
+    branched on. With ``branches`` 0 all bands that are hit are passed on their nearer side at once, up to five times,
+    and the result is returned if it costs less than ``below``. The search ends at cost ``below``. If it finds nothing,
+    it returns what the first string ran into. ``known``: further doors (s_m, low_m, high_m) to pass.
     """
     tube, limits = track.tube, problem.limits
     ends = (problem.start[2], problem.goal[2])
@@ -204,10 +205,10 @@ def fly(
 
 
 def lacking(problem: Problem, track: Track) -> Lacking | Closed:
-    """What the track lacks in length to be flown, where length helps.
+    """The length that a track lacks to be flyable, and where; `Closed` if more length does not help.
 
-    What climbs as steeply as allowed over pieces that are too short costs a convex function of the slope, like all
-    that a taut string makes least; so sides are searched as in `fly`.
+    With laps added to pieces that are too steep, a profile still costs a convex function of its slope, so the taut
+    string is the cheapest profile here too. Sides of bands are searched as in `fly`.
     """
     tube, limits = track.tube, problem.limits
     sections = _sections(problem, track, ())
@@ -265,7 +266,7 @@ def lacking(problem: Problem, track: Track) -> Lacking | Closed:
 
 @dataclass(frozen=True, slots=True)
 class _Hit:
-    """A band that a profile runs into, how deep, and whether over it is the nearer way out."""
+    """A band that a profile runs into, how many metres deep, and whether its top is nearer than its bottom."""
 
     band: int
     depth_m: float
@@ -274,7 +275,7 @@ class _Hit:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Sections:
-    """Doors at every breakpoint of a tube, its bands and the pins; for each band its doors' span and edges."""
+    """Doors at all breakpoints of a tube and its bands, and at pins; for each band its range of doors and altitudes."""
 
     s_m: Floats
     low_m: Floats
@@ -284,8 +285,8 @@ class _Sections:
     tops: list[Floats]
 
     def between(self, over: Sides) -> tuple[Floats, Floats]:
-        """Doors with bands passed as chosen, narrowed by `KEEP_M` on both sides, or to their middle where there is
-        less room; the ends are exempt."""
+        """Lowest and highest altitude of each door with bands passed as in ``over``, narrowed by `KEEP_M` on both sides
+        (to the middle where a door is smaller than that). The two ends are not narrowed."""
         low, high = self.low_m.copy(), self.high_m.copy()
         for k, side in enumerate(over):
             i, j = self.spans[k]
@@ -297,12 +298,12 @@ class _Sections:
         return low, high
 
     def zones(self, tube: Tube, over: Sides, s0_m: float, s1_m: float) -> tuple[int, ...]:
-        """Zones passed on a chosen side, from one place along the track to another or beside them."""
+        """Zones with a chosen side whose bands come within `BESIDE_M` of the piece from ``s0_m`` to ``s1_m``."""
         chosen = (b for b, side in zip(tube.bands, over, strict=True) if side is not None)
         return tuple({b.zone: None for b in chosen if b.s0_m < s1_m + BESIDE_M and b.s1_m > s0_m - BESIDE_M})
 
     def hits(self, profile: Profile, over: Sides) -> list[_Hit]:
-        """Bands without a side that ``profile`` does not clear by `KEEP_M`."""
+        """Bands without a chosen side that ``profile`` does not clear by `KEEP_M`."""
         out = []
         if any(side is None for side in over):
             z = profile.at(self.s_m)
@@ -316,7 +317,7 @@ class _Sections:
 
 
 def _narrow(low: Floats, high: Floats) -> None:
-    with np.errstate(invalid="ignore"):  # a door between infinities has no room, or any
+    with np.errstate(invalid="ignore"):  # a door between infinities gives NaN or infinity
         sections, middle = high - low, 0.5 * (low + high)
     wide, open_ = sections >= 2.0 * KEEP_M, sections >= 0.0
     ends = low[[0, -1]] - 1e-6, high[[0, -1]] + 1e-6
@@ -363,10 +364,10 @@ def _sections(problem: Problem, track: Track, known: Sequence[tuple[float, float
 
 
 def _close_to_ends(problem: Problem, tube: Tube) -> Floats:
-    """Places near an end to be looked at one by one, where the tube's floor is beyond what can be climbed to.
+    """Metres along the track, near an end, at which to read the floor again, if the tube's floor is out of reach there.
 
-    A tube bounds the floor over whole pieces. Start and goal lie on the floor more often than not, and a bound that
-    is a metre too high a few metres away would shut them in.
+    A tube bounds the floor over whole pieces. Start and goal mostly lie on the floor, and a bound that is a metre too
+    high a few metres away would shut them in.
     """
     limits, length = problem.limits, float(tube.s_m[-1])
     out = []
@@ -383,7 +384,8 @@ def _close_to_ends(problem: Problem, tube: Tube) -> Floats:
 
 
 def _forgive(low: Floats, high: Floats, k: int, z: float) -> None:
-    """Let an end at ``z`` be legal by a little, in place: a tube is conservative, and ends are judged elsewhere."""
+    """Move door ``k`` to ``z``, in place, if it misses ``z`` by less than `ENDS_M`: a tube is conservative, and whether
+    an end is legal is checked elsewhere."""
     if z < low[k] < z + ENDS_M:
         low[k] = z
     if z - ENDS_M < high[k] < z:
@@ -391,7 +393,7 @@ def _forgive(low: Floats, high: Floats, k: int, z: float) -> None:
 
 
 def _edge(s: Floats, at: Floats, value: Floats, highest: bool) -> Floats:
-    """A piecewise-linear function with jumps at rising places ``s``: the higher (lower) limit where it jumps."""
+    """Values of a piecewise-linear function with jumps at rising ``s``; at a jump the higher (lower) limit."""
     out = np.empty(len(s))
     edge(*(np.ascontiguousarray(a, np.float64) for a in (s, at, value)), highest, out)
     return out

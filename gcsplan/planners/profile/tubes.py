@@ -1,4 +1,4 @@
-"""Tubes cut and joined, so that a changed track asks only for the room over what changed."""
+"""Cutting and joining tubes, so that after a change of the track only the changed part needs a new tube."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gcsplan.world.airspace import Band, Tube
 
 
 def cut(tube: Tube, s0_m: float, s1_m: float) -> Tube | None:
-    """The part of a tube between two places, its ``s_m`` from 0; None where it has no length."""
+    """The part of a tube from ``s0_m`` to ``s1_m``, its ``s_m`` counted from 0; None if it is shorter than 1e-6 m."""
     if s1_m - s0_m < 1e-6:
         return None
     s, (floor, ceiling) = _cut_pieces(tube.s_m, (tube.floor_m, tube.ceiling_m), s0_m, s1_m)
@@ -45,7 +45,7 @@ def _cut_pieces(s: Floats, values: tuple[Floats, Floats], s0: float, s1: float) 
 
 
 def join(tubes: Sequence[Tube]) -> Tube:
-    """One tube after the other. Bands of one zone that meet become one, so that it is passed on one side."""
+    """Join tubes end to end. Bands of one zone that touch become one band, so that one side is chosen for both."""
     if len(tubes) == 1:
         return tubes[0]
     offsets = np.concatenate([[0.0], np.cumsum([t.s_m[-1] for t in tubes])])
