@@ -1,1 +1,1 @@
-"""Paths of arcs and tangents for fixed wings, their profile and repair; `planner` is its door."""
+"""Paths of arcs and tangents for fixed wings, their profile and repair; the entry is `planner`."""

@@ -1,9 +1,9 @@
-"""A track of straight legs and arcs of one radius: an arc path around discs, from start to goal.
+"""Arc paths: tracks of straight legs and arcs of one radius around discs, from start to goal.
 
-Every turn hugs a disc, on its left or on its right, and legs are the tangents between neighbours, so turns never
-overlap however close the discs are, and a turn of any size is one arc. For an autopilot each arc is then cut into
-turns of `MOST_DEG` at most; the way point of a turn is where its tangents meet. A disc with a pin touches that very
-point, and is cut there.
+Every turn follows the edge of a disc, on its left or on its right, and legs are the tangents between neighbouring
+discs. So turns never overlap however close the discs are, and a turn of any size is one arc. For an autopilot each arc
+is then divided into turns of at most `MOST_DEG`; the way point of a turn is where its tangents meet. The arc of a disc
+with a pin passes through that point and is divided there.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from gcsplan.planners.turns.kernels import CHORD_M, fill_outline, part_neighbour
 Ints = NDArray[np.int64]
 
 MOST_DEG = 100.0
-"""Largest turn at one way point."""
+"""Largest turn at one way point, in degrees."""
 
 ROUNDS = 12
-"""Times that discs are laid anew through their contacts, or pushed apart, before the arc path is drawn for good."""
+"""Rounds in which discs are placed through their contacts again; they are pushed apart up to four times as often."""
 
 NO_TURN = 1e-9
-"""A smaller turn, in radians, is none."""
+"""Turns up to this many radians count as none."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ArcPath:
     """``ends`` (2, 2) start and goal; discs in order: ``centre`` (K, 2), ``sense`` (K,) +1 for a left turn, -1 right.
 
-    ``pin`` (K, 2): the point that a disc touches, NaN where free; ``pin_m`` (K,) its altitude, NaN where free.
-    ``heading`` (K + 1,) radians of the legs, from east to north; ``turn`` (K,) >= 0 radians. ``gap_m``: how much too
-    close neighbours are for a tangent, in all; where it is not 0 there is no such arc path, and the rest is
-    meaningless.
+    ``pin`` (K, 2): the point that a disc must touch, NaN where free; ``pin_m`` (K,) its altitude, NaN where free.
+    ``heading`` (K + 1,) of the legs, radians from east to north; ``turn`` (K,) >= 0 radians. ``gap_m``: metres by which
+    neighbours are too close for a tangent, summed; where it is not 0 no such arc path exists, and ``heading`` and
+    ``turn`` are meaningless.
     """
 
     ends: Floats
@@ -51,17 +51,17 @@ class ArcPath:
 
     @property
     def pinned(self) -> NDArray[np.bool_]:
-        """(K,) which discs have a pin."""
+        """Which discs (K,) have a pin."""
         return np.isfinite(self.pin[:, 0])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Outline:
-    """An arc path as chords: ``points`` (N, 2), ``s_m`` (N,) along them.
+    """An arc path as chords: ``points`` (N, 2), ``s_m`` (N,) metres along them.
 
     ``arcs`` (A, 3): for each turn the indices of its first, middle and last point; ``corners`` (A, 2) its way point;
-    ``widen_m`` (N - 1,) how far arcs may lie outside of chords; ``disc`` (A,) whose turn it is; ``pins`` (P,) indices
-    of pinned points, ``pin_m`` (P,) their altitudes. ``true_m`` (N,) metres along legs and arcs themselves.
+    ``disc`` (A,) the index of its disc. ``widen_m`` (N - 1,) how far the arc may lie outside each chord; ``pins`` (P,)
+    indices of pinned points, ``pin_m`` (P,) their altitudes. ``true_m`` (N,) metres along legs and arcs themselves.
     """
 
     points: Floats
@@ -78,8 +78,7 @@ class Outline:
 def through(
     ends: Floats, radius_m: float, contact: Floats, sense: Floats, pinned: NDArray[np.bool_], pin_m: Floats
 ) -> ArcPath:
-    """The arc path whose turns pass through ``contact`` (K, 2) in the middle; contacts it need not touch are left
-    out."""
+    """The arc path whose turns pass through ``contact`` (K, 2) in their middle; discs it need not touch are removed."""
     heading = _headings(np.vstack([ends[:1], contact, ends[1:]]))
     sense, centre = sense.copy(), np.zeros_like(contact)
     pin = np.where(pinned[:, None], contact, np.nan)
@@ -95,7 +94,8 @@ def through(
 
 
 def tight(arc_path: ArcPath) -> ArcPath:
-    """The arc path drawn around its discs as they lie, those that it need not touch left out, pins touched."""
+    """The arc path around its discs where they are; free discs that it need not touch are removed, pinned ones moved so
+    that they touch their pins."""
     arc_path = _drawn(arc_path)
     for _ in range(len(arc_path.sense) + ROUNDS):
         loose = (arc_path.turn <= NO_TURN) & ~arc_path.pinned
@@ -114,14 +114,14 @@ def tight(arc_path: ArcPath) -> ArcPath:
 
 
 def moved(arc_path: ArcPath, disc: int, by: Floats) -> ArcPath:
-    """The arc path with one free disc moved by (2,) metres."""
+    """The arc path with one free disc moved by ``by`` (2,) metres."""
     centre = arc_path.centre.copy()
     centre[disc] += by
     return tight(replace(arc_path, centre=centre))
 
 
 def inserted(arc_path: ArcPath, at: int, contact: Floats, heading: float, sense: float) -> ArcPath:
-    """The arc path with a disc more, before disc ``at``, touching ``contact`` where the way there is ``heading``."""
+    """The arc path with one disc more, before disc ``at``, that a track of ``heading`` touches at ``contact``."""
     normal = sense * arc_path.radius_m * np.array([-math.sin(heading), math.cos(heading)])
     return tight(
         replace(
@@ -142,7 +142,7 @@ def without(arc_path: ArcPath, disc: int) -> ArcPath:
 
 
 def unlooped(arc_path: ArcPath) -> ArcPath:
-    """The arc path without free discs that it goes more than half round, as long as there are any."""
+    """The arc path without free discs around which it turns by more than 180 degrees, removed one by one."""
     while arc_path.gap_m == 0.0:
         loops = (arc_path.turn > math.pi) & ~arc_path.pinned
         if not loops.any():
@@ -152,7 +152,7 @@ def unlooped(arc_path: ArcPath) -> ArcPath:
 
 
 def outline(arc_path: ArcPath) -> Outline:
-    """The arc path as chords, each at most `CHORD_M` inside its arc."""
+    """The arc path as chords; each arc lies at most `CHORD_M` outside its chord."""
     size = 2
     step = 2.0 * math.acos(max(1.0 - CHORD_M / arc_path.radius_m, 0.5))
     most = math.radians(MOST_DEG)
@@ -180,7 +180,7 @@ def _headings(points: Floats) -> Floats:
 
 
 def _middles(heading: Floats) -> Floats:
-    """(K,) half-way headings at the turns between K + 1 legs."""
+    """Headings (K,) in the middle of the turns between K + 1 legs."""
     turn = np.diff(heading)
     return np.asarray(heading[:-1] + 0.5 * ((turn + math.pi) % (2.0 * math.pi) - math.pi))
 
@@ -206,11 +206,11 @@ def _drawn(arc_path: ArcPath, *, parted: bool = False) -> ArcPath:
 
 
 def _pins_laid(arc_path: ArcPath) -> ArcPath:
-    """Pinned discs laid through their pins again, half-way between the legs; on the other side where it turns so."""
+    """Place pinned discs so that the middle of their turn is at the pin; on the other side if the turn is negative."""
     if arc_path.gap_m > 0.0:
         return arc_path
     sense = np.where(arc_path.pinned & (arc_path.turn < 0.0), -arc_path.sense, arc_path.sense)
-    # A turn of more than half a circle goes on in its own sense, so its middle is not the nearer one.
+    # Not `_middles`: for a turn of more than 180 degrees that takes the middle of the shorter turn the other way.
     middle = arc_path.heading[:-1] + 0.5 * arc_path.sense * arc_path.turn
     normal = np.stack([-np.sin(middle), np.cos(middle)], axis=-1)
     centre = np.where(

@@ -1,4 +1,4 @@
-"""The kernels of fixed wings' tracks, as `gcsplan.planners.compiled`; they change when those rules do."""
+"""The unit of machine code for fixed-wing tracks, separate from `gcsplan.planners.compiled`."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ from gcsplan.native.unit import Unit
 UNIT = Unit("turns", Path(__file__).parent, "gcsplan.planners.turns", ("kernels",))
 
 kernel = UNIT.kernel
-"""What Python calls. Nothing is allocated in it: Python hands in the room."""
+"""Marks a function that Python calls. It allocates nothing: its caller passes all arrays."""

@@ -1,4 +1,4 @@
-"""Kernels of arc paths, of what a track breaks, and of the room over its arcs."""
+"""Kernels of arc paths: tangents, outlines, how far a track breaks its limits, and its tube over arcs."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from gcsplan.planners.turns.compiled import kernel
 Ints = NDArray[np.int64]
 
 END_M, FORGIVEN_M = 60.0, 25.0
-"""Bounds so near to start and goal are not read (see `track`) unless they are broken by more."""
+"""Within `END_M` metres of start and goal, floors that are exceeded by less than `FORGIVEN_M` metres are ignored (see
+`profile.track`)."""
 
 CHORD_M = 0.05
-"""Most that an arc lies outside the chords that stand for it."""
+"""Most metres by which an arc lies outside its chords."""
 
 
 @kernel("f8[,] f8 f8[,] f8[] f8[] f8[] f8[]")
 def tangents(
     ends: Floats, radius: float, centre: Floats, sense: Floats, heading: Floats, turn: Floats, out: Floats
 ) -> None:
-    """Headings of the legs and turns between them, in place; how much too close neighbours are into ``out`` (1,)."""
+    """Write the headings of the legs and the turns between them; into ``out`` (1,) the metres by which neighbouring
+    discs are too close for a tangent, summed (0: there is one everywhere)."""
     n = len(sense)
     gap = 0.0
     for k in range(n + 1):
@@ -44,14 +46,14 @@ def tangents(
         heading[k] = math.atan2(dy, dx) - (math.asin(across / d) if d > 0.0 else 0.0)
     for k in range(n):
         t = sense[k] * (heading[k + 1] - heading[k])
-        # Between a quarter of a circle the wrong way (the disc is not touched) and three the right way.
+        # From -90 degrees (turns the wrong way: the disc is not touched) to 270 degrees.
         turn[k] = (t + 0.5 * math.pi) % (2.0 * math.pi) - 0.5 * math.pi
     out[0] = gap
 
 
 @kernel("f8[,] f8 f8[,] f8[] b1[]")
 def part_neighbours(ends: Floats, radius: float, centre: Floats, sense: Floats, fixed: NDArray[np.bool_]) -> None:
-    """Push neighbours apart that are too close for a tangent, in place."""
+    """Push neighbouring discs apart that are too close for a tangent, in place; ``fixed`` ones stay."""
     n = len(sense)
     for k in range(n + 1):
         first, last = k == 0, k == n
@@ -85,9 +87,10 @@ def fill_outline(
     step: float, most: float, points: Floats, true_m: Floats, widen: Floats, arcs: Ints, corners: Floats,
     disc: Ints, pin_at: Ints,
 ) -> int:  # fmt: skip
-    """Fills the arrays of `Outline` (widen[i] belongs to the chord that ends in point i); how many points.
+    """Fill the arrays of `Outline` (``widen[i]`` belongs to the chord that ends at point i); return how many points.
 
-    The number of turns goes into the last place of ``disc``.
+    ``step``: largest angle of a chord, ``most``: largest angle of a turn, both in radians. The number of turns goes
+    into the last element of ``disc``.
     """
     points[0, 0], points[0, 1] = ends[0, 0], ends[0, 1]
     true_m[0] = 0.0
@@ -96,7 +99,7 @@ def fill_outline(
         whole = turn[k]
         if whole <= 0.0:
             continue
-        # From the centre, the arc begins at this angle and runs by ``sense``.
+        # Angle, seen from the centre, at which the arc begins; it runs in the direction of ``sense``.
         begin = heading[k] - sense[k] * 0.5 * math.pi
         x = centre[k, 0] + radius * math.cos(begin)
         y = centre[k, 1] + radius * math.sin(begin)
@@ -159,9 +162,10 @@ def fill_outline(
 def pinched(
     s: Floats, floor: Floats, ceiling: Floats, z0: float, z1: float, up: float, down: float, out: Floats
 ) -> None:
-    """Metres of floor over ceiling, summed along; the worst place, and how much there, into ``out`` (3,).
+    """Write to ``out`` (3,): metres of floor above ceiling, integrated along the track; the worst place; metres there.
 
-    Ends are judged by others.
+    The ceiling includes what can be climbed to from the start (``z0``), or descended from to the goal (``z1``). Places
+    near the ends are ignored if little is missing (`END_M`, `FORGIVEN_M`): the ends are checked elsewhere.
     """
     total, worst, most = 0.0, 0.0, 0.0
     length = s[-1]
@@ -189,7 +193,7 @@ def pinched(
 
 @kernel("f8[] f8[,] f8[,] f8[] f8[,] f8[,] f8[]")
 def shut(s: Floats, floor: Floats, ceiling: Floats, at: Floats, bottom: Floats, top: Floats, out: Floats) -> None:
-    """Metres of a band that can be passed neither below nor above, and their middle, into ``out`` (2,)."""
+    """Write to ``out`` (2,): metres of a band that can be passed neither under nor over, and the middle of these."""
     length, first, last = 0.0, at[-1], at[0]
     for i in range(len(floor)):
         for j in range(len(bottom)):
@@ -208,9 +212,10 @@ def shut(s: Floats, floor: Floats, ceiling: Floats, at: Floats, bottom: Floats, 
 def straighten(
     s: Floats, floor: Floats, ceiling: Floats, halves: Floats, at: Floats, low: Floats, high: Floats, slopes: Floats
 ) -> int:
-    """A tube with floor and ceiling over each half arc replaced by the lines that leave the most room between.
+    """Replace floor and ceiling over each half arc by straight lines that leave the most altitude free between them.
 
-    Into ``at`` (n + 1,), ``low`` and ``high`` (n, 2) for n pieces; how many are left. ``slopes`` (5,) is scratch.
+    The new tube goes into ``at`` (n + 1,), ``low`` and ``high`` (n, 2) for n pieces; returns the number of its pieces.
+    ``slopes`` (5,) is a working array.
     """
     n = len(floor)
     at[0] = s[0]
@@ -232,7 +237,7 @@ def straighten(
             slopes[k] = 0.0
         slopes[1] = (floor[j - 1, 1] - floor[i, 0]) / (b - a)
         slopes[2] = (ceiling[j - 1, 1] - ceiling[i, 0]) / (b - a)
-        # Along the highest floor, the steepest lines that still lie over all that comes before, and after.
+        # Two more slopes to try: from the floor's first point to its highest, and from its highest to its last.
         peak, peak_at = -np.inf, a
         for k in range(i, j):
             for e in range(2):
@@ -258,7 +263,7 @@ def straighten(
                     for e in range(2):
                         over = min(over, ceiling[k, e] - w * (s[k + e] - a))
                 tight = min(over - under, over + w * (b - a) - under - m * (b - a))
-                # Room that is there counts little, room that is missing all.
+                # Missing height counts a million times more than free height.
                 score = (1e6 * tight if tight < 0.0 else 0.0) - (2.0 * under + m * (b - a))
                 if over < np.inf:
                     score += 2.0 * over + w * (b - a)
@@ -273,9 +278,9 @@ def straighten(
 
 @kernel("f8[] f8[,] f8[,] f8[,] f8[] f8[,] f8[,]")
 def level(s: Floats, bottom: Floats, top: Floats, halves: Floats, at: Floats, under: Floats, over: Floats) -> int:
-    """A band that reaches over whole half arcs, each on one lowest bottom and one highest top.
+    """Extend a band to whole half arcs, each with the lowest bottom and the highest top along it; the number of pieces.
 
-    Into ``at`` (most + 1,), ``under`` and ``over`` (most, 2) for ``most`` = n + 2 H + 2; how many pieces there are.
+    Written to ``at`` (most + 1,), ``under`` and ``over`` (most, 2) with ``most`` = n + 2 H + 2, for H half arcs.
     """
     n, first, last = len(bottom), s[0], s[-1]
     for h in range(len(halves)):

@@ -1,14 +1,14 @@
-"""Paths for wings: a path of sharp corners made into legs and arcs of the turn radius, legal as flown.
+"""Paths for fixed wings: a path with sharp corners becomes legs and arcs of the turn radius, legal as flown.
 
-A fixed wing does not pass its way points: it begins to turn before each and flies an arc, tangent to both legs. So the
-corners that a shortest path has, where it touches obstacles, are laid on the arcs: an arc path around discs
-(`arc_path`) that touch the corners from the obstacle's side, which shifts the way points outwards. What is legal is
-decided on the track as flown, arcs as chords widened by what the arc lies outside them; its altitude profile is drawn
-anew (`turns.profile`), and where ground or zones are in the way the discs are moved (`turns.repair`).
+A fixed wing does not pass its way points: it begins to turn before each and flies an arc that is tangent to both legs.
+A shortest path has corners where it touches obstacles, so the arcs must pass there: the track becomes an arc path
+around discs (`arc_path`) that touch the corners from the obstacle's side, and the way points move outwards. The track
+is checked as flown, with arcs as chords, widened by how far the arc lies outside them. Its altitude profile is drawn
+anew (`turns.profile`), and discs are moved where ground or zones are in the way (`turns.repair`).
 
-- A via is passed exactly: it lies on its arc, and is a way point there, between the two that make the arc.
+- A via is passed exactly: it lies on its arc and is a way point there, between the two that make the arc.
 - Start and goal have no heading of their own.
-- No lower bound comes from here; that of the path with corners holds for every path with arcs too.
+- No lower bound is computed here; that of the path with corners holds for every path with arcs too.
 """
 
 from __future__ import annotations
@@ -28,32 +28,32 @@ from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, poli
 from gcsplan.world.path import Path
 
 Replan = Callable[[float], tuple[Floats, NDArray[np.bool_]] | None]
-"""A path and its pinned points, planned with so many metres of track error more (`with_more_clearance`); None: there
-is none."""
+"""Plans a path with more track error, by so many metres (`with_more_clearance`); returns its points and which of them
+are pinned, or None if there is no path."""
 
 LEVELS = (0.15, 0.4, 1.0)
-"""Room asked for in new plans where a path cannot be rounded, in turn radii."""
+"""Additional track errors, in turn radii, for which paths are planned anew if a path cannot be rounded cheaply."""
 
 OUT_M = 0.3
-"""So far outside of a corner its arc is laid at first: bounds over a line lose centimetres, walls are not smooth."""
+"""Metres outside of a corner at which its arc begins: bounds over a line lose centimetres, walls are not smooth."""
 
 WORTH, GOOD, DEAR = 3e-3, 1e-2, 3e-2
-"""What costs more than the path with corners by the first part is polished; by the second, begun anew; by the third,
-a path with more room is asked for."""
+"""Extra cost over the path with corners, as a part, above which the result is polished; above which the next arc path
+is tried; and above which a path with more clearance is planned."""
 
 SLACKS_M = (0.5, 4.0, 20.0)
-"""Points of the path that lie so near to the straight line between others are no corners; tried in turn."""
+"""Points of the path within this many metres of the straight line between others are not corners; tried in turn."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rounded:
     """A path as a fixed wing flies it.
 
-    ``way_points`` (M, 3): what the autopilot is given; at each but the first and the last, where the legs turn, it
-    flies the arc of the turn radius that is tangent to both. Arcs of neighbours meet at most. Altitude is linear along
-    the track between way points, and that of a way point is reached in the middle of its arc. ``flown`` (K, 3): that
-    track, arcs as chords; ``widen_m`` (K - 1,) how far the arc may lie outside each chord. ``length_m`` of the track
-    itself, arcs as arcs; ``cost`` in the problem's objective.
+    ``way_points`` (M, 3): for the autopilot. At each but the first and the last, where the legs turn, it flies the arc
+    of the turn radius that is tangent to both legs. Arcs of neighbours may touch but do not overlap. Altitude is linear
+    along the track between way points; that of a way point is reached in the middle of its arc. ``flown`` (K, 3): that
+    path, arcs as chords; ``widen_m`` (K - 1,) how far the arc may lie outside each chord. ``length_m``: of the path
+    along the arcs themselves; ``cost`` in the problem's objective.
     """
 
     way_points: Floats
@@ -71,10 +71,11 @@ def rounded(
     *,
     patience: int = 1000,
 ) -> Rounded | None:
-    """``points`` (N, 3), a legal path with corners, with turns of ``problem.turn_radius_m`` instead; None: not found.
+    """Round a legal path with corners, ``points`` (N, 3), by turns of ``problem.turn_radius_m``; None if not found.
 
-    ``pinned`` (N,) points that must be passed: the vias (ends are, always). ``replan`` is asked for a path with more
-    room where the given one cannot be rounded. ``patience`` counts the tracks that are tried for each path.
+    ``pinned`` (N,): points that must be passed, the vias; the ends always are. ``replan`` plans a path with more
+    clearance if the given one cannot be rounded cheaply. ``patience``: most tracks tried in each repair and in each
+    polishing of an arc path. Raises ValueError for a turn radius of 0 or less.
     """
     if problem.turn_radius_m <= 0.0:
         raise ValueError(f"turn_radius_m must be greater than 0, given {problem.turn_radius_m:g}")
@@ -91,10 +92,10 @@ def rounded(
 
 
 def with_more_clearance(problem: Problem, extra_m: float) -> Problem:
-    """``problem`` with so many metres of track error more, for a path that leaves room for arcs; no turn radius.
+    """``problem`` with ``extra_m`` metres more track error, so that its path leaves clearance for arcs; no turn radius.
 
-    Start and goal are lifted to where they are legal with it. A path for it begins and ends higher than it should:
-    `rounded` looks only at where a path goes, and draws its altitudes anew.
+    Start and goal are raised to where they are legal with that error, and vias have no altitude. So its path begins and
+    ends too high, but `rounded` uses only its track and draws the altitudes anew.
     """
     limits = replace(problem.limits, track_error_m=problem.limits.track_error_m + extra_m)
 
@@ -130,7 +131,7 @@ def _rounded(problem: Problem, points: Floats, pinned: NDArray[np.bool_], patien
 
 
 def _arc_paths(problem: Problem, points: Floats, pinned: NDArray[np.bool_]) -> Iterator[ArcPath]:
-    """Belts to begin with: around all corners, then around fewer, each without the loops that it may have first."""
+    """Yield arc paths to start from: around all corners, then around fewer; of each first a variant without loops."""
     counts = set()
     for slack in SLACKS_M:
         arc_path = arc_path_of(problem, points, pinned, slack)
@@ -145,7 +146,7 @@ def _arc_paths(problem: Problem, points: Floats, pinned: NDArray[np.bool_]) -> I
 
 
 def arc_path_of(problem: Problem, points: Floats, pinned: NDArray[np.bool_], slack_m: float) -> ArcPath:
-    """The arc path around those corners of a path that lie farther than ``slack_m`` from straight; not checked yet."""
+    """The arc path around the corners of a path that lie more than ``slack_m`` off straight lines; not checked yet."""
     flat = np.ascontiguousarray(points[:, :2], dtype=np.float64)
     must = np.array(pinned, dtype=bool)
     must[[0, -1]] = True
@@ -153,7 +154,7 @@ def arc_path_of(problem: Problem, points: Floats, pinned: NDArray[np.bool_], sla
     flat, must = flat[corners], must[corners]
     a, b = np.diff(flat[:-1], axis=0), np.diff(flat[1:], axis=0)
     turn = np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))
-    # A path that goes straight back turns about to the left as well as to the right.
+    # A path that goes straight back may turn to either side.
     sense = np.where(turn >= 0.0, 1.0, -1.0)
     inner, pins = flat[1:-1], must[1:-1]
     pin_m = np.full(len(inner), np.nan)
@@ -166,7 +167,7 @@ def arc_path_of(problem: Problem, points: Floats, pinned: NDArray[np.bool_], sla
 
 
 def _right(a: Floats, b: Floats) -> Floats:
-    """(N, 2) unit vectors to the right of the mean direction of ``a`` and ``b``; of ``a`` where they are opposite."""
+    """Unit vectors (N, 2) to the right of the mean direction of ``a`` and ``b``; of ``a`` where they are opposite."""
     way = a / np.hypot(*a.T)[:, None] + b / np.hypot(*b.T)[:, None]
     way = np.where(np.hypot(*way.T)[:, None] > 1e-6, way, a)
     way /= np.hypot(*way.T)[:, None]
@@ -174,7 +175,8 @@ def _right(a: Floats, b: Floats) -> Floats:
 
 
 def _corners(flat: Floats, must: NDArray[np.bool_], slack_m: float) -> NDArray[np.intp]:
-    """Indices of the points that are left when those near a straight line are not (Ramer, Douglas and Peucker)."""
+    """Indices of the points that remain without those near a straight line (Ramer, Douglas and Peucker); ``must`` stay,
+    and points within 1 mm of the one before are dropped."""
     keep = must.copy()
     terminals = np.flatnonzero(must)
     spans = list(zip(terminals[:-1].tolist(), terminals[1:].tolist(), strict=True))

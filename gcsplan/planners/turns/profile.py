@@ -1,8 +1,9 @@
 """The altitude profile of a track with arcs: a taut string that bends only where a way point can be.
 
-A way point's altitude is reached in the middle of its arc, and at either end of an arc, where it is a straight leg
-again, there may be one more. Between those the profile is a line, so over each half of an arc floor and ceiling are
-taken as lines that leave the least room out; then the string has no doors inside, and bends nowhere else.
+The altitude of a way point is reached in the middle of its arc; one more way point may be at either end of the arc,
+where a straight leg begins. Between these places the profile is straight. So floor and ceiling over each half of an
+arc are replaced by straight lines that lose as little altitude as possible. Then the string has no doors within half
+arcs, and does not bend there.
 """
 
 from __future__ import annotations
@@ -24,14 +25,15 @@ from gcsplan.world.airspace import Band, Legs, Tube, Violation
 Ints = NDArray[np.int64]
 
 CORRECTIONS, CORRECTED_M = 8, 0.01
-"""How often a profile is corrected by what the exact check finds, and by how much beyond it."""
+"""Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Risen:
-    """A legal flight over an outline: ``flown`` (K, 3) its chords, cut where the profile bends on a leg.
+    """A legal flight over an outline: ``flown`` (K, 3) its chords, divided where the profile bends on a leg.
 
-    ``widen_m`` (K - 1,) how far arcs lie outside; ``true_m`` (K,) metres along legs and arcs; ``way_points`` (M, 3).
+    ``widen_m`` (K - 1,) how far arcs lie outside their chords; ``true_m`` (K,) metres along legs and arcs themselves;
+    ``way_points`` (M, 3).
     """
 
     flown: Floats
@@ -41,7 +43,7 @@ class Risen:
 
 
 def rise(problem: Problem, track: Track, line: Outline) -> Risen | Obstruction:
-    """The cheapest legal altitudes over ``line`` and its ``track``, checked exactly; or what is in the way."""
+    """The cheapest legal flight over ``line`` and its ``track``, checked exactly; or the obstruction, if none is."""
     known: list[tuple[float, float, float]] = []
     blocked = Obstruction("pinched", 0.0, 0.0, 0.0)
     for _ in range(CORRECTIONS):
@@ -69,9 +71,10 @@ def rise(problem: Problem, track: Track, line: Outline) -> Risen | Obstruction:
 
 
 def track_of(problem: Problem, line: Outline, like: tuple[Outline, Track] | None = None) -> Track:
-    """The outline with its room: chords of arcs widened, first and last leg bare; bends only where way points are.
+    """The outline with its tube, which lets a profile bend only where way points are.
 
-    ``like``: an outline and its track, from which the room over the arcs that both have at either end is taken.
+    The tube is `CHORD_M` wider from the first to the last arc than on the first and last leg. ``like``: another outline
+    and its track; the parts of the tube that both share at either end are copied from it.
     """
     end = len(line.points) - 1
     i, j, before, after = 0, end, 0.0, 0.0
@@ -102,13 +105,13 @@ def track_of(problem: Problem, line: Outline, like: tuple[Outline, Track] | None
 
 
 def _common(a: Outline, b: Outline) -> tuple[int, int]:
-    """How many first arcs, and last arcs, with all before and after them, are the same; not all of them."""
+    """How many first arcs, and how many last arcs, two outlines share, with the legs before and after; never all."""
     most = min(len(a.arcs), len(b.arcs)) - 1
     size = min(len(a.points), len(b.points))
     head = tail = 0
     if most > 0:
         same = np.append((a.points[:size] == b.points[:size]).all(axis=1), False)
-        good = int(np.argmin(same))  # so many points
+        good = int(np.argmin(same))  # number of equal points
         rows = (a.arcs[:most] == b.arcs[:most]).all(axis=1) & (b.arcs[:most, 2] < good)
         head = int(np.argmin(np.append(rows, False)))
         same = np.append((a.points[: -size - 1 : -1] == b.points[: -size - 1 : -1]).all(axis=1), False)
@@ -120,13 +123,13 @@ def _common(a: Outline, b: Outline) -> tuple[int, int]:
 
 
 def _halves(line: Outline) -> Floats:
-    """(2A, 2) where each half of each arc begins and ends, metres along."""
+    """Beginning and end of each half of each arc, metres along the outline: (2A, 2)."""
     return np.asarray(line.s_m[np.stack([line.arcs[:, :2], line.arcs[:, 1:]], axis=1).reshape(-1, 2)])
 
 
 def _representable(line: Outline, profile: Profile) -> Floats:
-    """(N, 2) bends of a profile; one inside a half arc, as close to start and goal there may be, gives way to bends at
-    both ends of it: what the exact check says of that is another matter."""
+    """Bends (N, 2) of a profile, metres along and altitude. A bend inside a half arc, which is possible near start and
+    goal, is replaced by bends at both ends of the half arc; the exact check comes later."""
     s = profile.s_m
     inside = np.zeros(len(s), bool)
     also = []
@@ -142,7 +145,7 @@ def _representable(line: Outline, profile: Profile) -> Floats:
 
 
 def _bends(line: Outline, at: float) -> list[float]:
-    """Where to lift a profile so that it is lifted at ``at``: there, or at both ends of the half arc there."""
+    """Where to move a profile so that it moves at ``at``: there, or at both ends of the half arc around it."""
     for a, b in _halves(line).tolist():
         if a - 1e-6 < at < b + 1e-6:
             return [a, b]
@@ -150,9 +153,9 @@ def _bends(line: Outline, at: float) -> list[float]:
 
 
 def _dense(line: Outline, nodes: Floats) -> tuple[Floats, Floats, Floats]:
-    """Every point of the outline and of the profile: (K,) along, (K, 3), and (K - 1,) how far arcs lie outside."""
+    """All points of the outline and of the profile: metres along (K,), places (K, 3), widening of the legs (K - 1,)."""
     corner = line.s_m
-    # A bend within a millimetre of a point of the outline is that point's.
+    # A bend within a millimetre of a point of the outline is merged with that point.
     k = np.clip(np.searchsorted(corner, nodes[:, 0]), 1, len(corner) - 1)
     away = np.minimum(np.abs(corner[k] - nodes[:, 0]), np.abs(nodes[:, 0] - corner[k - 1]))
     s = np.sort(np.concatenate([corner, nodes[away > 1e-3, 0]]))
@@ -172,7 +175,7 @@ def _legs(problem: Problem, flown: Floats, widen: Floats) -> Legs:
 
 
 def _thinned(problem: Problem, line: Outline, nodes: Floats) -> Floats:
-    """The profile without the bends that it can do without, which makes it no longer; pinned altitudes stay."""
+    """Drop bends of a profile that it does not need to be legal, which never lengthens it; pinned altitudes stay."""
     pins = line.s_m[line.pins[np.isfinite(line.pin_m)]]
     for first in (1, 2, 1, 2):
         drop = np.zeros(len(nodes), bool)
@@ -189,7 +192,7 @@ def _thinned(problem: Problem, line: Outline, nodes: Floats) -> Floats:
 
 
 def _way_points(line: Outline, nodes: Floats) -> Floats:
-    """(M, 3) start, every corner, every other bend of the profile and every pin, goal."""
+    """Way points (M, 3): start, every corner, every pin and bend of the profile elsewhere, goal."""
     s, place = [line.s_m[line.arcs[:, 1]]], [line.corners]
     extra = np.sort(np.concatenate([nodes[1:-1, 0], line.s_m[line.pins]]))
     extra = extra[np.concatenate([[True], np.diff(extra) > 1e-3])] if len(extra) else extra
@@ -205,7 +208,7 @@ def _way_points(line: Outline, nodes: Floats) -> Floats:
 
 
 def _straightened(tube: Tube, halves: Floats) -> Tube:
-    """The tube with one piece for each half arc (``halves`` (H, 2), in order, ends among its breakpoints)."""
+    """The tube with one piece for each half arc; ``halves`` (H, 2) in order, their ends among its breakpoints."""
     s, floor, ceiling = np.empty_like(tube.s_m), np.empty_like(tube.floor_m), np.empty_like(tube.ceiling_m)
     n = straighten(tube.s_m, tube.floor_m, tube.ceiling_m, halves, s, floor, ceiling, np.empty(5))
     s, floor, ceiling = s[: n + 1], floor[:n], ceiling[:n]

@@ -1,8 +1,9 @@
-"""Discs of an arc path moved until the track is legal: a local search under the exact test of whole tracks.
+"""Repair of arc paths: a local search that moves discs until the track is legal under the exact check.
 
-What a track breaks is one number: metres of floor over ceiling (and over what can be climbed to from start, or flown
-down from to the goal), summed along the track; the way through zones that can be passed neither above nor below; and
-by how much discs are too close. The discs next to the worst place are moved, left out, or joined by another.
+How far a track breaks its limits is one number. It adds up the metres of floor above ceiling along the track (or above
+what can be climbed to from the start, or descended from to the goal), the length of track through zones that can be
+passed neither over nor under, and the metres by which discs are too close. The discs nearest to the worst place are
+moved or removed, or another disc is inserted.
 """
 
 from __future__ import annotations
@@ -21,45 +22,50 @@ from gcsplan.planners.turns.kernels import pinched, shut
 from gcsplan.planners.turns.profile import Risen, rise, track_of
 
 STEPS_M = (1.0, 4.0, 15.0, 50.0, 150.0)
-"""How far discs are moved."""
+"""Metres by which discs are moved."""
 
 NEAREST = 3
-"""Discs that are tried for the worst place."""
+"""Most discs near the worst place that are changed."""
 
 ZONE_M, GAP_M = 30.0, 1e4
-"""What a metre through a zone, and a metre that discs are too close, count beside a metre of floor over ceiling."""
+"""Weights of a metre through a zone and of a metre by which discs are too close, in metres of floor above ceiling
+along one metre."""
 
 SMALL, SLOW, LARGE = 0.999, 0.6, 0.3
-"""A change must leave less than the first part of what is broken; one that leaves more than the second is slow; one
-that leaves less than the third is taken at once."""
+"""Parts of the violation that a change leaves: below the first it is an improvement, above the second it is a slow
+one, below the third it is accepted at once."""
 
 SPARED = 4
-"""Of so many slow rounds, one looks at other ways out as well."""
+"""One of this many slow rounds also tries other ways out of start and into goal."""
 
 NEAR_END = 6.0
-"""So many turn radii from start or goal what is broken may be for want of climbing: then other ways out are tried."""
+"""Within this many turn radii of start or goal a violation may be a lack of climb: other ways out or in are tried."""
 
 WAYS_OUT, RUNS = 12, (0.0, 0.75, 2.0, 4.0)
-"""Headings out of start (into goal), and how far straight on, in turn radii, before the first (after the last) turn."""
+"""Headings out of the start (into the goal) that are tried; lengths of the straight leg there, in turn radii."""
 
 KICKS = 60
-"""Changes at random, of the discs near the worst place all at once, where no single one helps."""
+"""Random changes, of all discs near the worst place at once, if no single change helps."""
 
 GAIN, PROBE = 1e-4, 0.01
-"""Polishing: least gain worth a try, as a part of the whole; how far a disc is moved to see if it can be, in radii."""
+"""Polishing: least gain worth a try, as a part of the track's length; first move of a disc, to see whether it can be
+moved, in turn radii."""
 
 
 @dataclass(eq=False, slots=True)
 class Patience:
-    """How many tracks may still be tried."""
+    """The number of tracks that may still be tried."""
 
     left: int
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Tried:
-    """An arc path and how much it breaks (0: nothing that was seen), and where along ``line``; or ``risen``, its
-    flight."""
+    """An arc path with its chords ``line`` and ``track``, and how far it breaks its limits.
+
+    ``broken``: the measure of the module's docstring, 0 if it is legal; ``worst_m``: the worst place along ``line``;
+    ``risen``: the flight along it, if it is legal.
+    """
 
     arc_path: ArcPath
     line: Outline | None
@@ -70,14 +76,14 @@ class Tried:
 
 
 def mended(problem: Problem, arc_path: ArcPath, patience: Patience) -> Tried | None:
-    """A legal flight along ``arc_path``, or one that its discs can be moved to; None where none was found."""
+    """A legal flight along ``arc_path``, with its discs changed where needed; None if none is found."""
     rng = np.random.default_rng(problem.seed)
     here = tried(problem, arc_path)
     spared = 0
     while here.risen is None:
         best = here
         for number, group in enumerate((_moves(here), _ways_out(problem, here), _kicks(here, rng))):
-            # Slow progress may be none in the end: then other ways out are looked at too, now and then.
+            # Slow progress may end nowhere: so other ways out are tried now and then.
             slow = best.broken > SLOW * here.broken and number == 1 and spared % SPARED == 0
             if best is not here and not slow:
                 break
@@ -100,7 +106,8 @@ def mended(problem: Problem, arc_path: ArcPath, patience: Patience) -> Tried | N
 
 
 def polished(problem: Problem, here: Tried, enough: float, patience: Patience) -> Tried:
-    """``here`` with discs left out or moved inwards as long as that makes it cheaper and it costs over ``enough``."""
+    """Remove discs of ``here`` or move them inwards, as long as that makes it cheaper and it costs more than
+    ``enough``."""
     improved = True
     while improved:
         improved = False
@@ -116,7 +123,7 @@ def polished(problem: Problem, here: Tried, enough: float, patience: Patience) -
 
 
 def _shortened(problem: Problem, here: Tried, k: int, patience: Patience) -> Tried:
-    """``here`` without disc ``k``, or with it farther inwards, if that is legal and cheaper."""
+    """``here`` without disc ``k``, or with that disc farther inwards, if that is legal and cheaper; else ``here``."""
     arc_path, radius = here.arc_path, problem.turn_radius_m
     assert here.line is not None
     assert here.risen is not None
@@ -139,7 +146,7 @@ def _shortened(problem: Problem, here: Tried, k: int, patience: Patience) -> Tri
     if 2.0 * radius * math.sin(0.5 * min(arc_path.turn[k], math.pi)) > worth:
         out = _outwards(arc_path, k)
         first = better(moved(arc_path, k, -PROBE * radius * out))
-        if first is not None:  # nothing holds it, near by
+        if first is not None:  # a small move is legal, so larger ones may be
             for part in (1.0, 0.25, 0.06):
                 found = better(moved(arc_path, k, -part * radius * out))
                 if found is not None:
@@ -149,7 +156,7 @@ def _shortened(problem: Problem, here: Tried, k: int, patience: Patience) -> Tri
 
 
 def cost_of(problem: Problem, risen: Risen) -> float:
-    """Metres or joules of a flight, arcs as arcs."""
+    """Metres or joules of a flight, measured along the arcs, not their chords."""
     climbs = np.diff(risen.flown[:, 2])
     if problem.objective == "energy":
         flat = float(risen.true_m[-1])
@@ -158,7 +165,7 @@ def cost_of(problem: Problem, risen: Risen) -> float:
 
 
 def tried(problem: Problem, arc_path: ArcPath, like: Tried | None = None) -> Tried:
-    """What ``arc_path`` breaks, or how it is flown; quicker where another is ``like`` it."""
+    """Draw ``arc_path`` and find its flight, or measure how far it breaks its limits; faster if ``like`` is similar."""
     if arc_path.gap_m > 0.0:
         return Tried(arc_path, None, None, GAP_M * (1.0 + arc_path.gap_m), math.nan)
     line = outline(arc_path)
@@ -174,18 +181,18 @@ def tried(problem: Problem, arc_path: ArcPath, like: Tried | None = None) -> Tri
 
 
 def _middle(arc_path: ArcPath, k: int) -> float:
-    """Heading in the middle of a turn."""
+    """Heading in the middle of the turn around disc ``k``."""
     return float(arc_path.heading[k] + 0.5 * arc_path.sense[k] * arc_path.turn[k])
 
 
 def _outwards(arc_path: ArcPath, k: int) -> Floats:
-    """Away from the centre in the middle of a turn, unit vector."""
+    """Unit vector away from the centre of disc ``k``, at the middle of its turn."""
     at = _middle(arc_path, k)
     return np.asarray(arc_path.sense[k] * np.array([math.sin(at), -math.cos(at)]))
 
 
 def _near(here: Tried) -> list[int]:
-    """Free discs, the nearest to the worst place first."""
+    """Free discs, nearest to the worst place first, at most `NEAREST` (all if there is no outline)."""
     arc_path, line = here.arc_path, here.line
     if line is None:
         return [k for k in range(len(arc_path.sense)) if not arc_path.pinned[k]]
@@ -194,7 +201,7 @@ def _near(here: Tried) -> list[int]:
 
 
 def _moves(here: Tried) -> Iterator[ArcPath]:
-    """One disc moved, left out, or put in at the worst place."""
+    """Yield changes of one disc: moved, removed, or inserted at the worst place."""
     arc_path, line, near = here.arc_path, here.line, _near(here)
     for step in STEPS_M:
         for k in near:
@@ -221,7 +228,7 @@ def _moves(here: Tried) -> Iterator[ArcPath]:
 
 
 def _ways_out(problem: Problem, here: Tried) -> Iterator[ArcPath]:
-    """Another first turn, where what is broken is near the start; another last one, near the goal."""
+    """Yield other first turns if the worst place is near the start, and other last turns if it is near the goal."""
     if here.line is None:
         return
     arc_path, radius = here.arc_path, problem.turn_radius_m
@@ -247,7 +254,7 @@ def _ways_out(problem: Problem, here: Tried) -> Iterator[ArcPath]:
 
 
 def _kicks(here: Tried, rng: np.random.Generator) -> Iterator[ArcPath]:
-    """The discs near the worst place moved at random, near and far in turn."""
+    """Yield random moves of all discs near the worst place, small and large in turn."""
     near = _near(here)
     for k in range(KICKS if near else 0):
         wide = here.arc_path.radius_m * (0.02, 0.1, 0.4, 1.0)[k % 4]
