@@ -56,8 +56,8 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     """A path under a maximum AGL and the climb limit that `Airspace.examine` passes.
 
     Start, goal and vias must be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
-    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s`` is a last stop for all that comes
-    after the first path, and `WITHOUT` times that where there is none. ``climbs``: laps over start and goal are
+    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s`` is a last stop for all that
+    comes after the first path, and `WITHOUT` times that where there is none. ``climbs``: laps over start and goal are
     allowed; ``known``: a path is known already, so only one search is made. Raises Refusal if no path is found.
     """
     bound = straight_bound(problem)
