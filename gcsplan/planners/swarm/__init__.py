@@ -1,1 +1,1 @@
-"""Planners by swarm optimisers: encoding, cost, scene, repair, and ants; `planner` is the door of all but `aco`."""
+"""Planners by swarm optimisers: encoding, cost, scene, repair, and ants; the entry of all but `aco` is `planner`."""

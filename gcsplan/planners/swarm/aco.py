@@ -1,9 +1,9 @@
 """Ants on a grid of sections across the track: the krill paper's baseline (eq. 1, 2), on straight edges.
 
-D, all: K section planes of 21 × 21 nodes, between the volume's sides and between floor and ceiling; α 1, β 5, ρ 0.5,
-τ0 1, Δτ = L_straight/L_ant on the edges of the ants that arrive, τ in [0.01, 50], η = 1/d. Nodes and edges that are not
-allowed are left out; an ant in a dead end is dropped. An ant's nodes are the control points of its curve, and the best
-curve by the objective is kept.
+All of this is our decision (D): K section planes of 21 × 21 nodes, between the sides of the flight volume and between
+floor and ceiling; α 1, β 5, ρ 0.5, τ0 1, Δτ = L_straight/L_ant on the edges of the ants that arrive, τ in [0.01, 50],
+η = 1/d. Nodes and edges that are not allowed are left out; an ant in a dead end is dropped. The nodes of an ant are the
+control points of its curve, and the best curve by the objective is kept.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from gcsplan.planners.swarm.scene import Scene
 
 ACROSS = UPWARD = 21
 EDGE_PARTS = 16
-"""Points on an edge that crosses one gap straight on."""
+"""Points on an edge that runs straight from one section to the next."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Numbers of eq. 1 and 2."""
+    """Parameters of eq. 1 and 2: α, β, ρ, τ0 and the least and most of τ."""
 
     alpha: float = 1.0
     beta: float = 5.0
@@ -45,9 +45,9 @@ class Rule:
 
 
 def plan(problem: Problem, optimiser: str, defaults: Mapping[str, object]) -> Solution:
-    """A path that `Airspace.examine` passes, beside the best ant's curve or repaired from it.
+    """A path that `Airspace.examine` passes: few way points along the best ant's curve, or a repair of that curve.
 
-    Raises Refusal (NoMission, ``not_found``) where no ant arrives or the curve cannot be repaired.
+    Raises Refusal (NoMission, ``not_found``) if no ant arrives or the curve cannot be repaired.
     """
     begun = time.perf_counter()
     check_ends(problem)
@@ -55,7 +55,7 @@ def plan(problem: Problem, optimiser: str, defaults: Mapping[str, object]) -> So
 
 
 def search(problem: Problem, settings: Settings) -> Found:
-    """Send the ants once. Raises InputError for options that do not fit, Refusal where none arrives."""
+    """Run the ants once. Raises InputError for unknown options, Refusal if no ant arrives."""
     volume, parameters = settings.split()
     for name in parameters:
         if name not in Rule.__dataclass_fields__:
@@ -79,7 +79,7 @@ def search(problem: Problem, settings: Settings) -> Found:
 
 
 def make_layers(scene: Scene, points: tuple[int, ...]) -> list[Floats]:
-    """Nodes (n, 3) of each layer: terminals are layers of one node, sections of at most 21 × 21."""
+    """Nodes (n, 3) of each layer: a terminal is a layer of one node, a section one of at most 21 × 21."""
     layers = [scene.terminals[:1]]
     for i, count in enumerate(points):
         a, b = scene.terminals[i], scene.terminals[i + 1]
@@ -93,8 +93,8 @@ def make_layers(scene: Scene, points: tuple[int, ...]) -> list[Floats]:
 
 
 def _section(scene: Scene, middle: Floats, left: Floats, reach_m: float) -> Floats:
-    """Nodes of one plane across the track, those without room for flight left out."""
-    # How far the plane goes to either side before it leaves the volume.
+    """Nodes (n, 3) of one plane across the track, without those where the floor is above the ceiling."""
+    # Distance to either side at which the plane leaves the volume.
     with np.errstate(divide="ignore"):
         sides = np.stack([(scene.low[:2] - middle) / left, (scene.high[:2] - middle) / left])
     finite = np.where(np.isfinite(sides), sides, np.copysign(np.inf, sides))
@@ -108,7 +108,7 @@ def _section(scene: Scene, middle: Floats, left: Floats, reach_m: float) -> Floa
 
 
 def open_between(scene: Scene, layers: list[Floats]) -> list[Floats]:
-    """Lengths (A, B) of the edges from each layer to the next, inf where one is not allowed."""
+    """Lengths (A, B) of the edges from each layer to the next, inf for edges that are not allowed."""
     out = []
     for a, b in itertools.pairwise(layers):
         lengths = np.full((len(a), len(b)), np.inf)
@@ -125,9 +125,9 @@ def open_between(scene: Scene, layers: list[Floats]) -> list[Floats]:
 def march(
     problem: Problem, cost: Cost, layers: list[Floats], lengths: list[Floats], rule: Rule, settings: Settings
 ) -> tuple[Result, Floats | None]:
-    """The best ant's control points (N, 3), None where none arrived, and the run's account.
+    """Run the colonies; return the run's result and the best ant's control points (N, 3), None if no ant arrived.
 
-    An evaluation is an ant, arrived or not; ``evaluations`` is used exactly, a last colony is cut.
+    An evaluation is one ant, whether it arrives or not. ``evaluations`` is used exactly: the last colony is cut to it.
     """
     rng = np.random.default_rng(problem.seed)
     ants, rounds, limit = settings.population or 50, settings.iterations or 100, settings.evaluations
@@ -136,7 +136,7 @@ def march(
     eager = [np.where(np.isfinite(d), np.maximum(d, 1e-9), np.inf) ** -rule.beta for d in lengths]
     scent = [np.full(d.shape, rule.first) for d in lengths]
     best, best_cost, spent = None, np.inf, 0
-    trace = [(0, 0, np.inf)]  # before the first colony nothing is known
+    trace = [(0, 0, np.inf)]  # before the first colony
     begun = time.perf_counter()
     for turn in range(rounds):
         count = ants if limit is None else min(ants, limit - spent)
@@ -167,7 +167,7 @@ def march(
 def _walk(
     rng: np.random.Generator, ants: int, eager: list[Floats], scent: list[Floats], alpha: float
 ) -> NDArray[np.intp]:
-    """(arrived, layers) nodes of the ants that arrive, each step drawn by eq. 1."""
+    """Nodes (arrived, layers) of the ants that arrive; each step is drawn by eq. 1."""
     ways = np.zeros((ants, 1), np.intp)
     for e, s in zip(eager, scent, strict=True):
         at = ways[:, -1]

@@ -1,7 +1,7 @@
-"""Cubic B-splines from terminal to terminal, and few way points that stay beside the curve.
+"""Cubic B-splines from terminal to terminal, and few way points that stay close to the curve.
 
 E: the krill paper's eq. 11 prints the second numerator as ``u - u_{i+1}``; de Boor's is ``u_{i+k} - u``. The basis is
-clamped, so that a curve begins and ends in its terminals; with two or three control points its degree falls.
+clamped, so that a curve begins and ends in its terminals; with two or three control points its degree is 1 or 2.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ DEGREE = 3
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Control points (N, 3) to samples (S, 3): ``basis`` (N, S); ``terminals`` (M,) samples that are terminals.
+    """The map from control points (N, 3) to samples (S, 3).
 
-    ``bands`` (4, S), ``spans`` (n, 3): the same as kernels want it, without its zeros (`curve_kernels.draw`).
+    ``basis`` (N, S); ``terminals`` (M,): indices of the samples that are terminals; ``bands`` (4, S), ``spans`` (n, 3):
+    the basis without its zeros, for kernels (`curve_kernels.draw`).
     """
 
     basis: Floats
@@ -31,7 +32,7 @@ class Curve:
     spans: NDArray[np.int64]
 
     def samples(self, controls: Floats) -> Floats:
-        """(..., S, 3) samples of control points (..., N, 3)."""
+        """Samples (..., S, 3) of control points (..., N, 3)."""
         count = self.basis.shape[1]
         paths = np.ascontiguousarray(controls).reshape(-1, *controls.shape[-2:])
         out = np.empty((len(paths), count, 3))
@@ -41,8 +42,8 @@ class Curve:
 
 @lru_cache(maxsize=64)
 def curve(points: tuple[int, ...], legs: tuple[int, ...]) -> Curve:
-    """The curve past ``points[i]`` free control points on stage i, sampled by ``legs[i]`` legs there; stages share
-    their terminals."""
+    """The curve with ``points[i]`` free control points on stage i, sampled by ``legs[i]`` legs there; neighbouring
+    stages share a terminal."""
     controls, samples = sum(points) + len(points) + 1, sum(legs) + 1
     basis = np.zeros((controls, samples))
     row = column = 0
@@ -69,11 +70,11 @@ def _bands(basis: Floats) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def _basis(controls: int, samples: int) -> Floats:
-    """(controls, samples) values of the clamped basis of degree 3, or less where there are too few controls."""
+    """Values (controls, samples) of the clamped basis of degree 3, or of ``controls`` - 1 if that is less."""
     degree = min(DEGREE, controls - 1)
     knots = np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, controls - degree + 1), np.ones(degree)])
     u = np.linspace(0.0, 1.0, samples)[:, None]
-    last = controls - 1  # the interval that the end belongs to
+    last = controls - 1  # the interval to which u = 1 belongs
     here = (knots[:-1] <= u) & (u < knots[1:])
     here[-1, last] = True
     basis = here.astype(float)
@@ -86,9 +87,9 @@ def _basis(controls: int, samples: int) -> Floats:
 
 
 def fewer(points: Floats, kept: NDArray[np.intp], corridor_m: float) -> NDArray[np.intp]:
-    """Indices of a polyline (N, 3) of points (S, 3) that no point is further from than ``corridor_m``; ``kept`` stay.
+    """Indices of a subset of ``points`` (S, 3) whose polyline is within ``corridor_m`` of every point; ``kept`` stay.
 
-    Douglas and Peucker 1973, between each two that are kept.
+    Douglas and Peucker 1973, between neighbours of ``kept``.
     """
     chosen = [int(kept[0])]
     for a, b in zip(kept[:-1].tolist(), kept[1:].tolist(), strict=True):
@@ -108,7 +109,7 @@ def fewer(points: Floats, kept: NDArray[np.intp], corridor_m: float) -> NDArray[
 
 
 def _distances(points: Floats, a: Floats, b: Floats) -> Floats:
-    """(N,) distances of points from the segment a–b."""
+    """Distances (N,) of points from the segment a–b."""
     d = b - a
     square = float(d @ d)
     t = np.clip((points - a) @ d / square, 0.0, 1.0) if square > 0.0 else np.zeros(len(points))

@@ -1,4 +1,4 @@
-"""The kernels of swarm costs, ants and repair: as `gcsplan.planners.compiled`, but cut to vectors when shipped."""
+"""The unit of machine code for swarm costs, ants and repair: like `gcsplan.planners.compiled`, but vectorised."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ UNIT = Unit(
 )
 
 device = UNIT.device
-"""A function that only kernels call; nothing is allocated in it."""
+"""Marks a function that only kernels call; it allocates nothing."""
 
 kernel = UNIT.kernel
-"""What Python calls. Nothing is allocated in it: Python hands in the room."""
+"""Marks a function that Python calls. It allocates nothing: its caller passes all arrays."""

@@ -1,9 +1,9 @@
 """The terms of every swarm cost for a whole population at once, from control points to numbers, in one pass.
 
-Heights are bilinear in the raster's own grid, whose map from the plane is taken as quadratic (`scene.Scene`). Sampled,
-so it guides a search and never passes a mission. The papers' own terms are sums over their samples; what breaks a limit
-is measured on samples that are nowhere further apart than `SPACING`, or little more than the path's mean: a swarm that
-may bunch its samples anywhere else leaps through walls between two of them.
+Heights are bilinear in the raster's own grid, whose map from the plane is taken as quadratic (`scene.Scene`). All terms
+are sampled, so they guide a search and never pass a mission. The papers' own terms are sums over the samples of the
+curve. Broken limits are measured on denser samples, at most `SPACING` or little more than the path's mean apart:
+without them a swarm bunches its samples in open space and jumps over walls between two of them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from gcsplan.planners.swarm.scene_kernels import SCENE, gap_to, height_at, looku
 Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 
-# Columns of the terms, all >= 0. Metres unless said otherwise; m² are depths summed along the path.
+# Columns of the terms, all >= 0, in metres unless stated otherwise; m²: a depth integrated along the path.
 LENGTH, FLAT, RISE = 0, 1, 2  # length in space, in the plane, Σ|Δz|
 STEEP = 3  # height by which legs climb or sink more than the slope limits allow
 BELOW, SUNK = 4, 5  # length under the floor; its depth, m²
@@ -37,25 +37,25 @@ TURNS, SLOPES = 19, 20  # MSFOA's: how many turns, slopes are out of bounds
 BEND, EXPOSED, SPHERE = 21, 22, 23  # IB-ABC's: radians turned in space, m² exposed, metres of threat
 TERMS = 24
 
-# Groups of terms that cost time of their own: which are wanted, as bits.
+# Optional groups of terms, as bits; each takes extra time.
 ANGLES, NODES_NEAR, SAMPLES_NEAR, HEIGHTS, BENDS, HIDING = 1, 2, 4, 8, 16, 32
 CEILING = 64  # the ceiling follows the ground
 YAWS = 128  # SSGWO's exponentials of angles
 COUNTS = 256  # ABO's counts of samples
 
-# The papers' constants: compiled in, for no mission changes them.
+# The papers' constants, compiled in: no mission changes them.
 D_SAFE, R_UAV, CLAMP_M, PITCH_MAX = 10.0, 1.0, 0.1, math.radians(45.0)  # D: SSGWO
 TAN_PITCH_MAX = math.tan(PITCH_MAX)
 TAN_TURN_MAX = math.tan(math.radians(45.0))  # D: MSFOA, whose φ_max follows from a load that it does not give
 D_HIDE = 20.0  # D: IB-ABC's d_safe
 
 UNEVEN = 1.5
-"""Legs of more than so many times the mean are divided, where they are longer than `SPACING`."""
+"""Legs longer than this many times the mean leg, and longer than `SPACING`, are divided."""
 
 
 @device
 def _box_of(controls: Floats, box: Floats) -> None:
-    """West, east, south, north of a path, which lies within the hull of its control points."""
+    """Write west, east, south, north of a path to ``box``; the path lies within the hull of its control points."""
     box[0], box[1], box[2], box[3] = controls[0, 0], controls[0, 0], controls[0, 1], controls[0, 1]
     for i in range(1, len(controls)):
         box[0], box[1] = min(box[0], controls[i, 0]), max(box[1], controls[i, 0])
@@ -64,14 +64,14 @@ def _box_of(controls: Floats, box: Floats) -> None:
 
 @device
 def _away(box: Floats, zone: Floats, reach: float) -> bool:
-    """Whether no point of a path's box is within ``reach`` of a zone's centre, for sure."""
+    """True if the box of a path proves that none of its points is within ``reach`` of a zone's centre."""
     e, n = zone[s.ZE], zone[s.ZN]
     return bool(box[0] > e + reach or box[1] < e - reach or box[2] > n + reach or box[3] < n - reach)
 
 
 @device
 def _hits(x: Floats, y: Floats, e: float, n: float, square: float) -> float:
-    """How many samples are within a circle."""
+    """Number of samples within the circle about (e, n) of squared radius ``square``."""
     hits = 0.0
     for i in range(len(x)):
         dx, dy = x[i] - e, y[i] - n
@@ -81,7 +81,7 @@ def _hits(x: Floats, y: Floats, e: float, n: float, square: float) -> float:
 
 @device
 def _legs(x: Floats, y: Floats, z: Floats, leg: Floats, run: Floats, numbers: Floats, out: Floats) -> float:
-    """Lengths and climbs; how many legs are longer than samples should be apart."""
+    """Measure lengths and climbs of all legs; return how many legs are longer than `SPACING`."""
     length, flat, rise, steep, long = 0.0, 0.0, 0.0, 0.0, 0.0
     up, down, most = numbers[s.UP], numbers[s.DOWN], numbers[s.SPACING]
     for i in range(len(leg)):
@@ -101,7 +101,7 @@ def _legs(x: Floats, y: Floats, z: Floats, leg: Floats, run: Floats, numbers: Fl
 
 @device
 def _unknown(floor: Floats, weight: Floats) -> float:
-    """Length over unknown ground."""
+    """Length of path over unknown ground, in metres."""
     dark, unknown = 0.0, 0.0
     for i in range(len(floor)):
         dark += 1.0 if floor[i] != floor[i] else 0.0
@@ -115,14 +115,15 @@ def _unknown(floor: Floats, weight: Floats) -> float:
 def _limit_terms(
     z: Floats, weight: Floats, ground: Floats, floor: Floats, follows: bool, numbers: Floats, out: Floats
 ) -> None:
-    """How much of a path is under its floor, over its ceiling, which ``follows`` the ``ground`` or not.
+    """Measure how much of a path is under its floor and over its ceiling, and how deeply.
 
-    Counted in floats and in short loops: mixed with whole numbers, or all in one, they would not be cut to vectors.
+    ``follows``: the ceiling follows the ``ground``. Counts are floats and loops are short: with integers, or in one
+    loop, the compiler would not vectorise them.
     """
     below, sunk, above, proud = 0.0, 0.0, 0.0, 0.0
     agl, amsl = numbers[s.MAX_AGL], numbers[s.MAX_AMSL]
     for i in range(len(z)):
-        deep, high = max(0.0, floor[i] - z[i]), max(0.0, z[i] - amsl)  # NaN comes second: 0 stays
+        deep, high = max(0.0, floor[i] - z[i]), max(0.0, z[i] - amsl)  # max(0, NaN) is 0 in this order
         below += weight[i] if deep > 0.0 else 0.0
         sunk += weight[i] * deep
         above += weight[i] if high > 0.0 else 0.0
@@ -141,13 +142,14 @@ def _zone_terms(
     x: Floats, y: Floats, z: Floats, weight: Floats, leg: Floats, heights: Singles, quadratic: Floats, numbers: Floats,
     zones: Floats, corners: Floats, box: Floats, near: bool, out: Floats,
 ) -> None:  # fmt: skip
-    """Length inside zones and its depth; ``near``: also MSFOA's threat and IB-ABC's spheres, of samples alone."""
+    """Measure the length inside zones and its depth; with ``near`` also MSFOA's threat and IB-ABC's spheres, over the
+    samples of the curve alone."""
     inside, depth, threat, sphere = 0.0, 0.0, 0.0, 0.0
     for k in range(len(zones)):
         zone = zones[k]
         e, n, radius, margin = zone[s.ZE], zone[s.ZN], zone[s.ZR], zone[s.REACH]
         reach = radius + margin
-        # Zones away from the path's box cost nothing, and of the others the samples away from them next to nothing.
+        # Zones away from the path's box are skipped; in others a sample out of reach costs one comparison.
         if _away(box, zone, reach):
             continue
         square, follows = reach * reach, zone[s.LOW_AGL] != 0.0 or zone[s.HIGH_AGL] != 0.0
@@ -181,8 +183,8 @@ def _near_terms(
     x: Floats, y: Floats, z: Floats, heights: Singles, quadratic: Floats, numbers: Floats, zones: Floats,
     corners: Floats, box: Floats, stride: int, east: Floats, north: Floats, out: Floats,
 ) -> None:  # fmt: skip
-    """SSGWO's obstacle cost (eq. 31, 32): 1/d over nodes and obstacles nearer than d_safe. ``east``, ``north`` are
-    scratch."""
+    """SSGWO's obstacle cost (eq. 31, 32): the sum of 1/d over nodes and obstacles closer than d_safe. ``east`` and
+    ``north`` are working arrays."""
     near, count = 0.0, 0
     for i in range(stride, len(x) - 1, stride):
         east[count], north[count] = x[i], y[i]
@@ -217,7 +219,7 @@ def _near_terms(
 def _angle_terms(
     count: int, east: Floats, north: Floats, run: Floats, rise: Floats, base: Floats, bends: bool, out: Floats
 ) -> None:
-    """Turns and slopes between nodes: how many are too much, and ``bends``, radians."""
+    """Count turns and slopes between nodes that are out of bounds; with ``bends`` also add up the turns in radians."""
     slopes, turns, bend = 0.0, 0.0, 0.0
     for i in range(count):
         slope, h = rise[i] / max(run[i], 1e-9), base[i]
@@ -228,11 +230,11 @@ def _angle_terms(
     for i in range(count - 1):
         cross = abs(east[i] * north[i + 1] - north[i] * east[i + 1])
         dot = east[i] * east[i + 1] + north[i] * north[i + 1]
-        # No angle is needed to know that it is more than 45 degrees.
+        # Compares the tangent: whether a turn exceeds 45 degrees needs no angle.
         turns += 1.0 if cross > dot * TAN_TURN_MAX else 0.0
     if bends:
         for i in range(count - 1):
-            # On the spot it heads nowhere.
+            # A vertical chord has no heading.
             e, n = (east[i], north[i]) if run[i] > 0.0 else (0.0, 0.0)
             f, m = (east[i + 1], north[i + 1]) if run[i + 1] > 0.0 else (0.0, 0.0)
             u, v = rise[i], rise[i + 1]
@@ -259,7 +261,7 @@ def _yaw_terms(count: int, east: Floats, north: Floats, run: Floats, rise: Float
 
 @device
 def _count_terms(x: Floats, y: Floats, z: Floats, floor: Floats, numbers: Floats, out: Floats) -> None:
-    """ABO's samples under the floor or over unknown ground, and out of the volume."""
+    """Count ABO's samples under the floor or over unknown ground, and those out of the flight volume."""
     west, south, bottom = numbers[s.WEST], numbers[s.SOUTH], numbers[s.BOTTOM]
     east, north, top = numbers[s.EAST], numbers[s.NORTH], numbers[s.TOP]
     under, outside = 0.0, 0.0
@@ -288,11 +290,11 @@ def _hiding_terms(
     x: Floats, y: Floats, z: Floats, ground: Floats, run: Floats, zones: Floats, corners: Floats, numbers: Floats,
     box: Floats, cost: Floats, out: Floats,
 ) -> None:  # fmt: skip
-    """IB-ABC's concealment (eq. 4). ``cost`` (S,) is scratch: of a metre at each sample."""
+    """IB-ABC's concealment (eq. 4). ``cost`` (S,) is a working array: the cost of a metre at each sample."""
     lit = 3.0 * (numbers[s.H_MAX] + D_HIDE)
     for i in range(len(x)):
         apart = z[i] - ground[i]
-        cost[i] = apart - D_HIDE if apart >= D_HIDE else lit  # NaN is lit
+        cost[i] = apart - D_HIDE if apart >= D_HIDE else lit  # NaN gives `lit`
     for k in range(len(zones)):
         zone = zones[k]
         reach = zone[s.ZR] + D_HIDE
@@ -306,7 +308,7 @@ def _hiding_terms(
             continue
         for i in range(len(x)):
             dx, dy = x[i] - e, y[i] - n
-            # What is near ground or another zone already needs no distance.
+            # Samples near ground or another zone have the highest cost already: skip the distance.
             if dx * dx + dy * dy < square and cost[i] != lit and gap_to(zone, corners, x[i], y[i]) < D_HIDE:
                 cost[i] = lit
     exposed = 0.0
@@ -316,14 +318,15 @@ def _hiding_terms(
 
 
 SAMPLE_ARRAYS, FINE_ARRAYS, CHORD_ARRAYS = 3, 8, 5
-"""Arrays of scratch that `measure` wants: of a path's samples, of twice as many, and of its nodes."""
+"""Numbers of working arrays of `measure`: for a path's samples, for twice as many, and for chords between nodes."""
 
 ROOM = " ".join(["f8[]"] * (SAMPLE_ARRAYS + FINE_ARRAYS + CHORD_ARRAYS + 1))
-"""Forms of all scratch. Arrays of their own, no rows of one: a store to one is known to leave the others."""
+"""Forms of all working arrays. They are separate arrays, not rows of one, so that the compiler knows that they do not
+overlap."""
 
 
 def room(samples: int) -> list[Floats]:
-    """Scratch for paths of so many samples."""
+    """Working arrays of `measure` for paths of ``samples`` samples."""
     sizes = [samples, samples - 1, samples - 1] + [2 * samples] * FINE_ARRAYS
     return [np.zeros(n) for n in (*sizes, *[samples] * CHORD_ARRAYS, 4)]
 
@@ -340,10 +343,10 @@ def measure(
     box: Floats,
     out: Floats,
 ) -> None:  # fmt: skip
-    """Terms of P paths of N control points, ``controls`` (P, N, 3), into ``out`` (P, TERMS).
+    """Write the terms of P paths of N control points, ``controls`` (P, N, 3), to ``out`` (P, TERMS).
 
-    ``stride`` samples between two nodes; ``wanted`` groups of terms. Then scratch, see `room`: of samples and legs; of
-    samples and what is added on long legs, after them; of chords between nodes; a box.
+    ``stride``: samples from node to node; ``wanted``: bits of the optional groups of terms. The rest are working arrays
+    (see `room`): for samples and legs; for samples followed by points added on long legs; for chords; for a box.
     """
     count = len(cost)
     x, y, z = all_x[:count], all_y[:count], all_z[:count]
@@ -374,7 +377,7 @@ def measure(
             all_x[:many], all_y[:many], all_z, weight, leg, heights, quadratic, numbers, zones, corners, box,
             (wanted & SAMPLES_NEAR) != 0, to,
         )  # fmt: skip
-        weight[0] = weight[count - 1] = 0.0  # start and goal are given, and stand on the floor itself
+        weight[0] = weight[count - 1] = 0.0  # start and goal are fixed, and may lie exactly on the floor
         _limit_terms(all_z[:many], weight, ground, floor, (wanted & CEILING) != 0, numbers, to)
 
         if wanted & COUNTS:

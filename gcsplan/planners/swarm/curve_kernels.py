@@ -1,7 +1,7 @@
-"""From control points to samples and what stands between them: curves, legs, chords, and angles without a library.
+"""Kernels from control points to samples: curves, legs and chords, and exponentials and angles without a library.
 
-Exponentials and angles are sums and quotients of our own, right to the last digits: they are cut to vectors, and give
-the same bits on every machine, which a C library's do not.
+Exponentials and angles are computed by series, accurate to the last digits. Unlike those of a C library they are
+vectorised and give the same bits on every machine.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _EXP_MIDDLE = math.exp(EXP_MOST / 16.0)
 
 @device
 def exponential(x: float) -> float:
-    """e^x for 0 <= x <= `EXP_MOST`: a series for an eighth of it, about the middle, to the eighth power."""
+    """e^x for 0 <= x <= `EXP_MOST`: the series of e^(x/8) about the middle of its range, to the eighth power."""
     u = x * 0.125 - EXP_MOST / 16.0
     s = _E10 + u * _E11
     s = _E9 + u * s
@@ -46,7 +46,8 @@ def exponential(x: float) -> float:
 
 @device
 def angle(across: float, along: float) -> float:
-    """atan2(across, along) for across >= 0: from 0 to π; 0 where both are 0. A quarter of it, by its series."""
+    """atan2(across, along) for across >= 0, from 0 to π; 0 if both are 0. The series is that of a quarter of the angle
+    (folded to at most 45 degrees)."""
     a = abs(along)
     most, least = max(across, a), min(across, a)
     t = least / max(most, 1e-300)
@@ -72,17 +73,17 @@ def angle(across: float, along: float) -> float:
 def blend(
     b0: Floats, b1: Floats, b2: Floats, b3: Floats, p0: float, p1: float, p2: float, p3: float, out: Floats
 ) -> None:
-    """One coordinate of the samples of a span, which four control points decide."""
+    """Write one coordinate of the samples of a span, the weighted sum of four control points."""
     for i in range(len(out)):
         out[i] = b0[i] * p0 + b1[i] * p1 + b2[i] * p2 + b3[i] * p3
 
 
 @device
 def draw(controls: Floats, bands: Floats, spans: Ints, x: Floats, y: Floats, z: Floats) -> None:
-    """Samples of a curve from its control points (N, 3), N >= 2.
+    """Write the samples of a curve of control points (N, 3), N >= 2.
 
-    ``bands`` (4, S): weights of the control points from each span's first on; ``spans`` (n, 3): samples from, to
-    (exclusive), and the first control point there. Where there are fewer than four, the last ones weigh nothing.
+    ``bands`` (4, S): weights of four control points, from the span's first on; ``spans`` (n, 3): first sample, end
+    (exclusive), and first control point. With fewer than four control points the missing ones have weight 0.
     """
     last = len(controls) - 1
     for k in range(len(spans)):
@@ -93,7 +94,7 @@ def draw(controls: Floats, bands: Floats, spans: Ints, x: Floats, y: Floats, z: 
             controls[min(first + 2, last)],
             controls[min(first + 3, last)],
         )
-        # Slices, since an index that might be negative would not be cut to vectors.
+        # Slices, because a loop over indices that might be negative would not be vectorised.
         b0, b1, b2, b3 = bands[0, begin:end], bands[1, begin:end], bands[2, begin:end], bands[3, begin:end]
         blend(b0, b1, b2, b3, a[0], b[0], c[0], d[0], x[begin:end])
         blend(b0, b1, b2, b3, a[1], b[1], c[1], d[1], y[begin:end])
@@ -102,7 +103,7 @@ def draw(controls: Floats, bands: Floats, spans: Ints, x: Floats, y: Floats, z: 
 
 @kernel(f"f8[,,] {CURVE} f8[] f8[] f8[] f8[,,]")
 def samples_of(controls: Floats, bands: Floats, spans: Ints, x: Floats, y: Floats, z: Floats, out: Floats) -> None:
-    """Samples of curves (P, N, 3) into ``out`` (P, S, 3); ``x``, ``y``, ``z`` (S,) are scratch."""
+    """Write the samples of curves (P, N, 3) to ``out`` (P, S, 3); ``x``, ``y``, ``z`` (S,) are working arrays."""
     for p in range(len(controls)):
         draw(controls[p], bands, spans, x, y, z)
         to = out[p]
@@ -114,7 +115,7 @@ def samples_of(controls: Floats, bands: Floats, spans: Ints, x: Floats, y: Float
 
 @device
 def weigh(leg: Floats, weight: Floats) -> None:
-    """The length that each sample stands for, from the legs between them."""
+    """Write to ``weight`` the length that each sample stands for: half of each adjacent leg."""
     last = len(leg)
     weight[0] = 0.5 * leg[0]
     for i in range(last - 1):
@@ -124,9 +125,9 @@ def weigh(leg: Floats, weight: Floats) -> None:
 
 @device
 def divide(leg: Floats, step_m: float, x: Floats, y: Floats, z: Floats, weight: Floats, long: Floats) -> int:
-    """Add points, after the samples themselves, on every leg longer than ``step_m``; how many there are then.
+    """Append points on every leg longer than ``step_m`` after the samples; return the number of all points.
 
-    ``long`` is scratch: the long legs' indices, found without a jump for each leg.
+    ``long`` is a working array for the indices of the long legs, which are collected without branches.
     """
     found = 0
     for i in range(len(leg)):
@@ -154,10 +155,10 @@ def divide(leg: Floats, step_m: float, x: Floats, y: Floats, z: Floats, weight: 
 def chords(
     x: Floats, y: Floats, z: Floats, stride: int, east: Floats, north: Floats, run: Floats, rise: Floats, base: Floats
 ) -> int:
-    """Chords between nodes, every ``stride``-th sample, those of no length left out; how many.
+    """Write the chords between nodes (every ``stride``-th sample), without those of no length; return how many.
 
-    ``east``, ``north`` the way they head, which climbing on the spot keeps; ``run`` and ``rise`` metres, ``base`` the
-    altitude they begin at.
+    ``east``, ``north``: horizontal vector of a chord; a vertical chord keeps that of the chord before. ``run`` and
+    ``rise`` in metres; ``base``: the altitude at which a chord begins.
     """
     count = 0
     he, hn = 1.0, 0.0

@@ -1,7 +1,7 @@
-"""From a vector of the unit box to the control points of a path: five ways, by name.
+"""Encodings: five mappings, by name, from a vector in the unit box to the control points of a path.
 
-Each codes one stage, from a terminal to the next; a path with via points is its stages one after the other. Variables
-stand way point by way point, so that a rule may change one way point's together (``group``, `Encoding`).
+Each encodes one stage, from a terminal to the next; a path with via points is its stages one after the other. The
+variables of one way point are adjacent, so that an optimiser can change them together (its parameter ``group``).
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from gcsplan.errors import unknown_name
 from gcsplan.planners.swarm.scene import Scene
 
 LATERAL = 0.5
-"""Reach of a section to either side, as a part of the horizontal distance (IB-ABC, section 2.2)."""
+"""Reach of a section to either side, as a part of the stage's horizontal distance (IB-ABC, section 2.2)."""
 
 OFFSET = 0.25
-"""The same for `offsets`."""
+"""The same for the encoding ``offsets``."""
 
 Decode = Callable[[Scene, Floats, Floats, Floats, Floats], None]
-"""(scene, from (3,), to (3,), u (n, K, variables)) to points, into the last argument (n, K, 3)."""
+"""Arguments: scene, from (3,), to (3,), u (n, K, variables); points are written to the last argument (n, K, 3)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """``variables`` for each way point; ``decode`` one stage; ``points`` the usual number of way points."""
+    """``variables``: number for each way point; ``points``: default number of way points; ``decode`` maps one stage."""
 
     name: str
     summary: str
@@ -43,13 +43,13 @@ def _box(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
 
 
 def _polar(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
-    # E: MSFOA's eq. 31 has d = 1 … 3D, its eq. 32 k = 2 … D + 1. S > 1 lies on the circle.
+    # E: MSFOA's eq. 31 has d = 1 … 3D, its eq. 32 k = 2 … D + 1. S > 1 is set to 1.
     pairs = u.reshape(*u.shape[:2], 3, 2)
     _box(scene, a, b, np.minimum(np.hypot(pairs[..., 0], pairs[..., 1]), 1.0), out)
 
 
 def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """The step from a to b in the plane, and the same turned left."""
+    """The vector from a to b in the plane, and the same rotated left by 90 degrees."""
     ahead = b[:2] - a[:2]
     if not ahead.any():
         ahead = np.array([1.0, 0.0])
@@ -57,14 +57,15 @@ def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:
 
 
 def _flat(scene: Scene, a: Floats, b: Floats, along: Floats, aside: Floats, out: Floats) -> None:
-    """Points by their parts along the track and aside, within the map, into ``out`` (n, K, 2 or more)."""
+    """Write points, from their parts along the track and to its left, to ``out`` (n, K, 2 or more); clipped to the
+    map."""
     ahead, left = _frame(a, b)
     for i in range(2):
         np.clip(a[i] + along * ahead[i] + aside * left[i], scene.low[i], scene.high[i], out=out[..., i])
 
 
 def _altitude(scene: Scene, u: Floats, out: Floats) -> None:
-    """Altitudes anywhere in the volume, into ``out`` (n, K, 3)."""
+    """Write altitudes, from 0 at the bottom to 1 at the top of the flight volume, to ``out`` (n, K, 3)."""
     out[..., 2] = scene.low[2] + u * (scene.high[2] - scene.low[2])
 
 
@@ -105,7 +106,7 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
 
 
 def get_encoding(name: str) -> Encoding:
-    """The encoding called ``name``. Raises InputError that lists the known ones."""
+    """The encoding called ``name``. Raises InputError if it is unknown, with a list of the known ones."""
     found = ENCODINGS.get(name)
     if found is None:
         raise unknown_name(f"there is no encoding {name!r}", name, ENCODINGS)
@@ -114,7 +115,7 @@ def get_encoding(name: str) -> Encoding:
 
 @dataclass(frozen=True, eq=False)
 class Code:
-    """An encoding on a scene: ``dim`` variables to control points, the terminals among them; ``points`` a stage."""
+    """An encoding on a scene, from ``dim`` variables to control points with terminals; ``points`` of each stage."""
 
     encoding: Encoding
     scene: Scene
@@ -122,7 +123,7 @@ class Code:
 
     @classmethod
     def of(cls, name: str, scene: Scene, points: int | None = None) -> Code:
-        """``points`` way points in all (the encoding's own number unless given), shared out by the stages' lengths."""
+        """The code with ``points`` way points (default: the encoding's own), distributed by the stages' lengths."""
         encoding = get_encoding(name)
         stages = len(scene.terminals) - 1
         wanted = max(encoding.points if points is None else points, stages)
@@ -135,7 +136,7 @@ class Code:
         return self.encoding.variables * sum(self.points)
 
     def controls(self, u: Floats) -> Floats:
-        """(n, dim) in the unit box to (n, N, 3) control points, terminals included."""
+        """Control points (n, N, 3), terminals included, of ``u`` (n, dim) in the unit box."""
         terminals, n, v = self.scene.terminals, len(u), self.encoding.variables
         out = np.empty((n, sum(self.points) + len(terminals), 3))
         at = row = 0
@@ -149,7 +150,7 @@ class Code:
 
 
 def shares(total: int, weights: Floats) -> tuple[int, ...]:
-    """``total`` things over places by weight, at least one each; the largest remainders are rounded up."""
+    """Distribute ``total`` items over places by weight, at least one each; the largest remainders are rounded up."""
     weights = np.asarray(weights, float)
     even = np.full(len(weights), 1.0 / len(weights))
     exact = (total - len(weights)) * (weights / weights.sum() if weights.sum() > 0 else even)

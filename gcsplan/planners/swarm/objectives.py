@@ -1,8 +1,8 @@
-"""What the swarms minimise: the five papers' costs by name, over the terms that `cost_kernels` measures.
+"""The costs of the swarms: those of the five papers, by name, over the terms that `cost_kernels` measures.
 
-Each is the paper's own formula plus `forbidden`, what the path does against the limits of the mission that the paper
-does not know, so that every objective orders what is not allowed. All of it is sampled: it never passes a mission.
-D marks a decision where a paper is silent, E where its print is departed from.
+Each is the paper's own formula plus `forbidden`, how far the path breaks limits of the mission that the paper does not
+know, so that every objective ranks illegal paths too. All costs are sampled and never pass a mission. D marks a
+decision of ours where a paper is silent, E a departure from its printed text.
 """
 
 from __future__ import annotations
@@ -26,15 +26,17 @@ from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.scene_kernels import SCENE, clocks_of, nearness
 
 PENALTY = 100.0
-"""Cost of a metre that is not allowed, in metres: D, all; C and PC of MSFOA, P of ABO, μ_obs of SSGWO are 100 too."""
+"""Cost of a metre that is not allowed, in metres (D in all costs; C and PC of MSFOA, P of ABO, μ_obs of SSGWO are 100
+too)."""
 
 NODES, SAMPLES = 30, 200
-"""SSGWO's number of nodes, at which angles and nearness count, and about how many samples lie on a path."""
+"""SSGWO's number of nodes, at which angles and nearness are measured; approximate number of samples of a path."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What terms are weighed against: the straight line's own terms (TERMS,), and how the mission counts."""
+    """Reference values of the weights: the terms (TERMS,) and length of the straight line, height of the flight volume,
+    and the mission's objective with its energy per metre."""
 
     straight: Floats
     straight_m: float
@@ -49,7 +51,8 @@ Weigh = Callable[[Floats, Unit], Floats]
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """``weigh`` terms (n, TERMS) to costs (n,); ``wanted`` groups of terms that it needs beside the common ones."""
+    """One cost. ``weigh``: from terms (n, TERMS) to costs (n,); ``wanted``: bits of the optional groups of terms that
+    it needs; ``equations``: of its paper."""
 
     name: str
     summary: str
@@ -59,13 +62,15 @@ class Objective:
 
 
 def forbidden(terms: Floats, straight_m: float, skip: Sequence[int] = ()) -> Floats:
-    """(n,) metres of path that break a limit, and how deeply; 0 where none is broken. ``skip`` terms that the
-    objective counts in its own way."""
+    """Metres (n,) of path that break a limit, plus a measure of how deeply; 0 if no limit is broken.
+
+    ``skip``: terms that the objective counts itself.
+    """
     out = np.zeros(len(terms))
     for term in (k.BELOW, k.ABOVE, k.UNKNOWN, k.INSIDE, k.STEEP):
         if term not in skip:
             out += terms[:, term]
-    # Depths are summed along the path, m²; as a part of the way they order paths through one and the same hill.
+    # Depths integrated along the path (m²), divided by its straight length, rank paths through the same hill.
     for term in (k.SUNK, k.PROUD, k.DEEP):
         if term not in skip:
             out += terms[:, term] * (20.0 / straight_m)
@@ -73,10 +78,11 @@ def forbidden(terms: Floats, straight_m: float, skip: Sequence[int] = ()) -> Flo
 
 
 def _krill(terms: Floats, unit: Unit) -> Floats:
-    """Length (eq. 12), or energy where the mission asks for it.
+    """Length (eq. 12), or energy if that is the mission's objective.
 
-    E eq. 12–13 sum four segments; here the whole curve. E eq. 13 multiplies R1 by the horizontal and R2 by the vertical
-    distance, the reverse of Table 1; Table 1 holds. E: free space is C without C_obs, not its section with it.
+    E eq. 12–13 sum four segments; here the whole curve is summed. E eq. 13 multiplies R1 by the horizontal and R2 by
+    the vertical distance, the reverse of Table 1; Table 1 is used. E: free space is C minus C_obs, not their
+    intersection.
     """
     bad = PENALTY * forbidden(terms, unit.straight_m)
     if unit.energy:
@@ -92,9 +98,10 @@ MU_OBS = 100.0  # D: eq. 31
 def _ssgwo(terms: Floats, unit: Unit) -> Floats:
     """Eq. 26–34.
 
-    E eq. 29, 30: radians, wrapped, e^|Δθ| - 1 and |φ|. E eq. 31, 32 sum over all nodes and obstacles before they
-    compare with d_safe, measure to the centre as to a sphere, and reward a node inside: here each node against each
-    cylinder, d at least 0.1 m. D: plus 100 for each metre of path inside, so that infeasible paths are ordered.
+    E eq. 29, 30: here in radians, wrapped, with e^|Δθ| - 1 and |φ|. E eq. 31, 32 sum over all nodes and obstacles
+    before they compare with d_safe, measure the distance to a sphere's centre, and reward a node inside; here each node
+    is compared with each cylinder, with d at least 0.1 m. D: plus 100 for each metre of path inside, so that infeasible
+    paths are ranked.
     """
     length, angle, obstacle = SSGWO_WEIGHTS
     own = length * terms[:, k.LENGTH] + angle * (terms[:, k.YAW] + terms[:, k.PITCH])
@@ -107,10 +114,10 @@ PC = C = 100.0  # D: eq. 25, 26, 28, 29
 def _msfoa(terms: Floats, unit: Unit) -> Floats:
     """Eq. 20–27; the nearness of eq. 28–30 is added by `Cost`.
 
-    E eq. 21 is above ground: max(0, AGL - h_min). E eq. 24's T_de: max(0, 1 - d/R). E eq. 25 adds itself up: a
-    constant for each turn above φ_max (D 45°). E eq. 26 penalises slopes inside [β, α]: outside. D: JH as the path's
-    mean times its length, heights as a part of the volume's, as eq. 32 has them: in metres JH would be some 50 times
-    JL, and length would no longer count.
+    E eq. 21: here the height is above ground, max(0, AGL - h_min). E eq. 24: T_de is max(0, 1 - d/R). E eq. 25 adds the
+    penalty to itself; here it is a constant for each turn above φ_max (D 45°). E eq. 26 penalises slopes inside [β, α];
+    here those outside. D: JH is the path's mean height times its length, with heights as a part of the volume's height
+    as in eq. 32; in metres JH would be some 50 times JL, and length would no longer count.
     """
     high = terms[:, k.HIGH] / unit.height_m * terms[:, k.LENGTH]
     limits = C * (terms[:, k.TURNS] + terms[:, k.SLOPES])
@@ -119,7 +126,7 @@ def _msfoa(terms: Floats, unit: Unit) -> Floats:
 
 
 def _abo(terms: Floats, unit: Unit) -> Floats:
-    """Eq. 4–7: length, and P = 100 for each of the samples under ground (D: under the floor) or out of the volume."""
+    """Eq. 4–7: length, and P = 100 for each sample under ground (D: under the floor) or outside of the volume."""
     own = terms[:, k.LENGTH] + PENALTY * (terms[:, k.UNDER] + terms[:, k.OUTSIDE])
     return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m, (k.BELOW, k.SUNK, k.UNKNOWN)))
 
@@ -128,14 +135,15 @@ IB_ABC_WEIGHTS = (0.4, 0.2, 0.2, 0.2)  # D: λ of eq. 6
 
 
 def _ib_abc(terms: Floats, unit: Unit) -> Floats:
-    """Eq. 2–6, each term over its value on the straight line (D; over π, or one metre, where that is 0).
+    """Eq. 2–6, each term divided by its value on the straight line (D; where that is 0, by π or by one metre).
 
-    E eq. 3's atan of a cosine is arccos: Σ(π - α) is the sum of turns. E eq. 4 tests a segment's length against d_safe:
-    the distance to obstacle or ground; its Z is AGL. E eq. 5 charges W_t, zero at the centre: R_t - W_t.
+    E eq. 3: the atan of a cosine is taken as arccos, so Σ(π - α) is the sum of turns. E eq. 4 compares the length of a
+    segment with d_safe; here the distance to obstacle or ground, and Z is AGL. E eq. 5 charges W_t, which is zero at
+    the centre; here R_t - W_t.
     """
     out = np.zeros(len(terms))
     own = (k.LENGTH, k.BEND, k.EXPOSED, k.SPHERE)
-    # The arccos of float noise is some 1e-8 rad a node: a straight line's turns are none below 1e-3.
+    # Float noise turns a straight line by some 1e-8 rad per node (arccos): less than 1e-3 in all counts as 0.
     for weight, term, least, none in zip(
         IB_ABC_WEIGHTS, own, (1.0, math.pi, 1.0, 1.0), (1e-9, 1e-3, 1e-9, 1e-9), strict=True
     ):
@@ -161,7 +169,7 @@ OBJECTIVES: Mapping[str, Objective] = MappingProxyType(
 
 
 def get_objective(name: str) -> Objective:
-    """The cost called ``name``. Raises InputError that lists the known ones."""
+    """The cost called ``name``. Raises InputError if it is unknown, with a list of the known ones."""
     found = OBJECTIVES.get(name)
     if found is None:
         raise unknown_name(f"there is no swarm cost {name!r}", name, OBJECTIVES)
@@ -170,14 +178,14 @@ def get_objective(name: str) -> Objective:
 
 @dataclass(frozen=True, slots=True)
 class Earlier:
-    """A vehicle that has the right of way (MSFOA, section 3.2.2): points (Q, 3) and when it is there, seconds (Q,)."""
+    """A vehicle that has the right of way (MSFOA, section 3.2.2): its points (Q, 3) and their times (Q,) in seconds."""
 
     points: Floats
     clock_s: Floats
 
     @classmethod
     def at_speed(cls, points: Floats, speed_m_s: float, step_m: float = 5.0) -> Earlier:
-        """A polyline (N, 3) flown at one speed from 0 s, as points no further apart than ``step_m``."""
+        """A polyline (N, 3) flown at constant speed from time 0, as points no further apart than ``step_m``."""
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
         at = np.linspace(0.0, s[-1], max(2, math.ceil(s[-1] / step_m) + 1))
         dense = np.stack([np.interp(at, s, points[:, i]) for i in range(3)], axis=-1)
@@ -191,8 +199,8 @@ APART_M = 30.0
 class Cost:
     """A batch objective over the unit box: (n, dim) to (n,).
 
-    ``earlier`` vehicles count in every objective; ``speed_m_s`` is this one's. A path costs the same, to the bit,
-    alone and in any population. For one thread at a time: it works in scratch of its own.
+    ``earlier`` vehicles count in every objective; ``speed_m_s`` is the speed of this one. A path has the same cost, to
+    the bit, alone and in any population. Not thread-safe: it keeps its own working arrays.
     """
 
     def __init__(
@@ -231,14 +239,14 @@ class Cost:
         return self.code.dim
 
     def __call__(self, u: Floats) -> Floats:
-        """(n,) costs of ``u`` (n, dim) in the unit box."""
+        """Costs (n,) of ``u`` (n, dim) in the unit box."""
         return self.of_controls(self.code.controls(u))
 
     def of_controls(self, controls: Floats) -> Floats:
-        """(n,) costs of control points (n, N, 3)."""
+        """Costs (n,) of control points (n, N, 3)."""
         total = self.objective.weigh(self.terms(controls), self.unit)
         if self.earlier:
-            # E eq. 30 prints the reciprocal: t is a time. E eq. 29's cubic grows with the gap: C·(0.5 - t)³.
+            # E eq. 30 prints the reciprocal, but t is a time. E eq. 29's cubic grows with the gap: here C·(0.5 - t)³.
             paths = self.curve.samples(controls)
             clocks, near = np.empty(paths.shape[:2]), np.empty(len(paths))
             clocks_of(paths, self.speed_m_s, clocks)
@@ -248,18 +256,18 @@ class Cost:
         return np.asarray(total)
 
     def terms(self, controls: Floats) -> Floats:
-        """(n, TERMS) terms of control points (n, N, 3)."""
+        """Terms (n, TERMS) of control points (n, N, 3)."""
         out = np.empty((len(controls), k.TERMS))
         k.measure(controls, self._before, out)
         return out
 
     def straight_cost(self) -> float:
-        """JL + JH of the straight line, no penalties: what MSFOA's threshold is set against (D)."""
+        """JL + JH of the straight line, without penalties; MSFOA's threshold is a multiple of it (D)."""
         s = self.unit.straight
         return float(s[k.LENGTH] * (1.0 + s[k.HIGH] / self.unit.height_m))
 
     def _straight(self) -> Floats:
-        """(N, 3) control points of the straight line from terminal to terminal."""
+        """Control points (N, 3) of the straight line from terminal to terminal."""
         terminals, rows = self.code.scene.terminals, []
         for i, count in enumerate(self.code.points):
             t = np.arange(count + 1)[:, None] / (count + 1.0)
@@ -268,7 +276,7 @@ class Cost:
 
 
 def sampled(scene: Scene, points: tuple[int, ...]) -> tuple[Curve, int]:
-    """The curve past ``points`` free control points a stage, and how many samples lie between two nodes."""
+    """The curve with ``points`` free control points in each stage, and the number of samples from node to node."""
     stride = max(1, round(SAMPLES / (NODES + 1)))
     legs = shares((NODES + 1) * stride, np.linalg.norm(np.diff(scene.terminals, axis=0), axis=1))
     return curve(points, legs), stride

@@ -1,7 +1,7 @@
-"""Optimiser × encoding × objective: a swarm's search for a path, and what the exact check makes of its result.
+"""Planning by a swarm: an optimiser, an encoding and a cost search for a curve, and the exact check judges it.
 
-The search ends in a smooth curve. If the exact check passes the curve, few way points beside it are the path; if not,
-it is repaired (`repair`) or refused, and what was wrong with it is said. Nothing sampled passes a mission.
+If few way points close to the curve pass the exact check, they are the path. Otherwise the curve is repaired (`repair`)
+or the mission refused, and a note or the refusal states what was wrong. Nothing sampled passes a mission.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from gcsplan.world.airspace import Violation
 from gcsplan.world.path import Path
 
 CORRIDORS = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 0.0)
-"""Widths tried for few way points beside the curve, as parts of the straight way; 0 keeps every sample."""
+"""Corridors of the way points about the curve, as parts of the straight path, tried in turn; 0 keeps every sample."""
 
 THRESHOLD = 1.5
-"""MSFOA's switch from global to local search, as a multiple of JL + JH of the straight line (D)."""
+"""Cost at which MSFOA switches from global to local search, as a multiple of JL + JH of the straight line (D)."""
 
 COLLISIONS = frozenset({"min_agl", "terrain_clearance", "zone"})
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What a search may be told; None: as the optimiser's and the encoding's own tables have it.
+    """Settings of a search; None stands for the default of the optimiser or of the encoding.
 
-    ``parameters`` are the optimiser's own, the flight volume's sides (`VOLUME_KEYS`) among them. ``earlier`` vehicles
-    have the right of way, polylines (N, 3) from a common departure; all fly at ``speed_m_s``. For ants ``points``
-    is the number of sections.
+    ``parameters``: those of the optimiser, and the sides of the flight volume (`VOLUME_KEYS`). ``earlier``: polylines
+    (N, 3) of vehicles that have the right of way and depart at the same time; all fly at ``speed_m_s``. For ants
+    ``points`` is the number of sections.
     """
 
     encoding: str = "box"
@@ -61,7 +61,7 @@ class Settings:
 
     @classmethod
     def of(cls, defaults: Mapping[str, object], options: Mapping[str, object]) -> Settings:
-        """``options`` on top of a planner's ``defaults``. Raises InputError for a key that is not known."""
+        """Settings of a planner's ``defaults``, replaced by ``options``. Raises InputError for an unknown key."""
         known = cls.__dataclass_fields__
         for key in options:
             if key not in known:
@@ -80,8 +80,8 @@ class Settings:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Found:
-    """What a search ended in: ``curve`` (S, 3) with its ``terminals``, ``cost`` by the objective, ``violations`` by the
-    exact check. ``pitch_deg``, ``yaw_deg``: mean angle, and mean change of heading, between nodes (SSGWO's tables)."""
+    """The result of a search: its ``curve`` (S, 3), the indices of its ``terminals``, and the ``violations`` that the
+    exact check finds. ``pitch_deg``, ``yaw_deg``: mean slope and mean turn between nodes (SSGWO's tables)."""
 
     result: Result
     scene: Scene
@@ -98,12 +98,12 @@ class Found:
 
     @property
     def collisions(self) -> int:
-        """Legs of the curve that meet ground or zones."""
+        """Number of legs of the curve that meet ground or zones."""
         return len({v.leg for v in self.violations if v.kind in COLLISIONS})
 
 
 def search(problem: Problem, optimiser: str, settings: Settings) -> Found:
-    """Run ``optimiser`` once. Raises InputError for options that do not fit."""
+    """Run ``optimiser`` once. Raises InputError for options that it does not accept."""
     volume, parameters = settings.split()
     scene = Scene.of(problem, volume)
     code = Code.of(settings.encoding, scene, settings.points)
@@ -134,7 +134,7 @@ def search(problem: Problem, optimiser: str, settings: Settings) -> Found:
 def judged(
     problem: Problem, result: Result, scene: Scene, curve: Floats, terminals: NDArray[np.intp], stride: int
 ) -> Found:
-    """A search's curve with what the exact check says of it."""
+    """The curve of a search with its violations; ``stride``: samples from node to node."""
     curve = np.ascontiguousarray(curve)
     d = np.diff(curve[::stride], axis=0)
     pitch = np.degrees(np.abs(np.arctan2(d[:, 2], np.hypot(d[:, 0], d[:, 1]))))
@@ -145,9 +145,9 @@ def judged(
 
 
 def plan(problem: Problem, optimiser: str, defaults: Mapping[str, object]) -> Solution:
-    """A path that `Airspace.examine` passes, beside the curve that ``optimiser`` found or repaired from it.
+    """A path that `Airspace.examine` passes: few way points along the curve that ``optimiser`` found, or its repair.
 
-    Raises Refusal (NoMission, ``not_found``) where the curve cannot be repaired, InputError for bad options.
+    Raises Refusal (NoMission, ``not_found``) if the curve cannot be repaired, InputError for bad options.
     """
     begun = time.perf_counter()
     check_ends(problem)
@@ -155,14 +155,14 @@ def plan(problem: Problem, optimiser: str, defaults: Mapping[str, object]) -> So
 
 
 def finish(problem: Problem, found: Found, begun: float) -> Solution:
-    """The solution that a search's curve makes: as it is, repaired, or a refusal."""
+    """Make a solution of a search's curve, repaired if needed. Raises Refusal if it cannot be repaired."""
     searched_s = time.perf_counter() - begun
     name, wrong = found.result.optimiser, found.violations
     few = way_points_beside(problem, found)
     notes: tuple[str, ...]
     if few is not None:
         points, notes = few, ()
-        if wrong:  # between terminals the curve touched a limit that its chords do not
+        if wrong:  # the curve broke a limit that the fewer way points keep
             notes = (f"the curve that {name} found breaks {summary_of(problem, wrong)}; its way points pass",)
     else:
         mended = repair(problem, found.scene, found.curve, found.terminals)
@@ -191,7 +191,7 @@ def finish(problem: Problem, found: Found, begun: float) -> Solution:
 
 
 def way_points_beside(problem: Problem, found: Found) -> Floats | None:
-    """(N, 3) few way points, no point of the curve further from them than a corridor, that the exact check passes."""
+    """Few way points (N, 3) that pass the exact check and stay within a corridor of the curve; None if none do."""
     if any(v.kind in COLLISIONS for v in found.violations):
         return None
     for part in CORRIDORS:

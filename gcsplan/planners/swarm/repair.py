@@ -1,8 +1,8 @@
-"""What becomes of a curve that fails the exact check: pushed out sideways, heights drawn anew, or given up.
+"""Repair of a curve that fails the exact check: a new altitude profile, or a track pushed out sideways.
 
-The push is a dynamic programme over a ribbon about the curve: at each station a side step, so that neighbouring
-points join over open ground, with the interval of altitudes that the climb limits reach there. Its track gets the
-taut string's profile through the exact tube, and the exact check decides.
+The push is a dynamic programme over a ribbon around the curve. It chooses a side step at each station, so that
+neighbouring points are connected over open ground, and carries the interval of altitudes that the climb limits allow.
+The new track gets the taut string's profile through the exact tube, and the exact check decides.
 """
 
 from __future__ import annotations
@@ -24,35 +24,35 @@ from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Legs, Violation
 
 STATIONS, SIDES, REACH = 160, 30, 4
-"""Stations along the ribbon, side steps to either side, and by how many steps neighbours may differ."""
+"""Stations along the ribbon; side steps to either side; most side steps between neighbouring stations."""
 
 PUSHES = ((0.03, 0.0), (0.1, 0.0), (0.1, 0.01), (0.3, 0.0), (0.3, 0.01), (0.6, 0.005))
-"""Half-widths tried, as parts of the straight way; and what is kept over the floor and beside zones besides."""
+"""Half-widths of the ribbon and additional margin over the floor, as parts of the straight track; tried in turn."""
 
 CORRECTIONS, CORRECTED_M = 12, 0.01
-"""How often a profile is corrected by what the exact check finds, and by how much beyond it."""
+"""Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""
 
 WORTH = 1e-4
-"""What fewer way points may cost, as a part of the cost."""
+"""Extra cost that fewer way points may have, as a part of the cost."""
 
 
 @dataclass(frozen=True, eq=False)
 class Repaired:
-    """Way points (N, 3) that the exact check passes; ``pushed_m`` how far the track was moved sideways at most."""
+    """Way points (N, 3) that pass the exact check; ``pushed_m``: largest sideways move of the track."""
 
     points: Floats
     pushed_m: float
 
 
 def violations(problem: Problem, points: Floats) -> tuple[Violation, ...]:
-    """What the exact check has against a polyline (N, 3)."""
+    """Violations that the exact check finds on a polyline (N, 3)."""
     return problem.airspace.examine(Legs.of_path(points, problem.limits), problem.limits).violations
 
 
 def repair(problem: Problem, scene: Scene, samples: Floats, terminals: NDArray[np.intp]) -> Repaired | None:
-    """A legal path near the curve ``samples`` (S, 3) whose ``terminals`` must stay; None where none is found.
+    """A legal path near the curve ``samples`` (S, 3), whose ``terminals`` (indices) stay; None if none is found.
 
-    First the curve's own track with a new profile; then tracks pushed out further and further.
+    Tries a new profile over the curve's own track first, then tracks pushed out further and further.
     """
     flat = samples[:, :2]
     points = _with_profile(problem, flat, terminals)
@@ -71,14 +71,14 @@ def repair(problem: Problem, scene: Scene, samples: Floats, terminals: NDArray[n
 
 
 def _with_profile(problem: Problem, flat: Floats, terminals: NDArray[np.intp]) -> Floats | None:
-    """Way points over a track (N, 2) with the best altitude profile; None where there is none that passes."""
+    """Way points over a track (N, 2) with the best altitude profile; None if no profile passes the exact check."""
     pinned = np.zeros(len(flat), bool)
     pinned[terminals] = True
     pin_m = np.full(len(flat), np.nan)
     for i, via in zip(terminals[1:-1], problem.via, strict=True):
         pin_m[i] = math.nan if via.amsl_m is None else via.amsl_m
     track = make_track(problem, np.ascontiguousarray(flat), pinned, pin_m)
-    with np.errstate(invalid="ignore"):  # a zone without a top under no ceiling: room from infinity to infinity
+    with np.errstate(invalid="ignore"):  # over a zone without a top, without a ceiling: inf minus inf
         flown = fly(problem, track)
     if not isinstance(flown, Flown):
         return None
@@ -86,7 +86,10 @@ def _with_profile(problem: Problem, flat: Floats, terminals: NDArray[np.intp]) -
 
 
 def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
-    """Way points that pass; where the check finds the profile a little too low or high, it becomes a door."""
+    """Way points that pass the exact check, or None.
+
+    Where the profile is too low or too high the altitude that is needed becomes a door, and the profile is drawn again.
+    """
     known: list[tuple[float, float, float]] = []
     for _ in range(CORRECTIONS):
         points, pinned = way_points(problem, track, flown)
@@ -115,10 +118,10 @@ def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
 def _push(
     problem: Problem, scene: Scene, flat: Floats, terminals: NDArray[np.intp], half_m: float, margin_m: float
 ) -> tuple[Floats, NDArray[np.intp], float] | None:
-    """The track pushed to open places within ``half_m``, its terminals' indices, and how far it went at most.
+    """Push a track to open places within ``half_m``; return it, the indices of its terminals, and the largest push.
 
-    The cheapest chain of side steps by length; a step is open if no point of it is shut, and if the altitudes that
-    can be reached along the cheapest chain so far meet its room.
+    It is the shortest chain of side steps. A step is open if its middle and its end are, and if the altitudes that can
+    be reached along the shortest chain so far include legal ones there. None if no chain is open.
     """
     base, left, at_terminal = _ribbon(flat, terminals, half_m)
     n, m = len(base), 2 * SIDES + 1
@@ -126,7 +129,7 @@ def _push(
     aside = (np.arange(m) - SIDES) * step
     places = base[:, None] + aside[None, :, None] * left[:, None]  # (n, m, 2)
     shifts = np.arange(-REACH, REACH + 1)
-    source = np.arange(m)[:, None] - shifts  # (m, t) which side one comes from
+    source = np.arange(m)[:, None] - shifts  # (m, t) side at the station before
     legal = (source >= 0) & (source < m)
     source = np.clip(source, 0, m - 1)
     low, high = _room(problem, scene, places, margin_m)
@@ -167,10 +170,9 @@ def _push(
 
 
 def _ribbon(flat: Floats, terminals: NDArray[np.intp], half_m: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
-    """Stations (n, 2) along a track, unit vectors to the left there (n, 2), and which stations are its terminals.
+    """Stations (n, 2) along a track, unit vectors to the left there (n, 2), and the indices of its terminals.
 
-    A ribbon must not fold: the track's own turns within its half-width are smoothed away, between terminal and
-    terminal.
+    A ribbon must not fold: so turns of the track within the half-width are smoothed between terminals.
     """
     parts, at_terminal = [flat[:1]], [0]
     whole = float(distances(flat)[-1])
@@ -188,7 +190,7 @@ def _ribbon(flat: Floats, terminals: NDArray[np.intp], half_m: float) -> tuple[F
 
 
 def _smoothed(track: Floats, reach_m: float, count: int = 400) -> Floats:
-    """A track (n, 2) averaged along itself over ``reach_m`` to either side, less near its ends, which stay."""
+    """A track (n, 2) averaged along itself over ``reach_m`` to either side; over less near its ends, which stay."""
     s = distances(track)
     at = np.linspace(0.0, s[-1], count + 1)
     even = np.stack([np.interp(at, s, track[:, i]) for i in range(2)], axis=-1)
@@ -199,7 +201,7 @@ def _smoothed(track: Floats, reach_m: float, count: int = 400) -> Floats:
 
 
 def _room(problem: Problem, scene: Scene, places: Floats, margin_m: float) -> tuple[Floats, Floats]:
-    """Lowest and highest legal altitude at places (..., 2); the lowest is infinite where a place is shut."""
+    """Lowest and highest legal altitude at places (..., 2); the lowest is infinite where a zone closes a place."""
     flat = np.ascontiguousarray(places.reshape(-1, 2))
     air, limits = problem.airspace, problem.limits
     low = air.floor_amsl(flat[:, 0], flat[:, 1], limits) + margin_m
@@ -212,14 +214,14 @@ def _room(problem: Problem, scene: Scene, places: Floats, margin_m: float) -> tu
 
 
 def k_keep(max_agl_m: float | None) -> float:
-    """Kept from the ceiling where it follows the ground, which is known less well between two places than at them."""
+    """Metres kept from a ceiling that follows the ground, because the ground between two places is not read; else 0."""
     return 0.0 if max_agl_m is None else 0.02 * max_agl_m
 
 
 def _pin(
     problem: Problem, scene: Scene, low: Floats, high: Floats, at_terminal: NDArray[np.intp]
 ) -> tuple[Floats, Floats]:
-    """At terminals the middle of the ribbon alone is open, at the altitude that is asked for there."""
+    """Close the ribbon at terminals except in its middle, and there all but the altitude of the terminal, if fixed."""
     low, high = low.copy(), high.copy()
     heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
     for i, z in zip(at_terminal, heights, strict=True):

@@ -1,4 +1,4 @@
-"""A problem as the swarm's cost kernels see it: raster, zones, limits and flight volume in plain arrays."""
+"""A problem in plain arrays for the swarms' cost kernels: raster, zones, limits and flight volume."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Level, Zone
 
 GROWN = 0.1
-"""Room around the terminals on every side, as a part of the longer side; the shorter is first made as long: a mission
-due east needs as much room to either side."""
+"""Margin of the flight volume around the terminals, on every side, as a part of their box's longer side. The box is
+first made square: a mission due east needs as much space to either side."""
 
 KEEP_M = 0.05
-"""Kept from floor, ceiling and zones by the sampled cost, for what lies between two samples."""
+"""Metres that the sampled cost keeps from floor, ceiling and zones, for what lies between two samples."""
 
 KEEP_SLOPE = 0.999
-"""The part of a slope limit that the sampled cost allows."""
+"""Part of a slope limit that the sampled cost allows."""
 
 FAR = 1e9
 
 FLOOR_NODES = 160_000
-"""Nodes of the raster of floors, about: some milliseconds to make."""
+"""Nodes of the raster of floors, at most and roughly; it takes some milliseconds to make."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """``heights`` (rows, cols) top of the ground about the volume; ``quadratic`` (2, 6) the plane to (col, row) over 1,
-    u, v, u², uv, v²; ``floors`` and ``floor_map`` the same of the lowest legal altitude, terrain clearance and errors
-    included; ``numbers``, ``zones`` and ``corners`` as `cost_kernels` names them; ``low``, ``high`` (3,)
-    the flight volume; ``terminals`` (M, 3) start, via points, goal; ``straight_m`` from terminal to terminal in
-    space."""
+    """``heights`` (rows, cols): top of the ground around the volume; ``quadratic`` (2, 6): the map from the plane to
+    (col, row) over 1, u, v, u², uv, v²; ``floors`` and ``floor_map``: the same for the lowest legal altitude, terrain
+    clearance and errors included; ``numbers``, ``zones`` and ``corners``: see `scene_kernels`; ``low``, ``high`` (3,):
+    the flight volume; ``terminals`` (M, 3): start, via points, goal; ``straight_m``: length from terminal to terminal
+    in space."""
 
     heights: NDArray[np.float32]
     quadratic: Floats
@@ -57,7 +57,7 @@ class Scene:
 
     @classmethod
     def of(cls, problem: Problem, volume: Mapping[str, float] | None = None, samples: int = 200) -> Scene:
-        """The scene of ``problem``. Raises InputError where ``volume`` (`VOLUME_KEYS`) does not hold the terminals."""
+        """The scene of ``problem``. Raises InputError if ``volume`` (`VOLUME_KEYS`) does not contain the terminals."""
         surface, limits = problem.airspace.surface, problem.limits
         flat = np.array([problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]])
         west, south, east, north = _flat_volume(flat, volume or {})
@@ -68,7 +68,7 @@ class Scene:
         top, ground = surface.top_m, surface.ground_m
         c0, r0, c1, r1 = _window(surface, (west, south, east, north))
         quadratic[:, 0] -= c0, r0
-        # A piece in single precision (0.1 mm at 1000 m) stays in the processor's cache.
+        # A part of the raster in single precision (0.1 mm at 1000 m) fits into the processor's cache.
         heights = np.ascontiguousarray(top[r0:r1, c0:c1], dtype=np.float32)
         known = heights[np.isfinite(heights)]
         lowest, highest = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
@@ -103,7 +103,7 @@ class Scene:
             high,
             np.zeros((0, 3)),
             0.0,
-        )  # what follows asks it for heights
+        )  # incomplete, but `_terminals` can read heights from it
         terminals = scene._terminals(problem, flat)
         if not ((terminals >= low - 1e-6).all() and (terminals <= high + 1e-6).all()):
             raise InputError(
@@ -111,7 +111,7 @@ class Scene:
                 f"from {np.round(low, 1).tolist()} to {np.round(high, 1).tolist()} it does not"
             )
         straight = float(np.linalg.norm(np.diff(terminals, axis=0), axis=1).sum())
-        # Between two samples a chord dips into a circle by at most spacing² / 8R.
+        # Between two samples a chord enters a circle by at most spacing² / 8R.
         spacing = 1.5 * straight / samples
         numbers[k.SPACING] = spacing
         zones = scene.zones.copy()
@@ -120,7 +120,7 @@ class Scene:
 
     @property
     def ceiling_follows_ground(self) -> bool:
-        """Whether there is a max AGL."""
+        """Whether the mission has a maximum AGL."""
         return bool(self.numbers[k.MAX_AGL] < 0.5 * FAR)
 
     @property
@@ -129,11 +129,11 @@ class Scene:
         return self.ceiling_follows_ground or bool(self.zones[:, [k.LOW_AGL, k.HIGH_AGL]].any())
 
     def ground(self, points: Floats) -> Floats:
-        """(...,) height under points (..., 2 or more); NaN where unknown."""
+        """Height of the ground (...,) under points (..., 2 or more); NaN where unknown."""
         return self._heights(self.heights, self.quadratic, points)
 
     def floor(self, points: Floats) -> Floats:
-        """(...,) lowest legal altitude at points (..., 2 or more); NaN where ground within reach is unknown."""
+        """Lowest legal altitude (...,) at points (..., 2 or more); NaN where ground within reach is unknown."""
         return self._heights(self.floors, self.floor_map, points)
 
     def _heights(self, raster: NDArray[np.float32], to_raster: Floats, points: Floats) -> Floats:
@@ -143,7 +143,7 @@ class Scene:
         return out.reshape(points.shape[:-1])
 
     def room(self, points: Floats) -> tuple[Floats, Floats]:
-        """Lowest and highest altitude at points, within the volume; the lowest is never above the highest."""
+        """Lowest and highest legal altitude at points, clipped to the volume; the lowest is never above the highest."""
         n = self.numbers
         floor = np.nan_to_num(self.floor(points), nan=float(self.high[2]))
         high = np.full(floor.shape, n[k.MAX_AMSL])
@@ -153,7 +153,8 @@ class Scene:
         return np.minimum(np.clip(floor, self.low[2], self.high[2]), high), high
 
     def _terminals(self, problem: Problem, flat: Floats) -> Floats:
-        """Start, via points and goal; a via point whose height is free stands on the line between, if there is room."""
+        """Start, via points and goal (M, 3). A via of free altitude is put on the line between its neighbours of fixed
+        altitude, clipped to floor and ceiling."""
         known = [problem.start[2], *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via), problem.goal[2]]
         z = np.array(known)
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])
@@ -164,7 +165,7 @@ class Scene:
 
 
 def _flat_volume(terminals: Floats, given: Mapping[str, float]) -> tuple[float, float, float, float]:
-    """West, south, east, north of the square about the terminals, grown by `GROWN`."""
+    """West, south, east, north of the square around the terminals plus `GROWN`; sides in ``given`` replace its own."""
     low, high = terminals.min(axis=0), terminals.max(axis=0)
     longest = float((high - low).max())
     more = 0.5 * (longest - (high - low)) + GROWN * longest
@@ -174,7 +175,10 @@ def _flat_volume(terminals: Floats, given: Mapping[str, float]) -> tuple[float, 
 
 
 def _fit(surface: Surface, east: Floats, north: Floats) -> tuple[Floats, tuple[float, float], float]:
-    """The map to the grid as a quadratic over the volume: a raster in degrees bends by metres in tens of kilometres."""
+    """Fit a quadratic to the map to the grid, over the volume: a raster in degrees bends by metres in tens of km.
+
+    Returns the coefficients (2, 6), the centre (east, north) and the metres of one unit of u and v.
+    """
     centre = (float(east.mean()), float(north.mean()))
     scale_m = max(float(np.ptp(east)), float(np.ptp(north)), 1.0)
     u, v = (east - centre[0]) / scale_m, (north - centre[1]) / scale_m
@@ -190,7 +194,10 @@ def _floors(
     centre: tuple[float, float],
     scale_m: float,
 ) -> tuple[NDArray[np.float32], Floats | None]:
-    """Lowest legal altitudes on the raster's own nodes (no map of their own), or on fewer where there are many."""
+    """Lowest legal altitudes on the raster's own nodes, or on a grid over ``box`` if these are too many or too few.
+
+    Returns the floors and the map to their grid, None if that is the raster's own.
+    """
     air = problem.airspace
     c0, r0, c1, r1 = window
     to_nodes: Floats | None = None
@@ -209,7 +216,7 @@ def _floors(
 
 
 def _nodes(surface: Surface, cols: NDArray[np.intp], rows: NDArray[np.intp]) -> Floats:
-    """(rows, cols, 2) places of nodes, by a quadratic through some: the exact inverse would cost more than floors."""
+    """Places (rows, cols, 2) of nodes, by a quadratic fit: the exact inverse would take longer than the floors."""
     some_c, some_r = np.meshgrid(np.linspace(cols[0], cols[-1], 9), np.linspace(rows[0], rows[-1], 9))
     places = surface.grid.to_plane(some_c.ravel(), some_r.ravel())
 
@@ -223,7 +230,8 @@ def _nodes(surface: Surface, cols: NDArray[np.intp], rows: NDArray[np.intp]) -> 
 
 
 def _window(surface: Surface, box: tuple[float, float, float, float]) -> tuple[int, int, int, int]:
-    """First and last (exclusive) column and row, two of each at least, that hold a box of the plane and a cell more."""
+    """First column and row, end column and row (exclusive), at least two of each, around a box of the plane plus one
+    cell."""
     west, south, east, north = box
     edge = np.linspace(0.0, 1.0, 5)
     e = np.concatenate([west + edge * (east - west)] * 2 + [np.full(5, west), np.full(5, east)])
@@ -236,7 +244,7 @@ def _window(surface: Surface, box: tuple[float, float, float, float]) -> tuple[i
 
 
 def _zones(air: Airspace, limits: Limits) -> tuple[Floats, Floats]:
-    """Zones (Z, ZONE_COLUMNS) and the corners of polygons."""
+    """Zones (Z, ZONE_COLUMNS), and the corners (C, 2) of all polygons."""
     zones = np.zeros((len(air.zones), k.ZONE_COLUMNS))
     corners: list[Floats] = []
     reach = air.beside_m(limits)
@@ -264,7 +272,7 @@ def _level(level: Level | None, none: float, error: float) -> tuple[float, float
 
 
 def _middle(zone: Zone) -> float:
-    """Height of the sphere that stands for a zone: half-way up, or 0 where it has no ceiling."""
+    """Altitude of the centre of IB-ABC's sphere for a zone: half-way up, or 0 if the zone has no ceiling."""
     if zone.ceiling is None:
         return 0.0
     return 0.5 * (zone.ceiling.value_m + (zone.floor.value_m if zone.floor is not None else 0.0))

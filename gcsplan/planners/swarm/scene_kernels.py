@@ -1,4 +1,4 @@
-"""What the cost kernels share: a scene's numbers by name, heights and distances; and the kernels of ants and repair."""
+"""A scene's numbers by name, kernels for heights and distances, and the kernels of ants and repair."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ Singles = NDArray[np.float32]
 SCENE = "f4[,] f8[,] f4[,] f8[,] f8[] f8[,] f8[,]"
 """Forms of a scene's heights, quadratic, floors, floor_map, numbers, zones and corners."""
 
-# What the numbers of a scene are.
+# Indices of a scene's numbers.
 (
     MAX_AGL, MAX_AMSL, UP, DOWN, WEST, SOUTH, BOTTOM, EAST, NORTH, TOP, CENTRE_E, CENTRE_N, PER_UNIT,
     H_MIN, H_MAX, SPACING,
 ) = range(16)  # fmt: skip
 NUMBERS = 16
 
-# What the columns of a zone are: shape 0 a circle, else a polygon with so many corners from ``first``.
+# Columns of a zone. CORNERS: 0 for a circle, otherwise the number of corners of a polygon, which begin at row FIRST.
 ZE, ZN, ZR, REACH, Z_LOW, Z_HIGH, LOW_AGL, HIGH_AGL, CORNERS, FIRST, Z_MIDDLE = range(11)
 ZONE_COLUMNS = 11
 
-EDGE = 1e-6  # of a cell: float noise at the raster's edge
+EDGE = 1e-6  # tolerance at the raster's edge, in cells, for float noise
 
 
 @device
 def bilinear(raster: Singles, j: int | np.uint32, i: int | np.uint32, a: float, b: float) -> float:
-    """Between the nodes of the cell of row ``j`` and column ``i``, by its parts ``a`` along and ``b`` down."""
+    """Bilinear value in the cell of row ``j`` and column ``i``, at its parts ``a`` along the row and ``b`` down."""
     north = raster[j, i] + a * (raster[j, i + 1] - raster[j, i])
     south = raster[j + 1, i] + a * (raster[j + 1, i + 1] - raster[j + 1, i])
     return float(north + b * (south - north))
@@ -53,7 +53,7 @@ def height_at(heights: Singles, quadratic: Floats, numbers: Floats, e: float, n:
 
 @kernel("f4[,] f8[,] f8[] f8[,] f8[]")
 def heights_at(heights: Singles, quadratic: Floats, numbers: Floats, points: Floats, out: Floats) -> None:
-    """Bilinear heights under points (N, 2 or more) into ``out`` (N,)."""
+    """Write bilinear heights under points (N, 2 or more) to ``out`` (N,)."""
     for k in range(len(points)):
         out[k] = height_at(heights, quadratic, numbers, points[k, 0], points[k, 1])
 
@@ -62,7 +62,10 @@ def heights_at(heights: Singles, quadratic: Floats, numbers: Floats, points: Flo
 def place(
     raster: Singles, quadratic: Floats, numbers: Floats, x: Floats, y: Floats, column: Floats, row: Floats
 ) -> float:
-    """Columns and rows of all samples in a raster, and how many are off it. Straight arithmetic, on its own."""
+    """Write columns and rows of all samples in a raster; return how many are off it.
+
+    A loop of its own without branches, so that the compiler vectorises it.
+    """
     q, right, low = quadratic, raster.shape[1] - 1.0, raster.shape[0] - 1.0
     c0, c1, c2, c3, c4, c5 = q[0, 0], q[0, 1], q[0, 2], q[0, 3], q[0, 4], q[0, 5]
     r0, r1, r2, r3, r4, r5 = q[1, 0], q[1, 1], q[1, 2], q[1, 3], q[1, 4], q[1, 5]
@@ -80,7 +83,7 @@ def place(
 
 @device
 def darken(raster: Singles, column: Floats, row: Floats, out: Floats) -> None:
-    """NaN where a sample is off the raster."""
+    """Set ``out`` to NaN where a sample is off the raster."""
     right, low = raster.shape[1] - 1.0, raster.shape[0] - 1.0
     for t in range(len(out)):
         if column[t] < -EDGE or column[t] > right + EDGE or row[t] < -EDGE or row[t] > low + EDGE:
@@ -89,7 +92,7 @@ def darken(raster: Singles, column: Floats, row: Floats, out: Floats) -> None:
 
 @device
 def lookup(raster: Singles, column: Floats, row: Floats, off: float, out: Floats) -> None:
-    """Bilinear heights at places in a raster, ``off`` of them off it; NaN where unknown."""
+    """Write bilinear heights at places in a raster to ``out``, NaN where unknown; ``off`` places are off the raster."""
     rows, cols = raster.shape
     right, low = cols - 1.0, rows - 1.0
     last_i, last_j = np.int32(cols - 2), np.int32(rows - 2)
@@ -105,7 +108,7 @@ def lookup(raster: Singles, column: Floats, row: Floats, off: float, out: Floats
 def lookup_both(
     raster: Singles, other: Singles, column: Floats, row: Floats, off: float, out: Floats, other_out: Floats
 ) -> None:
-    """`lookup` in two rasters of one grid."""
+    """`lookup` in two rasters of the same grid."""
     rows, cols = raster.shape
     right, low = cols - 1.0, rows - 1.0
     last_i, last_j = np.int32(cols - 2), np.int32(rows - 2)
@@ -153,7 +156,7 @@ def gap_to(zone: Floats, corners: Floats, x: float, y: float) -> float:
 
 @kernel("f8[,,] f8 f8[,]")
 def clocks_of(paths: Floats, speed_m_s: float, out: Floats) -> None:
-    """Seconds from the start of ``paths`` (P, S, 3) at one speed into ``out`` (P, S)."""
+    """Write the seconds from the start of ``paths`` (P, S, 3), at constant speed, to ``out`` (P, S)."""
     for p in range(len(paths)):
         total = 0.0
         out[p, 0] = 0.0
@@ -168,17 +171,17 @@ def clocks_of(paths: Floats, speed_m_s: float, out: Floats) -> None:
 def nearness(
     paths: Floats, clocks: Floats, others: Floats, other_clocks: Floats, apart_m: float, soon_s: float, out: Floats
 ) -> None:
-    """MSFOA eq. 28–30 into ``out`` (P,): Σ (soon_s - gap)³ over pairs of points nearer than ``apart_m``.
+    """Write MSFOA eq. 28–30 to ``out`` (P,): Σ (soon_s - gap)³ over pairs of points closer than ``apart_m``.
 
-    ``paths`` (P, S, 3) with ``clocks`` (P, S) against ``others`` (Q, 3) with ``other_clocks`` (Q,), seconds.
-    No clock may fall along its path.
+    Compares ``paths`` (P, S, 3) with times ``clocks`` (P, S) to ``others`` (Q, 3) with times ``other_clocks`` (Q,), in
+    seconds. Times must not decrease along a path. ``gap`` is the time between two points, counted up to ``soon_s``.
     """
     square = apart_m * apart_m
     for p in range(len(paths)):
         total, first = 0.0, 0
         for i in range(paths.shape[1]):
             x, y, z, now = paths[p, i, 0], paths[p, i, 1], paths[p, i, 2], clocks[p, i]
-            # Both clocks rise: what is too long ago for this sample is so for all that follow.
+            # Times rise along both paths: a point that is too long ago for this sample is so for all later ones.
             while first < len(others) and now - other_clocks[first] >= soon_s:
                 first += 1
             for q in range(first, len(others)):
@@ -195,7 +198,7 @@ def nearness(
 def shut_by_zones(
     points: Floats, ground: Floats, low: Floats, high: Floats, zones: Floats, corners: Floats, out: NDArray[np.bool_]
 ) -> None:
-    """True in ``out`` (N,) where a zone leaves no room, over or under it, between ``low`` and ``high`` (N,)."""
+    """Write to ``out`` (N,) whether a zone closes all altitudes between ``low`` and ``high`` (N,) at a point."""
     for i in range(len(points)):
         out[i] = False
         for k in range(len(zones)):
@@ -216,8 +219,11 @@ def open_edges(
     starts: Floats, ends: Floats, step_m: float, grounded: bool, heights: Singles, quadratic: Floats, floors: Singles,
     floor_map: Floats, numbers: Floats, zones: Floats, corners: Floats, out: Floats,
 ) -> None:  # fmt: skip
-    """Lengths of straight edges from ``starts`` (A, 3) to ``ends`` (B, 3) into ``out`` (A, B); inf where a point of
-    one, no further than ``step_m`` from the next, is not allowed, or where it is too steep."""
+    """Write the lengths of straight edges from ``starts`` (A, 3) to ``ends`` (B, 3) to ``out`` (A, B).
+
+    They are inf if an edge is too steep, or if one of its points, at most ``step_m`` apart, is not allowed.
+    ``grounded``: the ceiling or a zone follows the ground.
+    """
     for a in range(len(starts)):
         for b in range(len(ends)):
             x, y, z = starts[a, 0], starts[a, 1], starts[a, 2]
