@@ -1,4 +1,4 @@
-"""Black-box optimisers on the unit box: numpy alone, and no word about aircraft, maps or missions.
+"""Black-box optimisers on the unit box. They use numpy alone and know nothing of aircraft, maps or missions.
 
 `gcsplan.optimisers.registry` lists them all, `gcsplan.optimisers.driver.minimise` runs one. An optimiser is a
 generator function: it yields a population (n, dim) in [0, 1] and is sent its costs (n,)::
@@ -12,5 +12,5 @@ generator function: it yields a population (n, dim) in [0, 1] and is sent its co
             better = f_tried < f
             x[better], f[better] = tried[better], f_tried[better]
 
-Add its row to the table, with its paper, and it is run, tested and listed like all others.
+Add a row with its paper to the table; then it is run, tested and listed like all others.
 """

@@ -1,8 +1,8 @@
 """Artificial bees: ABC (Karaboga 2005), and IB-ABC with B-ABC (Tan et al. 2023).
 
-The bees of one kind fly at once, from the places that the kind before left; the papers let them fly one by one.
-``group`` is the number of adjacent variables that make one element (a way point's coordinates; 1 on functions):
-elements are changed as a whole.
+All bees of one kind fly at once, from the sources that the kind before left; in the papers they fly one by one.
+``group`` is the number of adjacent variables that form one element (the coordinates of a way point; 1 on functions). An
+element is changed as a whole.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from gcsplan.optimisers.box import Indices, Run, Steps, clipped, keep_better, pa
 
 
 def abc(run: Run, *, limit: int, group: int) -> Steps:
-    """ABC: employed bees, onlookers by roulette on fitness, at most one scout a cycle; the best source is not exempt.
+    """ABC: employed bees, onlookers by roulette on fitness, at most one scout a cycle; it may replace the best source.
 
-    Each tries one element of its source: vⱼ = xⱼ + φ·(xⱼ − x_kj), k another source. A source's failures are counted,
-    one a bee that did not improve it.
+    Each bee tries to change one element of its source: vⱼ = xⱼ + φ·(xⱼ − x_kj), k another source. Each bee that does
+    not improve its source adds one to the source's failures; a scout replaces a source of more than ``limit`` failures.
     """
     x = run.first()
     f = yield x
@@ -34,14 +34,15 @@ def abc(run: Run, *, limit: int, group: int) -> Steps:
             _take_best_of_each(x, f, failures, chosen, tried, f_tried)
         spent = int(failures.argmax())
         if failures[spent] > limit:
-            # E Xu et al. eq. 4 adds rand·map(j) to the old place: a uniform redraw.
+            # E Xu et al. eq. 4 adds rand·map(j) to the old place; here the place is drawn anew, uniformly.
             x[spent] = run.rng.random(x.shape[1])
             f[spent] = (yield x[spent : spent + 1])[0]
             failures[spent] = 0
 
 
 def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group: int) -> Steps:
-    """IB-ABC, eq. 7-10: feedback μ from the counts of failure, two-element followers, scouts only when all are stuck.
+    """IB-ABC, eq. 7-10: feedback μ from counts of failures, followers that combine two other sources, and scouts only
+    when the mean count is high.
 
     ``scale`` bounds φ; ``spent_share`` is γ. Without ``feedback`` μ is 1: B-ABC, in our reading.
     """
@@ -51,10 +52,10 @@ def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group:
     f = yield x
     n, dim = x.shape
     elements = -(-dim // group)  # D
-    # E eq. 7: μ is 0/0 at the start; the counts Tr lie in [1, D], capped there (Th = L = D).
+    # E eq. 7: μ is 0/0 at the start; here the counts Tr are kept within [1, D] (Th = L = D).
     count = np.ones(n)
     for _ in run.cycles():
-        # Where D is 1 no count can exceed γD without meaning "just improved".
+        # At least 1, because with D = 1 even sources that just improved have a count above γD.
         if count.mean() > max(spent_share * elements, 1.0):  # eq. 10
             old = np.delete(np.arange(n), f.argmin())
             scouts = run.rng.permutation(old)[: max(1, round(spent_share * n))]
@@ -66,8 +67,8 @@ def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group:
             k, m = partners(run.rng, n, n, 2)
             phi = scale * run.rng.uniform(-1.0, 1.0, size=(n, 1))
             mu = (count / (count + count[k]))[:, None] if feedback else 1.0
-            # Eq. 7 starts from the source itself, eq. 9 from another; followers are given to the sources by descending
-            # fitness, one each, so that flying at once every source has its own.
+            # Eq. 7 starts from the source itself, eq. 9 from another. The paper assigns followers to sources by
+            # descending fitness, one each; when all fly at once this means one follower for every source.
             base = x[m] if following else x
             tried = clipped(np.where(_elements(run, n, dim, group), base + phi * (x[k] - x) * mu, x))
             improved |= keep_better(x, f, tried, (yield tried))
@@ -75,28 +76,28 @@ def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group:
 
 
 def roulette(rng: np.random.Generator, f: Floats, count: int) -> Indices:
-    """``count`` sources drawn in proportion to 1/(1 + f), or 1 + |f| where f < 0."""
+    """Draw ``count`` sources with probabilities in proportion to 1/(1 + f), or 1 + |f| where f < 0."""
     # E IB-ABC eq. 8 prints the same condition twice; the second case is f < 0.
     fitness = np.where(f >= 0.0, 1.0 / (1.0 + np.maximum(f, 0.0)), 1.0 + np.abs(f))
     edges = np.cumsum(fitness)
     drawn: Indices = np.searchsorted(edges, rng.random(count) * edges[-1], side="right")
-    drawn[drawn == len(f)] = len(f) - 1  # rounding, at the very end
+    drawn[drawn == len(f)] = len(f) - 1  # a draw at the very end may be rounded up
     return drawn
 
 
 def _one_element(run: Run, x: Floats, chosen: Indices, group: int) -> Floats:
-    """One bee for each of ``chosen``: one element moved along the line from another source."""
+    """Positions (n, dim) of bees, one for each of ``chosen``: one element moved along the line from another source."""
     n = len(x)
     other = run.rng.integers(0, n - 1, size=len(chosen))
     other += other >= chosen
-    # E Xu et al. eq. 3 prints rand for φ: uniform in [−1, 1].
+    # E Xu et al. eq. 3 prints rand for φ; here uniform in [−1, 1].
     phi = run.rng.uniform(-1.0, 1.0, size=(len(chosen), 1))
     mine = x[chosen]
     return clipped(np.where(_elements(run, len(chosen), run.dim, group), mine + phi * (mine - x[other]), mine))
 
 
 def _elements(run: Run, count: int, dim: int, group: int) -> NDArray[np.bool_]:
-    """(count, dim) mask of one element in each row."""
+    """Mask (count, dim) of one random element in each row."""
     chosen = run.rng.integers(0, -(-dim // group), size=(count, 1))
     mask: NDArray[np.bool_] = np.arange(dim) // group == chosen
     return mask
@@ -105,7 +106,7 @@ def _elements(run: Run, count: int, dim: int, group: int) -> NDArray[np.bool_]:
 def _take_best_of_each(
     x: Floats, f: Floats, failures: Indices, chosen: Indices, tried: Floats, f_tried: Floats
 ) -> None:
-    """Several bees may have tried one source: the best of them, if it improves, takes the source."""
+    """Replace each source by the best bee that tried it, if it improves, and update the failures, in place."""
     best_first = np.argsort(f_tried, kind="stable")
     sources, where = np.unique(chosen[best_first], return_index=True)
     best = best_first[where]

@@ -1,4 +1,4 @@
-"""What the update rules share: the state of a run as a rule sees it, bounds, partners, the best of a population."""
+"""Parts shared by the update rules: the state of a run, bounds, partners, distances, greedy replacement."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from gcsplan.arrays import Floats
 
 Indices = NDArray[np.intp]
 Steps = Generator[Floats, Floats, None]
-"""An optimiser at work: yields populations (n, dim) in [0, 1]; is sent their costs (n,), finite, its own to change."""
+"""A running optimiser: yields populations (n, dim) in [0, 1]; is sent their finite costs (n,), which it may change."""
 
 WORST = 1e100
-"""What a rule is told of a cost that is not finite, or is beyond it: squares and sums of it stay finite."""
+"""Cost that a rule receives for one that is larger or not finite; its squares and sums stay finite."""
 
 
 @dataclass(slots=True)
 class Run:
-    """What an update rule may know of its run; the driver makes it and counts ``evaluations``.
+    """The state of a run for its update rule; the driver makes it and counts ``evaluations``.
 
-    ``iterations`` and ``evaluations_limit`` are the budget, at least one of them given; ``start`` (m, dim) are points
-    that take the first places of the first population. ``elapsed`` is the share of the budget that was spent when the
-    present iteration began: t / T with t from 0 where iterations are what is limited.
+    ``iterations`` and ``evaluations_limit`` are the budget; at least one of them is set. ``start`` (m, dim): points
+    that take the first places of the first population. ``elapsed``: share of the budget that was spent when the current
+    iteration began; with a limit of iterations alone t / T, with t from 0.
     """
 
     rng: np.random.Generator
@@ -41,14 +41,14 @@ class Run:
 
     @property
     def horizon(self) -> float:
-        """T, the number of iterations planned; where evaluations alone are limited, as many as whole populations."""
+        """T, the number of planned iterations; if only evaluations are limited, their number over the population."""
         if self.iterations is not None:
             return float(self.iterations)
         assert self.evaluations_limit is not None
         return max(1.0, self.evaluations_limit / self.population)
 
     def first(self, count: int | None = None) -> Floats:
-        """The first population (count, dim), uniform in the box; ``count`` is the population unless given."""
+        """The first population (count, dim): ``start``, then uniform in the box. Default ``count``: the population."""
         x = self.rng.random((self.population if count is None else count, self.dim))
         given = self.start[: len(x)]
         if given.size:
@@ -56,7 +56,7 @@ class Run:
         return x
 
     def cycles(self) -> Iterator[int]:
-        """Count the iterations from 0 until the budget's number; keeps ``iteration`` and ``elapsed``."""
+        """Yield the iterations from 0 to the budget's number, and update ``iteration`` and ``elapsed``."""
         self._first_cost, self.in_cycles = self.evaluations, True
         while self.iterations is None or self.iteration < self.iterations:
             self.elapsed = self._spent()
@@ -71,33 +71,33 @@ class Run:
 
 
 def clipped(x: Floats) -> Floats:
-    """``x`` itself, every value moved to the nearest in [0, 1]."""
+    """Clip ``x`` to [0, 1] in place and return it."""
     return np.clip(x, 0.0, 1.0, out=x)
 
 
 def partners(rng: np.random.Generator, count: int, among: int, how_many: int) -> list[Indices]:
-    """For each row i of ``count``: ``how_many`` different indices below ``among``, none of them i; uniform, no retries.
+    """Draw for each row i of ``count`` ``how_many`` different indices below ``among``, none of them i; uniform.
 
-    Returned as ``how_many`` arrays (count,). ``among`` must exceed ``how_many``.
+    Returns ``how_many`` arrays (count,). ``among`` must exceed ``how_many``. Draws without retries.
     """
     taken = [np.arange(count)]
     for k in range(1, how_many + 1):
         drawn = rng.integers(0, among - k, size=count)
         for other in np.sort(np.stack(taken), axis=0):
-            drawn += drawn >= other  # skip what is taken, lowest first
+            drawn += drawn >= other  # skip taken indices, lowest first
         taken.append(drawn)
     return taken[1:]
 
 
 def rms_distances(x: Floats) -> Floats:
-    """(n, n) distances ‖xᵢ − xⱼ‖ / √dim; exact differences, since rules compare them when all have nearly met."""
+    """Distances (n, n) ‖xᵢ − xⱼ‖ / √dim, from differences: they stay exact when the population has nearly converged."""
     gap = x[:, None, :] - x[None, :, :]
     squares: Floats = np.einsum("ijk,ijk->ij", gap, gap) / x.shape[1]
     return np.sqrt(squares)
 
 
 def keep_better(x: Floats, f: Floats, tried: Floats, f_tried: Floats) -> NDArray[np.bool_]:
-    """Greedy replacement in place: rows of ``tried`` that cost less. Returns which."""
+    """Replace rows of ``x`` and ``f`` by those of ``tried`` that cost less, in place; return which (n,)."""
     better = f_tried < f
     x[better] = tried[better]
     f[better] = f_tried[better]

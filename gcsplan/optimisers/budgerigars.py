@@ -1,7 +1,7 @@
 """Parrots and budgerigars: PO (Lian et al. 2024) and ABO (Li et al. 2024), eq. 8-13 of the latter.
 
-``origin`` is the point, in unit coordinates, that the rule's bare positions (P_mean, P_best, P_i) refer to: the rule is
-drawn to it. At 0.5, the middle of the box, every function with its optimum there is flattered.
+``origin`` is the point, in unit coordinates, from which the rule's bare positions (P_mean, P_best, P_i) are measured;
+the rule pulls towards it. At 0.5, the middle of the box, it has an advantage on functions with their optimum there.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ BEHAVIOURS = 4
 
 
 def abo(run: Run, *, alpha: float, beta: float, origin: float, stay_step: float, talk: str) -> Steps:
-    """ABO: one of four behaviours for each individual, all alike probable; what results replaces it, be it worse.
+    """ABO: one of four equally probable behaviours for each individual; the result replaces it even if it is worse.
 
-    ``alpha`` and ``beta`` are the dependency coefficients, 1 or more; both 1 is the Parrot Optimizer. ``stay_step`` is
-    the most that staying moves along the diagonal (eq. 11). ``talk`` is "added" or "printed" (eq. 12).
+    ``alpha`` and ``beta`` are the dependency coefficients, 1 or more; with both 1 this is the Parrot Optimizer.
+    ``stay_step``: most by which staying moves along the diagonal (eq. 11). ``talk``: "added" or "printed" (eq. 12).
+    Raises InputError for other values.
     """
     for what, given in (("alpha", alpha), ("beta", beta)):
-        if given < 1.0:  # else (α − t/T) turns negative under a broken power
+        if given < 1.0:  # otherwise (α − t/T) becomes negative, and its fractional power is not real
             raise InputError(f"abo: {what} must be 1 or more, given {given}")
     if talk not in ("added", "printed"):
         raise InputError(f"abo: talk must be added or printed, given {talk!r}")
@@ -40,19 +41,19 @@ def abo(run: Run, *, alpha: float, beta: float, origin: float, stay_step: float,
         flight = levy(run.rng, (n, dim))
         mean = x.mean(axis=0)
         moved = np.empty_like(x)
-        # E all: eq. 8, 11 and 12 use bare positions and so pull to the coordinates' origin; hence ``origin``.
+        # E in all: eq. 8, 11 and 12 use bare positions and so pull to the origin of the coordinates; hence ``origin``.
 
         i = behaviour == 0  # searching, eq. 8
         pull = (alpha - share) ** ((alpha + 1.0) * share)
         moved[i] = origin + (x[i] - best) * flight[i] + r1[i] * pull * (mean - origin)
 
-        i = behaviour == 1  # staying; E eq. 11: rand·1 is at most 1 m of 100, hence the step
+        i = behaviour == 1  # staying; E eq. 11: rand·1 is at most 1 m in 100 m, hence ``stay_step``
         moved[i] = x[i] + (best - origin) * flight[i] + r1[i] * stay_step
 
         i = behaviour == 2  # communicating, eq. 12
         flown = 0.2 * r1[i] * (beta - share) * (x[i] - mean)
         alone = 0.2 * r1[i] * np.exp(-share / np.maximum(r2[i], np.finfo(float).tiny)) * (x[i] - origin)
-        # E eq. 12 replaces P_i by a small term near the origin; the Parrot Optimizer's own code adds the term.
+        # E eq. 12 replaces P_i by a small term near the origin; the Parrot Optimizer's code adds the term to P_i.
         moved[i] = (x[i] if talk == "added" else origin) + np.where(coin[i] <= 0.5, flown, alone)
 
         i = behaviour == 3  # escaping, eq. 13
@@ -66,8 +67,8 @@ def abo(run: Run, *, alpha: float, beta: float, origin: float, stay_step: float,
 
 
 def levy(rng: np.random.Generator, shape: tuple[int, int]) -> Floats:
-    """Levy flights by Mantegna's way, eq. 10."""
-    # E eq. 10: σ's exponent is 1/γ and its denominator's power of 2 is (γ − 1)/2; u has σ already.
+    """Levy flights of ``shape`` by Mantegna's method, eq. 10."""
+    # E eq. 10: the exponent of σ is 1/γ and the power of 2 in its denominator (γ − 1)/2; u contains σ already.
     u = rng.normal(0.0, LEVY_SPREAD, size=shape)
     v = rng.normal(0.0, 1.0, size=shape)
     return u / np.maximum(np.abs(v), np.finfo(float).tiny) ** (1.0 / LEVY_POWER)

@@ -1,4 +1,4 @@
-"""Particle swarm and differential evolution: the baselines that every paper compares with."""
+"""Particle swarm and differential evolution: the baselines of every paper."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gcsplan.optimisers.box import Run, Steps, clipped, keep_better, partners
 def pso(
     run: Run, *, inertia_first: float, inertia_last: float, own_pull: float, swarm_pull: float, top_speed: float
 ) -> Steps:
-    """Particle swarm: all move, then all are judged; zero first velocity, speed limited, stopped at a bound."""
+    """Particle swarm: all move, then all are evaluated; first velocity 0, limited speed, particles stop at bounds."""
     x = run.first()
     own = x.copy()
     f_own = yield x
@@ -27,7 +27,8 @@ def pso(
 
 
 def de(run: Run, *, scale_least: float, scale_most: float, crossover: float) -> Steps:
-    """rand/1/bin: mutant a + F·(b − c) of three others, binomial crossover, greedy; reflected at a bound."""
+    """Differential evolution rand/1/bin: mutant a + F·(b − c) of three others, binomial crossover, greedy replacement;
+    reflected at a bound."""
     x = run.first()
     f = yield x
     n, dim = x.shape
@@ -38,6 +39,6 @@ def de(run: Run, *, scale_least: float, scale_most: float, crossover: float) -> 
         mutant = np.where(mutant < 0.0, -mutant, mutant)
         mutant = np.where(mutant > 1.0, 2.0 - mutant, mutant)
         crossed = run.rng.random((n, dim)) < crossover
-        crossed[np.arange(n), run.rng.integers(0, dim, size=n)] = True  # at least one comes from the mutant
+        crossed[np.arange(n), run.rng.integers(0, dim, size=n)] = True  # at least one variable is the mutant's
         tried = clipped(np.where(crossed, mutant, x))
         keep_better(x, f, tried, (yield tried))

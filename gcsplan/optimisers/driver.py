@@ -1,4 +1,4 @@
-"""One driver for every optimiser: seed, bounds, exact budget, best so far, history, stopping."""
+"""The driver of all optimisers: seed, bounds, exact budget, best so far, history, stopping."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from gcsplan.optimisers.box import WORST, Run
 from gcsplan.optimisers.registry import Entry, get
 
 Cost = Callable[[Floats], NDArray[np.floating]]
-"""A batch objective: (n, dim) in [0, 1] to costs (n,). It must not change its argument."""
+"""A batch objective: from points (n, dim) in [0, 1] to costs (n,). It must not change its argument."""
 
 StoppedBy = Literal["iterations", "evaluations", "target", "told"]
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """A run after one batch: what `minimise` tells while it goes on. ``x`` (dim,) is the best point so far."""
+    """A run after one batch, as `minimise` reports it. ``x`` (dim,) is the best point so far, ``cost`` its cost."""
 
     iteration: int
     evaluations: int
@@ -33,26 +33,26 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """After each batch, in order (m,): cost evaluations so far, the iteration it was of (0 the first), best cost."""
+    """For each batch in order (m,): cost evaluations so far, its iteration (0: first population), best cost so far."""
 
     evaluations: NDArray[np.int64]
     iterations: NDArray[np.int64]
     cost: Floats
 
     def by_iteration(self) -> Floats:
-        """Best cost at the end of each iteration, the first population's at [0]; (iterations begun + 1,)."""
+        """Best cost at the end of each iteration, (iterations begun + 1,); [0] is after the first population."""
         last = np.searchsorted(self.iterations, np.arange(self.iterations[-1] + 1), side="right") - 1
         return self.cost[last]
 
     def at_evaluations(self, counts: ArrayLike) -> Floats:
-        """Best cost known after as many evaluations as each of ``counts`` says; inf before the first batch's end."""
+        """Best cost known after each number of evaluations in ``counts``; inf before the end of the first batch."""
         place = np.searchsorted(self.evaluations, np.asarray(counts), side="right") - 1
         return np.where(place < 0, np.inf, self.cost[np.maximum(place, 0)])
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """The best point (dim,) that was evaluated, its cost (inf where no cost was finite), and what it took."""
+    """The best point ``x`` (dim,) that was evaluated, its cost (inf if no cost was finite), and a record of the run."""
 
     x: Floats
     cost: float
@@ -83,13 +83,13 @@ def minimise(
         optimiser: a name of `gcsplan.optimisers.registry`, or a row of your own.
         cost: batch objective, (n, dim) to (n,). A value that is not finite counts as the worst.
         dim: number of variables, 1 or more.
-        population: size of the swarm; the row's own unless given.
-        iterations: rounds of the update rule after the first population; the row's own where ``evaluations`` is
-            missing too.
-        evaluations: most cost evaluations (rows handed to ``cost``), used exactly: a last batch is cut. With both
-            given, the first to be reached ends the run.
+        population: size of the swarm; default: that of the row.
+        iterations: rounds of the update rule after the first population; default: that of the row, unless
+            ``evaluations`` is set.
+        evaluations: most cost evaluations (rows passed to ``cost``), used exactly: the last batch is cut. If both are
+            set, the run ends at whichever is reached first.
         seed: a whole number, or a generator to draw from.
-        parameters: the rule's own, on top of the row's defaults.
+        parameters: those of the rule; they replace the row's defaults.
         target: stop after the batch that finds this cost or less.
         start: (m, dim) points that take the first places of the first population.
         tell: called after each batch; return True to stop.
@@ -139,7 +139,7 @@ def _start(start: ArrayLike | None, dim: int) -> Floats:
 
 
 class _Book:
-    """Evaluates batches and keeps the account of a run."""
+    """Evaluates batches and records a run."""
 
     def __init__(self, run: Run, cost: Cost, target: float | None, tell: Callable[[State], bool | None] | None) -> None:
         self.run = run
@@ -151,7 +151,7 @@ class _Book:
         self.trace: list[tuple[int, int, float]] = []
 
     def evaluate(self, batch: Floats) -> tuple[Floats, StoppedBy | None]:
-        """Costs of ``batch`` (cut to what the budget still holds), and why to stop, or None."""
+        """Costs of ``batch``, cut to the rest of the budget, and the reason to stop, or None."""
         run = self.run
         limit = run.evaluations_limit
         if limit is not None:

@@ -1,8 +1,8 @@
 """Fruit flies: FOA (Pan 2012), IFFO (Pan et al. 2014), MFOA (Yuan et al. 2014), MSFOA (Shi et al. 2020).
 
-Equation numbers are those of Shi et al. FOA's smell judgement S = 1/D (eq. 3) needs D ≥ 1 to stay in [0, 1], which the
-unit square cannot give; MSFOA replaces it by the distance itself (eq. 31), an encoding with two hidden variables for
-each coordinate. Here is the search alone: places of swarms, and flies around them.
+Equation numbers are those of Shi et al. FOA's smell judgement S = 1/D (eq. 3) stays in [0, 1] only for D ≥ 1, which
+does not hold in the unit square. MSFOA uses the distance itself (eq. 31), an encoding with two hidden variables for
+each coordinate. This module holds the search alone: places of swarms, and flies around them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from gcsplan.optimisers.box import Indices, Run, Steps, clipped, keep_better
 
 
 def foa(run: Run, *, step: float) -> Steps:
-    """One swarm: flies uniform around its place, the swarm moves to the best fly if that is better (eq. 1-6)."""
+    """FOA: flies uniform around the place of one swarm, which moves to the best fly if that is better (eq. 1-6)."""
     centre = run.first(1)
     f = yield centre
     for _ in run.cycles():
@@ -26,7 +26,7 @@ def foa(run: Run, *, step: float) -> Steps:
 
 
 def iffo(run: Run, *, radius_most: float, radius_least: float) -> Steps:
-    """Pan et al. 2014: each fly changes one dimension of the place, within a radius that falls exponentially."""
+    """IFFO (Pan et al. 2014): each fly changes one dimension of the place, within a radius that falls exponentially."""
     centre = run.first(1)
     f = yield centre
     n = run.population
@@ -40,9 +40,9 @@ def iffo(run: Run, *, radius_most: float, radius_least: float) -> Steps:
 
 
 def mfoa(run: Run, *, swarms: int, power: float, radius: float) -> Steps:
-    """Yuan et al. 2014: several swarms, radius R·((T − t)/T)^power; the mean of their places is one more candidate.
+    """MFOA (Yuan et al. 2014): several swarms, radius R·((T − t)/T)^power, and the mean of their places as a candidate.
 
-    Where that mean is better than the best place it takes it: our reading.
+    If the mean is better than the best place, it replaces that place (our reading).
     """
     _check_swarms("mfoa", run, swarms)
     centres = run.first(swarms)
@@ -61,8 +61,9 @@ def msfoa(
 ) -> Steps:
     """MSFOA, eq. 7-19: global or local search for each swarm, then a competition with offspring.
 
-    A swarm searches globally while its cost is above ``threshold``, locally below; None is half the best first cost.
-    ``own_share`` is coe₂, the fly's share in its child; the rest, coe₁, is the old best of a swarm drawn for each fly.
+    A swarm searches globally while its cost is above ``threshold``, locally otherwise; None: the best first cost minus
+    half its size. ``own_share`` is coe₂, the share of the fly in its child; the rest, coe₁, is the share of the best
+    fly of a swarm drawn for each child.
     """
     _check_swarms("msfoa", run, swarms)
     centres = run.first(swarms)
@@ -71,18 +72,18 @@ def msfoa(
     home = np.arange(run.population) % swarms
     for _ in run.cycles():
         u = run.rng.uniform(-1.0, 1.0, size=(run.population, run.dim))
-        # E steps 14 and 19 jump to 8 and 5, back to the parents and to a new start: the offspring stay offspring, and
-        # the next iteration goes on from the swarms' places (13 and 6 are meant).
+        # E steps 14 and 19 jump to 8 and 5, that is back to the parents and to a new start. Steps 13 and 6 are meant:
+        # the offspring are used, and the next iteration continues from the places of the swarms.
         far = (f > level)[home, None]
         # D: both steps are shares of the unit box (eq. 7-10 print 1 and R).
         flies = centres[home] + np.where(far, global_step * np.sin(math.pi / 2.0 * u), local_step * u)
         f_flies = yield clipped(flies)
         best = _best_of_each(f_flies, home, swarms)
-        # E Algorithm 2 leaves out the random(1, G) of eq. 14, and nests the loop over the offspring wrongly.
+        # E Algorithm 2 omits the random(1, G) of eq. 14, and nests the loop over the offspring wrongly.
         parent = best[run.rng.integers(0, swarms, size=run.population)]
         children = clipped((1.0 - own_share) * flies[parent] + own_share * flies)
         f_children = yield children
-        # E eq. 18-19 order old, new and present in a chain; the best of the three stays.
+        # E eq. 18-19 compare old, new and current place in a chain; here the best of the three stays.
         _move(centres, f, flies, f_flies, home)
         _move(centres, f, children, f_children, home)
 
@@ -93,12 +94,12 @@ def _check_swarms(name: str, run: Run, swarms: int) -> None:
 
 
 def _best_of_each(f_flies: Floats, home: Indices, swarms: int) -> Indices:
-    """(swarms,): the best fly of each swarm."""
+    """Index of the best fly of each swarm, (swarms,)."""
     order = np.lexsort((f_flies, home))
     return order[np.searchsorted(home[order], np.arange(swarms))]
 
 
 def _move(centres: Floats, f: Floats, flies: Floats, f_flies: Floats, home: Indices | None = None) -> None:
-    """Each swarm's place moves to its best fly where that is better, in place."""
+    """Move each swarm's place to its best fly if that is better, in place; without ``home`` there is one swarm."""
     best = np.array([f_flies.argmin()]) if home is None else _best_of_each(f_flies, home, len(centres))
     keep_better(centres, f, flies[best], f_flies[best])

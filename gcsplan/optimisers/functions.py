@@ -1,4 +1,4 @@
-"""The nine benchmark functions of Feng et al. 2024 (Electronics 13, 68), table 1, plain and with the optimum moved."""
+"""The nine benchmark functions of Feng et al. 2024 (Electronics 13, 68), table 1, plain and with a moved optimum."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import numpy as np
 from gcsplan.arrays import Floats
 
 SHIFT_SEED = 2024
-SHIFT_SHARE = 0.6  # an optimum moves by at most this share of the half range, in each dimension by its own
+SHIFT_SHARE = 0.6  # an optimum moves by at most this share of the half range, differently in each dimension
 
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """One function to minimise, its least value 0.
+    """One function to minimise; its minimum is 0.
 
-    ``value`` takes points (n, D) in the paper's coordinates within ±``reach`` and gives (n,). ``optimum`` is the
-    coordinate of the optimum, the same in every dimension. A ``noisy`` one has uniform [0, 1) added at each evaluation.
+    ``value`` maps points (n, D) in the paper's coordinates, within ±``reach``, to (n,). ``optimum``: coordinate of the
+    optimum, the same in every dimension. ``noisy``: a uniform number in [0, 1) is added at each evaluation.
     """
 
     name: str
@@ -31,12 +31,12 @@ class Function:
     noisy: bool = False
 
     def shift(self, dim: int) -> Floats:
-        """How far the moved optimum lies from the plain one, (dim,); fixed, and never past the box."""
+        """Vector (dim,) from the plain optimum to the moved one; fixed, and never out of the box."""
         share: Floats = np.random.default_rng(SHIFT_SEED).uniform(-SHIFT_SHARE, SHIFT_SHARE, dim)
         return self.reach * share
 
     def optimum_unit(self, dim: int, *, shifted: bool = False) -> Floats:
-        """The optimum in the unit box, (dim,)."""
+        """The optimum (dim,) in the unit box."""
         place = np.full(dim, self.optimum)
         if shifted:
             place += self.shift(dim)
@@ -44,7 +44,7 @@ class Function:
         return unit
 
     def resolution(self, dim: int, *, shifted: bool = False) -> float:
-        """What the function is worth one step of double precision off its optimum: less cannot be told apart."""
+        """Value one step of double precision away from the optimum; smaller values cannot be distinguished from 0."""
         place = self.optimum_unit(dim, shifted=shifted)
         beside = np.stack([np.nextafter(place, end) for end in (0.0, 1.0)])
         return float(self.on_unit_box(dim, shifted=shifted)(beside).max())
@@ -52,7 +52,7 @@ class Function:
     def on_unit_box(
         self, dim: int, *, shifted: bool = False, noise: np.random.Generator | None = None
     ) -> Callable[[Floats], Floats]:
-        """The function of points (n, dim) in [0, 1]; a noisy one without ``noise`` to draw from stays bare."""
+        """The function over points (n, dim) in [0, 1]; a noisy one has no noise if ``noise`` is None."""
         shift = self.shift(dim) if shifted else np.zeros(dim)
 
         def cost(u: Floats) -> Floats:
@@ -100,7 +100,7 @@ def rastrigin(x: Floats) -> Floats:
 
 def ackley(x: Floats) -> Floats:
     """f8."""
-    # E table 1, f8: the bracket of the second exp closes too late; 20 + e stand outside, and 1/30 is 1/n.
+    # E table 1, f8: the bracket of the second exp closes too late; 20 + e belongs outside, and 1/30 is 1/n.
     n = x.shape[1]
     far: Floats = np.exp(-0.2 * np.sqrt(_sum(x * x) / n))
     waves: Floats = np.exp(_sum(np.cos(2.0 * math.pi * x)) / n)

@@ -1,6 +1,6 @@
 """Krill: foraging, enemy avoidance and cruising (Xu, Zhu, Sun 2024, Biomimetics 9, 353), eq. 5-8 and fig. 5-9.
 
-Distances are ‖·‖/√dim, so that the range and the step mean the same in every dimension.
+Distances are ‖·‖/√dim, so that range and step have the same meaning for every number of dimensions.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from gcsplan.optimisers.box import Run, Steps, clipped, rms_distances
 
 
 def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int) -> Steps:
-    """Every krill avoids enemies and cruises, and keeps the better of the two; either becomes foraging if it fails.
+    """Each krill avoids enemies and cruises, and keeps the better result; where one of the two fails, it forages.
 
-    ``sight`` is U, ``crowding`` δ, ``attempts`` T of foraging. The better result replaces the krill, be it worse.
+    ``sight`` is U, ``crowding`` δ, ``attempts`` T of foraging. The better result replaces the krill even if it is worse
+    than the krill was.
     """
     x = run.first()
     f = yield x
@@ -27,17 +28,17 @@ def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int
         seen = rms_distances(x) < sight
         seen[everyone, everyone] = False
         around = seen.sum(axis=1)
-        # E crowding Y_c/n_f < δ·Y_i compares food as a cost, and any ratio depends on the cost's offset; by rank: go if
-        # the target is better and fewer than δ·N crowd there.
+        # E crowding Y_c/n_f < δ·Y_i compares food as a cost, and any ratio depends on the cost's offset. Here a krill
+        # goes if the target is better and fewer than δ·N krill are there.
         roomy = (around > 0) & (around < crowding * n)
 
-        # Enemy avoidance. E eq. 8 writes the centre of two: the mean of the neighbours in sight.
+        # Enemy avoidance. E eq. 8 prints the centre of two krill; here the mean of all neighbours in sight.
         centre = seen @ x / np.maximum(around, 1)[:, None]
         f_centre = np.full(n, np.inf)
         if roomy.any():
             f_centre[roomy] = yield clipped(centre[roomy])
 
-        # Cruising. E prints Y_c where Y_j is meant; the crowd counted is the one around X_j.
+        # Cruising. E prints Y_c where Y_j is meant; the crowd is counted around X_j.
         lead = np.where(seen, f, np.inf).argmin(axis=1)
         cruises = (around > 0) & (f[lead] < f) & (around[lead] < crowding * n)
 
@@ -55,7 +56,7 @@ def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int
 
 
 def towards(rng: np.random.Generator, x: Floats, target: Floats, step: float) -> Floats:
-    """Eq. 6: a random part of one step from each of ``x`` (n, dim) in the direction of its target."""
+    """Move each of ``x`` (n, dim) by a random part of one step towards its target (eq. 6)."""
     way = target - x
     length = np.sqrt((way * way).mean(axis=1, keepdims=True))
     return x + rng.random((len(x), 1)) * step * way / np.where(length > 0.0, length, 1.0)
@@ -64,7 +65,7 @@ def towards(rng: np.random.Generator, x: Floats, target: Floats, step: float) ->
 def forage(
     rng: np.random.Generator, x: Floats, f: Floats, sight: float, step: float, attempts: int
 ) -> Generator[Floats, Floats, Floats]:
-    """Fig. 5: look at random places in sight, step towards the first that is better; after T looks, step at random."""
+    """Forage (fig. 5): try random places in sight, step towards the first better one; after T tries, step at random."""
     moved = np.empty_like(x)
     hungry: NDArray[np.intp] = np.arange(len(x))
     for _ in range(attempts):

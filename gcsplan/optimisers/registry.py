@@ -1,8 +1,8 @@
-"""The table of all optimisers: what each is, its paper and equations, its defaults. Cheap to import.
+"""The table of all optimisers: summary, paper, equations and defaults of each. Fast to import.
 
-An optimiser is listed here and nowhere else: the driver runs, the tests test and the benchmarks compare what stands in
-this table. ``population`` is the number of solutions a swarm holds; what an iteration evaluates is a multiple of it
-(``evaluations_per_iteration``, in words), so compare by equal evaluations as well.
+An optimiser is listed here and nowhere else: the driver, the tests and the benchmarks use this table. ``population`` is
+the number of solutions in a swarm. One iteration evaluates a multiple of it (``evaluations_per_iteration``, in words),
+so comparisons should use equal evaluations too.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ Value = float | int | bool | str | None
 class Entry:
     """One optimiser.
 
-    ``update`` is "module:function" of its update rule, a module of this package unless dotted, imported on the first
-    call only; or the function itself. ``equations`` are the paper's numbers. ``loses_to_random`` is empty, or says why
-    the rule does not beat random search of equal evaluations on a shifted Sphere and Rastrigin of 30 dimensions.
+    ``update`` is "module:function" of its update rule (a module of this package unless dotted, imported only on the
+    first call), or the function itself. ``equations`` are numbers in the paper. ``loses_to_random`` is empty, or states
+    why the rule does not beat random search of equal evaluations on a shifted Sphere and Rastrigin of 30 dimensions.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Entry:
         return cast("Callable[..., Steps]", getattr(import_module(where), function))
 
     def with_defaults(self, parameters: Mapping[str, object] | None = None) -> dict[str, object]:
-        """The defaults with ``parameters`` on top. Raises InputError for an unknown name or kind of value."""
+        """The defaults, replaced by ``parameters``. Raises InputError for an unknown name or a wrong kind of value."""
         given = dict(parameters or {})
         for name, value in given.items():
             if name not in self.defaults:
@@ -69,7 +69,7 @@ def _fits(value: object, usual: Value) -> bool:
         return isinstance(value, int) and value >= 1
     if isinstance(usual, str):
         return isinstance(value, str)
-    # NaN is the one number that differs from itself.
+    # A number equals itself unless it is NaN.
     return (value is None and usual is None) or (isinstance(value, (int, float)) and value == value)
 
 
@@ -300,7 +300,7 @@ def names() -> tuple[str, ...]:
 
 
 def get(name: str) -> Entry:
-    """The optimiser called ``name``. Raises InputError that names the nearest known one."""
+    """The optimiser called ``name``. Raises InputError if it is unknown, with the closest known name."""
     entry = TABLE.get(name)
     if entry is None:
         raise unknown_name(f"there is no optimiser {name!r}", name, TABLE)

@@ -1,9 +1,9 @@
-"""Grey wolves: GWO and its children MGWO, IGWO, SOGWO, SSGWO.
+"""Grey wolves: GWO and its variants MGWO, IGWO, SOGWO, SSGWO.
 
-Equation numbers are those of Feng et al. 2024 (Electronics 13, 68), which restates GWO in its own (1)-(12).
+Equation numbers are those of Feng et al. 2024 (Electronics 13, 68), which restates GWO as its (1)-(12).
 
-``origin`` is the point that the rule's |C·leader − x| and multiples of positions refer to, in unit coordinates: the
-rule pulls towards it. At 0.5, the middle of the box, every function with its optimum there is flattered.
+``origin`` is the point, in unit coordinates, from which |C·leader − x| and multiples of positions are measured; the
+rule pulls towards it. At 0.5, the middle of the box, it has an advantage on functions with their optimum there.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ANNEALING_SHARE = 0.95  # η of eq. 25
 
 
 def gwo(run: Run, *, origin: float) -> Steps:
-    """Grey wolf optimizer (Mirjalili et al. 2014), eq. 1-12: every wolf to the mean of what three leaders tell it."""
+    """Grey wolf optimizer (Mirjalili et al. 2014), eq. 1-12: each wolf moves to the mean of three leaders' targets."""
     x = run.first()
     f = yield x
     pack = Pack(x, f)
@@ -34,10 +34,10 @@ def gwo(run: Run, *, origin: float) -> Steps:
 
 
 def mgwo(run: Run, *, origin: float) -> Steps:
-    """Our reading of MGWO (Zhang 2021), of which the SSGWO paper names no more than three parts.
+    """Our reading of MGWO (Zhang 2021), of which the SSGWO paper names only three parts.
 
     An exponential convergence factor a = 2·(1 − (e^(t/T) − 1)/(e − 1)); weights wₖ ∝ 1/(fₖ − f_α + ε) of the leaders
-    with ε = |f_δ − f_α| + 1e−12; and a move that is kept only if it improves.
+    with ε = |f_δ − f_α| + 1e−12; and moves that are kept only if they improve.
     """
     x = run.first()
     f = yield x
@@ -49,11 +49,12 @@ def mgwo(run: Run, *, origin: float) -> Steps:
         tried = clipped(np.tensordot(weight / weight.sum(), told, axes=1))
         f_tried = yield tried
         keep_better(x, f, tried, f_tried)
-        pack = Pack(x, f)  # the best three ever are still in their places
+        pack = Pack(x, f)  # moves are greedy, so the best three ever are in the population
 
 
 def igwo(run: Run, *, origin: float) -> Steps:
-    """Improved GWO (Nadimi-Shahraki et al. 2021): GWO's move or one learnt from neighbours, if either improves."""
+    """Improved GWO (Nadimi-Shahraki et al. 2021): the better of GWO's move and one learnt from neighbours, if it
+    improves."""
     x = run.first()
     f = yield x
     n = len(x)
@@ -70,7 +71,7 @@ def igwo(run: Run, *, origin: float) -> Steps:
 
 
 def sogwo(run: Run, *, origin: float) -> Steps:
-    """Selective opposition GWO (Dhargupta et al. 2020): wolves unlike α jump to the far side before GWO's move."""
+    """Selective opposition GWO (Dhargupta et al. 2020): wolves unlike α are mirrored in the box before GWO's move."""
     x = run.first()
     f = yield x
     pack = Pack(x, f)
@@ -101,8 +102,8 @@ def ssgwo(run: Run, *, origin: float, factor: str, leaders: str) -> Steps:
         first, others = order[:PACK], order[PACK:]
         tried = np.empty_like(x)
         if leaders == "apart":
-            # E eq. 17-19: as printed no X_i is in them, and with b ≥ 0 they lead β and δ away from α; Algorithm 1
-            # updates A and C, which only eq. 6-11 use. So these serve the others, eq. 17-19 the leaders alone.
+            # E eq. 17-19: as printed they do not contain X_i, and with b ≥ 0 they move β and δ away from α; Algorithm 1
+            # updates A and C, which only eq. 6-11 use. So the others move by eq. 6-11, only the leaders by eq. 17-19.
             told = tell(run.rng, x[others], x[first], a, origin)
             tried[others] = _weighed(told, nearness(x, x[first])[:, others])  # eq. 23
             tried[first] = scattered(run.rng, x, first, others, a, 1)[:, 0]
@@ -110,7 +111,7 @@ def ssgwo(run: Run, *, origin: float, factor: str, leaders: str) -> Steps:
             told = scattered(run.rng, x, first, others, a, len(x))
             tried[:] = _weighed(told, nearness(x, x[first]))
         f_tried = yield clipped(tried)
-        # E eq. 24: the inner "while (P > rand)" need not end; one trial for each wolf and iteration.
+        # E eq. 24: the inner "while (P > rand)" may never end; here one trial for each wolf and iteration.
         worse = np.maximum(f_tried - f, 0.0) / max(temperature, 1e-200)
         taken = (f_tried < f) | (run.rng.random(len(f)) < np.exp(-np.minimum(worse, 700.0)))
         if leaders == "apart":
@@ -120,12 +121,12 @@ def ssgwo(run: Run, *, origin: float, factor: str, leaders: str) -> Steps:
 
 
 def tell(rng: np.random.Generator, x: Floats, leaders: Floats, a: float, origin: float) -> Floats:
-    """(3, n, dim): where each leader (3, dim) sends each wolf (n, dim), eq. 3, 4 and 6-11, unclipped."""
+    """Targets (3, n, dim) that each leader (3, dim) sets for each wolf (n, dim), eq. 3, 4 and 6-11, unclipped."""
     r1, r2 = rng.random((2, PACK, *x.shape))
     r1 *= 2.0 * a
     r1 -= a  # A, eq. 3
     r2 *= 2.0  # C, eq. 4
-    # E all: |C·X_leader − X| is measured from the coordinates' origin and pulls there; hence ``origin``.
+    # E in all: |C·X_leader − X| is measured from the origin of the coordinates and pulls there; hence ``origin``.
     r2 *= (leaders - origin)[:, None, :]
     r2 -= x - origin
     np.abs(r2, out=r2)
@@ -137,7 +138,7 @@ def tell(rng: np.random.Generator, x: Floats, leaders: Floats, a: float, origin:
 def scattered(
     rng: np.random.Generator, x: Floats, first: NDArray[np.intp], others: NDArray[np.intp], a: float, count: int
 ) -> Floats:
-    """(3, count, dim): eq. 17-19 drawn ``count`` times, b uniform in [0, 2] in each dimension, unclipped."""
+    """Positions (3, count, dim), eq. 17-19 drawn ``count`` times; b uniform in [0, 2] in each dimension; unclipped."""
     alpha, beta, delta = x[first]
     r1 = rng.integers(0, len(others), size=count)
     r2 = rng.integers(0, len(others) - 1, size=count)
@@ -151,8 +152,8 @@ def scattered(
 
 
 def nearness(x: Floats, leaders: Floats) -> Floats:
-    """(3, n): eq. 14-16, the mean distance of all wolves to a leader over the distance of this one."""
-    # E eq. 14-16 divide vectors: norms, at least 1e−9 of the mean.
+    """Eq. 14-16 (3, n): mean distance of all wolves from a leader, divided by the distance of this wolf."""
+    # E eq. 14-16 divide vectors; here norms, at least 1e−9 of the mean.
     gap = leaders[:, None, :] - x[None, :, :]
     d = np.sqrt(np.einsum("kij,kij->ki", gap, gap))
     mean = d.mean(axis=1, keepdims=True)
@@ -161,10 +162,10 @@ def nearness(x: Floats, leaders: Floats) -> Floats:
 
 
 def opposed(x: Floats, f: Floats, alpha: Floats, a: float) -> Floats:
-    """SOGWO's selective opposition: (n, dim) with the near dimensions of chosen ω wolves turned to 1 − u.
+    """SOGWO's selective opposition: positions (n, dim) with close dimensions of chosen ω wolves mirrored to 1 − u.
 
-    Chosen are those whose Spearman correlation with α over the dimensions is 0 or less (ties ranked in order), and
-    that are close to α (|Δ| < a/4) in at least half of the dimensions.
+    A wolf is chosen if its Spearman correlation with α over the dimensions is 0 or less (ties ranked in order), and if
+    it is close to α (|Δ| < a/4) in at least half of the dimensions.
     """
     dim = x.shape[1]
     omega = np.argsort(f, kind="stable")[PACK:]
@@ -180,14 +181,14 @@ def opposed(x: Floats, f: Floats, alpha: Floats, a: float) -> Floats:
 
 
 class Pack:
-    """The three best places ever, α, β, δ: ``x`` (3, dim) and ``f`` (3,), best first."""
+    """The three best positions so far, α, β, δ: ``x`` (3, dim) and ``f`` (3,), best first."""
 
     def __init__(self, x: Floats, f: Floats) -> None:
         best = np.argsort(f, kind="stable")[:PACK]
         self.x, self.f = x[best], f[best]
 
     def meet(self, x: Floats, f: Floats) -> None:
-        """Let better wolves take the lead; among equals the older stays."""
+        """Update the three with better wolves of ``x``; of equals the older stays."""
         better = np.flatnonzero(f < self.f[-1])
         if better.size:
             all_f = np.concatenate([self.f, f[better]])
@@ -195,8 +196,8 @@ class Pack:
             self.x, self.f = np.concatenate([self.x, x[better]])[best], all_f[best]
 
 
-# E eq. 13 falls fastest early (1.293 at T/4, linear 1.5), against its text "remains high": the cosine has its values at
-# 0, T/2 and T and the shape that the text asks for.
+# E eq. 13 falls fastest at first (1.293 at T/4, linear 1.5), but its text says "remains high": the cosine has the same
+# values at 0, T/2 and T and the shape of the text.
 FACTORS = {
     "cosine": lambda share: 1.0 + math.cos(math.pi * share),
     "printed": lambda share: (
@@ -208,7 +209,7 @@ FACTORS = {
 
 
 def _weighed(told: Floats, near: Floats) -> Floats:
-    """Eq. 20-23: (3, n, dim) weighed by (3, n) as shares of their sum."""
+    """Eq. 20-23: the mean (n, dim) of targets (3, n, dim), weighted by ``near`` (3, n)."""
     mixed: Floats = np.einsum("kn,knd->nd", near / near.sum(axis=0), told)
     return mixed
 
@@ -218,7 +219,7 @@ def _learnt(rng: np.random.Generator, x: Floats, led: Floats) -> Floats:
     n, dim = x.shape
     radius = np.sqrt(((x - led) ** 2).sum(axis=1))
     gap = x[:, None, :] - x[None, :, :]
-    within = np.sqrt(np.einsum("ijk,ijk->ij", gap, gap)) <= radius[:, None]  # itself always
+    within = np.sqrt(np.einsum("ijk,ijk->ij", gap, gap)) <= radius[:, None]  # a wolf is always within its own radius
     by_nearness = np.argsort(~within, axis=1, kind="stable")
     pick = (rng.random((n, dim)) * within.sum(axis=1)[:, None]).astype(np.intp)
     neighbour = np.take_along_axis(by_nearness, pick, axis=1)
@@ -227,7 +228,7 @@ def _learnt(rng: np.random.Generator, x: Floats, led: Floats) -> Floats:
 
 
 def _halfway(tried: Floats, old: Floats) -> Floats:
-    """A value beyond a bound comes to lie halfway between the old value and the bound."""
+    """Move values beyond a bound to the middle between the old value and the bound."""
     tried = np.where(tried < 0.0, old / 2.0, tried)
     return np.where(tried > 1.0, (old + 1.0) / 2.0, tried)
 
