@@ -63,43 +63,43 @@ class Function:
 
 
 def sphere(x: Floats) -> Floats:
-    """f1."""
+    """Sphere, f1."""
     return _sum(x * x)
 
 
 def schwefel_2_22(x: Floats) -> Floats:
-    """f2."""
+    """Schwefel 2.22, f2."""
     size = np.abs(x)
     return _sum(size) + cast("Floats", size.prod(axis=1))
 
 
 def rosenbrock(x: Floats) -> Floats:
-    """f3, its optimum at 1."""
+    """Rosenbrock, f3; its optimum is at 1."""
     return _sum(100.0 * (x[:, 1:] - x[:, :-1] ** 2) ** 2 + (x[:, :-1] - 1.0) ** 2)
 
 
 def schwefel_2_21(x: Floats) -> Floats:
-    """f4."""
+    """Schwefel 2.21, f4."""
     return cast("Floats", np.abs(x).max(axis=1))
 
 
 def schwefel_1_2(x: Floats) -> Floats:
-    """f5."""
+    """Schwefel 1.2, f5."""
     return _sum(np.cumsum(x, axis=1) ** 2)
 
 
 def quartic(x: Floats) -> Floats:
-    """f6, without its noise."""
+    """Quartic, f6, without its noise."""
     return _sum(np.arange(1, x.shape[1] + 1) * x**4)
 
 
 def rastrigin(x: Floats) -> Floats:
-    """f7."""
+    """Rastrigin, f7."""
     return _sum(x * x - 10.0 * np.cos(2.0 * math.pi * x) + 10.0)
 
 
 def ackley(x: Floats) -> Floats:
-    """f8."""
+    """Ackley, f8."""
     # E table 1, f8: the bracket of the second exp closes too late; 20 + e belongs outside, and 1/30 is 1/n.
     n = x.shape[1]
     far: Floats = np.exp(-0.2 * np.sqrt(_sum(x * x) / n))
@@ -108,7 +108,7 @@ def ackley(x: Floats) -> Floats:
 
 
 def griewank(x: Floats) -> Floats:
-    """f9."""
+    """Griewank, f9."""
     waves = np.cos(x / np.sqrt(np.arange(1, x.shape[1] + 1))).prod(axis=1)
     return _sum(x * x) / 4000.0 - cast("Floats", waves) + 1.0
 

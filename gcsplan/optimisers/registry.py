@@ -43,7 +43,7 @@ class Entry:
     loses_to_random: str = ""
 
     def rule(self) -> Callable[..., Steps]:
-        """The generator function."""
+        """The generator function of the update rule; imports its module."""
         if callable(self.update):
             return self.update
         module, _, function = self.update.partition(":")
@@ -295,7 +295,7 @@ TABLE: Mapping[str, Entry] = MappingProxyType({entry.name: entry for entry in _E
 
 
 def names() -> tuple[str, ...]:
-    """Every optimiser's name, family by family."""
+    """Names of all optimisers, family by family."""
     return tuple(TABLE)
 
 

@@ -20,7 +20,7 @@ STEP, GOAL_X, GOAL_Y, GOAL_LOW, GOAL_HIGH, CAP, UP, DOWN, WEIGHT, SPARE = range(
 
 DONE, SHORT = 0, 1
 AT_ONCE = 1024
-"""Most labels that expanding one label can add; so many must be free before it is expanded."""
+"""Most labels that the expansion of one label can add; the arrays must have space for them before it begins."""
 
 
 @device

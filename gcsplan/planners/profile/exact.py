@@ -26,7 +26,8 @@ CORRECTIONS, CORRECTED_M = 24, 0.03
 
 @dataclass(frozen=True, slots=True)
 class Unsettled:
-    """Why no profile over a track passes: the ``place`` (east, north), and what is missing there ``by`` metres.
+    """Why no profile over a track passes: the ``place`` (east, north), the ``kind`` of obstruction, and ``by`` how many
+    metres it fails.
 
     ``samples`` (K, 4): east, north, floor, ceiling along the track, with all corrections so far. ``span_m``: length of
     the piece that is too steep, along the track; ``zone``: index of the zone that is met, -1 if it is none.

@@ -24,8 +24,8 @@ KEEP_M = 1e-4
 """Metres kept from floors and ceilings where they are far enough apart, so that rounding never decides."""
 
 CLOSE_M, CLOSE_STEP_M, CLOSE_SPARE_M = 60.0, 1.0, 0.03
-"""Where a tube shuts an end in: the floor is read again within so many metres of it, at so many metres apart, and
-raised by so many metres."""
+"""Where a tube shuts an end in, the floor is read again: how far from that end, at what spacing, and what is added to
+it, all in metres."""
 
 DEARER = 2e-4
 """Extra cost of passing over or under zones, as a part, from which on a track around the deepest is worth a search."""

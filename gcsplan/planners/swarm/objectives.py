@@ -96,7 +96,7 @@ MU_OBS = 100.0  # D: eq. 31
 
 
 def _ssgwo(terms: Floats, unit: Unit) -> Floats:
-    """Eq. 26–34.
+    """SSGWO, eq. 26–34.
 
     E eq. 29, 30: here in radians, wrapped, with e^|Δθ| - 1 and |φ|. E eq. 31, 32 sum over all nodes and obstacles
     before they compare with d_safe, measure the distance to a sphere's centre, and reward a node inside; here each node
@@ -112,7 +112,7 @@ PC = C = 100.0  # D: eq. 25, 26, 28, 29
 
 
 def _msfoa(terms: Floats, unit: Unit) -> Floats:
-    """Eq. 20–27; the nearness of eq. 28–30 is added by `Cost`.
+    """MSFOA, eq. 20–27; the nearness of eq. 28–30 is added by `Cost`.
 
     E eq. 21: here the height is above ground, max(0, AGL - h_min). E eq. 24: T_de is max(0, 1 - d/R). E eq. 25 adds the
     penalty to itself; here it is a constant for each turn above φ_max (D 45°). E eq. 26 penalises slopes inside [β, α];
@@ -126,7 +126,7 @@ def _msfoa(terms: Floats, unit: Unit) -> Floats:
 
 
 def _abo(terms: Floats, unit: Unit) -> Floats:
-    """Eq. 4–7: length, and P = 100 for each sample under ground (D: under the floor) or outside of the volume."""
+    """ABO, eq. 4–7: length, and P = 100 for each sample under ground (D: under the floor) or outside of the volume."""
     own = terms[:, k.LENGTH] + PENALTY * (terms[:, k.UNDER] + terms[:, k.OUTSIDE])
     return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m, (k.BELOW, k.SUNK, k.UNKNOWN)))
 
@@ -135,7 +135,7 @@ IB_ABC_WEIGHTS = (0.4, 0.2, 0.2, 0.2)  # D: λ of eq. 6
 
 
 def _ib_abc(terms: Floats, unit: Unit) -> Floats:
-    """Eq. 2–6, each term divided by its value on the straight line (D; where that is 0, by π or by one metre).
+    """IB-ABC, eq. 2–6, each term divided by its value on the straight line (D; where that is 0, by π or one metre).
 
     E eq. 3: the atan of a cosine is taken as arccos, so Σ(π - α) is the sum of turns. E eq. 4 compares the length of a
     segment with d_safe; here the distance to obstacle or ground, and Z is AGL. E eq. 5 charges W_t, which is zero at

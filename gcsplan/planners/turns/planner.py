@@ -28,8 +28,8 @@ from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, poli
 from gcsplan.world.path import Path
 
 Replan = Callable[[float], tuple[Floats, NDArray[np.bool_]] | None]
-"""Plans a path with more track error, by so many metres (`with_more_clearance`); returns its points and which of them
-are pinned, or None if there is no path."""
+"""Plans a path with additional track error, its argument in metres (`with_more_clearance`); returns the points and
+which of them are pinned, or None if there is no path."""
 
 LEVELS = (0.15, 0.4, 1.0)
 """Additional track errors, in turn radii, for which paths are planned anew if a path cannot be rounded cheaply."""
