@@ -1,1 +1,1 @@
-"""From a `Mission`, whoever made it, to one `Verdict`: safe, violations, or not judged."""
+"""The check: it judges a `Mission` of any origin and returns one `Verdict`: safe, violations, or not judged."""

@@ -1,4 +1,4 @@
-"""What is known on board while a mission is followed, and how an item's place and altitude are read there."""
+"""The state of the aircraft while a mission is followed, and how it determines an item's place and altitude."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gcsplan.vehicle import Autopilot, Vehicle
 
 
 class Aboard:
-    """Where the aircraft is, how fast, what it has flown; and what an item's numbers mean there."""
+    """Position, speed and stretches flown so far; and what an item's numbers mean at that point."""
 
     def __init__(
         self,
@@ -49,15 +49,15 @@ class Aboard:
         self.airborne = False
         self.known = True
         self.landed = self.stopped = False
-        self.low_m, self.around_m = 0.0, 0.0  # how far below `at`, and to the side, the next leg may begin
+        self.low_m, self.around_m = 0.0, 0.0  # how far below `at`, and to the side, the next leg may begin, m
 
     def note(self, words: str) -> None:
-        """Note ``words``, once only: a round may be flown more than once."""
+        """Add ``words`` to the notes unless they are there: a round may be flown more than once."""
         if words not in self.flight.notes:
             self.flight.notes.append(words)
 
     def instead(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
-        """Add a stretch that some versions fly in place of another one."""
+        """Add a stretch that some autopilot versions fly in place of another one."""
         self.flight.instead.append(self.stretch(seq, kind, start, end, more))
 
     def add(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
@@ -65,21 +65,21 @@ class Aboard:
         self.flight.stretches.append(self.stretch(seq, kind, start, end, more))
 
     def stretch(self, seq: int, kind: StretchKind, start: Place, end: Place, more: dict[str, object]) -> Stretch:
-        """One stretch at the pace that holds now."""
+        """One stretch at the present pace."""
         fields: dict[str, object] = {"rates_m_s": self.pace.rates_m_s, "jumped_from": self.jumped_from} | more
         return Stretch(seq, kind, start, end, self.pace.speed_m_s, **fields)  # type: ignore[arg-type]
 
     def has_place(self, item: MissionItem) -> bool:
-        """Whether the item says where; latitude = longitude = 0 is 'here'."""
+        """Whether the item holds a place; latitude = longitude = 0 means "here"."""
         return item.frame != m.NO_POSITION and not (item.x == 0 and item.y == 0)
 
     def off_africa(self, item: MissionItem) -> bool:
-        """A way point at latitude = longitude = 0, for an autopilot to which that is a place like any other."""
+        """Whether the item goes to latitude = longitude = 0, for an autopilot that takes this as an ordinary place."""
         moves = (cmd.WAYPOINT, cmd.LOITER_UNLIM, cmd.LOITER_TIME, cmd.LAND, cmd.VTOL_LAND)
         return item.command in moves and item.x == 0 and item.y == 0
 
     def target(self, item: MissionItem) -> Place | None:
-        """Where the item leads; None where that is not known."""
+        """The place that the item leads to; None if it is unknown."""
         lat, lon = (item.lat_deg, item.lon_deg) if self.has_place(item) else self.at[:2]
         if not self.has_place(item) and not self.known:
             return None
@@ -87,7 +87,7 @@ class Aboard:
         return None if amsl is None else (lat, lon, amsl)
 
     def altitude(self, item: MissionItem, here: Place) -> float | None:
-        """The item's altitude AMSL at ``here``, in its frame; None where the ground or the frame is not known."""
+        """The item's altitude AMSL at ``here``, in its frame; None if the ground or the frame is unknown."""
         frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
         if not math.isfinite(item.z):
             return None
@@ -110,18 +110,18 @@ class Aboard:
         return None
 
     def hold(self, item: MissionItem) -> float:
-        """Seconds for which a way point holds."""
+        """Seconds for which the vehicle holds at a way point."""
         if self.autopilot is Autopilot.ARDUPLANE or not math.isfinite(item.params[0]):
             return 0.0
         return max(0.0, item.params[0])
 
     def loiter_s(self, item: MissionItem) -> float:
-        """Seconds of a loiter in one place."""
+        """Seconds of a loiter in one place; inf without end."""
         if item.command != cmd.LOITER_TIME:
             return math.inf
         return max(0.0, item.params[0]) if math.isfinite(item.params[0]) else math.inf
 
     def turns_s(self, item: MissionItem, reach_m: float) -> float:
-        """Seconds of an item's turns with a radius."""
+        """Seconds that the item's turns take on a circle of radius ``reach_m``."""
         turns = item.params[0] if math.isfinite(item.params[0]) and item.params[0] > 0 else 1.0
         return turns * 2.0 * math.pi * reach_m / self.pace.speed_m_s

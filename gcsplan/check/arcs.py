@@ -1,18 +1,18 @@
-"""Corners as a fixed wing flies them: arcs that touch both legs, laid over the straight stretches of a flight.
+"""Corners as a fixed wing flies them: arcs that touch both legs replace the corners of a flight's straight stretches.
 
 What is assumed of ArduPlane (commands_logic.cpp, `verify_nav_wp`; AP_L1_Control.cpp; altitude.cpp):
 
 - A way point counts as reached at its own acceptance radius (param2), else at `turn_distance`: the smaller of
   WP_RADIUS and the L1 distance, times turn/90°. There the turn begins, on an arc of ``turn_radius_m``.
-- Where that is not the tangent length of the corner, the arc moves along the leg before it by the difference, and the
-  leg behind it to the side by its sine: both are widened by that.
-- It leaves the arc in calm air too (`tracking`): by what exceeds ``track_error_m`` both legs are widened as well.
-- Altitude changes evenly along what is flown, from the middle of one arc to that of the next. ArduPlane computes it
-  along the straight line between way points instead, and aims at the altitude of the way point once a turn begins: all
-  altitudes between these are judged too (``Flight.instead``).
-- Behind a circle a leg may begin anywhere on it.
+- If that is not the tangent length of the corner, the arc moves along the leg before it by the difference, and the leg
+  after it moves to the side by the difference times the turn's sine: both legs are widened by that.
+- The aircraft leaves the arc in calm air too (`tracking`): the excess over ``track_error_m`` widens both legs as well.
+- Altitude changes evenly along what is flown, from the middle of one arc to the middle of the next. ArduPlane instead
+  computes it along the straight line between way points, and aims at the altitude of the way point once a turn begins:
+  all altitudes between these are judged too (``Flight.instead``).
+- After a circle a leg may begin anywhere on it.
 
-Corners whose arcs do not fit between their way points are named as not judged, and left sharp.
+Corners whose arcs do not fit between their way points are reported as not judged, and left sharp.
 """
 
 from __future__ import annotations
@@ -39,37 +39,38 @@ __all__ = ["SAG_M", "UNFITTING", "bend", "tangent_m"]
 
 
 SAG_M = 0.2
-"""How far an arc may lie outside its chords, which are widened by that."""
+"""How far an arc may lie outside its chords, m; the chords are widened by that."""
 
 FIT_M = 0.25
-"""Arcs of neighbouring corners may overlap by this: rounding on the wire moves arcs that just touch."""
+"""Arcs of neighbouring corners may overlap by this, m: rounding on the wire moves arcs that just touch."""
 
 UNFITTING = "what is flown there is not judged"
 
 LEAST_TURN = math.radians(0.02)
 ABOUT = math.radians(170.0)
-"""Below `LEAST_TURN` a leg goes on straight; above `ABOUT` it turns about, on an arc that begins far before its end."""
+"""Below `LEAST_TURN` a leg continues straight; above `ABOUT` it turns back, on an arc begun far before its end."""
 
 MOST_BANK_DEG = 45.0
-"""ArduPlane's ROLL_LIMIT_DEG, default."""
+"""Default of ArduPlane's ROLL_LIMIT_DEG."""
 
 SETTLES_S = 15.0
-"""Seconds on a straight leg after which the L1 controller is back on it (NAVL1_PERIOD 17, NAVL1_DAMPING 0.75)."""
+"""Seconds on a straight leg until the L1 controller is back on it (NAVL1_PERIOD 17, NAVL1_DAMPING 0.75)."""
 
 SAME_M = 0.02
 GRAVITY_M_S2 = 9.80665
 
 
 def tangent_m(radius_m: float, turn_rad: float) -> float:
-    """How far before its corner an arc begins."""
+    """How far before its corner an arc begins, m."""
     return radius_m * math.tan(0.5 * abs(turn_rad))
 
 
 def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tuning: Tuning = DEFAULTS) -> None:
-    """Lay arcs of the vehicle's turn radius over the corners of ``flight``, in place.
+    """Replace the corners of ``flight`` by arcs of the vehicle's turn radius, in place.
 
-    ``mission`` is the one that is followed, as stored. Every stretch is replaced by the chords of half the arc
-    behind it, what is left of it, and the chords of half the arc ahead, under its own number.
+    ``mission`` is the mission that is followed, as stored. Each stretch is replaced by the chords of the second half of
+    the arc before it, its remaining straight part, and the chords of the first half of the arc after it, all with its
+    item number.
     """
     radius = vehicle.turn_radius_m
     if mission.autopilot is not Autopilot.ARDUPLANE:
@@ -125,9 +126,10 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
 
 @dataclass(frozen=True, slots=True)
 class _Corner:
-    """``turn`` radians, left positive; 0 where it is left sharp.
+    """One corner. ``turn``: radians, left positive; 0 if it is left sharp.
 
-    ``tangent`` metres, its arc's; ``off_m``: how far that may lie elsewhere; ``begins_m``: where the turn begins.
+    ``tangent``: tangent length of its arc, m; ``off_m``: how far the arc may lie elsewhere; ``begins_m``: how far
+    before the way point the turn begins.
     """
 
     turn: float = 0.0
@@ -137,7 +139,7 @@ class _Corner:
 
 
 class _Run:
-    """Straight stretches flown one after the other without a stop, in the plane."""
+    """Straight stretches that are flown one after the other without a stop, in the plane."""
 
     def __init__(
         self, run: Sequence[Stretch], mission: Mission, vehicle: Vehicle, frame: Frame, flight: Flight, behind_m: float,
@@ -197,13 +199,13 @@ class _Run:
             )
             # Left sharp, so that the rest can be judged.
             found[k], found[k + 1] = _Corner(off_m=a.off_m), _Corner(off_m=b.off_m)
-        for k, s in enumerate(self.run[:-1]):  # on a leg too short to settle, the offset stays for the next turn
+        for k, s in enumerate(self.run[:-1]):  # on a leg too short to settle, the offset remains at the next turn
             if self.long_m[k] - found[k].tangent - found[k + 1].tangent < SETTLES_S * s.speed_m_s:
                 found[k + 1] = replace(found[k + 1], off_m=found[k + 1].off_m + found[k].off_m)
         return found
 
     def _begins_m(self, mission: Mission, s: Stretch, turn: float, flight: Flight) -> tuple[float, float]:
-        """How far before the end of ``s`` the turn behind it begins, at least and at most."""
+        """How far before the end of ``s`` the turn after it begins, m: at least and at most."""
         item = _item(mission, s.seq)
         if item is None or item.command != cmd.WAYPOINT:
             return 0.0, 0.0  # a take-off ends where its height is reached, not before
@@ -221,12 +223,12 @@ class _Run:
         return least, most
 
     def _widen_m(self, k: int) -> float:
-        """How much a leg is widened: by a turn before it that began late or early, and by a circle that it leaves."""
+        """How much a leg is widened, m: for a late or early turn before it, and for a circle from which it starts."""
         c = self.corners[k]
         return c.off_m + (self.behind_m if k == 0 else 0.0)
 
     def _track(self, k: int) -> list[tuple[Floats, float, float]]:
-        """Leg ``k`` as flown: (east and north, metres flown, how far the piece to there may lie elsewhere)."""
+        """Leg ``k`` as flown: (east and north, metres flown, how far the piece up to there may lie elsewhere)."""
         a, b, heading = self.corners[k], self.corners[k + 1], float(self.heading[k])
         along = np.array([math.cos(heading), math.sin(heading)])
         leaves = self.points[k, :2] + a.tangent * along
@@ -245,7 +247,7 @@ class _Run:
         return track
 
     def _half_arc(self, start: Floats, heading: float, turn: float) -> tuple[list[Floats], float]:
-        """The ends of the chords of the first half of an arc, and how far it lies outside them."""
+        """The ends of the chords of the first half of an arc, and how far it lies outside them, m."""
         if not turn:
             return [start], 0.0
         n = self._parts(turn)
@@ -257,7 +259,7 @@ class _Run:
         return max(1, math.ceil(0.5 * abs(turn) / step))
 
     def flown(self, k: int) -> Iterator[Stretch]:
-        """Leg ``k``, altitude even along what is flown."""
+        """Leg ``k`` with altitude changing evenly along what is flown."""
         z0, z1 = self.points[k, 2], self.points[k + 1, 2]
         whole = max(float(self.flown_m[k]), 1e-9)
         track = [(p, z0 + (z1 - z0) * min(s / whole, 1.0), off) for p, s, off in self._track(k)]
@@ -291,7 +293,7 @@ class _Run:
         return lat, lon, float(z)
 
     def banded(self, k: int, band: Stretch) -> Iterator[Stretch]:
-        """Leg ``k`` flown anywhere between the altitudes of its ends: its whole band, level."""
+        """Leg ``k`` at any altitude between those of its ends, as one level band."""
         z0, z1 = self.points[k, 2], self.points[k + 1, 2]
         if band.terrain:
             yield band
@@ -304,7 +306,7 @@ class _Run:
             )
 
     def instead(self, k: int) -> Iterator[Stretch]:
-        """Leg ``k`` at the altitudes that ArduPlane computes: along the line between the way points."""
+        """Leg ``k`` at the altitudes that ArduPlane computes along the line between the way points."""
         s = self.run[k]
         a, b = self.corners[k], self.corners[k + 1]
         z0, z1 = self.points[k, 2], self.points[k + 1, 2]
@@ -339,19 +341,19 @@ class _Run:
 
 
 def _chord(radius: float, heading: float, turn: float) -> Floats:
-    """From the start of an arc to where it has turned by ``turn``."""
+    """The vector from the start of an arc to the place where it has turned by ``turn``."""
     length, course = 2.0 * radius * math.sin(0.5 * abs(turn)), heading + 0.5 * turn
     return np.array([length * math.cos(course), length * math.sin(course)])
 
 
 def _moves(s: Stretch) -> bool:
-    """True for a stretch that leads to another place, and at whose ends the aircraft turns on arcs."""
-    circles = s.reach_m > 0.0  # a climb in circles, which turns as it is
+    """Whether a stretch leads to another place with turns on arcs at its ends."""
+    circles = s.reach_m > 0.0  # a climb in circles is a turn already
     return s.kind in ("takeoff", "cruise", "land") and not circles and flat_m(s.start, s.end) > SAME_M
 
 
 def _runs(stretches: Sequence[Stretch]) -> Iterator[tuple[int, int]]:
-    """Index ranges of stretches that are flown through, and of those between."""
+    """Index ranges of stretches flown through without a stop; every other stretch is a range of its own."""
     first = 0
     for i in range(1, len(stretches) + 1):
         if i < len(stretches):

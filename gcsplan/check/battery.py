@@ -1,9 +1,9 @@
-"""The battery along a mission: what each leg takes, and whether what is left brings the vehicle home.
+"""The battery along a mission: what each leg uses, and whether the rest is enough for the return from every point.
 
 The model is R1/R2 (`gcsplan.vehicle.Energy`): a return costs R1 for its climb and its descent and R2 for the straight
-way. Along a straight leg the energy spent is linear, and that of the return is convex: the distance to home is, and
-so is the climb to the level of the return. So their sum is above a limit on at most the two ends of a leg, and where
-it crosses is found by halving, not by sampling.
+line home. Along a straight leg the energy spent is linear, and the energy of the return is convex, because the distance
+to home and the climb to the return's altitude are. So their sum exceeds a limit at most on two parts of a leg, one at
+each end, and bisection finds where it crosses the limit, without sampling.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MOST_ROUNDS = 1000
 
 @dataclass(frozen=True, slots=True)
 class LegBattery:
-    """One leg: its energy, what is spent at its end, a return from there; percent of the battery (or None)."""
+    """One leg: its energy, the energy spent by its end, and a return from there; percent of the battery (or None)."""
 
     seq: int
     kind: str
@@ -39,11 +39,11 @@ class LegBattery:
 
 @dataclass(frozen=True, slots=True)
 class BatteryHome:
-    """Whether the battery reaches for the return, from every point.
+    """Whether the battery is enough for the return, from every point.
 
-    ``usable_j``: the battery less its reserve. ``most_j``: the most that spent and return come to, anywhere, at
-    ``most_at`` (``most_m`` along the mission). ``point_of_no_return``: the first place beyond which the return is not
-    within it (None: there is none); ``no_return_m`` how far along; ``short``: (from_m, to_m) of all such parts.
+    ``usable_j``: the battery less its reserve. ``most_j``: the highest sum of energy spent and return, at ``most_at``
+    (``most_m`` along the mission). ``point_of_no_return``: the first place beyond which that sum exceeds ``usable_j``
+    (None: there is none); ``no_return_m`` how far along; ``short``: (from_m, to_m) of all such parts.
     """
 
     usable_j: float
@@ -59,11 +59,11 @@ class BatteryHome:
 
     @property
     def most_percent(self) -> float:
-        """The most that is used with the return, percent of the whole battery."""
+        """The highest use with the return included, percent of the whole battery."""
         return 100.0 * self.most_j / self.battery_j
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """The fields as plain values."""
         return {
             "usable_j": self.usable_j,
             "most_j": self.most_j,
@@ -77,7 +77,7 @@ class BatteryHome:
         }
 
     def describe(self) -> str:
-        """One line."""
+        """Describe it in one line."""
         usable = 100.0 * self.usable_j / self.battery_j
         if self.point_of_no_return is None or self.no_return_m is None:
             return (
@@ -92,7 +92,7 @@ class BatteryHome:
 
 
 def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m: float) -> BatteryHome | None:
-    """Spent so far plus the return, from every point of a flight; None where the capacity is not given."""
+    """The energy spent so far plus the return, from every point of a flight; None if the capacity is not given."""
     energy, rule = vehicle.energy, RULES[vehicle.autopilot]
     if energy.battery_j is None or not verdict.legs:
         return None
@@ -143,7 +143,7 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
 
 
 def flown(legs: Sequence[LegFigures]) -> Iterator[LegFigures]:
-    """The legs as often as they are flown: a run of neighbours that are flown n times is flown n times as a whole."""
+    """Yield the legs as often as they are flown: neighbours with the same count n are flown n times as one group."""
     for times, run in groupby(legs, key=lambda leg: leg.times):
         yield from (leg for legs_of_run in repeat(list(run), min(times, MOST_ROUNDS)) for leg in legs_of_run)
 
@@ -154,7 +154,7 @@ def _between(leg: LegFigures, part: float) -> Place:
 
 
 def _above(used: Callable[[float], float], usable: float, at_end: bool) -> list[tuple[float, float]]:
-    """Parts of a leg on which the convex ``used`` is above ``usable``; ``at_end``: above after the hold there."""
+    """Parts of a leg on which the convex ``used`` exceeds ``usable``; ``at_end``: it does after the hold at the end."""
     before, after = used(0.0) > usable, used(1.0) > usable
     if not before and not after:
         return [(1.0, 1.0)] if at_end else []
@@ -170,7 +170,7 @@ def _above(used: Callable[[float], float], usable: float, at_end: bool) -> list[
 
 
 def _least(used: Callable[[float], float]) -> float:
-    """Where a convex function on [0, 1] is least, by thirds."""
+    """Where a convex function on [0, 1] has its minimum, by ternary search."""
     a, b = 0.0, 1.0
     for _ in range(HALVINGS):
         c, d = a + (b - a) / 3.0, b - (b - a) / 3.0
@@ -179,7 +179,7 @@ def _least(used: Callable[[float], float]) -> float:
 
 
 def _crossing(used: Callable[[float], float], usable: float, above: float, below: float) -> float:
-    """Where it crosses ``usable`` between a place above it and one below, on the safe side: still above."""
+    """Where ``used`` crosses ``usable`` between ``above`` and ``below``; on the safe side, so still above it."""
     for _ in range(HALVINGS):
         middle = 0.5 * (above + below)
         above, below = (middle, below) if used(middle) > usable else (above, middle)

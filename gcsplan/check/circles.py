@@ -6,7 +6,7 @@ PLANE_LOITER_RADIUS_M = 60.0  # ArduPlane WP_LOITER_RAD, default
 
 
 def circle_growth(amsl_m: float) -> float:
-    """By how much ArduPlane widens a circle at an altitude: (true over equivalent airspeed)², ISA, on a hot day.
+    """The factor by which ArduPlane widens a circle: (true over equivalent airspeed)² at an altitude, ISA, hot day.
 
     Source: AP_L1_Control.cpp, `loiter_radius`.
     """

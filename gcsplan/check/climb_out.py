@@ -1,18 +1,18 @@
-"""A fixed wing leaving the ground and coming back to it: straight and slanting, where a multicopter has its columns.
+"""A fixed wing's climb-out and glide: straight and slanting, where a multicopter has its columns.
 
-What ArduPlane does (commands_logic.cpp, `do_takeoff`, `verify_takeoff`; takeoff.cpp): it notes the course over ground
-on which it was launched, once it is fast, and keeps its nose there, so that a cross wind carries it aside. It climbs
-with the pitch of param1 (4° where that is 0). With an airspeed sensor that is the least pitch: with power to spare it
-climbs at up to PTCH_LIM_MAX_DEG, so what lies between the slant and the item's altitude is judged too. At the item's
-altitude it turns towards the next item. The mission holds no heading, so the climb-out leads to the place of the item,
-as maps draw it; without a place it leads towards the next item.
+What ArduPlane does (commands_logic.cpp, `do_takeoff`, `verify_takeoff`; takeoff.cpp): once it is fast, it records the
+course over ground on which it was launched and holds its nose on that heading, so a cross wind carries it aside. It
+climbs with the pitch of param1 (4° if that is 0). With an airspeed sensor that is the least pitch: with power to spare
+it climbs at up to PTCH_LIM_MAX_DEG, so the space between the slant and the item's altitude is judged too. At the item's
+altitude it turns towards the next item. The mission holds no heading, so the climb-out is judged towards the item's
+place, as maps draw it; if the item has no place, towards the next item.
 
 A NAV_LAND glides straight from the way point before it (AP_Landing_Slope.cpp), towards a point before and above its
-place from which the flare is flat: a few metres below the line between both.
+place from which the flare is flat: a few metres below the line between the two.
 
 Both are exempt from min AGL, climb angle and terrain clearance, as columns are; never from zones, their clearance and
-ceilings. They must keep a clearance over bare ground: the altitude error, and near the ends, where the aircraft has
-just left the ground, half of its height above the touch point.
+ceilings. They must keep a clearance over bare ground: the altitude error, but near the ends, where the aircraft is
+close to the ground, half of its height above the touch point.
 """
 
 from __future__ import annotations
@@ -39,41 +39,41 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.world import World
 
 LEAST_PITCH_DEG = 4.0
-"""ArduPlane's where the item has none."""
+"""ArduPlane's pitch if the item has none."""
 
 NEAR_M = 1.0
-"""An item this near to home does not say where a climb-out leads."""
+"""An item this near to home, m, does not define the direction of a climb-out."""
 
 SAME_M = 0.02
 
 SPARED = 0.5
-"""The part of its height that the aircraft needs below itself while it is lower than the altitude error allows."""
+"""The part of its height that the aircraft needs as clearance while it is too low for the full altitude error."""
 
 
 MOST_PARTS = 24
-"""Level bands into which the space above a climb-out is divided."""
+"""Most level bands into which the space above a climb-out is divided."""
 
 REACHED_M = 5.0
-"""LOITER_TO_ALT counts an altitude as reached this near to it (navigation.cpp, `loiter_angle_update`)."""
+"""LOITER_TO_ALT counts an altitude as reached within this, m (navigation.cpp, `loiter_angle_update`)."""
 
 FLARE_S, FLARE_MOST_M, LAND_SINK_M_S = 2.0, 6.0, 0.25
-"""LAND_FLARE_SEC, twice LAND_FLARE_ALT, TECS_LAND_SINK: the defaults."""
+"""Defaults of LAND_FLARE_SEC, of twice LAND_FLARE_ALT, and of TECS_LAND_SINK."""
 
 CHORD_M = 2.0
-"""How far the chords of a circle that is climbed in may lie inside it."""
+"""How far the chords of a climbing circle may lie inside it, m."""
 
 BOUND_M = 0.05
-"""The exact check bounds the ground beside a line, at times a few centimetres too high; where the aircraft stands on
-it, that is no violation."""
+"""Violations up to this, m, are ignored: the exact check bounds the ground beside a line, at times a few centimetres
+too high, and the aircraft stands on it."""
 
 
 def is_wing(vehicle: Vehicle) -> bool:
-    """A vehicle that cannot stand in the air."""
+    """Return whether the vehicle cannot stand still in the air."""
     return vehicle.turn_radius_m > 0.0
 
 
 def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | None) -> None:
-    """NAV_TAKEOFF: straight ahead until the altitude of the item is reached; ``after``: the next item flown to."""
+    """NAV_TAKEOFF: straight ahead until the item's altitude is reached; ``after``: the next item that is flown to."""
     lat, lon, ground = pilot.home
     top = pilot.altitude(item, (lat, lon, ground))
     ahead = _place(pilot, item)
@@ -110,7 +110,7 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
 
 
 def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, Place, float]]:
-    """What lies between a climb-out and the altitude of its end, as level lines and half their heights.
+    """The space between a climb-out and the altitude of its end, as level lines and half the heights of their bands.
 
     A place may be any three numbers. The altitude errors cover the gaps between the bands and the slant.
     """
@@ -127,9 +127,10 @@ def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, 
 
 
 def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bool:
-    """LOITER_TO_ALT right behind a climb-out that ends on its circle: the take-off goes on in circles. Else False.
+    """Continue the take-off in circles: LOITER_TO_ALT right after a climb-out that ends on its circle.
 
-    The aircraft may be anywhere within the circle, as low as the climb-out ended.
+    Return False and change nothing otherwise. The aircraft may be anywhere within the circle, as low as the
+    climb-out ended.
     """
     before = pilot.flight.stretches[-1] if pilot.flight.stretches else None
     target = pilot.target(item) if pilot.has_place(item) else None
@@ -155,7 +156,7 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
 
 
 def _helix(begin: Place, top: Place, radius_m: float, turns: float, slope: float) -> list[Place]:
-    """From ``begin`` up to the altitude of ``top`` on a circle around it; ``turns`` 1: clockwise."""
+    """A climb from ``begin`` to the altitude of ``top`` on a circle around it; ``turns`` 1: clockwise."""
     east_m, north_m = degree_m(top[0])
     east, north = offset_m(top, begin)
     angle = math.atan2(north, east)
@@ -170,7 +171,7 @@ def _helix(begin: Place, top: Place, radius_m: float, turns: float, slope: float
 
 
 def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
-    """NAV_LAND: straight down from where it is to the place of the item."""
+    """NAV_LAND: a straight descent from the present place to the place of the item."""
     target = pilot.target(item) if pilot.has_place(item) else None
     pilot.landed = True
     if target is None:
@@ -198,9 +199,9 @@ def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
 
 
 def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Place]:
-    """The second half of a glide as it is flown below its line: towards where the flare begins, then to the ground.
+    """The second half of a glide as it is flown below its line: to the beginning of the flare, then to the ground.
 
-    A place may be any three numbers. Empty where the glide stays on its line. AP_Landing_Slope.cpp,
+    A place may be any three numbers. Empty if the glide stays on its line. AP_Landing_Slope.cpp,
     `type_slope_setup_landing_glide_slope`, with the defaults.
     """
     fall = top[2] - ground[2]
@@ -219,12 +220,12 @@ def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Pl
 
 
 def slants(stretches: Sequence[Stretch]) -> list[Stretch]:
-    """The stretches that leave the ground, or come down to it, on a slant."""
+    """The stretches that leave the ground or come down to it on a slant."""
     return [s for s in stretches if s.column and s.kind in ("takeoff", "land") and flat_m(s.start, s.end) > SAME_M]
 
 
 def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World) -> list[Finding]:
-    """Where a climb-out or a glide comes too near to the ground, or is too steep."""
+    """Findings where a climb-out or a glide is too near to the ground or too steep."""
     found = []
     for s in stretches:
         if s.column and s.kind == "takeoff" and s.reach_m > 0.0 and flat_m(s.start, s.end) <= SAME_M:
@@ -256,8 +257,9 @@ def slant_shortage(
 ) -> tuple[float, float, float, float] | None:
     """The worst place where ``line`` (2, 3), rising from ``touch`` (3,) or falling to it, is too near to bare ground.
 
-    (east, north, amsl, metres missing), or None where it is high enough all along. The clearance that is needed rises
-    evenly from 0 at ``touch`` to the altitude error, so both parts of the line are straight lines below it.
+    Return (east, north, amsl, metres missing), or None if the line is high enough everywhere. The required clearance
+    rises linearly from 0 at ``touch`` to the altitude error and then stays, so each of the two parts of the line,
+    lowered by its clearance, is straight.
     """
     a, b = (line[0], line[1]) if line[0, 2] <= line[1, 2] else (line[1], line[0])
     rise = float(b[2] - a[2])
@@ -291,7 +293,7 @@ def slant_shortage(
 
 
 def circle_missing_m(low: Floats, reach_m: float, limits: Limits, air: Airspace) -> float:
-    """By how much a circle around ``low`` (3,) is too near to bare ground; inf where that is unknown."""
+    """By how much a circle around ``low`` (3,) is too near to bare ground, m; inf where the ground is unknown."""
     plain = Limits(
         min_agl_m=0.0, track_error_m=limits.track_error_m + reach_m, altitude_error_m=limits.altitude_error_m
     )

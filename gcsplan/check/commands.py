@@ -1,4 +1,4 @@
-"""Commands that move nothing, and params with which a command is flown in another way.
+"""Commands that do not move the vehicle, and items that the autopilot flies differently from what their command says.
 
 The whole table, by command, autopilot and param, is in docs/safety.md.
 """
@@ -29,13 +29,13 @@ UNMOVED = frozenset(
 )  # fmt: skip
 """Commands that move nothing but cameras, servos, speeds and clocks (CONDITION_* delay only the next DO_ command).
 
-Not among them, though they go nowhere themselves: DO_SET_PARAMETER 180, DO_AUTOTUNE_ENABLE 212, DO_AUX_FUNCTION 218
-(which may change the mode), DO_GUIDED_LIMITS 222, DO_ENGINE_CONTROL 223, and a parachute that is released.
+These go nowhere themselves but are not in the set: DO_SET_PARAMETER 180, DO_AUTOTUNE_ENABLE 212, DO_AUX_FUNCTION 218
+(it may change the mode), DO_GUIDED_LIMITS 222, DO_ENGINE_CONTROL 223, and DO_PARACHUTE with release.
 """
 
 
 def moves_nothing(command: int, first: float) -> bool:
-    """True for a command (``first`` is its param1) after which the flight goes on as if it were not there."""
+    """Return whether the flight goes on unchanged after a command; ``first`` is its param1."""
     return command in UNMOVED or (command == cmd.DO_PARACHUTE and first != RELEASE)
 
 
@@ -45,11 +45,12 @@ FW_DESCENT = 1.0  # NAV_VTOL_LAND_OPTIONS
 
 
 def flown_otherwise(item: MissionItem, mission: Mission) -> str:
-    """Why the autopilot flies ``item`` (as stored) in another way than its command says; empty if it does not.
+    """Return why the autopilot flies ``item`` (as stored) differently from what its command says; empty if it does not.
 
-    PX4: a precision landing looks for its beacon (navigator/precland.cpp); a hold that is no number has no known end.
-    ArduPlane: a VTOL landing may begin as a fixed wing's spiral (quadplane.cpp, `landing_with_fixed_wing_spiral_
-    approach`); a return goes on to DO_LAND_START by RTL_AUTOLAND, without which it does not arm.
+    PX4: a precision landing searches for its beacon (navigator/precland.cpp); a hold time that is not finite has no
+    known end. ArduPlane: a VTOL landing may begin as a fixed wing's spiral (quadplane.cpp,
+    `landing_with_fixed_wing_spiral_approach`); a return continues to DO_LAND_START if RTL_AUTOLAND is set, and without
+    RTL_AUTOLAND the vehicle does not arm.
     """
     first, second = item.params[:2]
     if mission.autopilot is Autopilot.PX4:

@@ -1,24 +1,24 @@
 """Corners as autopilots cut them: where a vehicle turns before the way point, and how much that widens its legs.
 
-A way point counts as reached within a radius. There the vehicle turns, and flies to where the next leg ends. Facts:
+A way point counts as reached within a radius. There the vehicle turns, and flies to the end of the next leg. Facts:
 
-- PX4 (mission_block.cpp, `is_mission_item_reached`): a multicopter takes a way point's own radius (param2), or
-  NAV_ACC_RAD (10 m) where that is 0, negative or not finite, and for every other command. A hold begins within that
-  radius as well. A take-off ends NAV_MC_ALT_RAD below its top.
+- PX4 (mission_block.cpp, `is_mission_item_reached`): a multicopter uses a way point's own radius (param2). It uses
+  NAV_ACC_RAD (10 m) if that is 0, negative or not finite, and for every other command. A hold begins within that
+  radius too. A take-off ends NAV_MC_ALT_RAD below its top.
 - ArduCopter (SCurve.cpp, `advance_target_along_track`): it begins the next leg while it still brakes on this one, where
   the middle of the turn lies within WPNAV_RADIUS (2 m), and not in the first half of either leg. The item's own radius
-  is not stored. It stops at a hold, before a landing, a return or a circle.
-- ArduPlane (commands_logic.cpp, `verify_nav_wp`): param2 in whole metres, or `turn_distance` where that is 0. Fixed
-  wings, which turn with a radius, are in `arcs`; this is the VTOL.
-- Behind a circle the next leg begins anywhere on it.
+  is not stored. It stops at a hold, and before a landing, a return or a circle.
+- ArduPlane (commands_logic.cpp, `verify_nav_wp`): it uses param2 in whole metres, or `turn_distance` if that is 0.
+  Fixed wings, which turn with a radius, are in `arcs`; this module is for the VTOL.
+- After a circle the next leg begins anywhere on it.
 
-The only assumption on how a vehicle gets onto its next leg is that it stays between that leg and the straight line
-from where it turned to the leg's end. With the turn begun R before a corner of angle A, that line is R·sin(A) off the
-next leg at its beginning and on it at its end, and no more than R·sin(A)·cos(A) off the leg before.
+The only assumption about how a vehicle gets onto its next leg: it stays between that leg and the straight line from
+where it turned to the leg's end. If the turn begins R before a corner of angle A, that line is R·sin(A) off the next
+leg at the leg's beginning and 0 at its end, and no more than R·sin(A)·cos(A) off the leg before.
 
-``track_error_m`` and ``altitude_error_m`` include corners by definition, so what lies within them widens nothing. What
-lies beyond widens the legs, and is flown instead of them. A vehicle whose ``corner_accel_m_s2`` is not bounded
-turns on the spot by definition.
+``track_error_m`` and ``altitude_error_m`` include corners by definition, so offsets within them widen nothing. Offsets
+beyond them widen the legs, and the widened legs are added as flown in place of the straight ones. A vehicle whose
+``corner_accel_m_s2`` is not bounded turns on the spot by definition.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ from gcsplan.world.frame import Frame
 __all__ = ["round_corners"]
 
 PARTS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
-"""Parts of a leg, each widened by what its beginning needs."""
+"""Places along a leg where it is cut into parts; each part is widened by what its beginning needs."""
 
 SAME_M = 0.02
 UNJUDGED = "that is not judged"
 
 
 def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tuning: Tuning = DEFAULTS) -> None:
-    """Add to ``flight`` what is flown at the corners of ``mission`` (as stored): arcs, or widened legs."""
+    """Add to ``flight`` the arcs or widened legs that are flown at the corners of ``mission`` (as stored)."""
     if vehicle.turn_radius_m > 0.0:
         bend(flight, mission, vehicle, frame, tuning)
         return
@@ -63,9 +63,9 @@ def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Fra
 
 @dataclass(frozen=True, slots=True)
 class _Off:
-    """How far from the beginning of a leg a vehicle may begin it: to the side, and in height.
+    """How far from the beginning of a leg a vehicle may begin it, metres: to the side, and in height.
 
-    ``meant``: the mission itself puts it there, on a circle; the vehicle's error comes on top.
+    ``meant``: the mission itself puts it there, on a circle; the vehicle's error is added to the offset.
     """
 
     aside_m: float = 0.0
@@ -74,7 +74,7 @@ class _Off:
 
 
 class _Cutter:
-    """Goes along a flight from leg to leg, with how far it may be off at the beginning of each."""
+    """Goes through a flight leg by leg, with the offset that the vehicle may have at the beginning of each."""
 
     def __init__(self, flight: Flight, mission: Mission, vehicle: Vehicle, tuning: Tuning) -> None:
         self.mission, self.tuning, self.limits = mission, tuning, vehicle.limits
@@ -86,7 +86,7 @@ class _Cutter:
         self.not_judged: list[str] = []
 
     def widened(self, stretches: Sequence[Stretch]) -> list[Stretch]:
-        """What is flown instead of ``stretches``, where corners are cut by more than the errors hold."""
+        """The stretches flown in place of ``stretches`` wherever corners are cut by more than the errors include."""
         found: list[Stretch] = []
         off, last, stops = _Off(), None, False
         for s in stretches:
@@ -114,7 +114,7 @@ class _Cutter:
         return found
 
     def _leave(self, s: Stretch, after: Stretch, off: _Off, stops: bool) -> _Off:
-        """How far from the beginning of ``after`` it may begin it; ``off``: the same of ``s``."""
+        """How far off the beginning of ``after`` the vehicle may begin it; ``off``: the same for ``s``."""
         turn, long_m = _turn(s, after), flat_m(s.start, s.end)
         sine = 1.0 if after.column else math.sin(min(turn, 0.5 * math.pi))
         rise_m = abs(s.end[2] - s.start[2])
@@ -125,7 +125,7 @@ class _Cutter:
             shorter_m = 0.5 * min(long_m, flat_m(after.start, after.end))
             rise_m = 0.5 * max(rise_m, abs(after.end[2] - after.start[2]))
             return _Off(min(radius_m, shorter_m * sine), min(radius_m, rise_m))
-        if radius_m >= long_m:  # it turns at once, from wherever it is
+        if radius_m >= long_m:  # it turns at once, wherever it is
             aside_m, sag_m = min(radius_m, long_m + off.aside_m), rise_m + off.height_m
         else:
             part = radius_m / long_m
@@ -135,7 +135,7 @@ class _Cutter:
         return _Off(aside_m, sag_m)
 
     def _radius_m(self, s: Stretch, after: Stretch, turn: float, stops: bool) -> float:
-        """How far before the end of ``s`` it may turn; 0 where it does not."""
+        """How far before the end of ``s`` the vehicle may turn, m; 0 if it does not turn early."""
         item = self._item(s.seq)
         within = s.seq == after.seq and s.kind == after.kind == "cruise"  # pieces of one curve, or up to one circle
         if item is None or within or s.kind == "rtl":
@@ -175,7 +175,7 @@ class _Cutter:
     # -- what is flown -------------------------------------------------------------------------------------------
 
     def _before(self, s: Stretch, after: Stretch, begun: _Off, stops: bool) -> Iterator[Stretch]:
-        """The end of ``s`` from where it turns: what is flown from there need not lie beside ``after``."""
+        """The end of ``s`` from where the vehicle turns: its course from there need not lie beside ``after``."""
         radius_m, long_m = self._radius_m(s, after, turn := _turn(s, after), stops), flat_m(s.start, s.end)
         aside_m, height_m = self._beyond(begun, after)
         if self.copter or radius_m >= long_m:
@@ -187,7 +187,7 @@ class _Cutter:
     def _parts(
         self, s: Stretch, cuts: Sequence[float], off_m: tuple[float, float], *, fading: bool
     ) -> Iterator[Stretch]:
-        """``s`` between ``cuts``, and its wider and higher form by ``off_m``, which falls to 0 at the end."""
+        """The parts of ``s`` between ``cuts``, widened by ``off_m`` (aside, in height); ``fading``: down to 0."""
         aside_m, height_m = off_m
         if aside_m <= 1e-9 and height_m <= 0.0:
             return
@@ -202,9 +202,9 @@ class _Cutter:
                 )  # fmt: skip
 
     def _beyond(self, off: _Off, s: Stretch) -> tuple[float, float]:
-        """The offset on ``s``; 0 where the vehicle's own errors include it.
+        """The offset that widens ``s``; 0 where the vehicle's own errors include it.
 
-        A return is flown at the altitude at which it began: the error of that altitude comes on top.
+        A return is flown at the altitude at which it began, so an error of that altitude always widens it.
         """
         if off.meant:
             return off.aside_m, off.height_m
@@ -238,7 +238,7 @@ def _between(s: Stretch, part: float) -> Place:
 
 
 def _turn(s: Stretch, after: Stretch) -> float:
-    """The angle between two legs seen from above, radians; a right angle where one of them goes nowhere."""
+    """The angle between two legs seen from above, radians; a right angle if one of them has no horizontal length."""
     one, two = _course(s), _course(after)
     if one is None or two is None:
         return 0.5 * math.pi

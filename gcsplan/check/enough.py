@@ -1,7 +1,7 @@
-"""By how much a limit is broken: a leg that is moved by that much keeps it.
+"""By how much a limit is broken: a leg that is moved by this depth keeps the limit.
 
 The exact check resolves the ground beside a leg only as finely as a yes or no needs, so its depth of a violation is
-good to a tenth. The depth that is reported was tried: the leg, moved by it, passes.
+exact to about a tenth. The depth reported here was tried: the leg, moved by it, passes.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from gcsplan.world.limits import Limits
 __all__ = ["enough", "rounded_up"]
 
 UPWARD = {"min_agl": 1.0, "terrain_clearance": 1.0, "max_agl": -1.0}
-"""Which way a leg is moved to keep a limit of height."""
+"""The direction in which a leg is moved to keep a limit of height: 1 up, −1 down."""
 
 TRIES = 8
 FINER = 7
 LEAST_PART = 0.8
-"""The search for the depth begins at this part of what the kernel reports."""
+"""The bisection for the depth begins at this part of a depth that is enough."""
 
 CENTIMETRE = 0.01
 
 
 def rounded_up(by: float) -> float:
-    """``by`` in whole hundredths, never less."""
+    """``by`` rounded up to whole hundredths; unchanged if it is not finite or is 1e9 or more."""
     return round(math.ceil(by * 100.0 - 1e-7) / 100.0, 2) if math.isfinite(by) and by < 1e9 else by
 
 
 def enough(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> Violation:
-    """``v`` with a ``by`` in hundredths that is enough for all of ``broken``: the legs that break what it breaks."""
+    """``v`` with a ``by`` in hundredths that is enough for all of ``broken``, the legs that break the same limit."""
     if v.kind == "coverage":
         return v
     by = _lift(v, broken, legs, limits, air) if v.kind in UPWARD else rounded_up(v.by)
@@ -43,7 +43,7 @@ def enough(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, a
 
 
 def _lift(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> float:
-    """Between what is not enough and what is, by trial: metres up, or down under a ceiling."""
+    """The smallest sufficient move found by trial, in metres: up, or down under a ceiling."""
     alone = Limits(
         min_agl_m=limits.min_agl_m if v.kind == "min_agl" else -1e9,
         max_agl_m=limits.max_agl_m if v.kind == "max_agl" else None,

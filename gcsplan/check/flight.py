@@ -1,21 +1,21 @@
-"""What an autopilot does with a mission: its items as the straight stretches that are flown.
+"""What an autopilot does with a mission: the items as the straight stretches that are flown.
 
-Only motion is read here, judging is `judge`'s. A command whose motion we do not know is named in ``not_judged``,
-and so is never lost. Facts about the autopilots: ArduPilot's and PX4's sources and a flown ArduCopter.
+This module reads only motion; `judge` judges it. A command whose motion we do not know is listed in ``not_judged``, so
+nothing is lost silently. Facts about the autopilots come from ArduPilot's and PX4's sources and a flown ArduCopter.
 
 - Frame-3 altitudes count from where the vehicle arms: the ground at home.
-- The frame of the *target* decides how altitude runs along a leg: to a terrain-frame item it is interpolated above
-  ground from the height above ground that the leg began with.
-- ArduCopter: altitude 0 keeps the altitude in the item's own frame, latitude = longitude = 0 is "here"
-  (mode_auto.cpp, `loc_from_cmd`); take-off ignores its place and ends a metre up at least.
-- ArduPlane: altitude 0 is kept only at latitude = longitude = 0 (commands.cpp, `set_next_WP`). A change of less than
-  GLIDE_SLOPE_MIN, and a climb that begins low, is flown at once and not along the leg (altitude.cpp): such a leg is
-  judged as the whole band between both altitudes. A VTOL take-off climbs *by* its altitude, whatever its frame.
-  Circles grow with altitude (AP_L1_Control.cpp, `loiter_radius`). It waits for no NAV_DELAY once it is armed.
-- PX4 knows no "here": latitude = longitude = 0 lies off Africa. A VTOL take-off goes over to forward flight. Behind an
-  item without autocontinue it goes on with none (mission.cpp, `on_active`); ArduPilot does not look at that.
-- A circle's radius is param3's of LOITER_TURNS, of ArduPlane's LOITER_UNLIM and param2's of its LOITER_TO_ALT; its
-  LOITER_TIME takes WP_LOITER_RAD whatever the item says, and so does a radius of 1 m or less (commands_logic.cpp).
+- The frame of the *target* decides the altitude along a leg: on the leg to a terrain-frame item it is interpolated
+  above ground, beginning with the height above ground at which the leg begins.
+- ArduCopter: altitude 0 keeps the altitude in the item's own frame, latitude = longitude = 0 means "here"
+  (mode_auto.cpp, `loc_from_cmd`); take-off ignores its place and climbs at least 1 m.
+- ArduPlane: altitude 0 keeps the altitude only at latitude = longitude = 0 (commands.cpp, `set_next_WP`). A change of
+  less than GLIDE_SLOPE_MIN, and a climb that begins low, is flown at once and not along the leg (altitude.cpp): such a
+  leg is judged as the whole band between both altitudes. A VTOL take-off climbs *by* its altitude, whatever its frame.
+  Circles grow with altitude (AP_L1_Control.cpp, `loiter_radius`). It does not wait for NAV_DELAY once it is armed.
+- PX4 has no "here": latitude = longitude = 0 lies off Africa. A VTOL take-off changes to forward flight. After an item
+  without autocontinue PX4 flies no further item (mission.cpp, `on_active`); ArduPilot ignores that flag.
+- A circle's radius is param3 of LOITER_TURNS and of ArduPlane's LOITER_UNLIM, and param2 of its LOITER_TO_ALT; its
+  LOITER_TIME uses WP_LOITER_RAD whatever the item says, and so does a radius of 1 m or less (commands_logic.cpp).
 - LAND with a place flies there level (in terrain frame at its height above ground), then descends. ArduCopter before
   4.6 holds its height above ground wherever it has terrain data: that is judged too.
 - RTL: `rtl.model`. Jumps: `route`. Splines: `spline`.
@@ -44,7 +44,7 @@ from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
 PLANE_GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane GLIDE_SLOPE_MIN, default
-PLANE_LOW_M = 20.0  # ArduPlane setup_glide_slope: below this above home it climbs at once
+PLANE_LOW_M = 20.0  # ArduPlane setup_glide_slope: below this height above home it climbs at once
 COPTER_CIRCLE_RADIUS_M = 10.0  # ArduCopter CIRCLE_RADIUS, default
 LEAST_CLIMB_M = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}  # takeoff_start; MIS_TAKEOFF_ALT, default
 TAKE_OFF_ELSEWHERE_M = 30.0
@@ -57,10 +57,10 @@ def follow(
     *,
     rtl_rel_home_m: float | None = None,
 ) -> Flight:
-    """The flight that ``mission`` (as stored on board) asks for.
+    """Return the flight that ``mission`` (as stored on board) leads to.
 
-    ``ground_amsl(lat_deg, lon_deg)`` is the terrain, NaN where unknown. ``rtl_rel_home_m`` is the altitude of a
-    return above home; without it an RTL is not judged.
+    ``ground_amsl(lat_deg, lon_deg)`` is the terrain, NaN where unknown. ``rtl_rel_home_m`` is the altitude of a return
+    above home; without it an RTL is not judged.
     """
     pilot = _Pilot(mission, vehicle, ground_amsl, rtl_rel_home_m)
     if fly_in_order(mission, pilot):
@@ -127,7 +127,7 @@ class _Pilot(Aboard):
             self._lose(seq, item)
 
     def finish(self) -> None:
-        """What happens after the last item, where it is not a landing."""
+        """Report the return that ArduPlane flies after the last item as not judged."""
         if self.airborne and not self.landed and self.autopilot is Autopilot.ARDUPLANE:
             last = self.flight.stretches[-1] if self.flight.stretches else None
             if last is not None and (last.kind != "loiter" or last.hold_s < math.inf):
@@ -184,7 +184,7 @@ class _Pilot(Aboard):
         self.airborne = True
 
     def _go(self, seq: int, item: MissionItem, *, hold_s: float = 0.0, short_m: float = 0.0) -> None:
-        """To the item's place; its altitude is reached ``short_m`` before it, at a circle's edge."""
+        """Fly to the item's place; its altitude is reached ``short_m`` before it, at a circle's edge."""
         target = self.target(item)
         if target is None:
             self._lose(seq, item)
@@ -205,7 +205,7 @@ class _Pilot(Aboard):
         self._leg(seq, "cruise", target, terrain=terrain, hold_s=hold_s)
 
     def _curve(self, seq: int, item: MissionItem) -> None:
-        """A spline as ArduCopter flies it; passing or standing at its beginning are both judged."""
+        """A spline as ArduCopter flies it; both a pass through its beginning and a stop there are judged."""
         target, after = self.target(item), self._next(seq)
         terrain = any(i is not None and i.frame in (m.TERRAIN, 11) for i in (item, after))
         copter = self.autopilot is Autopilot.ARDUCOPTER
@@ -213,7 +213,7 @@ class _Pilot(Aboard):
             self._lose(seq, item)
             return
         here, arrives = self.at, np.zeros(3)
-        self.at = target  # "as high as before" in the item after it means here
+        self.at = target  # "altitude 0" in the item after it means the altitude here
         beyond = self.target(after) if self.has_place(after) else None
         self.at = here
         if beyond is not None and self.hold(item) == 0.0:
@@ -231,7 +231,7 @@ class _Pilot(Aboard):
         self.note("splines are judged as ArduCopter 4.1 and later fly them")
 
     def _next(self, seq: int) -> MissionItem | None:
-        """The item that is flown to after ``seq``, the return where none is left; None where a jump decides."""
+        """The next item that is flown to after ``seq``, an RTL if none is left; None if a jump decides."""
         for item in self.items[seq + 1 - self.first_seq :]:
             if item.command in (cmd.DO_JUMP, cmd.DO_JUMP_TAG):
                 return None
@@ -240,14 +240,14 @@ class _Pilot(Aboard):
         return MissionItem(cmd.RTL, m.NO_POSITION)
 
     def _leg(self, seq: int, kind: StretchKind, target: Place, *, terrain: bool, hold_s: float = 0.0) -> None:
-        """From here to ``target``, in whatever way the autopilot changes its altitude on the way."""
+        """A leg from here to ``target``, with all the altitude profiles that the autopilot may fly on it."""
         here = self.at
         self.add(seq, kind, here, target, terrain=terrain, hold_s=hold_s, on_path=kind == "cruise")
         self.at = target
         self.direction = None if hold_s else towards(here, target)
         if self.autopilot is not Autopilot.ARDUPLANE:
             return
-        if self.low_m and not terrain:  # it makes up for that within half the leg
+        if self.low_m and not terrain:  # it corrects that within half the leg
             half = tuple(0.5 * (a + b) for a, b in zip(here, target, strict=True))
             low, on = (*here[:2], here[2] - self.low_m), (half[0], half[1], half[2] - self.low_m)
             self.instead(seq, kind, low, on, reach_m=self.around_m)
@@ -280,7 +280,7 @@ class _Pilot(Aboard):
         self.direction = None
 
     def _circle(self, seq: int, radius_m: float) -> float:
-        """Radius of a circle whose item says ``radius_m`` (the sign is the direction)."""
+        """Radius of a circle whose item says ``radius_m``, m (its sign is the direction)."""
         plane = self.autopilot is Autopilot.ARDUPLANE
         radius_m = abs(radius_m) if math.isfinite(radius_m) else 0.0
         if radius_m > (1.0 if plane else 0.0):
@@ -309,7 +309,7 @@ class _Pilot(Aboard):
             reach_m *= circle_growth(high)
             self.add(seq, "loiter", around, around, band_m=0.5 * (high - low), reach_m=reach_m)
             self.low_m, self.around_m = min(REACHED_M, self.at[2] - low), reach_m
-        elif self.autopilot is Autopilot.PX4 and before[2] != self.at[2]:  # level first, then there
+        elif self.autopilot is Autopilot.PX4 and before[2] != self.at[2]:  # level first, then up or down there
             self.instead(seq, "cruise", before, (*place, before[2]))
             self.instead(seq, "loiter", (*place, before[2]), self.at, column=True)
 

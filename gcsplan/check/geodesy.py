@@ -1,4 +1,4 @@
-"""Distances between places given in degrees, without a plane."""
+"""Distances between places in degrees, without a projected plane."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
 
 
 def degree_m(lat_deg: float) -> tuple[float, float]:
-    """Metres of a degree of longitude and of one of latitude, at a latitude on the ellipsoid."""
+    """Metres per degree of longitude and per degree of latitude, at a latitude on the WGS84 ellipsoid."""
     lat = math.radians(lat_deg)
     w = 1.0 - ECCENTRICITY_2 * math.sin(lat) ** 2
     east, north = EQUATOR_M / math.sqrt(w) * math.cos(lat), EQUATOR_M * (1.0 - ECCENTRICITY_2) / w**1.5
@@ -18,11 +18,11 @@ def degree_m(lat_deg: float) -> tuple[float, float]:
 
 
 def offset_m(a: Place, b: Place) -> tuple[float, float]:
-    """Metres east and north from ``a`` to ``b``, by the ellipsoid's radii half way: a millionth off over 100 km."""
+    """Metres east and north from ``a`` to ``b``, by the ellipsoid's radii at mid latitude: 1e-6 off over 100 km."""
     east, north = degree_m(0.5 * (a[0] + b[0]))
     return east * ((b[1] - a[1] + 180.0) % 360.0 - 180.0), north * (b[0] - a[0])
 
 
 def flat_m(a: Place, b: Place) -> float:
-    """Horizontal metres between places, as `offset_m` has them."""
+    """Horizontal distance in metres, by `offset_m`."""
     return math.hypot(*offset_m(a, b))

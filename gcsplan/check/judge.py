@@ -1,7 +1,7 @@
-"""`judge`: a mission, decoded as the autopilot stores it, held against a world and a vehicle's limits.
+"""`judge`: judge a mission, decoded as the autopilot stores it, against a world and a vehicle's limits.
 
-What is checked is what is flown: wire numbers rounded as on board, the whole of every leg, widened by the track
-and altitude error and by the bow between the line straight in the plane and the one straight in degrees.
+The check judges what is flown: wire numbers rounded as on board, and every leg along its whole length, widened by the
+track and altitude errors and by the bow between the line straight in the plane and the line straight in degrees.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 
 TERRAIN_ERROR_M = 30.0
-"""ArduPilot shifts all terrain by up to this when it arms; terrain-frame legs are judged with it."""
+"""ArduPilot shifts all terrain by up to this, m, when it arms; terrain-frame legs are judged with it as an error."""
 
 HIGHEST_M = 20_000.0
-"""Above any aircraft that gcsplan plans for; keeps absurd numbers out of the exact check."""
+"""Above any aircraft that gcsplan plans for, m; keeps absurd numbers out of the exact check."""
 
 
 def judge(
@@ -49,8 +49,8 @@ def judge(
 ) -> Verdict:
     """Judge ``mission`` for ``vehicle`` in ``world``; never raises for a mission that is merely unsafe.
 
-    ``misses``: report too how near it comes to each limit (half as much work again). ``tuning``: the parameters that
-    decide where the autopilot turns, where they were read from the vehicle.
+    ``misses``: also report how near it comes to each limit (half as much work again). ``tuning``: the parameters that
+    decide where the autopilot turns, if they were read from the vehicle.
     """
     table = profile_of(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
@@ -79,7 +79,7 @@ def judge(
     figures = _figures(flight, plane, report, vehicle, world)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
-    if flight.instead:  # what may be flown in place of a stretch must be legal; its figures are not the mission's
+    if flight.instead:  # alternatives must be legal too; the figures stay those of the mission
         plane = legs_in_plane(flight.instead, vehicle.limits, world, terrain_error_m)
         report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
         findings = _worst(findings, _findings(flight.instead, plane, report, vehicle.limits, world))
@@ -92,7 +92,7 @@ def judge(
 
 
 def _refused(mission: Mission) -> list[Finding]:
-    """The items that the autopilot will not take: the upload would end there."""
+    """Findings for the items that the autopilot does not accept: the upload would end at the first of them."""
     refuses, found = profile_of(mission.autopilot).refuses, []
     for seq, item in enumerate(mission.items, mission.first_seq):
         if why := refuses(item):
@@ -102,7 +102,7 @@ def _refused(mission: Mission) -> list[Finding]:
 
 
 def _unreached(flight: Flight) -> list[Finding]:
-    """Items behind a hold or a loop without end."""
+    """Findings for the items after a hold or a loop without end."""
     return [
         _finding(u.first, "unreachable", u.describe(), float(u.last - u.first + 1), 0.0, math.nan, "items")
         for u in flight.unreached
@@ -110,7 +110,7 @@ def _unreached(flight: Flight) -> list[Finding]:
 
 
 def _is_too_far(stretch: Stretch, world: World) -> bool:
-    """Beyond `FARTHEST_M` from the frame's origin, off the globe, or `HIGHEST_M` up or down."""
+    """Whether it leads beyond `FARTHEST_M` from the frame's origin, off the globe, or beyond `HIGHEST_M` up or down."""
     lat0, lon0 = math.radians(world.frame.lat_deg), math.radians(world.frame.lon_deg)
     for lat_deg, lon_deg, amsl_m in (stretch.start, stretch.end):
         lat, lon = math.radians(lat_deg), math.radians(lon_deg)
@@ -195,7 +195,7 @@ WORDS = {
 
 
 def _worst(findings: list[Finding], more: list[Finding]) -> list[Finding]:
-    """``findings`` and ``more``; of those that are of one kind, item and zone the worst."""
+    """``findings`` plus ``more``; one of ``more`` replaces a lesser finding of the same kind, item and zone."""
     kept = {(f.seq, f.kind, f.zone): f for f in reversed(findings)}
     for f in more:
         key = (f.seq, f.kind, f.zone)
@@ -261,7 +261,7 @@ def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict
 
 
 def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None:
-    """The power, J/s, of a mission's last hold or round, which has no end; None where the mission ends."""
+    """The power, W, of a mission's last hold or round if that has no end; None if the mission ends."""
     if flight.loop_seq is not None:
         begun = max((i for i, leg in enumerate(verdict.legs) if leg.jumped_from == flight.loop_seq), default=0)
         round_ = verdict.legs[begun:]

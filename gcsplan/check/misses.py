@@ -1,4 +1,4 @@
-"""How near a mission comes to each limit that it keeps: where there is least room, and how much."""
+"""How near a mission comes to each limit that it keeps: the smallest margin, and its place."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from gcsplan.world.world import World
 from gcsplan.world.zones import Circle
 
 MOST_ZONES = 3
-"""So many zones are named, the nearest first."""
+"""The number of zones reported, nearest first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Miss:
-    """The least room that is left to one limit (for zones: to one zone), errors and clearances taken off.
+    """The smallest margin to one limit (for zones: to one zone), after errors and clearances are subtracted.
 
-    ``value``: heights with the errors taken off, as a finding gives them; angles and distances to zones on the line
-    itself. ``room`` is negative where the limit is broken. The place is where it is least.
+    ``room``: the margin, negative if the limit is broken. ``value``: heights after the errors are subtracted, as in a
+    finding; angles and distances to zones are those of the line itself. The place is where the margin is smallest.
     """
 
     kind: str
@@ -40,7 +40,7 @@ class Miss:
     zone: str = ""
 
     def describe(self) -> str:
-        """One line."""
+        """Describe it in one line."""
         what = f"{WORDS[self.kind]}{f' {self.zone}' if self.zone else ''}"
         left = (
             f"{self.room:.1f} {self.unit} to spare" if self.room >= 0.0 else f"broken by {-self.room:.1f} {self.unit}"
@@ -57,15 +57,16 @@ WORDS = {
     "climb": "steepest climb", "descent": "steepest descent",
 }  # fmt: skip
 LIFT_M = 50_000.0
-"""An altitude error that breaks every limit of height on every leg: by less where there is more room to the limit."""
+"""An added altitude error, m, that breaks every limit of height on every leg; it breaks a limit by less the larger the
+margin."""
 
 
 def nearest_misses(
     stretches: Sequence[Stretch], legs: Legs, owner: NDArray[np.intp], report: LegReport, vehicle: Vehicle, world: World
 ) -> tuple[Miss, ...]:
-    """A `Miss` for each limit that the vehicle has, and for the zones that it comes nearest to.
+    """Return a `Miss` for each limit that the vehicle has, and for the `MOST_ZONES` zones that it comes nearest to.
 
-    ``owner`` (N,): the stretch of each leg. Heights are those of the exact check: the lowest or highest within the
+    ``owner`` (N,): index of each leg's stretch. Heights are those of the exact check: the lowest or highest within the
     track error.
     """
     limits = vehicle.limits
@@ -90,7 +91,7 @@ def nearest_misses(
     for k in sorted(met, key=lambda k: float(near[report.nearest_zone == k].min()))[:MOST_ZONES]:
         distance = np.where(report.nearest_zone == k, near, np.inf)
         room, at = distance - legs.track_error_m - reach, np.zeros(len(run))
-        for v in report.violations:  # inside, the clearance is 0 however deep
+        for v in report.violations:  # inside a zone the reported clearance is 0 at any depth
             if v.kind == "zone" and v.zone == k:
                 room[v.leg], distance[v.leg] = -v.by, v.value
         leg = int(room.argmin())
@@ -122,7 +123,7 @@ def _heights(
 
 
 def _nearest_part(start: Floats, end: Floats, world: World, zone: int) -> float:
-    """Which part of a leg is nearest to a zone's outline, seen from above."""
+    """The part of a leg, 0 to 1, at which it is nearest to a zone's outline, seen from above."""
     shape = world.airspace.zones[zone].shape
     way = (end - start)[:2]
     square = float(way @ way)

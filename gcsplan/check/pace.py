@@ -1,4 +1,4 @@
-"""How fast it is flown: cruise, climb and descent, as a mission's speed changes set them."""
+"""Speeds of the flight: cruise, climb and descent, as a mission's speed changes set them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gcsplan.vehicle import Autopilot, Vehicle
 
 AIRSPEED, GROUND_SPEED, CLIMB, DESCENT = 0.0, 1.0, 2.0, 3.0  # SPEED_TYPE
 DEFAULT = -2.0
-"""Sets a speed back to its default; -1 leaves it as it is."""
+"""This value resets a speed to its default; −1 leaves it unchanged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Pace:
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> Pace:
-        """What a mission begins with: the vehicle's own."""
+        """The pace at the beginning of a mission: the vehicle's own speeds."""
         return cls(vehicle.speed_max_m_s, (vehicle.climb_m_s, vehicle.descent_m_s))
 
     def changed(self, item: MissionItem, vehicle: Vehicle) -> tuple[Pace, str]:

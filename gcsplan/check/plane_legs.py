@@ -1,7 +1,7 @@
-"""A flight's stretches as straight legs of the plane; those in the terrain frame in pieces that follow the ground.
+"""A flight's stretches as straight legs of the plane; terrain-frame stretches as pieces that follow the ground.
 
 Over a bilinear surface the ground under a straight line is a quadratic in each cell. So is the altitude of a leg that
-is interpolated above ground: its distance from a chord is known from its middle, and its slope is steepest at an end.
+is interpolated above ground: its middle gives its distance from a chord, and its slope is steepest at an end.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from gcsplan.world.world import World
 __all__ = ["PlaneLegs", "legs_in_plane", "steep_report"]
 
 SAG_M = 0.05
-"""How far a chord may lie from the quadratic that it stands for; added to the altitude error of its piece."""
+"""How far a chord may lie from the quadratic that it replaces, m; added to the altitude error of its piece."""
 
 GRID_BOW_M = 0.01
-"""How far lines that are straight in the plane may lie from those straight in the grid, where cells are cut."""
+"""How far lines straight in the plane may lie from lines straight in the grid, m, when legs are cut at cell borders."""
 
 SHORTEST_M = 1e-3
 MOST_PARTS = 200
-"""Into which a piece of a terrain-frame leg is cut for `SAG_M`, at most."""
+"""Most parts into which a piece of a terrain-frame leg is cut to keep `SAG_M`."""
 
 NOISE_DEG = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneLegs:
-    """The legs of all stretches in the plane; ``owner`` (N,) is the stretch of each leg.
+    """The legs of all stretches in the plane; ``owner`` (N,) is the index of each leg's stretch.
 
-    ``steep`` (N, 2): steepest rise over run, up and down (negative), where that is not the leg's own slope; else NaN.
+    ``steep`` (N, 2): steepest rise over run, up and down (negative), if that is not the leg's own slope; else NaN.
     """
 
     legs: Legs
@@ -77,10 +77,10 @@ def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, te
 
 
 def follow_ground(ends: Floats, surface: Surface) -> tuple[Floats, Floats, Floats]:
-    """A terrain-frame leg (2, 3) as straight pieces: points (N + 1, 3), how far each piece is off (N,), and `steep`.
+    """A terrain-frame leg (2, 3) as straight pieces: points (N + 1, 3), their deviations, m (N,), and `steep` (N, 2).
 
-    Height is interpolated above ground between the ends. Over unknown ground it is left as one straight leg, which is
-    examined as such, and reports the void.
+    Height above ground is interpolated between the ends. Over unknown ground the leg stays one straight piece; its
+    examination reports the void.
     """
     straight = ends, np.zeros(1), np.full((1, 2), np.nan)
     run_m = float(np.hypot(*(ends[1, :2] - ends[0, :2])))
@@ -104,7 +104,7 @@ def follow_ground(ends: Floats, surface: Surface) -> tuple[Floats, Floats, Float
     begun = np.concatenate([[0], np.cumsum(parts)[:-1]])
     share = (np.arange(len(piece)) - begun[piece]) / parts[piece]
     f = np.append(t[:-1][piece] + np.diff(t)[piece] * share, 1.0)
-    # The quadratic itself, so that neighbouring pieces meet: its chord, and four times its sag at the middle.
+    # Points on the quadratic itself (chord plus four times its sag at the middle), so that neighbouring pieces meet.
     z = np.append(z[:-1][piece] + (np.diff(z)[piece] + 4.0 * sag[piece] * (1.0 - share)) * share, z[-1])
     en = ends[0, :2] + f[:, None] * (ends[1, :2] - ends[0, :2])
     points = np.column_stack([en, z])
@@ -114,7 +114,7 @@ def follow_ground(ends: Floats, surface: Surface) -> tuple[Floats, Floats, Float
 
 
 def _cell_cuts(ends: Floats, surface: Surface, run_m: float) -> Floats:
-    """Where a line crosses from cell to cell: rising parts of it from 0 to 1, none so near that rounding counts."""
+    """Where a line crosses cell borders: rising parts from 0 to 1, at least `SHORTEST_M` apart."""
     way = ends[1, :2] - ends[0, :2]
     middle, both = surface.grid(*(ends[0, :2] + 0.5 * way)), surface.grid(ends[:, 0], ends[:, 1])
     bow_m = float(np.hypot(*((middle - both.mean(axis=0)) * surface.grid.metres_per_cell(*ends[0, :2]))))
@@ -139,7 +139,7 @@ def _cell_cuts(ends: Floats, surface: Surface, run_m: float) -> Floats:
 
 
 def steep_report(plane: PlaneLegs, report: LegReport, limits: Limits) -> LegReport:
-    """``report``, where a piece that follows the ground has the angle of its steepest metre, not of its chord."""
+    """``report`` with the steepest angle of each piece that follows the ground, instead of its chord's angle."""
     mine = np.flatnonzero(~np.isnan(plane.steep[:, 0]) & ~plane.legs.column)
     if not len(mine):
         return report

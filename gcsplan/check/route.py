@@ -1,12 +1,12 @@
-"""In which order the items of a mission are flown: jumps with their counts, as the autopilots count them.
+"""The order in which the items of a mission are flown: jumps with their counts, as the autopilots count them.
 
-- A jump's count belongs to the jump and is never reset: once it is used up, the jump is passed
-  (ArduPilot's `AP_Mission::get_next_cmd`, PX4's `getNonJumpItem`). 0 never jumps; −1 is without end on ArduPilot, and
-  65,535 rounds on PX4, which keeps 16 bits.
-- ArduPilot counts `MOST_JUMPS` jumps of one mission and takes the rest for used up. Jump tags are ArduPilot's alone.
-- A round that begins as the one before it began is flown as that one was: it is followed once, and counted.
-- Behind a hold or a loop without end nothing is flown. On ArduPilot DO_ items right behind a hold are carried out while
-  it lasts, and what stands behind DO_LAND_START is for a return to lead to.
+- A jump's count belongs to the jump and is never reset: once it is used up, the jump is skipped
+  (ArduPilot's `AP_Mission::get_next_cmd`, PX4's `getNonJumpItem`). A count of 0 never jumps; −1 repeats without end on
+  ArduPilot and 65,535 times on PX4, which keeps 16 bits.
+- ArduPilot counts `MOST_JUMPS` jumps of one mission and treats the others as used up. Only ArduPilot has jump tags.
+- A round that begins in the same state as the round before it is flown identically: it is followed once, and counted.
+- Nothing is flown after a hold or a loop without end. On ArduPilot the DO_ items right after a hold are carried out
+  while it lasts, and only a return leads to the items after DO_LAND_START.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from gcsplan.mavlink.mission.mission import Mission, MissionItem
 
 MOST_JUMPS = 15  # AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS on small boards, 100 on large ones; the rest count as used up
 MOST_STEPS = 100_000
-"""Items flown one after the other, rounds that repeat others aside, before a mission is given up as endless."""
+"""Most steps before a mission is given up as endless. Rounds that repeat the round before them are not counted."""
 
 
 class Pilot(Protocol):
-    """Who flies the items; see `flight`."""
+    """What flies the items; see `flight`."""
 
     flight: Flight
     jumped_from: int | None
@@ -37,22 +37,26 @@ class Pilot(Protocol):
 
     @property
     def over(self) -> bool:
-        """True once the aircraft is down and stays there."""
+        """Whether the aircraft is down and stays there."""
         ...
 
     @property
     def stays(self) -> bool:
-        """True once the aircraft holds without end."""
+        """Whether the aircraft holds without end."""
         ...
 
     @property
     def state(self) -> Hashable:
-        """All that the rest of the flight depends on, but the counts of the jumps."""
+        """Everything that the rest of the flight depends on, except the counts of the jumps."""
         ...
 
 
 class _Jump:
-    """One jump: its target's index (None: nowhere), rounds (None: without end), and what became of it so far."""
+    """One jump: the index of its target (None: no such item), its rounds (None: without end), and its progress.
+
+    ``done``: rounds flown. ``was``: when it last jumped, the state then, and the numbers of ``stretches`` and
+    ``instead``.
+    """
 
     __slots__ = ("done", "rounds", "target", "was")
 
@@ -62,7 +66,7 @@ class _Jump:
 
 
 def fly_in_order(mission: Mission, pilot: Pilot) -> bool:
-    """Have ``pilot`` fly the items of ``mission`` (as stored) in their order; False where that never ends."""
+    """Make ``pilot`` fly the items of ``mission`` (as stored) in order; return False if that never ends."""
     jumps = _jumps(mission)
     flight, first, items = pilot.flight, mission.first_seq, mission.items
     if mission.autopilot.is_ardupilot and len(jumps) > MOST_JUMPS:
@@ -128,7 +132,7 @@ def _jumps(mission: Mission) -> dict[int, _Jump]:
 
 
 def _again(flight: Flight, jump: _Jump, was: tuple[Hashable, int, int]) -> None:
-    """The rounds that are left, all like the last one."""
+    """Count the stretches of the last round for all remaining rounds too: they are flown identically."""
     assert jump.rounds is not None
     times = 1 + jump.rounds - jump.done
     _, since, instead = was
@@ -138,7 +142,7 @@ def _again(flight: Flight, jump: _Jump, was: tuple[Hashable, int, int]) -> None:
 
 
 def _never(mission: Mission, flight: Flight, seq: int, index: int, *, loop: bool) -> None:
-    """Name the items from ``index`` on, which are never flown: behind ``seq``, that holds or jumps without end."""
+    """Record the items from ``index`` on as never flown, because ``seq`` before them holds or jumps without end."""
     first, items, ardupilot = mission.first_seq, mission.items, mission.autopilot.is_ardupilot
     landing = len(items)
     if ardupilot:

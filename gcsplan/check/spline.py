@@ -1,10 +1,11 @@
-"""The curve that ArduCopter flies to a SPLINE_WAYPOINT, as chords and how far it bulges from each.
+"""The curve that ArduCopter flies to a SPLINE_WAYPOINT, as chords and how far the curve bulges from each chord.
 
-A cubic Hermite curve between two way points with a direction at either end, of a length that is cut down where both
-together exceed `LONGEST` times the distance (ArduCopter 4.1 and later: SplineCurve.cpp, `set_origin_and_destination`;
-AC_WPNav.cpp, `set_spline_destination`). It leaves along the leg before it, or with no direction where the aircraft
-stopped, and arrives parallel to the leg after it, or, if that is a spline too, to the line from its own beginning to
-that one's end. In simulation ArduCopter 4.6.0 flew within 1.2 m of these chords, 57 m beside the straight line.
+It is a cubic Hermite curve between two way points with a direction at each end. The directions are shortened if their
+lengths together exceed `LONGEST` times the distance (ArduCopter 4.1 and later: SplineCurve.cpp,
+`set_origin_and_destination`; AC_WPNav.cpp, `set_spline_destination`). The curve leaves along the leg before it, or with
+no direction if the aircraft stopped. It arrives parallel to the leg after it or, if that is a spline too, to the line
+from this curve's beginning to that one's end. In simulation ArduCopter 4.6.0 flew within 1.2 m of these chords, 57 m
+beside the straight line.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ LONGEST = 4.0  # SPLINE_FACTOR
 BULGE_M = 0.25
 MOST_PIECES = 200
 LOOKS, BESIDE, STILL = 16, 1e-5, 1e-6
-"""Places of a piece that are looked at; how near to a place its sides are, as a part of the curve; and at what part of
-its fastest a curve stands still."""
+"""Samples per piece; offset of the samples on both sides of a place, as a part of the curve; and the part of its
+fastest speed below which a curve counts as standing still."""
 
 
 def towards(a: Place, b: Place) -> Vector:
-    """(3,) from ``a`` to ``b``: east, north, up, metres."""
+    """The vector (3,) from ``a`` to ``b``: east, north, up, metres."""
     return np.array([*offset_m(a, b), b[2] - a[2]])
 
 
@@ -35,10 +36,10 @@ Slopes = list[tuple[float, float]]
 
 
 def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[list[Place], float, Slopes]:
-    """The curve's points from ``start`` to ``end`` (both returned exactly), and its bulge beyond their chords.
+    """The curve's points from ``start`` to ``end`` (both exact), its bulge beyond the chords, m, and its slopes.
 
-    ``leaves``, ``arrives``: (3,) directions with their lengths, metres. Last, for each chord, the steepest rise over
-    run of the curve over it, up and down (negative).
+    ``leaves``, ``arrives``: (3,) directions with their lengths, metres. The slopes are, for each chord, the steepest
+    rise over run of the curve over it, up and down (negative).
     """
     way = towards(start, end)
     both = float(np.linalg.norm(leaves) + np.linalg.norm(arrives))
@@ -57,12 +58,12 @@ def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[l
 
 
 def _slopes(leaves: Vector, square: Vector, cube: Vector, pieces: int) -> Slopes:
-    """Steepest slopes of each piece, up and down: at its ends and wherever the slope has an extreme, and between.
+    """Steepest slopes of each piece, up and down: at its ends, at the slope's extremes, and at samples between.
 
     With the speed v(t), a quadratic in each direction, the slope is v_up / sqrt(r), r = v_east² + v_north². Its
-    derivative is 0 at the roots of 2 v_up' r - v_up r': at most five. Where the curve stands still, at an end or on
-    the way, the slope is what it tends to on either side: `BESIDE` is so near. `LOOKS` places of each piece are a net
-    below them, for roots are not exact where several fall together.
+    derivative is 0 at the roots of 2 v_up' r - v_up r': at most five. Where the curve stands still, at an end or within
+    it, the slope is its limit on either side: a place `BESIDE` it is near enough. `LOOKS` samples of each piece are a
+    safety net, because computed roots are inexact where several coincide.
     """
     speed = zip(leaves, 2.0 * square, 3.0 * cube, strict=True)
     east, north, up = (np.polynomial.Polynomial(coefficients) for coefficients in speed)

@@ -1,4 +1,4 @@
-"""What a flight is made of: straight stretches, and what is not known of them."""
+"""The parts of a flight: its straight stretches, and what is unknown about them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Place = tuple[float, float, float]
 class Stretch:
     """One straight stretch, flown on behalf of wire item ``seq``.
 
-    ``column``: vertical take-off or landing. ``terrain``: altitude is interpolated above ground between the ends.
-    ``band_m`` widens the altitude error (altitude is known only within a band), ``reach_m`` the track error (a
+    ``column``: vertical take-off or landing. ``terrain``: altitude above ground is interpolated between the ends.
+    ``band_m`` widens the altitude error (the altitude is known only within a band), ``reach_m`` the track error (a
     loiter's circle). ``on_path``: counts for the path's length, from the top of the take-off to the approach.
-    ``rates_m_s``: of climb and descent, None the vehicle's own. ``times``: how often it is flown, by a jump that leads
-    back. ``jumped_from``: the jump that led to it, where it is the first after one. ``steep``: of a chord, rise over
-    run of what is flown over it at its steepest, up and down (negative); None: it is flown as it is.
+    ``rates_m_s``: of climb and descent; None: the vehicle's own. ``times``: how often it is flown, because a jump leads
+    back. ``jumped_from``: the jump that led to it, for the first stretch after a jump. ``steep``: for a chord of a
+    curve, the curve's steepest rise over run, up and down (negative); None: the stretch is flown straight.
     """
 
     seq: int
@@ -41,7 +41,7 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True)
 class Unreached:
-    """Items ``first`` to ``last``, which are never flown, for ``seq`` holds or jumps back without end."""
+    """Items ``first`` to ``last``, which are never flown because ``seq`` holds or jumps back without end."""
 
     seq: int
     first: int
@@ -49,7 +49,7 @@ class Unreached:
     loop: bool = False
 
     def describe(self) -> str:
-        """One line."""
+        """Describe it in one line."""
         does = "jumps back" if self.loop else "holds"
         behind = f"item {self.first} is" if self.first == self.last else f"items {self.first} to {self.last} are"
         return f"item {self.seq} {does} without end: {behind} never reached"
@@ -59,8 +59,8 @@ class Unreached:
 class Flight:
     """All stretches in order, what could not be followed, and what is assumed.
 
-    ``instead``: stretches that another version flies in place of one of the ``stretches``; they must be legal too.
-    ``loop_seq``: the jump that leads back without end, None where there is none.
+    ``instead``: stretches that another version flies in place of some of ``stretches``; they must be legal too.
+    ``loop_seq``: the jump that leads back without end, None if there is none.
     """
 
     stretches: list[Stretch] = field(default_factory=list)

@@ -1,11 +1,11 @@
-"""How far from the arc at its corner ArduPlane flies, in calm air.
+"""How far ArduPlane flies from the arc at a corner, in calm air.
 
-ArduPlane has no arcs: where a turn begins it steers for the next leg, and approaches it at 45° at
-most (AP_L1_Control.cpp, `update_waypoint`). A turn begun at the tangent length comes near to the arc, as long as the
-turn is not much more than a right angle and the tangent not much longer than the L1 distance; else it cuts the corner
-or swings wide. `l1_off_m` flies that law. The aircraft also banks late: `late_m` is the offset of ArduPlane 4.6.0's own
-simulated plane (NAVL1_PERIOD 17) at corners of 3° to 120°, on arcs of 100 m at 15 and 21 m/s and of 180 m at
-28 m/s: 4 m at 6°, 6 m at 15°, 10 to 16 m from 30° on.
+ArduPlane has no arcs: where a turn begins it steers for the next leg, and approaches it at 45° at most
+(AP_L1_Control.cpp, `update_waypoint`). A turn that begins at the tangent length stays near the arc, as long as the turn
+is not much more than a right angle and the tangent not much longer than the L1 distance; else it cuts the corner or
+swings wide. `l1_off_m` simulates that law. The aircraft also banks late: `late_m` is the offset of ArduPlane 4.6.0's
+own simulated plane (NAVL1_PERIOD 17) at corners of 3° to 120°, on arcs of 100 m at 15 and 21 m/s and of 180 m at 28
+m/s: 4 m at 6°, 6 m at 15°, 10 to 16 m from 30° on.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from functools import lru_cache
 __all__ = ["late_m", "tracking_m"]
 
 L1_DAMPING, L1_PERIOD_S = 0.75, 17.0
-"""NAVL1_DAMPING and NAVL1_PERIOD, the defaults."""
+"""Defaults of NAVL1_DAMPING and NAVL1_PERIOD."""
 
 LATE_S, LATE_PER_SINE = 0.72, 3.0
-"""Seconds of flight by which a turn lies outside its arc, and how fast that grows with a small turn's sine."""
+"""Seconds of flight by which a turn lies outside its arc, and how fast that grows with the sine of a small turn."""
 
 MOST_BANK_DEG, BANK_S = 45.0, 0.5
-"""ROLL_LIMIT_DEG, default, and the time in which a simulated aircraft banks."""
+"""Default of ROLL_LIMIT_DEG, and the time constant of a simulated aircraft's bank, s."""
 
 STEP_S, CALM_S = 0.1, 30.0
-"""ArduPlane steers ten times a second; the flight is followed for this long behind the turn."""
+"""Time step (ArduPlane steers ten times a second), and how long the flight is simulated after the turn, s."""
 
 CAPTURE_SINE = math.sqrt(0.5)
 GRAVITY_M_S2 = 9.80665
 
 
 def late_m(turn_rad: float, speed_m_s: float) -> float:
-    """How far outside its arc a turn was measured to lie, scaled to a speed."""
+    """How far outside its arc a turn was measured to lie, m, scaled to a speed."""
     turn = min(abs(turn_rad), 0.5 * math.pi)
     return LATE_S * speed_m_s * min(1.0, LATE_PER_SINE * math.sin(turn))
 
 
 def tracking_m(radius_m: float, turn_rad: float, speed_m_s: float) -> float:
-    """How far from its arc a turn that begins at the tangent length is flown in calm air; 0 at no speed."""
+    """How far from its arc a turn that begins at the tangent length is flown in calm air, m; 0 at speed 0."""
     if not speed_m_s > 0.0:
         return 0.0
     turn = math.radians(math.ceil(math.degrees(abs(turn_rad)) - 1e-6))
@@ -47,7 +47,7 @@ def tracking_m(radius_m: float, turn_rad: float, speed_m_s: float) -> float:
 
 @lru_cache(maxsize=4096)
 def l1_off_m(radius_m: float, turn_rad: float, speed_m_s: float) -> float:
-    """The farthest from the arc that the L1 law leads, the turn to the left, both legs long."""
+    """The largest distance from the arc under the L1 law, m, for a turn to the left between long legs."""
     tangent = radius_m * math.tan(0.5 * turn_rad)
     ahead = L1_DAMPING * L1_PERIOD_S / math.pi * speed_m_s
     gain = 4.0 * L1_DAMPING**2 * speed_m_s**2 / ahead

@@ -1,4 +1,4 @@
-"""The parameters of an autopilot that decide where it turns: its defaults, or what was read from the vehicle."""
+"""The autopilot parameters that decide where it turns: their defaults, or the values read from the vehicle."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Tuning:
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> Tuning:
-        """What ``values`` (parameters by name, in their own units) say; defaults for the others.
+        """The tuning from ``values`` (parameters by name, in their own units), with defaults for the others.
 
-        Numbers that are not finite or not positive are left aside.
+        Numbers that are not finite or not positive are ignored.
         """
         known = {
             "WPNAV_RADIUS": ("copter_radius_m", 0.01), "WP_RADIUS_M": ("copter_radius_m", 1.0),
@@ -38,11 +38,11 @@ class Tuning:
         return cls(**fields, read=frozenset(usable))
 
     def says(self, parameter: str, value: float, unit: str = "m") -> str:
-        """``parameter`` and its value in words, and where the value comes from."""
+        """``parameter``, its value and the source of the value, in words."""
         return f"{parameter} {value:g} {unit}, {'read from the vehicle' if parameter in self.read else 'the default'}"
 
     def plane_turns_m(self, speed_m_s: float, turn_rad: float, growth: float = 1.0) -> float:
-        """How far before a way point without its own radius ArduPlane turns (`AP_L1_Control::turn_distance`)."""
+        """How far before a way point without its own radius ArduPlane turns, m (`AP_L1_Control::turn_distance`)."""
         ahead_m = self.l1_damping * self.l1_period_s / math.pi * speed_m_s
         return min(self.plane_radius_m * growth, ahead_m) * min(1.0, abs(turn_rad) / (0.5 * math.pi))
 

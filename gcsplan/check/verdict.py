@@ -1,4 +1,4 @@
-"""`Verdict`: what the check says of one mission, in numbers and in words."""
+"""`Verdict`: the result of the check of one mission, in numbers and in words."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gcsplan.mavlink.mission.mission import Mission
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One limit broken by wire item ``seq``: at a place, by how much, in words. ``zone`` is its name or empty."""
+    """One limit broken by wire item ``seq``: the place, by how much, and a message. ``zone`` is its name or empty."""
 
     seq: int
     kind: str
@@ -29,12 +29,12 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class LegFigures:
-    """One flown stretch in numbers; NaN where the ground is unknown.
+    """Figures of one flown stretch; NaN where the ground is unknown.
 
-    ``min_agl_m`` counts above ground and what stands on it, on the line itself; ``agl_end_m`` above bare ground.
-    ``energy_j`` holds the hold's cost too; ``hold_s`` may be infinite (a loiter without end costs nothing here).
-    Figures are those of one time; ``times``: how often it is flown, where a jump leads back. ``jumped_from``: the jump
-    that leads to it.
+    ``min_agl_m`` counts from the ground and what stands on it, on the line itself; ``agl_end_m`` from bare ground.
+    ``energy_j`` includes the hold; ``hold_s`` may be infinite (a loiter without end costs nothing here). The figures
+    are those of one pass; ``times``: how often it is flown, if a jump leads back. ``jumped_from``: the jump that leads
+    to it.
     """
 
     seq: int
@@ -61,10 +61,10 @@ class LegFigures:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """``mission`` is the one that was judged, as sent; the judgement is of what the autopilot stores of it.
+    """The result of the check of ``mission`` (as sent); what is judged is what the autopilot stores of it.
 
-    ``misses``: how near it comes to each limit, on request. ``until_reserve_s``: of a mission that ends in a
-    hold or a round without end, how long that may last.
+    ``misses``: how near it comes to each limit, on request. ``until_reserve_s``: if the mission ends in a hold or a
+    round without end, seconds until the battery is down to its reserve.
     """
 
     mission: Mission
@@ -78,7 +78,7 @@ class Verdict:
 
     @property
     def safe(self) -> bool | None:
-        """True, False, or None where no limit is broken but something could not be judged."""
+        """True, False, or None if no limit is broken but something could not be judged."""
         if self.findings:
             return False
         return None if self.not_judged else True
@@ -90,48 +90,48 @@ class Verdict:
 
     @property
     def length_m(self) -> float:
-        """Length of the path in space."""
+        """Length of the path in space, m."""
         return math.fsum(leg.length_m * leg.times for leg in self.path_legs)
 
     @property
     def path_energy_j(self) -> float:
-        """Energy of the path alone, comparable with a planner's bound."""
+        """Energy of the path alone, J; comparable with a planner's lower bound."""
         return math.fsum(leg.energy_j * leg.times for leg in self.path_legs)
 
     @property
     def energy_j(self) -> float:
-        """Energy of the whole flight: columns, holds and the return included."""
+        """Energy of the whole flight, J, including columns, holds and the return."""
         return math.fsum(leg.energy_j * leg.times for leg in self.legs)
 
     @property
     def time_s(self) -> float:
-        """Duration of the whole flight; a loiter without end counts nothing."""
+        """Duration of the whole flight, s; a loiter without end counts as 0."""
         return math.fsum(leg.time_s * leg.times for leg in self.legs)
 
     @property
     def arrive_s(self) -> float:
-        """From leaving the ground to the end of the path (the goal at approach altitude)."""
+        """Seconds from leaving the ground to the end of the path (the goal at approach altitude)."""
         last = max((i for i, leg in enumerate(self.legs) if leg.on_path), default=-1)
         return math.fsum(leg.time_s * leg.times for leg in self.legs[: last + 1])
 
     @property
     def lowest(self) -> LegFigures | None:
-        """The stretch that is lowest above ground, columns aside."""
+        """The stretch that is lowest above ground, except columns; None if there is none."""
         legs = [leg for leg in self.legs if not leg.column and not math.isnan(leg.min_agl_m)]
         return min(legs, key=lambda leg: leg.min_agl_m, default=None)
 
     @property
     def nearest(self) -> LegFigures | None:
-        """The stretch nearest to a zone whose height band it meets; None where it meets none."""
+        """The stretch nearest to a zone among those that meet a zone's height band; None if there is none."""
         legs = [leg for leg in self.legs if leg.nearest_zone]
         return min(legs, key=lambda leg: leg.zone_clearance_m, default=None)
 
     @property
     def max_climb_deg(self) -> float:
-        """The steepest stretch, up or down, columns aside."""
+        """The steepest angle of all stretches except columns, up or down, degrees."""
         return max((abs(leg.climb_deg) for leg in self.legs if not leg.column and leg.horizontal_m > 0), default=0.0)
 
     def describe(self) -> str:
-        """All findings and all that is not judged, one a line."""
+        """All findings and all that is not judged, one per line."""
         lines = [f.message for f in self.findings] + [f"not judged: {what}" for what in self.not_judged]
         return "\n".join(lines)

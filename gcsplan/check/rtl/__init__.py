@@ -1,1 +1,1 @@
-"""The way home after a failsafe: the autopilot's own return, judged from every point of a mission."""
+"""The way home: the autopilot's own return after a failsafe, judged from every point of a mission."""

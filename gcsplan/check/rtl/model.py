@@ -1,16 +1,16 @@
 """How each autopilot returns: one table of rules, and one return as straight pieces.
 
-ArduCopter (mode_rtl.cpp, ``compute_return_target``): climbs on the spot to the greatest of its altitude and RTL_ALT
-(RTL_ALT_M since 4.7; relative to home), flies straight home at it, descends. Within a cone around home it climbs less:
-to RTL_CONE_SLOPE times the distance, 2.5 m at least. RTL_CLIMB_MIN (0) adds to its own altitude.
-PX4 (rtl.cpp): the same with RTL_RETURN_ALT and RTL_CONE_ANG (45 degrees). Later versions have the cone only within
-RTL_MIN_DIST (10 m) of home and climb fully beyond it; older ones go to RTL_DESCEND_ALT within that distance.
-ArduPlane, a QuadPlane too: turns and flies home at once, climbing to RTL_ALTITUDE (ALT_HOLD_RTL before 4.5; -1 keeps
-its altitude) as it goes, or gliding down to it, and circles over home with WP_LOITER_RAD, grown with altitude.
+- ArduCopter (mode_rtl.cpp, ``compute_return_target``): climbs on the spot to the higher of its altitude and RTL_ALT
+  (RTL_ALT_M since 4.7; relative to home), flies straight home at that altitude, descends. Within a cone around home it
+  climbs less: to RTL_CONE_SLOPE times the distance, at least 2.5 m. RTL_CLIMB_MIN (0) is added to its own altitude.
+- PX4 (rtl.cpp): the same with RTL_RETURN_ALT and RTL_CONE_ANG (45 degrees). Later versions have the cone only within
+  RTL_MIN_DIST (10 m) of home and climb fully beyond it; older ones go to RTL_DESCEND_ALT within that distance.
+- ArduPlane, a QuadPlane too: turns and flies home at once, and on the way climbs or glides to RTL_ALTITUDE
+  (ALT_HOLD_RTL before 4.5; -1 keeps its altitude). Over home it circles with WP_LOITER_RAD, grown with altitude.
 
 Two modules read these rules. `return_pieces` is the return of an RTL item, from one place; `sweep` judges the return
 after a failsafe, from every point of a mission. Where an autopilot may fly one of several altitudes, both judge all of
-them: in the cone from the cone's altitude up to the return altitude, on a plane's way home from its altitude to the
+them: in the cone from the cone's altitude up to the return altitude, on a plane's flight home from its altitude to the
 return altitude. Not judged: RTL_ALT_TYPE 1 (terrain), RTL_CLIMB_MIN, fences that cap the return, Q_RTL_MODE, missions
 with DO_LAND_START. `cone_differs` is judged in `return_pieces` alone.
 """
@@ -30,13 +30,13 @@ from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 
 AT_HOME_M = 5.0
-"""Nearer to home than this, or than the track error, a return is a descent."""
+"""Within this distance of home, m, or within the track error if that is larger, a return is only a descent."""
 
 Metres = TypeVar("Metres", float, Floats)
 
 
 class RallyAltitude(Enum):
-    """What the altitude of a rally point does to a return that leads there."""
+    """What the altitude of a rally point means for a return to it."""
 
     GROUND = "the point must lie on the ground, and the return altitude counts from it"
     RAISES = "the return is no lower than the point's altitude"
@@ -49,9 +49,9 @@ class ReturnRule:
 
     ``parameter``: its name for the return altitude, which counts from home. ``climbs_first``: it climbs on the spot,
     never descends before it is home, and then descends vertically; else it turns, changes its altitude on the way, and
-    circles over home with ``loiter_radius_m``. ``cone_slope``: rise over run of the cone around home, below which it
-    climbs no further; 0: no cone. ``cone_differs``: some versions may
-    fly lower near home, so that an RTL item is judged as if it did not climb within the cone.
+    circles over home with ``loiter_radius_m``. ``cone_slope``: rise over run of the cone around home; inside the cone
+    it climbs only to the cone's altitude; 0: no cone. ``cone_differs``: some versions may fly lower near home, so an
+    RTL item is judged as if it did not climb within the cone.
     """
 
     parameter: str
@@ -63,15 +63,15 @@ class ReturnRule:
     rally: RallyAltitude
 
     def level_amsl_m(self, return_amsl_m: float, begins_amsl_m: float) -> float:
-        """The altitude of the way home, for a return altitude and that at which the return begins."""
+        """The altitude AMSL of the flight home, for a return altitude and the altitude at which the return begins."""
         return max(return_amsl_m, begins_amsl_m) if self.climbs_first else return_amsl_m
 
     def cone_amsl_m(self, base_amsl_m: float, distance_m: Metres) -> Metres:
-        """The least altitude that is climbed to at a distance from home; the cone stands at ``base_amsl_m``."""
+        """The lowest altitude to climb to at a distance from home; the cone's tip is at ``base_amsl_m``."""
         return base_amsl_m + self.cone_slope * distance_m
 
     def circle_m(self, amsl_m: float) -> float:
-        """Radius of the circle over home at an altitude."""
+        """Radius of the circle over home at an altitude, m."""
         return self.loiter_radius_m * circle_growth(amsl_m)
 
 
@@ -94,21 +94,21 @@ RULES = {
 
 
 def about_turn_m(vehicle: Vehicle) -> float:
-    """How far from where its return begins a plane may be while it turns about.
+    """How far a plane may be from the beginning of its return while it turns about, m.
 
-    Without a turn radius the track error holds a turn: to turn about takes twice as much.
+    Without a turn radius the track error includes a turn: to turn about takes twice as much.
     """
     return 2.0 * max(vehicle.limits.track_error_m, vehicle.turn_radius_m)
 
 
 def at_home_m(limits: Limits) -> float:
-    """The distance from home within which a return is a descent."""
+    """The distance from home within which a return is only a descent, m."""
     return max(AT_HOME_M, limits.track_error_m)
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One straight piece; ``instead``: flown in place of another one by some versions. The rest is `Stretch`'s."""
+    """One straight piece; ``instead``: some versions fly it in place of another one. Other fields: see `Stretch`."""
 
     start: Place
     end: Place
@@ -147,6 +147,6 @@ def return_pieces(rule: ReturnRule, at: Place, home: Place, return_amsl_m: float
 
 
 def _band(at: Place, home: Place, a_amsl_m: float, b_amsl_m: float, *, instead: bool = False) -> Piece:
-    """Level home, at any altitude between two."""
+    """A level flight home at any altitude between two."""
     middle, half = 0.5 * (a_amsl_m + b_amsl_m), 0.5 * abs(b_amsl_m - a_amsl_m)
     return Piece((*at[:2], middle), (*home[:2], middle), band_m=half, instead=instead)

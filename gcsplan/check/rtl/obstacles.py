@@ -1,10 +1,10 @@
-"""What stands in the way of returns, as obstacles in height, and the levels at which they are passed.
+"""Obstacles in height in the way of returns, and the levels at which returns pass them.
 
-A return at the level ``h`` is somewhere between a lowest and a highest altitude: *highest* is the greater of the level
-and of where it begins, *lowest* depends on how the autopilot gets to its level. Ground is a wall without a bottom, a
-ceiling one without a top, a zone has either or neither. A wall is hit where the highest is above its bottom and the
-lowest below its top. Raising the level never gets a return below a wall again, so the lowest level that passes all is
-found by going up from wall top to wall top.
+A return at the level ``h`` flies between a lowest and a highest altitude: *highest* is the greater of the level and the
+altitude at which it begins, *lowest* depends on how the autopilot gets to its level. Ground is an obstacle without a
+bottom, a ceiling one without a top; a zone may have both, one or neither. An obstacle is hit if the highest altitude is
+above its bottom and the lowest below its top. Raising the level never brings a return below an obstacle again, so going
+up from top to top finds the lowest level that passes all obstacles.
 """
 
 from __future__ import annotations
@@ -21,15 +21,16 @@ Ints = NDArray[np.intp]
 
 TOUCH_M = 1e-6
 GROUND, MAX_AMSL, MAX_AGL = -1, -2, -3
-"""What a wall is, where it is no zone."""
+"""Values of `Obstacles.what` for obstacles that are no zones."""
 
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
     """R obstacles in the way of N returns, altitudes AMSL.
 
-    ``high`` (N,): the highest that each return begins. By wall (R,): the return, bottom and top; the lowest altitude of
-    the return there is ``max(base, min(h, limit))``; ``what``: `GROUND`, `MAX_AMSL`, `MAX_AGL` or a zone's index.
+    ``high`` (N,): the highest altitude at which each return begins. For each obstacle (R,): ``back``, the index of its
+    return; its bottom and top; ``base`` and ``limit``: the lowest altitude of the return there is ``max(base, min(h,
+    limit))``; ``what``: `GROUND`, `MAX_AMSL`, `MAX_AGL` or a zone's index.
     """
 
     high: Floats
@@ -44,19 +45,19 @@ class Obstacles:
         return len(self.high)
 
     def hit(self, level: Floats | float) -> Bools:
-        """(R,) obstacles that are hit at a level, or at one for each return (N,)."""
+        """(R,) whether each obstacle is hit at a level, or at one level per return (N,)."""
         h = np.broadcast_to(np.asarray(level, float), self.high.shape)[self.back]
         lowest = np.maximum(self.base, np.minimum(h, self.limit))
         return np.asarray((np.maximum(self.high[self.back], h) > self.bottom + TOUCH_M) & (lowest < self.top - TOUCH_M))
 
     def passes(self, level: Floats | float) -> Bools:
-        """(N,) returns that hit nothing."""
+        """(N,) whether each return hits nothing."""
         ok = np.ones(len(self), np.bool_)
         ok[self.back[self.hit(level)]] = False
         return ok
 
     def lowest(self, start: float) -> Floats:
-        """(N,) the lowest level from ``start`` up that passes; inf where none does."""
+        """(N,) the lowest level at or above ``start`` that passes; inf if none does."""
         level = np.full(len(self), start)
         for _ in range(len(self.back) + 1):
             hit = np.flatnonzero(self.hit(level))
@@ -69,7 +70,7 @@ class Obstacles:
         return level
 
     def together(self, start: float, returns: Bools | None = None) -> float:
-        """The lowest level from ``start`` up that suits all of ``returns`` (all of them by default); inf if none."""
+        """The lowest level at or above ``start`` that all of ``returns`` pass (default: all returns); inf if none."""
         mine = np.ones(len(self), np.bool_) if returns is None else returns
         level = start
         for _ in range(len(self.back) + 1):
@@ -82,24 +83,27 @@ class Obstacles:
         return level
 
     def highest(self, level: float) -> float:
-        """How far ``level``, which passes all returns, may be raised; inf where nothing bounds it."""
+        """The highest level to which ``level``, which passes all returns, may be raised; inf if nothing bounds it."""
         h = np.minimum(level, self.limit)
         under = np.maximum(self.base, h) < self.top - TOUCH_M
         return float(self.bottom[under].min(initial=np.inf))
 
     def worst(self, which: int, level: float) -> int | None:
-        """The wall that return ``which`` hits highest up, zones before ground; None where it hits none."""
+        """The index of the worst obstacle that return ``which`` hits; None if it hits none.
+
+        Obstacles that no level passes come first, then zones before ground, then the highest top.
+        """
         rows = np.flatnonzero((self.back == which) & self.hit(level))
         if not len(rows):
             return None
         return int(rows[np.lexsort((self.top[rows], self.what[rows] >= 0, np.isinf(self._over(rows))))[-1]])
 
     def _over(self, rows: Ints) -> Floats:
-        """The level that gets over each of the obstacles."""
+        """The level that passes over each obstacle of ``rows``; inf if none does."""
         return np.where(self.top[rows] <= self.limit[rows], self.top[rows], np.inf)
 
     def take(self, returns: Bools) -> Obstacles:
-        """Those of some returns."""
+        """The obstacles of the returns that are True in ``returns``."""
         number = np.cumsum(returns) - 1
         rows = returns[self.back]
         return Obstacles(
@@ -109,7 +113,7 @@ class Obstacles:
 
     @classmethod
     def join(cls, parts: Sequence[Obstacles]) -> Obstacles:
-        """Those of all parts, one after the other."""
+        """The obstacles of all parts, with their returns numbered one part after the other."""
         offset = np.cumsum([0, *(len(p) for p in parts)])
         back = np.concatenate([p.back + o for p, o in zip(parts, offset[:-1], strict=True)])
         names = ("bottom", "top", "base", "limit", "what")
@@ -120,7 +124,7 @@ class Obstacles:
         )
 
     def ordered(self, order: Ints) -> Obstacles:
-        """The returns in another order."""
+        """The same obstacles with the returns in another order."""
         place = np.empty(len(order), np.intp)
         place[order] = np.arange(len(order))
         return Obstacles(self.high[order], place[self.back], self.bottom, self.top, self.base, self.limit, self.what)

@@ -1,10 +1,10 @@
-"""Rally points: places to return to where the way home is not clear, proposed from the ground under the mission.
+"""Rally points: places to return to where the way home is not clear, proposed on the ground under the mission.
 
 The autopilot goes to the nearest of home and its rally points, not to the one that it can reach: ArduPilot with
 RALLY_INCL_HOME 1 and no RALLY_LIMIT_KM (0; by default a point farther than 0.3 km, for planes 5 km, is not used), PX4
-with RTL_TYPE 0. A proposal is judged the same way: from every part of the mission, to each place that may be nearest
-from there. Of many points the one that matters least is left out, one by one, as long as that costs little. What the
-altitude of a point means to each autopilot is `model.RallyAltitude`.
+with RTL_TYPE 0. A proposal is judged accordingly: from every part of the mission, to each place that may be nearest
+from there. Of many points the least useful is removed, one by one, as long as that costs little. What the altitude of a
+point means to each autopilot is in `model.RallyAltitude`.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from gcsplan.vehicle import Vehicle
 
 MOST_POINTS = 6
 LEVELS = 40
-"""Return altitudes that are compared."""
+"""Most return altitudes that are compared."""
 
 CANDIDATES = 16
 LOOKED_AT = 4
-"""Places looked at for each candidate; the flattest is taken."""
+"""Places examined for each candidate; the flattest is used."""
 
 PARTS = 120
-"""Into which a mission is cut to choose by; what is chosen is then refined."""
+"""Parts into which a mission is cut, about, to choose the points; the choice is then refined."""
 
 NEAREST_HOME_M = 200.0
 FLAT_WITHIN_M = 10.0
 WORTH = 0.01
-"""A point, or a greater altitude, must make this part of the mission safe at least."""
+"""The least part of the mission that a point, or a higher altitude, must make safe."""
 
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """Rally points, the return altitude that they are judged with, and what stays unsafe."""
+    """Rally points, the return altitude with which they are judged, and the stretches that stay unsafe."""
 
     points: tuple[RallyPoint, ...]
     rel_home_m: float
@@ -57,7 +57,7 @@ class Proposal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Place:
-    """Somewhere to return to, the level of the return there, and what is in its way from the parts that it serves."""
+    """A place to return to, the level of the return there, and the obstacles from the parts that it serves."""
 
     target: Target
     level: float
@@ -78,7 +78,7 @@ def rally_items(points: Sequence[RallyPoint]) -> tuple[MissionItem, ...]:
 def propose(
     trace: MissionTrace, refinement: Refinement, home: Target, vehicle: Vehicle, return_rel_home_m: float
 ) -> Proposal:
-    """Rally points for a mission that no single return altitude brings home from every point."""
+    """Propose rally points for a mission without a single return altitude that is clear from every point."""
     ground = home.ground_amsl_m
     level = _rounded(
         best_level(refinement.strict[CLEAR], refinement.parts.size, ground + return_rel_home_m, refinement.start),
@@ -125,7 +125,7 @@ def propose(
 
 
 def best_level(obstacles: Obstacles, size: Floats, level: float, start: float) -> float:
-    """``level``, or a higher one that leaves clearly less unsafe: the lowest of those nearly as good as any."""
+    """The lowest of ``level`` and higher levels whose unsafe length is within `WORTH` of the least."""
     each = obstacles.lowest(start)
     each = np.sort(each[np.isfinite(each) & (each > level)])
     few = each[np.linspace(0, len(each) - 1, min(len(each), LEVELS)).astype(int)]
@@ -138,7 +138,7 @@ def best_level(obstacles: Obstacles, size: Floats, level: float, start: float) -
 def _level_there(
     obstacles: Obstacles, size: Floats, target: Target, level: float, vehicle: Vehicle, home_amsl_m: float
 ) -> float:
-    """The level of a return to ``target``, chosen where the autopilot leaves a choice."""
+    """The level of a return to ``target``, chosen if the autopilot leaves a choice."""
     rally = RULES[vehicle.autopilot].rally
     if rally is RallyAltitude.GROUND:
         return target.ground_amsl_m + level - home_amsl_m
@@ -148,12 +148,12 @@ def _level_there(
 
 
 def _rounded(level: float, home_amsl_m: float) -> float:
-    """Up to a whole metre above home, as parameters and rally points are set."""
+    """The level rounded up to a whole metre above home, as parameters and rally points are set."""
     return home_amsl_m + math.ceil(level - home_amsl_m - 1e-6)
 
 
 def _candidates(trace: MissionTrace, home: Target, vehicle: Vehicle) -> list[tuple[Target, float, bool]]:
-    """Places on the ground under the mission, the flattest near each of a few evenly along it; and where it ends."""
+    """Candidate places on the ground: the flattest near each of a few places along the mission, and where it ends."""
     ends = trace.last[: trace.mains]
     u = np.linspace(trace.first[0], ends[-1], CANDIDATES * LOOKED_AT + 1)
     places = trace.points(np.append(u, ends[-1]))[:, :2]
@@ -184,9 +184,10 @@ def _candidates(trace: MissionTrace, home: Target, vehicle: Vehicle) -> list[tup
 
 
 def _choose(away: Floats, safe: NDArray[np.bool_], size: Floats) -> list[int]:
-    """Rows (home is row 0) with which little is unsafe, by the nearest from each part.
+    """Choose the rows of points that leave little unsafe, if each part uses its nearest place (home is row 0).
 
-    Thinned out from all of them, for a single point takes over all that lies beyond it and may make things worse.
+    Points are removed one by one from the full set, because a single added point takes over all that lies beyond it and
+    may make things worse.
     """
 
     def safe_m(rows: list[int]) -> float:
@@ -205,7 +206,7 @@ def _choose(away: Floats, safe: NDArray[np.bool_], size: Floats) -> list[int]:
 
 
 def _judged_with(trace: MissionTrace, vehicle: Vehicle, places: Sequence[_Place], like: Refinement) -> Refinement:
-    """Refined returns to the nearest of ``places``; a part that may go to several must reach each of them."""
+    """The refined returns to the nearest of ``places``; a part that may go to several must reach each of them."""
     spots = np.array([p.target.en for p in places])
 
     def judge(parts: TraceParts, whole: bool) -> GradedObstacles:
@@ -227,7 +228,7 @@ def _judged_with(trace: MissionTrace, vehicle: Vehicle, places: Sequence[_Place]
 
 
 TIE_M = 1.0
-"""Two places that are so nearly equally far count as equally far."""
+"""Two places whose distances differ by no more than this, m, count as equally far."""
 
 
 def _failures(obstacles: Obstacles, level: float, some: NDArray[np.intp], count: int) -> Obstacles:
@@ -241,7 +242,7 @@ def _failures(obstacles: Obstacles, level: float, some: NDArray[np.intp], count:
 
 
 def _on_one(parts: Sequence[Obstacles], count: int) -> Obstacles:
-    """Obstacles of the same returns, put together."""
+    """Obstacles of the same returns, joined."""
     names = ("back", "bottom", "top", "base", "limit", "what")
     return Obstacles(np.zeros(count), *(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 

@@ -1,8 +1,8 @@
-"""Refinement: parts of a mission are split until it is known from where the return is safe, and at which level.
+"""Refinement: split parts of a mission until it is known from where the return is safe, and at which level.
 
 Each part of the trace is judged twice: with the return from its middle alone, which can only be too lenient, and with
-the returns from all of it, which can only be too strict. Where the two differ in what matters, and where safe and
-unsafe parts meet, parts are split. A smallest part on which the two still differ counts as unsafe.
+the returns from all of it, which can only be too strict. Parts are split where the two results differ in a way that
+matters, and where safe and unsafe parts meet. A smallest part on which the two still differ counts as unsafe.
 """
 
 from __future__ import annotations
@@ -20,25 +20,26 @@ Judge = Callable[[TraceParts, bool], GradedObstacles]
 """``judge(parts, whole)``: see `sweep.obstacles_of_returns`."""
 
 CLEAR, LEGAL = 0, 1
-FIRST_PIECES = 120_000  # of ground, for which the size of the first parts is chosen
-MOST_PIECES = 1_500_000  # after which nothing is split further
+FIRST_PIECES = 120_000  # pieces of ground for the first parts, about; sets their size
+MOST_PIECES = 1_500_000  # of ground; beyond this nothing is split further
 COARSE_M, COARSEST_M = 64.0, 400.0
 SMALLEST_M = 4.0
-"""Parts are not split below this."""
+"""Parts shorter than this, m, are not split."""
 
 COARSER = 4.0
-"""By how much coarser the grade `LEGAL` is: a mission at its least height would be split all along."""
+"""The smallest parts are this many times longer for the grade `LEGAL`: else a mission at its lowest legal height would
+be split along its whole length."""
 
 LEAST_PARTS, SMALLER = 30, 16.0
-"""A short mission begins with so many parts, and the smallest are so much smaller than the first."""
+"""Least number of parts of a short mission at first, and how many times smaller its smallest parts are."""
 
 PIECES = 4
 LEVEL_M = 0.5
-"""The lowest level is found to within this."""
+"""The lowest level is found to within this, m."""
 
 
 class Refinement:
-    """``parts``, ``strict`` and ``lenient`` belong together, in the order of the trace; ``start``: the lowest level."""
+    """``parts``, ``strict`` and ``lenient`` correspond, in the order of the trace; ``start``: the lowest level."""
 
     def __init__(
         self,
@@ -62,11 +63,11 @@ class Refinement:
             self._split(open_)
 
     def never(self, grade: int) -> Bools:
-        """(N,) parts from which no level passes."""
+        """(N,) whether no level passes from each part."""
         return np.isinf(self.strict[grade].lowest(self.start))
 
     def bad(self, grade: int, level: float) -> Bools:
-        """(N,) parts from which the return at ``level`` does not pass."""
+        """(N,) whether the return at ``level`` from each part does not pass."""
         return ~self.strict[grade].passes(level)
 
     def _open(self) -> Bools:
@@ -85,7 +86,7 @@ class Refinement:
 
     @staticmethod
     def _between(bad: Bools, bad_lenient: Bools) -> Bools:
-        """Unsafe parts that may be safe in part: safe in the middle, or beside a safe part."""
+        """Unsafe parts that may be partly safe: safe in the middle, or next to a safe part."""
         beside = np.zeros(len(bad), np.bool_)
         beside[1:] |= ~bad[:-1]
         beside[:-1] |= ~bad[1:]
@@ -110,7 +111,7 @@ class Refinement:
 
 
 def sizes_m(trace: MissionTrace, away_m: float, cell_m: float) -> tuple[float, float]:
-    """How long the first parts are, and the smallest: of returns ``away_m`` long over cells of ``cell_m``."""
+    """Length of the first parts and of the smallest, m, for returns ``away_m`` long over cells of ``cell_m``."""
     length = float((trace.last - trace.first).sum())
     first = np.clip(length * 2.5 * (away_m / cell_m + 1.0) / FIRST_PIECES, COARSE_M, COARSEST_M)
     first = min(float(first), max(length, 1e-3) / LEAST_PARTS)

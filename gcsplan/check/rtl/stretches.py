@@ -1,4 +1,4 @@
-"""Parts of a mission from which the return fails, joined to stretches that a person can read."""
+"""Parts of a mission from which the return fails, joined to stretches for messages."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from gcsplan.check.stretch import Place
 Ints = NDArray[np.intp]
 ROUND_M = 0.1
 LOOKED_AT = 500
-"""Points on a way home, of which the highest is named in messages."""
+"""Samples on the line home; messages name the highest of them."""
 
 
 def rel_home(
     obstacles: Obstacles, level: float, home_amsl_m: float, returns: NDArray[np.bool_] | None = None
 ) -> float | None:
-    """A level as metres above home, rounded up where the rounded one passes too; None for none."""
+    """A level as metres above home, rounded up if the rounded level passes too; None if it is infinite."""
     if math.isinf(level):
         return None
     mine = np.ones(len(obstacles), np.bool_) if returns is None else returns
@@ -41,9 +41,10 @@ def stretches_of(
     *,
     but: int | None = None,
 ) -> tuple[UnsafeStretch, ...]:
-    """What fails ``grade`` at ``level``, in the order flown; not what fails the grade ``but`` already.
+    """The stretches that fail ``grade`` at ``level``, in the order flown, without those that fail the grade ``but``.
 
-    ``target``: where they lead, for the place of the obstacle; None: neither the place nor an altitude is given.
+    ``target``: where the returns lead, needed to locate the obstacle; with None neither the obstacle's place nor an
+    altitude is reported.
     """
     bad = refinement.bad(grade, level)
     if but is not None:
@@ -53,7 +54,7 @@ def stretches_of(
 
 
 def _groups(refinement: Refinement, bad: NDArray[np.bool_]) -> list[Ints]:
-    """Runs of bad parts, one after the other on the trace."""
+    """Runs of bad parts that follow each other on the trace."""
     where = np.flatnonzero(bad)
     if not len(where):
         return []
@@ -95,7 +96,7 @@ def _stretch(
 
 
 def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
-    """The highest ground, obstacles on it included, straight on the way from a place on the trace."""
+    """The highest ground, with what stands on it, on the straight line from a place on the trace to ``target``."""
     start = trace.points(np.array([u]))[0, :2]
     places = start + np.linspace(0.0, 1.0, LOOKED_AT)[:, None] * (target.en - start)
     top = trace.world.airspace.surface.top_at(*places.T)
@@ -126,7 +127,7 @@ def _why(obstacles: Obstacles, row: int, name: str, grade: int, obstacle: Place 
 
 
 def _without_doubles(found: list[UnsafeStretch]) -> tuple[UnsafeStretch, ...]:
-    """Stretches that lie within another one are left out: other versions fly another way between the same items."""
+    """Drop stretches within another one: they come from other versions that fly differently between these items."""
     kept = [
         s
         for i, s in enumerate(found)

@@ -1,9 +1,9 @@
-"""What returns from parts of a mission to a place meet, as obstacles in height.
+"""The obstacles in height that returns from parts of a mission to a place meet.
 
-How each autopilot returns is in `model`. Where it may fly in several ways, all of them count: a plane climbs from where
-it is no slower than at ``climb_m_s`` at its fastest, or at once; descends late or at once; turns about first. The line
-home lies between the one straight in the plane and the one straight in degrees. In the cone min AGL does not apply: the
-aircraft is about to land.
+How each autopilot returns is in `model`. Where several flights are possible, all are judged. A plane climbs from its
+altitude at least at the slope of ``climb_m_s`` at its highest speed, or at once; it descends late or at once; it turns
+about first. The line home lies between the line straight in the plane and the line straight in degrees. Inside the cone
+min AGL does not apply, because the aircraft is about to land.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from gcsplan.vehicle import Vehicle
 from gcsplan.world import ways
 
 GROUPS = 6
-"""Lines home are judged in so many groups of similar width at most, each group with its greatest width."""
+"""Most groups into which lines home of similar width are put; each group is judged with its greatest width."""
 
 LEAST_IN_GROUP = 50
 
 TANGENT = 2.1
-"""The tangents at a parabola's ends cross at twice its height; the rest is for the cubic term of the true curve."""
+"""The tangents at a parabola's ends cross at twice its height; the rest allows for the cubic term of the true curve."""
 
 CIRCLE_ABOVE_M = 1000.0
-"""A circle over home is judged with the radius that it has this high above home."""
+"""The height above home, m, whose radius is used to judge a circle over home."""
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where a return ends: on ``ground_amsl_m``; ``cone_amsl_m`` is the height that the cone stands on."""
+    """The end of a return, on ``ground_amsl_m``; ``cone_amsl_m`` is the altitude of the cone's tip."""
 
     east_m: float
     north_m: float
@@ -52,7 +52,7 @@ class Target:
 class GradedObstacles:
     """Obstacles in the way of returns from parts of a mission, by grade (see `WayHome`).
 
-    ``cost``: the pieces of ground that were judged.
+    ``cost``: the number of pieces of ground that were judged.
     """
 
     clear: Obstacles
@@ -63,14 +63,14 @@ class GradedObstacles:
         return (self.clear, self.legal)[grade]
 
     def take(self, parts: NDArray[np.bool_]) -> GradedObstacles:
-        """Those from some of the parts."""
+        """The obstacles from some of the parts."""
         return GradedObstacles(self.clear.take(parts), self.legal.take(parts), 0)
 
 
 def obstacles_of_returns(
     trace: MissionTrace, parts: TraceParts, target: Target, vehicle: Vehicle, *, whole: bool
 ) -> GradedObstacles:
-    """Returns from ``parts`` to ``target``: from all of each part if ``whole``, else from its middle alone."""
+    """The obstacles of returns from ``parts`` to ``target``: from all of each if ``whole``, else from its middle."""
     rule, limits, air = RULES[vehicle.autopilot], vehicle.limits, trace.world.airspace
     n = len(parts)
     middle = trace.points(parts.middle)
@@ -101,7 +101,7 @@ def obstacles_of_returns(
             found.ground(some, met, -np.inf, *_climbs(met, low[some], reach[some] + about_m, climb))
             i = some[at.way]
             found.zones(i, at, -np.inf, low[i] + climb * np.maximum(at.s0_m - reach[i] - about_m, 0.0))
-    if rule.climbs_first:  # near home the altitude is not known: no zone may be within reach of it
+    if rule.climbs_first:  # near home the altitude is not known: no zone may be within reach
         for some in _alike(extra, np.flatnonzero(distance + reach <= there_m)):
             swept = ways.Swept(regions[some], own[some])
             met = ways.over(air, start[some], end[some], limits, float(extra[some].max()), swept)
@@ -122,9 +122,9 @@ def obstacles_of_returns(
 
 
 def _swept(trace: MissionTrace, sides: TraceParts, target: Target) -> tuple[Floats, Floats]:
-    """What the returns from parts of the trace cover: (N, 5, 2) points around it, and how far the ways bow, metres.
+    """The regions that returns from parts of the trace cover, (N, 5, 2) points around each, and the bows, metres.
 
-    A way lies between the line that is straight in the plane and the one that is straight in degrees. The one curves
+    A return lies between the line that is straight in the plane and the one that is straight in degrees. One curves
     away from the other as a parabola, which lies within the triangle of its ends and the crossing of its tangents.
     """
     frame = trace.world.frame
@@ -144,7 +144,7 @@ def _swept(trace: MissionTrace, sides: TraceParts, target: Target) -> tuple[Floa
 
 
 def _over_home(found: _Builder, trace: MissionTrace, target: Target, vehicle: Vehicle, n: int) -> None:
-    """The descent over home, or a plane's circle there, which every return ends with."""
+    """Add the descent over home, or a plane's circle there, with which every return ends."""
     air, limits = trace.world.airspace, vehicle.limits
     if RULES[vehicle.autopilot].climbs_first:
         at = ways.over(air, target.en[None], target.en[None], limits).crossings
@@ -166,7 +166,7 @@ def _over_home(found: _Builder, trace: MissionTrace, target: Target, vehicle: Ve
 
 
 def _climbs(met: ways.Ways, low: Floats, spare: Floats, climb: float) -> tuple[Floats, Floats]:
-    """Whether each plane, climbing from ``low`` as it goes, is above the ground all the way: inf, or -inf if not."""
+    """For both grades: inf for each plane that stays above the ground while it climbs from ``low``, else -inf."""
     out = []
     reached = low[met.piece_way] + climb * np.maximum(met.piece_s_m - spare[met.piece_way], 0.0)
     for floor in (met.piece_clear_m, met.piece_legal_m):
@@ -201,30 +201,30 @@ class _Builder:
     def ground(
         self, i: NDArray[np.intp], met: ways.Ways, base: Floats | float, clear_limit: Floats, legal_limit: Floats
     ) -> None:
-        """Terrain under each way, and what max AGL leaves above it."""
+        """Add the terrain under each return, and the ceiling that max AGL sets above it."""
         self._put(0, i, -np.inf, met.clear_m, base, clear_limit, GROUND)
         self._put(1, i, -np.inf, met.legal_m, base, legal_limit, GROUND)
-        if legal_limit is not clear_limit:  # what is legal is clear besides
+        if legal_limit is not clear_limit:  # a legal return must be clear too
             self._put(1, i, -np.inf, met.clear_m, base, clear_limit, GROUND)
         capped = np.isfinite(met.ceiling_m)
         self.ceiling(i[capped], met.ceiling_m[capped], MAX_AGL, (1,))
 
     def zones(self, i: NDArray[np.intp], at: ways.Crossings, base: Floats | float, limit: Floats) -> None:
-        """Zones that ways meet."""
+        """Add the zones that returns meet."""
         for grade in (0, 1):
             self._put(grade, i, at.bottom_m, at.top_m, base, limit, at.zone)
 
     def one(self, grade: int, i: NDArray[np.intp], bottom: float, top: float, what: int) -> None:
-        """The same obstacle for each of ``i``, where the return is at its level."""
+        """Add the same obstacle for each of ``i``, where the return is at its level."""
         self._put(grade, i, bottom, top, -np.inf, np.inf, what)
 
     def ceiling(self, i: NDArray[np.intp], bottom: Floats, what: int, grades: tuple[int, ...]) -> None:
-        """An altitude that the return may not rise above."""
+        """Add an altitude that the return may not exceed."""
         for grade in grades:
             self._put(grade, i, bottom, np.inf, -np.inf, np.inf, what)
 
     def by_grade(self) -> tuple[Obstacles, Obstacles]:
-        """Clear and legal."""
+        """The obstacles of the grades clear and legal."""
         made = []
         for rows in self.rows:
             columns = [np.concatenate([r[k] for r in rows]) if rows else np.zeros(0) for k in range(6)]

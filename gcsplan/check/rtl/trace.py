@@ -19,11 +19,12 @@ Ints = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class MissionTrace:
-    """Vertices by a running number ``u`` that grows by horizontal plus vertical metres along each stretch.
+    """Vertices by a running coordinate ``u`` that grows by horizontal plus vertical metres along each stretch.
 
     ``u``, ``east``, ``north``, ``amsl``, ``along`` (V,); between stretches ``u`` has a gap. ``along`` is the horizontal
-    distance flown so far. By stretch (S,): ``first``, ``last`` u; ``seq``; by how much more than the limits' own errors
-    the track and the altitude may be off there. The first ``mains`` are the mission's, the others may be flown instead.
+    distance flown so far. For each stretch (S,): ``first`` and ``last`` u; ``seq``; ``track_m``, ``altitude_m``: by how
+    much its errors exceed the limits' own errors. The first ``mains`` stretches are the mission's; the others may be
+    flown instead.
     """
 
     u: Floats
@@ -40,7 +41,7 @@ class MissionTrace:
     mains: int
 
     def cut(self, size_m: float) -> TraceParts:
-        """The whole trace in parts of about ``size_m`` at most."""
+        """The whole trace in parts of at most ``size_m`` or so."""
         counts = np.maximum(np.ceil((self.last - self.first) / size_m), 1.0).astype(int)
         stretch = np.repeat(np.arange(len(counts)), counts)
         step = (self.last - self.first) / counts
@@ -50,11 +51,11 @@ class MissionTrace:
         return TraceParts(start, end, stretch)
 
     def points(self, u: Floats) -> Floats:
-        """(N, 4) east, north, amsl, along of places on the trace."""
+        """(N, 4) east, north, amsl, along at places on the trace."""
         return np.stack([np.interp(u, self.u, a) for a in (self.east, self.north, self.amsl, self.along)], axis=-1)
 
     def heights(self, parts: TraceParts) -> tuple[Floats, Floats]:
-        """Lowest and highest that the vehicle may be on each part, AMSL, within the stretch's own band."""
+        """The lowest and the highest altitude AMSL of the vehicle on each part, with the stretch's own band."""
         ends = np.stack([np.interp(u, self.u, self.amsl) for u in (parts.start, parts.end)])
         low, high = ends.min(axis=0), ends.max(axis=0)
         a, b = np.searchsorted(self.u, parts.start, "right"), np.searchsorted(self.u, parts.end, "left")
@@ -68,7 +69,7 @@ class MissionTrace:
         return low - band, high + band
 
     def place(self, u: float) -> Place:
-        """Latitude, longitude, AMSL of a place on the trace."""
+        """Latitude, longitude and AMSL of a place on the trace."""
         east, north, amsl, _ = self.points(np.array([u]))[0].tolist()
         lat, lon = self.world.frame.to_degrees(east, north).tolist()
         return lat, lon, amsl
@@ -87,20 +88,20 @@ class TraceParts:
 
     @property
     def size(self) -> Floats:
-        """(N,) metres."""
+        """(N,) length of each part in u, metres."""
         return self.end - self.start
 
     @property
     def middle(self) -> Floats:
-        """(N,) the u in the middle."""
+        """(N,) the u of each part's middle."""
         return 0.5 * (self.start + self.end)
 
     def take(self, which: NDArray[np.bool_] | Ints) -> TraceParts:
-        """Some of the parts."""
+        """The chosen parts."""
         return TraceParts(self.start[which], self.end[which], self.stretch[which])
 
     def split(self, pieces: int) -> TraceParts:
-        """Each part in so many of equal size."""
+        """Each part cut into ``pieces`` of equal size."""
         step = self.size / pieces
         start = (self.start[:, None] + np.arange(pieces) * step[:, None]).ravel()
         end = np.append(start[1:], 0.0)
@@ -109,9 +110,9 @@ class TraceParts:
 
 
 def trace_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: float) -> MissionTrace | None:
-    """The trace of a flight, with what may be flown instead of its stretches; None where it goes nowhere.
+    """The trace of a flight, including what may be flown instead of its stretches; None if it goes nowhere.
 
-    A plane's columns and slants are not on it: how it returns from near the ground is not known.
+    A plane's columns, climb-outs and glides are left out: how it returns from near the ground is not known.
     """
     mains = [s for s in flight.stretches if s.kind != "rtl"]
     others = [s for s in flight.instead if s.kind != "rtl"]
@@ -141,7 +142,7 @@ def trace_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: fl
             begun[s.seq] = low, so_far + float(way[-1])
             mine_along = so_far + way
             so_far += float(way[-1])
-        else:  # beside the stretch that it stands for
+        else:  # it lies beside the stretch that it replaces
             low, high = begun.get(s.seq, (so_far, so_far))
             part = way / way[-1] if way[-1] > 0.0 else way
             mine_along = low + part * (high - low)

@@ -12,12 +12,12 @@ from gcsplan.check.stretch import Place
 
 @dataclass(frozen=True, slots=True)
 class UnsafeStretch:
-    """A part of the mission from which the return is not safe at the altitude that was judged.
+    """A part of the mission from which the return is not safe at the judged altitude.
 
-    ``from_seq``, ``to_seq``: wire items being flown to at its ends; ``start``, ``end``: where the vehicle is there;
-    ``from_m``, ``to_m``: horizontal metres along the mission (equal for a column). ``why`` in words; ``obstacle`` the
-    highest ground in the way, where ground is the reason. ``lowest_rel_home_m``: the lowest return altitude that is
-    safe from all of the stretch, None where there is none.
+    ``from_seq``, ``to_seq``: wire items that the vehicle flies to at its ends; ``start``, ``end``: where the vehicle is
+    there; ``from_m``, ``to_m``: horizontal metres along the mission (equal for a column). ``why``: the reason in words;
+    ``obstacle``: the highest ground in the way, if ground is the reason. ``lowest_rel_home_m``: the lowest return
+    altitude that is safe from all of the stretch, None if there is none.
     """
 
     from_seq: int
@@ -52,7 +52,7 @@ class UnsafeStretch:
         return f"item {self.from_seq}" if self.from_seq == self.to_seq else f"items {self.from_seq} to {self.to_seq}"
 
     def describe(self) -> str:
-        """One line."""
+        """Describe it in one line."""
         cure = (
             "no return altitude is safe from there"
             if self.lowest_rel_home_m is None
@@ -65,7 +65,7 @@ class UnsafeStretch:
 class RallyPoint:
     """A place to return to instead of home; ``rel_home_m`` is the altitude to be sent with it (frame 3).
 
-    ``serves_m``: metres of the mission from which the vehicle would come here, as it is the nearest.
+    ``serves_m``: metres of the mission from which the vehicle would come here, because it is the nearest.
     """
 
     lat_deg: float
@@ -76,7 +76,7 @@ class RallyPoint:
     why: str
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """The fields as plain values."""
         return {
             "lat": self.lat_deg,
             "lon": self.lon_deg,
@@ -89,10 +89,10 @@ class RallyPoint:
 
 @dataclass(frozen=True, slots=True)
 class ProfilePoint:
-    """One part of the mission: ``from_m`` to ``to_m`` along it, and the lowest level of the return (AMSL) from there.
+    """One part of the mission, ``from_m`` to ``to_m`` along it, and the lowest level of the return (AMSL) from there.
 
-    ``clear_amsl_m``: that meets neither ground, obstacle nor zone; ``legal_amsl_m``: that keeps all limits of height;
-    None where there is none. ``low_amsl_m``, ``high_amsl_m``: the mission's own altitude there.
+    ``clear_amsl_m``: the level that meets neither ground, obstacle nor zone; ``legal_amsl_m``: the level that keeps all
+    limits of height; None if there is none. ``low_amsl_m``, ``high_amsl_m``: the mission's own altitude there.
     """
 
     from_m: float
@@ -108,15 +108,15 @@ class WayHome:
     """The way home from every point of one mission.
 
     Two grades. *Clear*: the return, within track and altitude error, meets no ground or obstacle, keeps the horizontal
-    clearance and enters no zone or its clearance. *Legal*: it keeps min AGL, max AGL and max AMSL besides.
+    clearance and enters no zone or its clearance. *Legal*: it also keeps min AGL, max AGL and max AMSL.
 
-    ``parameter`` is the autopilot's name for the return altitude; ``rtl_rel_home_m`` what was judged, ``assumed``
-    where it was not set and the autopilot's default was taken. ``lowest_rel_home_m`` … ``highest_rel_home_m``: return
-    altitudes that are clear from every point (None: none is; highest None: no limit from above);
-    ``lowest_legal_rel_home_m`` likewise for legal. ``unsafe``: where the return is not clear; ``irregular``: where it
-    is clear but not legal. ``advised_rel_home_m``: the lowest clear altitude, or where none is clear from every point,
-    one that leaves little unsafe; ``rally``: points proposed for that case, to be judged with it; ``left``: what stays
-    unsafe even so. ``profile`` in the order flown.
+    ``parameter`` is the autopilot's name for the return altitude; ``rtl_rel_home_m`` is the altitude judged;
+    ``assumed``: it was not set, so the autopilot's default was judged. ``lowest_rel_home_m`` … ``highest_rel_home_m``:
+    return altitudes that are clear from every point (None: none is; highest None: no upper limit);
+    ``lowest_legal_rel_home_m``: the lowest that is legal from every point. ``unsafe``: where the return is not clear;
+    ``irregular``: where it is clear but not legal. ``advised_rel_home_m``: the lowest clear altitude, or, if none is
+    clear from every point, one that leaves little unsafe; ``rally``: points proposed for that case, to be judged with
+    it; ``left``: what stays unsafe even with them. ``profile``: in the order flown.
     """
 
     vehicle: str
@@ -139,7 +139,7 @@ class WayHome:
 
     @property
     def safe(self) -> bool | None:
-        """True where the return is clear from every point and the battery reaches; None where not all was judged."""
+        """True if the return is clear from every point and the battery is enough; None if not all of it was judged."""
         if self.unsafe or (self.battery is not None and self.battery.short):
             return False
         return None if self.not_judged else True
@@ -219,6 +219,6 @@ class WayHome:
         return rows
 
     def describe(self) -> str:
-        """All of `rows` and the notes, one a line."""
+        """All of `rows` and the notes, one per line."""
         lines = [f"{label}: {words}" for label, words in self.rows()] + [f"note: {words}" for words in self.notes]
         return "\n".join(lines)

@@ -1,12 +1,12 @@
-"""The way home: the autopilot's own return, from every point of every leg of a mission.
+"""The way home: the autopilot's own return, judged from every point of every leg of a mission.
 
-Each point of a mission has its own straight way home. Parts of the mission are judged as a whole: every return from a
-part lies within half its length of the one from its middle; the ground is bounded over the line so widened, with the
-kernels and margins of the exact check (`gcsplan.world.ways`), and zones are held against the region that the returns
-sweep. Nothing is sampled, so what is called safe is safe. What is called unsafe is so, except: the ends of a stretch
-(`refinement.SMALLEST_M`), safe gaps shorter than `COARSE_M` (`COARSEST_M` on long missions) within one, and what the
-bounds of the ground beside a line cost: the widening times the slope there. The lowest altitude is beside that at most
-`LEVEL_M` too high.
+Each point of a mission has its own straight line home. Parts of the mission are judged as a whole: every return from a
+part lies within half its length of the return from its middle. The ground is bounded over that line widened by so much,
+with the kernels and margins of the exact check (`gcsplan.world.ways`), and zones are compared with the region that the
+returns sweep. Nothing is sampled, so a point reported as safe is safe. A point reported as unsafe is unsafe, except: at
+the ends of a stretch (`refinement.SMALLEST_M`), in safe gaps within a stretch that are shorter than `COARSE_M`
+(`COARSEST_M` on long missions), and for what the bounds of the ground beside a line cost: the widening times the slope
+there. Apart from that the lowest altitude is at most `LEVEL_M` too high.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ __all__ = ["RallyPoint", "UnsafeStretch", "WayHome", "way_home"]
 
 PROFILE_POINTS = 400
 NOISE_M = 1e-3
-"""An altitude that touches what is above it is lowered by this."""
+"""Subtracted from the highest altitude, so that it does not touch what is above it, m."""
 
 RETURNS_BY_ITSELF = "after the last item ArduPlane returns"
-"""How `flight` begins its note on the return that is judged here."""
+"""The beginning of `flight`'s note on the return, which is judged here."""
 
 
 def way_home(
@@ -54,8 +54,8 @@ def way_home(
 ) -> WayHome:
     """Judge the return home from every point of the mission of ``verdict``.
 
-    ``rtl_rel_home_m`` is the vehicle's return altitude above home; None takes the autopilot's default. ``rally``:
-    propose rally points where no altitude is clear from every point. Never raises for a mission that is merely unsafe.
+    ``rtl_rel_home_m`` is the vehicle's return altitude above home; None: the autopilot's default. ``rally``: propose
+    rally points if no altitude is clear from every point. Never raises for a mission that is merely unsafe.
     """
     mission, rule = verdict.mission, RULES[vehicle.autopilot]
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
@@ -107,7 +107,7 @@ def way_home(
 
 
 def refinement_of(trace: MissionTrace, target: Target, vehicle: Vehicle, level: float) -> Refinement:
-    """Returns from all of ``trace`` to ``target``, refined for ``level``."""
+    """The returns from all of ``trace`` to ``target``, refined for ``level``."""
 
     def judged(parts: TraceParts, whole: bool) -> GradedObstacles:
         return obstacles_of_returns(trace, parts, target, vehicle, whole=whole)
@@ -119,7 +119,7 @@ def refinement_of(trace: MissionTrace, target: Target, vehicle: Vehicle, level: 
 
 
 def _lowest(refinement: Refinement, grade: int, home_amsl_m: float) -> tuple[float | None, float | None]:
-    """The lowest altitude that is safe from every point, and how high it may be, above home."""
+    """The lowest altitude that is safe from every point, and the highest up to which it stays so, above home."""
     obstacles = refinement.strict[grade]
     level = obstacles.together(refinement.start)
     top = obstacles.highest(level) if math.isfinite(level) else math.inf
@@ -127,7 +127,7 @@ def _lowest(refinement: Refinement, grade: int, home_amsl_m: float) -> tuple[flo
 
 
 def _profile(trace: MissionTrace, refinement: Refinement) -> tuple[ProfilePoint, ...]:
-    """What each part of the mission needs, parts joined so that there are not too many."""
+    """The levels that each part of the mission needs; parts are joined into at most `PROFILE_POINTS` groups."""
     parts, mains = refinement.parts, trace.mains
     own = np.flatnonzero(parts.stretch < mains)
     if not len(own):
