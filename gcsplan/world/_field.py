@@ -1,4 +1,4 @@
-"""A surface's map to its grid, as the exact check wants it: numbers in a row, and bounds of what the map does."""
+"""A surface's map to its grid in the form that the exact check needs: packed numbers, and bounds of the map."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from gcsplan.world.surface import DEGREE, TERMS, GridMap
 
 
 class Field(NamedTuple):
-    """What the check knows of a surface's map to its grid.
+    """What the check uses of a surface's map to its grid.
 
-    ``bend`` bounds the map's second derivative, cells taken as metres, 1/m: a line of length L bows by bend·L²/8 at
-    most, and the metric changes by bend·d over a distance d. ``step_x``, ``step_y``: metres of one column and one
+    ``bend`` bounds the map's second derivative, 1/m, with cells taken as metres: a line of length L bows by at most
+    bend·L²/8, and the metric changes by bend·d over a distance d. ``step_x``, ``step_y``: metres of one column and one
     row, a lower bound over the whole map: (step_x·Δcol)² + (step_y·Δrow)² <= distance². ``packed``: all of it for the
-    kernels. Beyond the square that the map was fitted to it is not to be trusted, and nothing is known.
+    kernels. Beyond the square to which the map was fitted the map is not valid, and the ground counts as unknown.
     """
 
     packed: Floats
@@ -30,7 +30,7 @@ class Field(NamedTuple):
 
     @classmethod
     def of(cls, grid: GridMap) -> Field:
-        """Bounds of ``grid``, and its numbers in the kernels' order."""
+        """The bounds of ``grid``, and its numbers in the kernels' order."""
         order = [TERMS.index((i, j)) for i in range(DEGREE, -1, -1) for j in range(DEGREE - i, -1, -1)]
         low = [TERMS.index(t) for t in ((0, 0), (1, 0), (0, 1))]
         affine = not grid.coefficients[[k for k, (i, j) in enumerate(TERMS) if i + j > 1]].any()
@@ -60,7 +60,7 @@ def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
     steps = np.array([steps_of(*m.ravel().tolist()) for m in inverse])
     if affine:
         return 0.0, float(steps[:, 0].min()), float(steps[:, 1].min())
-    # Of a symmetric form the largest value over two directions is attained at two that are equal.
+    # A symmetric form has its largest value over two directions where the two are equal.
     uu, uv, vv = (np.einsum("nij,nj->ni", inverse, derivative(*d)) for d in ((2, 0), (1, 1), (0, 2)))
     turn = np.linspace(0.0, np.pi, 24, endpoint=False)
     c, s = np.cos(turn)[:, None, None], np.sin(turn)[:, None, None]

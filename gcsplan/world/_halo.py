@@ -1,6 +1,6 @@
-"""What lies around each cell of a surface: the steepest slope, the highest and the lowest node within a reach.
+"""Bounds around each cell of a surface: the steepest slope, the highest and the lowest node within a reach.
 
-A large surface is looked at where it is asked for alone: of a lidar's model of a county a mission sees a few streets.
+A large surface is examined only where the bounds are needed: a mission uses a few streets of a county's lidar model.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from gcsplan.world._shared import Halo
 from gcsplan.world.surface import GridMap
 
 LARGE = 2_000_000
-"""Cells from which on a surface is looked at a tile at a time."""
+"""Surfaces with more cells than this are examined tile by tile."""
 TILE, SPACING = 128, 32
-"""Columns and rows of a tile, and how far apart places on a line are, at most, whose tiles are looked at."""
+"""Columns and rows of a tile, and the largest spacing, in cells, of the places on a line whose tiles are examined."""
 BOW = 2
-"""Columns or rows by which a line in the plane leaves that between two such places in the grid, and more."""
+"""Upper bound, in cells, of how far a line of the plane leaves the straight grid line between two such places."""
 TALL, WIDE, WIDER = 64, 1024, 4
-"""Rows and columns that are worked on at once, at least: they stay in the processor's cache. As many, at least, as a
-few times how far around them is looked."""
+"""Fewest rows and columns worked on at once, so that they stay in the processor's cache; and the fewest as a multiple
+of the reach around them, in cells."""
 
 
 class Surroundings:
-    """The halo of a surface (rows, cols) for a reach. What has not been asked for stands in it as unknown."""
+    """The halo of a surface (rows, cols) for a reach. Tiles that have not been examined count as unknown."""
 
     def __init__(self, grid: GridMap, field: Field, heights: Floats, reach_m: float) -> None:
         self._grid, self._field, self._heights, self._reach_m = grid, field, heights, reach_m
@@ -46,14 +46,14 @@ class Surroundings:
         self._held = Held(HALO, *self.halo)
 
     def __reduce__(self) -> tuple[type[Surroundings], tuple[GridMap, Field, Floats, float]]:
-        """A copy in another process looks anew."""
+        """Pickle the inputs only: a copy in another process examines its tiles anew."""
         return Surroundings, (self._grid, self._field, self._heights, self._reach_m)
 
     def along(self, start: Floats, end: Floats) -> Held:
-        """The halo as kernels take it, looked at along lines between places (N, 2 or more) of the plane."""
+        """The halo in the kernels' form, examined along lines between places (N, 2 or more) of the plane."""
         if self._seen.size and not self._seen.all():
             tiles = self._tiles(start, end)
-            with self._lock:  # what is seen by one who comes later is done
+            with self._lock:  # a caller who waits here finds the tiles done
                 for i, j in np.argwhere(tiles & ~self._seen).tolist():
                     rows, cols = (slice(k * TILE, (k + 1) * TILE) for k in (i, j))
                     _look_at(self._field, self._heights, self.halo, rows, cols)
@@ -61,7 +61,7 @@ class Surroundings:
         return self._held
 
     def _tiles(self, start: Floats, end: Floats) -> NDArray[np.bool_]:
-        """Those that lines meet, and perhaps more."""
+        """Which tiles the lines meet; perhaps a few more."""
         found = np.zeros(self._seen.shape, np.bool_)
         length = np.hypot(*(end - start)[:, :2].T)
         parts = np.ceil(length / (SPACING * min(self._field.step_x, self._field.step_y))).astype(np.intp) + 1
@@ -79,14 +79,14 @@ class Surroundings:
 
 
 def halo_around(field: Field, heights: Floats, reach_m: float) -> Halo:
-    """The halo of a surface, looked at everywhere."""
+    """The halo of a surface, examined everywhere."""
     halo = _not_looked_at(field, heights, reach_m)
     _look_at(field, heights, halo, slice(0, halo.slope.shape[0]), slice(0, halo.slope.shape[1]))
     return halo
 
 
 def _not_looked_at(field: Field, heights: Floats, reach_m: float) -> Halo:
-    """A halo in which nothing is known."""
+    """A halo in which everything is unknown."""
     shape = heights.shape[0] - 1, heights.shape[1] - 1
     cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
     slope, high, low = (np.empty(shape, np.float32) for _ in range(3))

@@ -1,12 +1,12 @@
 """The exact check of legs: every violation along the whole of every leg, never by sampling.
 
-What is tested is the leg as the grid sees it: between its ends, mapped to the DEM's own grid, straight in parts short
-enough that the bow against the line that is straight in the plane stays within centimetres, and that bow widens the
-leg. Legs, limits and zones are metres of the plane; the way there and back is `gcsplan.world.frame`'s.
+The leg is tested in the DEM's own grid: its ends are mapped there, and it is cut into straight parts short enough that
+the bow against the line straight in the plane stays within centimetres; that bow widens the leg. Legs, limits and zones
+are in metres of the plane; `gcsplan.world.frame` converts to and from degrees.
 
-Exact are: the ground under the line, zones with levels above mean sea level, ceilings, angles. Conservative, to a
-few centimetres at most, are: what lies beside the line within its errors and clearance, and zones over ground.
-Touching a limit is legal; a micrometre is float noise.
+Exact are: the ground under the line, zones with levels above mean sea level, ceilings, angles. Conservative, by a few
+centimetres at most, are: what lies beside the line within its errors and clearance, and zones over ground. Touching a
+limit is legal; a micrometre is float noise.
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ from gcsplan.world.zones import Polygon, Zone
 __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 
 NEAR_M, NEAR_PART = 0.01, 0.01
-"""To which the kernel resolves the nearest place of a zone over ground (`_sweep_zones.nearest_conflict`)."""
+"""The kernel finds the nearest place of a zone over ground to this many metres, or this part of the distance
+(`_sweep_zones.nearest_conflict`)."""
 
 ANGLE_DEG = 1e-7
 """Float noise of an angle: a climb that is steeper by less is legal."""
@@ -64,10 +65,10 @@ Kind = Literal["min_agl", "max_agl", "max_amsl", "terrain_clearance", "zone", "c
 class Legs:
     """N straight legs. ``start``, ``end``: (N, 3) east_m, north_m, amsl_m.
 
-    ``column`` (N,): take-off and landing columns, exempt from min AGL, climb angle and terrain clearance, never
-    from zones, their clearance, ceilings, or DEM coverage. ``track_error_m``, ``altitude_error_m`` (N,): of each
-    leg, added to nothing else (the caller puts the limits' errors, bows and margins in). Kept as read-only copies or
-    views. Raises ValueError for other shapes, for numbers that are not finite, and for negative errors.
+    ``column`` (N,): take-off and landing columns, exempt from min AGL, climb angle and terrain clearance, never from
+    zones, their clearance, ceilings, or DEM coverage. ``track_error_m``, ``altitude_error_m`` (N,): the whole errors of
+    each leg (the caller includes the limits' errors, bows and margins). Kept as read-only copies or views. Raises
+    ValueError for other shapes, for numbers that are not finite, and for negative errors.
     """
 
     start: Floats
@@ -114,8 +115,8 @@ class Legs:
 class Violation:
     """One limit broken on one leg, at its worst point.
 
-    ``fraction`` in [0, 1] along the leg; ``value`` what was found, ``limit`` what was wanted, ``by`` how far
-    off it is (> 0), in ``unit`` (m or deg); ``zone`` the zone's index, or -1. Errors and clearances are in ``value``:
+    ``fraction`` in [0, 1] along the leg; ``value`` found, ``limit`` required, ``by`` the difference (> 0), in ``unit``
+    (m or deg); ``zone`` the zone's index, or -1. Errors and clearances are included in ``value``:
 
     - min_agl, max_agl, max_amsl: the height that is left, or reached, at the worst point within the leg's errors;
     - terrain_clearance: lowest flight level over the highest ground within the clearance, against 0;
@@ -139,14 +140,14 @@ class Violation:
 
 @dataclass(frozen=True, eq=False)
 class LegReport:
-    """What the check found; arrays are (N,) over the legs.
+    """The results of the check; arrays are (N,) over the legs.
 
-    ``min_agl_m``: lowest height above top (ground + obstacles) on the line itself, errors not taken off (the
-    violations take them off); ``min_agl_at`` its fraction; ``max_agl_m`` highest above ground. NaN where the
-    ground is unknown on the whole leg. ``climb_deg`` signed. ``zone_clearance_m``: horizontal distance, on the
-    line itself, to the nearest zone whose height band the leg (widened by its altitude error) meets, ``inf``
-    where none, 0 inside; ``nearest_zone`` its index or -1. For a zone over ground it is a lower bound, made with the
-    lowest and highest ground under the zone, but where the leg keeps clear of it never less than was demanded.
+    ``min_agl_m``: lowest height above top (ground + obstacles) on the line itself, errors not subtracted (the
+    violations subtract them); ``min_agl_at`` its fraction; ``max_agl_m`` highest above ground. NaN where the ground is
+    unknown on the whole leg. ``climb_deg`` signed. ``zone_clearance_m``: horizontal distance, on the line itself, to
+    the nearest zone whose height band the leg (widened by its altitude error) meets, ``inf`` if none, 0 inside;
+    ``nearest_zone`` its index or -1. For a zone over ground the distance is a lower bound, made with the lowest and
+    highest ground under the zone; if the leg keeps clear of the zone, it is never less than the required distance.
     """
 
     min_agl_m: Floats
@@ -159,10 +160,10 @@ class LegReport:
 
 
 class Airspace:
-    """A surface and its zones, ready to judge legs.
+    """A surface and its zones, with the functions that judge legs.
 
-    ``scale`` >= 1: largest scale of the plane over the mission; real metres times it are metres of the plane at
-    most, so every horizontal clearance is multiplied by it.
+    ``scale`` >= 1: largest scale of the plane over the mission; real metres times it are at most metres of the plane,
+    so every horizontal clearance is multiplied by it.
     """
 
     def __init__(self, surface: Surface, zones: Sequence[Zone] = (), *, scale: float = 1.0) -> None:
@@ -217,8 +218,10 @@ class Airspace:
         return ok, room.cut
 
     def floor_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:
-        """Lowest legal altitude over points of the plane, for terrain (min AGL, clearance; errors of ``limits``
-        added); conservative; +inf where unknown. Zones are not in it."""
+        """Lowest legal altitude over points of the plane, for terrain; conservative; +inf where unknown.
+
+        It includes min AGL, the clearance and the errors of ``limits``; it does not include zones.
+        """
         reach = Reaches.of(limits, self._field, self.scale)
         floor = self._around(1.0, east_m, north_m, reach.near_m) + (limits.min_agl_m + reach.near_margin_m)
         if limits.horizontal_clearance_m > 0.0:
@@ -227,7 +230,7 @@ class Airspace:
         return np.where(np.isnan(floor), np.inf, floor)
 
     def ceiling_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:
-        """Highest legal altitude over points (max AGL, max AMSL; errors taken off); conservative; -inf unknown."""
+        """Highest legal altitude over points (max AGL, max AMSL; less the errors); conservative; -inf where unknown."""
         reach = Reaches.of(limits, self._field, self.scale)
         ground = -self._around(-1.0, east_m, north_m, reach.near_m) - reach.near_margin_m
         ceiling = ground + ((math.inf if limits.max_agl_m is None else limits.max_agl_m) - limits.altitude_error_m)
@@ -236,7 +239,7 @@ class Airspace:
         return np.where(np.isnan(ground), -np.inf, ceiling)
 
     def tube(self, track: ArrayLike, limits: Limits) -> Tube:
-        """The tube over a ground track (N, 2) of points in the plane, errors of ``limits`` included."""
+        """The tube over a track (N, 2) of points in the plane, errors of ``limits`` included."""
         points = np.array(track, dtype=np.float64, order="C")
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
             raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
@@ -247,14 +250,14 @@ class Airspace:
         return make_tube(points, limits, self._field, self._zones, halo, self._surfaces, self._grounds, self.scale)
 
     def straight_cells(self, bow_m: float) -> int:
-        """So many cells of the terrain model lie in the plane as if its lines were straight, within ``bow_m``."""
+        """How many cells of the terrain model in a row have lines that are straight in the plane within ``bow_m``."""
         f = self._field
         if f.affine:
             return int(max(self.surface.ground_m.shape))
         return max(int(math.sqrt(4.0 * bow_m / f.bend) / max(f.step_x, f.step_y)), 1)
 
     def _around(self, sign: float, east_m: ArrayLike, north_m: ArrayLike, reach_m: float) -> Floats:
-        """Highest ``sign`` times height within reach of each point; NaN where unknown."""
+        """Highest value of ``sign`` times height within reach of each point; NaN where unknown."""
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
         out = np.empty(e.size)
         points = np.stack([e.ravel(), n.ravel()], axis=-1)
@@ -263,8 +266,7 @@ class Airspace:
         return out.reshape(e.shape)
 
     def _held(self, of_top: bool, reach_m: float, start: Floats, end: Floats) -> Held:
-        """The halo of top or ground for a reach, for lines between places (N, 2 or more), as kernels take it; made
-        once for each size in cells."""
+        """The kernels' halo of top or ground for a reach, along lines between places (N, 2 or more); made once per size."""
         f = self._field
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))
@@ -297,7 +299,7 @@ class Airspace:
         )  # fmt: skip
 
     def beside_m(self, limits: Limits) -> float:
-        """Metres in the plane that are kept from zones on every side: clearance, and what the track may be off."""
+        """Horizontal distance to keep from zones on every side, metres of the plane: clearance plus track error."""
         return (limits.horizontal_clearance_m + limits.track_error_m) * self.scale
 
     def _violations(
@@ -339,17 +341,17 @@ class Airspace:
         )
 
     def _depths(self, legs: Legs, hit: NDArray[np.intp], hit_at: Floats) -> tuple[Floats, Floats]:
-        """Signed distances of broken zones, never too large, and where on the leg.
+        """Signed distances to broken zones, never too large, and where on the leg.
 
-        The kernel gives 0 anywhere inside a polygon, and any place inside a zone over ground: of those the deepest
-        within the zone's band of heights is taken.
+        The kernel returns 0 anywhere inside a polygon, and any place inside a zone over ground: there the deepest place
+        within the zone's band of heights is searched for.
         """
         value, at = hit_at[:, 0].copy(), hit_at[:, 1].copy()
         for row in range(len(hit)):
             leg, k = hit[row].tolist()
             numbers, shape = self._zones.table[k], self.zones[k].shape
             over_ground = bool(numbers[FLOOR_AGL] or numbers[CEILING_AGL])
-            if over_ground and value[row] > 0.0:  # the nearest place is looked for to a centimetre or a hundredth
+            if over_ground and value[row] > 0.0:  # the kernel's distance is accurate to NEAR_M or NEAR_PART of it
                 value[row] = max(0.0, value[row] - max(NEAR_M, NEAR_PART * value[row]))
                 continue
             if value[row] > 0.0 or not (over_ground or isinstance(shape, Polygon)):
@@ -383,7 +385,7 @@ _HELD_NOTHING = Held(FOUND, *_NOTHING)
 
 
 def _steepest(degrees: float) -> float:
-    """Rise over run of the steepest legal leg, float noise forgiven."""
+    """Rise over run of the steepest legal leg, with float noise allowed."""
     return math.inf if degrees >= 90.0 else math.tan(math.radians(degrees + ANGLE_DEG))
 
 

@@ -1,9 +1,8 @@
-"""What a raster's coordinates and heights are measured from, and the way from there to real AMSL.
+"""The datums of a raster's coordinates and heights, and the conversion from them to altitudes above mean sea level.
 
-A height without a datum is not a height: ellipsoidal and geoid heights differ by up to 107 m. pyproj passes
-ellipsoidal heights through *unchanged* when it lacks the geoid's grid, so nothing here relies on a transform
-between vertical systems: an ellipsoidal raster needs the grid's file, and the shift that the grid gives is looked at
-before it is believed.
+A height without a datum is meaningless: ellipsoidal and geoid heights differ by up to 107 m. pyproj passes ellipsoidal
+heights through *unchanged* if it lacks the geoid's grid, so nothing here relies on a transform between vertical
+systems: an ellipsoidal raster needs the grid's file, and the shift from the grid is checked for plausibility.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from gcsplan.errors import InputError
 from gcsplan.world.frame import Frame
 
 WORST_SHIFT_M = 30.0
-"""A horizontal datum shift less accurate than this is refused: it would move hills by more than a DEM cell."""
+"""A horizontal datum shift less accurate than this, m, is refused: it would move hills by more than a DEM cell."""
 
-# Keys are stripped of everything but letters and digits.
+# Keys hold only letters and digits.
 _GEOIDS = {"EGM84": "EGM84", "EGM96": "EGM96", "EGM2008": "EGM2008", "AMSL": "AMSL", "MSL": "AMSL"}
 _ELLIPSOIDAL = {"WGS84", "ELLIPSOIDAL", "ELLIPSOID", "HAE", "GRS80", "ETRS89"}
 _NATIONAL = {
@@ -34,7 +33,7 @@ _NATIONAL = {
 
 @dataclass(frozen=True, slots=True)
 class VerticalDatum:
-    """``name`` for the outputs; ``ellipsoidal`` heights must be converted; ``note`` is said to the user, or ""."""
+    """``name`` for the outputs; ``ellipsoidal`` heights must be converted; ``note`` is shown to the user, or ""."""
 
     name: str
     ellipsoidal: bool = False
@@ -43,10 +42,10 @@ class VerticalDatum:
 
 @dataclass(frozen=True, eq=False)
 class RasterCRS:
-    """A raster's coordinate system, taken apart.
+    """A raster's coordinate system, in its parts.
 
-    ``horizontal`` is a 2D pyproj CRS; ``vertical`` what the raster itself says of its heights, or None;
-    ``vertical_unit_m`` metres in one unit of them, or None.
+    ``horizontal`` is a 2D pyproj CRS; ``vertical`` is the datum that the raster itself states for its heights, or None;
+    ``vertical_unit_m`` is the length of its height unit in metres, or None.
     """
 
     horizontal: Any
@@ -93,9 +92,9 @@ def take_apart(crs: str, *, where: str) -> RasterCRS:
 
 
 def vertical_datum(given: str | None, raster: VerticalDatum | None, *, where: str) -> VerticalDatum:
-    """The datum of a DEM's heights, from the user's word and the raster's own; they must not contradict.
+    """The datum of a DEM's heights, from the mission file's key and the raster's statement; they must not contradict.
 
-    Raises InputError where neither says it, where the word is unknown, and where the two differ.
+    Raises InputError if neither states one, if the key's value is unknown, and if the two differ.
     """
     if given is None:
         if raster is None:
@@ -123,9 +122,9 @@ def plane_to_raster(
 ) -> tuple[Transformer, float]:
     """One fixed operation (east_m, north_m) -> (x, y) of the raster's CRS, and its accuracy in metres (-1 unknown).
 
-    PROJ may choose another operation for every point, and a ballpark one (no datum shift at all) where it has
-    nothing better: the one it finds best for the middle of ``box`` is used for all, never a ballpark one. Raises
-    InputError where there is none, or none better than `WORST_SHIFT_M`.
+    PROJ may choose another operation for every point, and a ballpark one (no datum shift at all) if it has nothing
+    better. Here the best operation for the middle of ``box`` is used for all points, and never a ballpark one. Raises
+    InputError if there is none, or none better than `WORST_SHIFT_M`.
     """
     middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
     try:
@@ -151,7 +150,7 @@ def plane_to_raster(
 
 
 def to_wgs84(horizontal: Any, *, where: str) -> Transformer:
-    """From a raster's coordinates to (longitude, latitude) on WGS84; good enough to look up a geoid."""
+    """From a raster's coordinates to (longitude, latitude) on WGS84; accurate enough to look up a geoid."""
     try:
         return Transformer.from_crs(horizontal, CRS.from_epsg(4326), always_xy=True)
     except ProjError as why:

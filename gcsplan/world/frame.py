@@ -1,8 +1,8 @@
-"""The door between degrees and metres: the only importer of pyproj's plane transforms.
+"""The conversion between degrees and metres; the only importer of pyproj's plane transforms.
 
-Inside gcsplan a place is (east_m, north_m) on a transverse Mercator plane whose origin lies in the middle of
-the mission (scale 1 there), and a height is real altitude above mean sea level. The plane tangent to the
-ellipsoid is never used: its "up" is off by d²/2R, 7.8 m at 10 km.
+Inside gcsplan a place is (east_m, north_m) on a transverse Mercator plane whose origin lies in the middle of the
+mission (scale 1 there), and a height is an altitude above mean sea level. The plane tangent to the ellipsoid is never
+used: its "up" is off by d²/2R, 7.8 m at 10 km.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from pyproj import CRS, Transformer
 from gcsplan.errors import InputError
 
 FARTHEST_M = 150_000.0
-"""From the origin; there the plane's scale is off by 2.8e-4. Beyond it a mission is refused."""
+"""Farthest distance from the origin, m; the plane's scale is off by 2.8e-4 there. Missions beyond it are refused."""
 
 EARTH_RADIUS_M = 6_371_008.8  # mean radius R1 of WGS84 (IUGG)
 
 BOW_PARTS = np.arange(1, 16) / 16.0
-"""Where along a leg `Frame.bow_m` measures."""
+"""Parts of a leg at which `Frame.bow_m` measures."""
 
 
 class Frame:
     """One plane: ``to_plane`` and ``to_degrees`` are inverse to each other within a micrometre.
 
-    ``amsl_m`` is the altitude of ``up_m: 0`` in missions given in local metres.
+    ``amsl_m`` is the altitude of ``up_m: 0`` in missions written in local metres.
     """
 
     def __init__(self, lat_deg: float, lon_deg: float, amsl_m: float = 0.0) -> None:
@@ -41,7 +41,8 @@ class Frame:
         self.lon_deg = float(lon_deg)
         self.amsl_m = float(amsl_m)
         self._projection = f"+proj=tmerc +lat_0={self.lat_deg:.15g} +lon_0={self.lon_deg:.15g} +k=1 +x_0=0 +y_0=0"
-        # What PROJ makes of the two coordinate systems, to the last bit, without looking for it in its database.
+        # What PROJ derives from the two coordinate systems, identical to the last bit, without a search in its
+        # database.
         plane = f"{self._projection} +ellps=WGS84"
         self._forward = Transformer.from_pipeline(
             f"+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step {plane}"
@@ -52,7 +53,7 @@ class Frame:
 
     @cached_property
     def crs(self) -> CRS:
-        """The plane as a coordinate system, for what has one of its own."""
+        """The plane as a coordinate system, for rasters that have one of their own."""
         return CRS.from_proj4(f"{self._projection} +datum=WGS84 +units=m")
 
     def to_plane(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> NDArray[np.float64]:
@@ -70,11 +71,11 @@ class Frame:
         return 1.0 + 1.01 * distance_m**2 / (2.0 * EARTH_RADIUS_M**2)
 
     def bow_m(self, start_deg: ArrayLike, end_deg: ArrayLike) -> NDArray[np.float64]:
-        """(N,) how far the line that is straight in degrees lies from the one straight in the plane, metres.
+        """(N,) how far the line that is straight in degrees lies from the line straight in the plane, metres.
 
-        ``start_deg``, ``end_deg``: (N, 2) latitude, longitude. The distance is that of the points at the same part of
-        both lines. It is a square in the part flown, with a cube beside it that tells in legs of tens of kilometres,
-        so it is measured at `BOW_PARTS`; between them it is less than 2 % more, which are added.
+        ``start_deg``, ``end_deg``: (N, 2) latitude, longitude. The distance is measured between points at the same part
+        of both lines. It is quadratic in that part, with a cubic term that counts in legs of tens of kilometres, so it
+        is measured at `BOW_PARTS`; between them it exceeds the measured maximum by less than 2 %, which are added.
         """
         a, b = np.atleast_2d(np.asarray(start_deg, float)), np.atleast_2d(np.asarray(end_deg, float))
         span = (b[:, 1] - a[:, 1] + 180.0) % 360.0 - 180.0
@@ -88,7 +89,7 @@ class Frame:
 def centre_of(lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[float, float]:
     """Middle of a set of points in degrees, safe across the antimeridian, rounded to 1e-4 degrees.
 
-    Rounded so that moving one point by a little does not change every number in every file.
+    It is rounded so that moving one point by a little does not change every number in every file.
     """
     lat, lon = np.asarray(lat_deg, float), np.asarray(lon_deg, float)
     turned = (lon - lon[0] + 180.0) % 360.0 - 180.0

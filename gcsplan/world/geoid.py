@@ -1,7 +1,7 @@
-"""How high a geoid lies above the ellipsoid, from a grid file in PROJ's formats (.gtx, GeoTIFF).
+"""The height of a geoid above the ellipsoid, from a grid file in PROJ's formats (.gtx, GeoTIFF).
 
-PROJ itself is not let near the file: a GeoTIFF with strips of no rows ends the whole process in a division by zero.
-GDAL reads it, and what is between four posts is bilinear, as PROJ's own ``vgridshift`` takes it.
+PROJ itself never opens the file: a GeoTIFF with strips of no rows ends the whole process in a division by zero. GDAL
+reads it, and heights between four posts are bilinear, as in PROJ's own ``vgridshift``.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from gcsplan.errors import InputError
 from gcsplan.world.raster import gdal, missing, require_numbers
 
 WORST_GEOID_M = 120.0
-"""No geoid is farther from its ellipsoid (EGM2008: -107 … +86 m)."""
+"""No geoid is farther from its ellipsoid than this, m (EGM2008: -107 … +86 m)."""
 
 MAX_POSTS = 4_000_000
-"""Of the part of a grid that a mission needs; the finest geoid there is has 2,000 in a square degree."""
+"""Most posts of a grid that a mission may need; the finest existing geoid has 2,000 per square degree."""
 
-_UNDULATION = "geoid_undulation"  # what PROJ calls the band that is wanted, where there are several
+_UNDULATION = "geoid_undulation"  # PROJ's name for the wanted band, if there are several
 
 
 class GeoidGrid:
-    """Height of a geoid above the ellipsoid. Raises InputError where the file is missing or no grid."""
+    """Height of a geoid above the ellipsoid. Raises InputError if the file is missing or is no grid."""
 
     def __init__(self, path: Path, *, where: str) -> None:
         self.path = path
@@ -62,7 +62,7 @@ class GeoidGrid:
         return height
 
     def _read(self, lat: Floats | None, lon: Floats | None) -> Floats:
-        """Heights at points, NaN where the grid has none; of no points: only see that it is a grid."""
+        """Heights at points, NaN where the grid has none; without points: only check that the file is a grid."""
         try:
             with gdal(self.path, "GTX") as dataset:
                 require_numbers(dataset, self.path, where=self.where)
@@ -70,7 +70,7 @@ class GeoidGrid:
         except InputError:
             raise
         except Exception as why:
-            # As for rasters: GDAL and rasterio raise a wide choice of types on broken headers.
+            # As for rasters: GDAL and rasterio raise many types of exception on broken headers.
             said = (str(why.__cause__ or why).strip() or type(why).__name__).splitlines()[0][:200]
             raise InputError(
                 f"the geoid grid {self.path} cannot be read as a .gtx or GeoTIFF grid ({said})", where=self.where
@@ -78,7 +78,7 @@ class GeoidGrid:
 
 
 def _heights(dataset: Any, lat: Floats | None, lon: Floats | None) -> Floats:
-    """Bilinear between posts, which stand in the middle of pixels. Raises ValueError for what is no grid in degrees."""
+    """Heights, bilinear between posts at the centres of pixels. Raises ValueError if it is no grid in degrees."""
     t, cols, rows = dataset.transform, dataset.width, dataset.height
     if (
         t.b
@@ -104,7 +104,7 @@ def _heights(dataset: Any, lat: Floats | None, lon: Floats | None) -> Floats:
 
 
 def _kept(at: Floats, last: int) -> tuple[Floats, Floats]:
-    """Bounds that move a point onto the edge that it is on but for rounding."""
+    """Bounds that move a point onto an edge if it is off that edge only by rounding."""
     low = np.where(np.abs(at) < 1e-6, 0.0, -np.inf)
     high = np.where(np.abs(at - last) < 1e-6, float(last), np.inf)
     return low, high

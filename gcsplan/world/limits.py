@@ -1,4 +1,4 @@
-"""What every leg of one vehicle is held to."""
+"""The limits that every leg of one vehicle must keep."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits and errors of one vehicle; metres and degrees. ``None`` is no limit.
+    """Limits and errors of one vehicle; metres and degrees. ``None`` means no limit.
 
-    ``track_error_m`` and ``altitude_error_m`` widen every check: the aircraft may be that far from
-    the mission's line. Touching a limit is legal.
+    ``track_error_m`` and ``altitude_error_m`` widen every check: the aircraft may be that far from the mission's line.
+    Touching a limit is legal.
     """
 
     min_agl_m: float

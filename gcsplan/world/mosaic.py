@@ -1,4 +1,4 @@
-"""Several tiles as one grid, and the window of it that a mission needs, on a plane-to-grid polynomial."""
+"""Several tiles as one grid, and the window of it that a mission needs, with a polynomial map from plane to grid."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from gcsplan.world.surface import NO_SIDES, GridMap, Sides
 Box = tuple[float, float, float, float]
 
 FIT_ERROR_M = 0.01
-"""The polynomial may misplace a node by this much at most."""
+"""The polynomial may misplace a node by this much at most, m."""
 
 FEW_CELLS, CELLS_IN_BYTE = 5_000_000, 100
-"""A window may have so many cells, or so many for each byte of its files: no ground is packed more closely."""
+"""Most cells of a window, or cells per byte of its files if that is more: no terrain is packed more closely."""
 
 ALIGNED_CELLS = 1e-3
 """Tiles whose nodes are off a common grid by more than this part of a cell are refused."""
@@ -35,7 +35,7 @@ _SPARE_CELLS = 3
 class Window:
     """A rectangle of nodes: ``heights_m`` (rows, cols), NaN unknown; ``grid`` maps the plane to them.
 
-    ``x``, ``y``: coordinates of the columns and rows in the raster's own units. ``goes_on``: past which sides (first
+    ``x``, ``y``: coordinates of the columns and rows in the raster's own units. ``goes_on``: beyond which sides (first
     column, first row, last column, last row) the tiles hold more.
     """
 
@@ -48,7 +48,7 @@ class Window:
 
     @property
     def plane_box(self) -> Box:
-        """West, south, east, north of all nodes in the plane."""
+        """West, south, east, north of all nodes in the plane, m."""
         rows, cols = self.heights_m.shape
         c, r = np.linspace(0, cols - 1, 33), np.linspace(0, rows - 1, 33)
         border = np.concatenate([self.grid.to_plane(c, 0), self.grid.to_plane(c, rows - 1),
@@ -59,14 +59,14 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """A tile's first node in the common grid, and its size."""
+    """A tile with its first node in the common grid."""
 
     raster: Raster
     col: int
     row: int
 
     def overlap(self, col: int, row: int, cols: int, rows: int) -> tuple[int, int, int, int] | None:
-        """Column, row, columns, rows shared with a window of the common grid; None where they do not meet."""
+        """Column, row, columns, rows shared with a window of the common grid; None if they do not overlap."""
         c0, c1 = max(col, self.col), min(col + cols, self.col + self.raster.cols)
         r0, r1 = max(row, self.row), min(row + rows, self.row + self.raster.rows)
         return (c0, r0, c1 - c0, r1 - r0) if c0 < c1 and r0 < r1 else None
@@ -74,7 +74,7 @@ class _Placed:
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """The common grid, whose node 0, 0 is the first tile's first one at (x0, y0), and the tiles on it."""
+    """The common grid and the tiles on it; its node (0, 0) is the first node of the first tile, at (x0, y0)."""
 
     x0: float
     y0: float
@@ -88,7 +88,7 @@ class _Layout:
 
 
 class Mosaic:
-    """Tiles with one coordinate system, one resolution and one grid. Raises InputError where they differ."""
+    """Tiles with one coordinate system, one resolution and one grid. Raises InputError if they differ."""
 
     def __init__(self, rasters: Sequence[Raster], *, where: str) -> None:
         self.rasters = tuple(rasters)
@@ -117,10 +117,10 @@ class Mosaic:
                     where=where,
                 )
         self._degrees = to_wgs84(first.crs.horizontal, where=where)
-        self._layout(0.0)  # tiles off the common grid are found before anything is read
+        self._layout(0.0)  # finds tiles off the common grid before anything is read
 
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        """True where a place lies on some tile (which may still be void there); good to a few metres."""
+        """True if a place lies on some tile (which may still be void there); accurate to a few metres."""
         x, y = (float(v) for v in self._degrees.transform(lon_deg, lat_deg, direction="INVERSE"))
         if not (math.isfinite(x) and math.isfinite(y)):
             return False
@@ -134,18 +134,19 @@ class Mosaic:
     def node_degrees(self, window: Window, cols: ArrayLike, rows: ArrayLike) -> tuple[Floats, Floats]:
         """Latitude and longitude of the nodes ``rows`` × ``cols`` of a window, (len(rows), len(cols)) each.
 
-        Good to a few metres (whatever datum shift PROJ has at hand): enough to look up a geoid, not to place a node.
+        Accurate to a few metres (whatever datum shift PROJ has available): enough to look up a geoid, not to place a
+        node.
         """
         x, y = np.meshgrid(window.x[np.asarray(cols)], window.y[np.asarray(rows)])
         lon, lat = self._degrees.transform(x, y)
         return np.asarray(lat, float), np.asarray(lon, float)
 
     def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0, most_cells: int | None = None) -> Window:
-        """Nodes that cover ``box`` (west, south, east, north, plane metres) and ``spare_m`` around it.
+        """The nodes that cover ``box`` (west, south, east, north, plane metres) and ``spare_m`` around it.
 
-        Clipped to what the tiles hold; gaps between them are NaN, and where two of them hold one node the higher
-        height counts. Raises InputError where no tile meets the box, beyond ``most_cells`` (`MAX_CELLS`), and where the
-        plane cannot be fitted to `FIT_ERROR_M`.
+        The window is clipped to the tiles; gaps between them are NaN, and where two tiles hold the same node the higher
+        height counts. Raises InputError if no tile meets the box, beyond ``most_cells`` (`MAX_CELLS`), and if the plane
+        cannot be fitted to `FIT_ERROR_M`.
         """
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         there, accuracy_m = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
@@ -229,16 +230,16 @@ class Mosaic:
         return _plane_box(there, x, y)
 
     def _near(self, x: Floats, lon_deg: float) -> Floats:
-        """Longitudes within half a turn of ``lon_deg``, so that the antimeridian is no edge; else as they are."""
+        """Longitudes within half a turn of ``lon_deg``, so that the antimeridian is no edge; projected x unchanged."""
         return np.asarray(lon_deg + (x - lon_deg + 180.0) % 360.0 - 180.0) if self.crs.geographic else x
 
     def _turn(self, raster: Raster, lon_deg: float) -> float:
-        """Whole turns that bring a tile's middle nearest to ``lon_deg``."""
+        """Degrees of the whole turns that bring a tile's middle nearest to ``lon_deg``."""
         middle = raster.west + 0.5 * raster.cols * raster.dx
         return 360.0 * round((lon_deg - middle) / 360.0) if self.crs.geographic else 0.0
 
     def _layout(self, lon_deg: float) -> _Layout:
-        """Every tile on the grid of the first one, all of them turned to where ``lon_deg`` is."""
+        """Every tile on the grid of the first one, all turned to the longitude ``lon_deg``."""
         first = self.rasters[0]
         x0 = first.west + 0.5 * first.dx + self._turn(first, lon_deg)
         y0 = first.north - 0.5 * first.dy
@@ -272,7 +273,7 @@ def _lattice(box: Box) -> tuple[Floats, Floats]:
 
 
 def _plane_box(there: Any, x: Floats, y: Floats) -> Box:
-    """The plane's box around a window given by its columns' and rows' coordinates."""
+    """The plane's box around a window with these coordinates of columns and rows."""
     xs, ys = np.meshgrid(x[np.linspace(0, len(x) - 1, 33).astype(int)], y[np.linspace(0, len(y) - 1, 33).astype(int)])
     back = there.transform(xs.ravel(), ys.ravel(), direction="INVERSE")
     e, n = (np.asarray(a, float) for a in back)

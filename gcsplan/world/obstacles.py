@@ -1,4 +1,4 @@
-"""What stands on the ground: one height for all of it, or a canopy raster, never under-estimated between nodes."""
+"""What stands on the ground: one height everywhere, or a canopy raster that is never under-estimated between nodes."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from gcsplan.world.mosaic import Window
 from gcsplan.world.surface import GridMap
 
 TALLEST_M = 250.0
-"""A canopy cell beyond this (or below -1 m) is an undeclared nodata value: unknown. The tallest tree has 116 m."""
+"""A canopy cell above this, m (or below -1 m) is an undeclared nodata value: unknown. The tallest tree has 116 m."""
 
-_PAD_CELLS = 0.02  # of a DEM cell: bows of pixel edges and the fit's error are far below it
+_PAD_CELLS = 0.02  # of a DEM cell: far above the bows of pixel edges and the fit's error
 _CHUNK_CELLS = 200_000  # a hundred megabytes of corners and indices
 
 
 def canopy_on(ground: Window, canopy: Window, *, unknown_m: float = np.nan) -> Floats:
     """Obstacle height at each node of ``ground``, (rows, cols) metres; NaN where the canopy is unknown.
 
-    A canopy value holds for its whole pixel. Each DEM cell takes the greatest of the pixels that it meets, each node
-    the greatest of its four cells: so the bilinear surface over the nodes is nowhere below ground plus canopy.
+    A canopy value holds for its whole pixel. Each DEM cell gets the greatest value of the pixels that it meets, each
+    node the greatest of its four cells, so the bilinear surface over the nodes is nowhere below ground plus canopy.
     ``unknown_m`` is the height of nodata pixels and of everything outside the canopy raster.
     """
     heights = np.where((canopy.heights_m >= -1.0) & (canopy.heights_m <= TALLEST_M), canopy.heights_m, unknown_m)
@@ -48,7 +48,7 @@ def canopy_on(ground: Window, canopy: Window, *, unknown_m: float = np.nan) -> F
 
 
 def _raise_cells(cells: Floats, at: Floats, heights: Floats) -> None:
-    """Raise every DEM cell to the pixels that it meets; ``at`` (n + 1, m + 1, 2) are their corners on the DEM grid."""
+    """Raise each DEM cell to the pixels that it meets; ``at`` (n + 1, m + 1, 2) are their corners on the DEM grid."""
     corners = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, :-1], at[1:, 1:]])
     low = np.floor(corners.min(axis=0) - _PAD_CELLS).astype(np.intp)
     high = np.floor(corners.max(axis=0) + _PAD_CELLS).astype(np.intp)
@@ -62,7 +62,7 @@ def _raise_cells(cells: Floats, at: Floats, heights: Floats) -> None:
 
 
 def _outside(cells: Floats, ground: Window, canopy: Window, unknown_m: float) -> None:
-    """Cells that are not wholly on the canopy raster take ``unknown_m`` (and stay higher where a pixel is)."""
+    """Raise the cells that are not wholly on the canopy raster to ``unknown_m`` (a pixel there may be higher)."""
     to_canopy = _grid_to_grid(ground, canopy)
     rows, cols = ground.heights_m.shape
     step = max(1, _CHUNK_CELLS // cols)
@@ -77,7 +77,7 @@ def _outside(cells: Floats, ground: Window, canopy: Window, unknown_m: float) ->
 
 
 def _grid_to_grid(source: Window, target: Window) -> GridMap:
-    """Columns and rows of one window to those of another, through the plane."""
+    """The map from columns and rows of one window to those of another, through the plane."""
 
     def exact(col: Floats, row: Floats) -> tuple[Floats, Floats]:
         plane = source.grid.to_plane(col, row)
@@ -89,7 +89,7 @@ def _grid_to_grid(source: Window, target: Window) -> GridMap:
 
 
 def _largest_pixel(canopy: Window, to_ground: GridMap) -> float:
-    """Side of a canopy pixel in DEM cells, at the worst of nine places."""
+    """Side of a canopy pixel in DEM cells, the largest of nine places."""
     rows, cols = canopy.heights_m.shape
     sizes = [
         np.abs(to_ground.jacobian(c, r)).sum(axis=1).max()

@@ -1,4 +1,4 @@
-"""A planned path: points in the plane with real altitude."""
+"""A planned path: points in the plane with altitudes above mean sea level."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class Path:
 
     @property
     def length_m(self) -> float:
-        """Length in space."""
+        """Length in space, m."""
         return float(self.leg_length_m.sum())
 
     @property
     def vertical_m(self) -> float:
-        """Total climb plus total descent, ``Σ|Δz|``."""
+        """Total climb plus total descent, ``Σ|Δz|``, m."""
         return float(np.abs(np.diff(self.points[:, 2])).sum())
 
     def energy_j(self, vertical_j_per_m: float, horizontal_j_per_m: float) -> float:
-        """``R1·Σ|Δz| + R2·Σ horizontal`` (krill paper, Table 1)."""
+        """Energy ``R1·Σ|Δz| + R2·Σ horizontal``, J (krill paper, Table 1)."""
         return vertical_j_per_m * self.vertical_m + horizontal_j_per_m * float(self.leg_horizontal_m.sum())

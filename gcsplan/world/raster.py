@@ -1,8 +1,7 @@
 """One raster file: its header, and windows of it in metres with NaN for everything unknown.
 
-GDAL is let near three formats only, and only at files that exist: a path from a mission file must never become a
-web request. Heights belong to pixel centres, whatever AREA_OR_POINT says: GDAL's transform is that of the corners in
-either case.
+GDAL opens only three formats, and only files that exist: a path from a mission file must never become a web request.
+Heights belong to pixel centres, whatever AREA_OR_POINT says: GDAL's transform refers to the corners in either case.
 """
 
 from __future__ import annotations
@@ -27,17 +26,17 @@ Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
 
 SAMPLE = "sample:jacksboro"
 MAX_CELLS = 200_000_000
-"""Of one window: 1.6 GB as float64."""
+"""Most cells of one window: 1.6 GB as float64."""
 
 MAX_BLOCK_BYTES = 64 * 2**20
-"""Of one block of a file, which GDAL unpacks whole to read one cell of it; no more than its cache holds."""
+"""Most bytes of one block of a file. GDAL unpacks a whole block to read one cell; its cache holds no more than this."""
 
 FARTHEST_UNITS, LEAST_CELL = 1e9, 1e-11
-"""Coordinates beyond the first are not on Earth in any unit; a cell below the second part of its grid's coordinates is
-lost in their rounding."""
+"""Coordinates beyond the first are not on Earth in any unit; a cell smaller than the second, as a part of the grid's
+largest coordinate, is lost in rounding."""
 
 LOWEST_M, HIGHEST_M = -500.0, 9000.0
-"""Ground outside of this is a void that nobody declared (-9999, -32768, 3.4e38): unknown."""
+"""Ground outside of this range is an undeclared void (-9999, -32768, 3.4e38): unknown."""
 
 UNITS_M = {
     "": 1.0, "m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0,
@@ -50,19 +49,19 @@ UNITS_M = {
 """Metres in one unit of height, by the words that files use (lower case)."""
 
 CACHE_BYTES = MAX_BLOCK_BYTES
-"""Of unpacked blocks that GDAL keeps; without a word it keeps a twentieth of the machine's memory."""
+"""Unpacked blocks that GDAL caches, bytes; its default is a twentieth of the machine's memory."""
 
 _STRIP_CELLS = 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """A north-up raster's header, and how to read a window of it.
+    """A north-up raster's header, and the function that reads a window of it.
 
-    ``read(col, row, cols, rows)`` gives strips (first row within the window, heights (n, cols)), NaN where unknown.
-    ``west``, ``north`` are the outer corner in the raster's own units, ``dx``, ``dy`` > 0 the cell. ``read`` gives
-    metres but of the raster's own vertical datum; ``vertical`` is what the file says of that. ``stored_bytes``: the
-    size of the file.
+    ``read(col, row, cols, rows)`` yields strips (first row within the window, heights (n, cols)), NaN where unknown.
+    ``west``, ``north`` are the outer corner in the raster's own units, ``dx``, ``dy`` > 0 the cell. ``read`` returns
+    metres, but above the raster's own vertical datum; ``vertical`` is the file's statement of that datum.
+    ``stored_bytes``: the size of the file.
     """
 
     name: str
@@ -83,8 +82,8 @@ class Raster:
 def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: str | None = None) -> Raster:
     """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt, ESRI .asc).
 
-    ``crs`` overrides the file's; ``height_unit`` says what the file does not. Raises InputError for anything that is
-    not a readable, georeferenced, north-up raster of real numbers.
+    ``crs`` overrides the file's; ``height_unit`` states the unit if the file does not. Raises InputError for anything
+    that is not a readable, georeferenced, north-up raster of real numbers.
     """
     require_file(path, where=where)
     try:
@@ -93,7 +92,7 @@ def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: 
     except InputError:
         raise
     except Exception as why:
-        # GDAL and rasterio raise a wide choice of types on broken headers; all of them mean the same to the user.
+        # GDAL and rasterio raise many types of exception on broken headers; all mean the same to the user.
         raise InputError(_unreadable(path, why), where=where) from None
 
 
@@ -122,7 +121,7 @@ def sample_jacksboro() -> Raster:
 
     Its xmin … ymax are the edges of the cells and row 0 is the north (the file's "ymin" is the northern edge).
     """
-    # Where the file lies is all that is wanted: importing matplotlib would take longer than the rest.
+    # Only the file's location is needed: importing matplotlib would take longer than the rest.
     found = importlib.util.find_spec("matplotlib")
     if found is None or found.origin is None:
         raise InputError(f"{SAMPLE} comes with matplotlib, which is not installed: pip install matplotlib")
@@ -145,7 +144,7 @@ def sample_jacksboro() -> Raster:
 def gdal(path: Path, other: str = "") -> Iterator[Any]:
     """The dataset at ``path``, whatever GDAL's environment variables say about pixel corners.
 
-    ``other``: the driver of what is no GeoTIFF, where the file's name does not say.
+    ``other``: the driver for a file that is no GeoTIFF, if the file's name does not decide it.
     """
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning
@@ -154,7 +153,7 @@ def gdal(path: Path, other: str = "") -> Iterator[Any]:
         warnings.catch_warnings(),
         rasterio.Env(GTIFF_POINT_GEO_IGNORE=False, GDAL_PAM_ENABLED=True, GDAL_CACHEMAX=CACHE_BYTES),
     ):
-        # Our own check of the georeference says more; the others are between rasterio and its own dependencies.
+        # Our own check of the georeference says more; the other warnings are between rasterio and its dependencies.
         for category in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
             warnings.simplefilter("ignore", category)
         with rasterio.open(path.resolve(), driver=_driver(path, other)) as dataset:
@@ -162,7 +161,7 @@ def gdal(path: Path, other: str = "") -> Iterator[Any]:
 
 
 def _driver(path: Path, other: str) -> str:
-    """GDAL's word for the format, by the file's first bytes; never one that may follow links to elsewhere."""
+    """GDAL's name of the format, by the file's first bytes; never a format that may follow links to other files."""
     with path.open("rb") as file:
         magic = file.read(4)
     if magic in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
@@ -187,7 +186,7 @@ def _unreadable(path: Path, why: Exception) -> str:
 
 
 def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
-    """Raise InputError where an opened file holds no real numbers, or one number costs too much to read."""
+    """Raise InputError if an opened file holds no real numbers, or reading one number costs too much memory."""
     from rasterio.enums import ColorInterp, Interleaving
 
     if dataset.colorinterp[0] in (ColorInterp.red, ColorInterp.palette) or "complex" in dataset.dtypes[0]:
@@ -267,7 +266,7 @@ def _require_grid(t: Any, dataset: Any, path: Path, *, where: str) -> None:
 def _require_degrees(t: Any, dataset: Any, path: Path, *, where: str) -> None:
     south = t.f + t.e * dataset.height
     east = t.c + t.a * dataset.width
-    # Half a cell beyond the pole is where a global grid of posts ends.
+    # A global grid of posts ends half a cell beyond the pole.
     if t.f > 90.0 - t.e or south < -90.0 + t.e or t.c < -540.0 or east > 540.0:
         raise InputError(
             f"{path} is in degrees but reaches from {t.c:g}, {south:g} to {east:g}, {t.f:g}: if it is in metres, "
@@ -311,7 +310,7 @@ def _strips(
     from rasterio.windows import Window
 
     if dataset.driver == "AAIGrid":
-        # GDAL seeks a row behind a missing one in a time that doubles with each; asked in order it says so at once.
+        # GDAL seeks a row after a missing one in a time that doubles with each; read in order it fails at once.
         for above in range(row + rows):
             dataset.read(1, window=Window(0, above, 1, 1))
     strip = max(1, _STRIP_CELLS // cols)
@@ -330,7 +329,7 @@ def _strips(
 
 
 def missing(dataset: Any, band: int, col: int, row: int, cols: int, rows: int) -> Iterator[tuple[slice, slice]]:
-    """Where a GeoTIFF has no data in a window of a band: blocks that were never written, which GDAL reads as 0 m."""
+    """Blocks of a GeoTIFF's window of a band that were never written, as slices; GDAL reads them as 0 m."""
     if dataset.driver != "GTiff":
         return
     height, width = dataset.block_shapes[0]

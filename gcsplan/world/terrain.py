@@ -1,7 +1,7 @@
-"""From what the user says of the terrain to the `Surface` that everything is planned over and checked against.
+"""Loads the terrain that a mission names as the `Surface` over which paths are planned and checked.
 
-`open_terrain` looks at headers only, so that a place can be asked for (`Terrain.covers`) before there is a plane;
-`load_terrain` reads the part that a mission needs. Unknown ground (voids, nodata, outside of every tile) stays NaN.
+`open_terrain` reads only headers, so that `Terrain.covers` works before there is a plane; `load_terrain` reads the part
+that a mission needs. Unknown ground (voids, nodata, outside of every tile) stays NaN.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ Box = tuple[float, float, float, float]
 HeightUnit = Literal["m", "ft", "us_ft"]
 
 RASTER_SPARE_M = 3000.0
-"""Read around the box, so that the map's border is not the edge of what was asked for."""
+"""Read around the requested box, m, so that the edge of the map lies beyond the box."""
 
 GEOID_STEP_M = 100.0
-"""The geoid is looked up this densely and linear between: it bends by less than a millimetre in that."""
+"""Spacing at which the geoid is looked up, linear between, m: it bends by less than a millimetre over that."""
 
 
 @dataclass(frozen=True, slots=True)
 class TerrainSpec:
-    """What the ground is; paths are as they are opened (the mission file makes them relative to itself).
+    """The terrain as the user states it; paths are opened as they are (the mission file resolves relative ones).
 
     Either ``dem`` (paths of tiles, or ``sample:jacksboro`` alone), or ``flat_m`` with ``peaks`` on it (metres of a
-    local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` say what the rasters do not.
+    local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` state what the rasters do not.
     ``obstacle_height_m`` stands everywhere; ``canopy`` is a raster of heights above ground, whose nodata cells are
-    unknown unless ``canopy_nodata_m`` gives their height; where both are given the higher one counts.
+    unknown unless ``canopy_nodata_m`` sets their height; if both are set the higher one counts.
     """
 
     dem: tuple[str, ...] = ()
@@ -59,14 +59,14 @@ class TerrainSpec:
 
 
 class Terrain(Protocol):
-    """A terrain whose headers are read and found good."""
+    """A terrain whose headers have been read and accepted."""
 
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        """True where a place lies on the terrain (which may still be void there)."""
+        """True if a place lies on the terrain (which may still be void there)."""
 
     @property
     def is_flat(self) -> bool:
-        """True where the ground has one height everywhere."""
+        """True if the ground has one height everywhere."""
 
     def extent(self, frame: Frame, box: Box) -> Box:
         """A box of the plane that holds all of the terrain, as far as the plane reaches; ``box`` is the mission's."""
@@ -74,29 +74,29 @@ class Terrain(Protocol):
     def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
         """The surface over ``box`` (west, south, east, north, plane metres).
 
-        ``most_cells``: raise InputError beyond so many, and where the grid would have to be coarser than it ought to
-        be; None: as many as there is room for.
+        ``most_cells``: raise InputError if the surface needs more cells, or a grid coarser than it should be; None:
+        only the general limits apply.
         """
 
 
 def load_terrain(spec: TerrainSpec, frame: Frame, box: Box, *, where: str) -> Surface:
     """The surface over ``box`` (west, south, east, north, plane metres); ``where`` names the spec in messages.
 
-    Raises InputError for every fault of the files, for a missing or contradictory datum, where the DEM does not meet
-    the box or holds nothing but voids there, and where the window would not fit into memory.
+    Raises InputError for every fault of the files, for a missing or contradictory datum, if the DEM does not meet the
+    box or holds only voids there, and if the window would not fit into memory.
     """
     return open_terrain(spec, where=where).load(frame, box)
 
 
 def open_terrain(spec: TerrainSpec, *, where: str) -> Terrain:
-    """Open and judge every file of ``spec`` without reading heights. Raises InputError."""
+    """Open and check every file of ``spec`` without reading heights. Raises InputError."""
     if bool(spec.dem) == (spec.flat_m is not None or bool(spec.peaks)):
         raise InputError("give either `dem` or `flat_m` and `peaks`", where=where)
     return _RasterTerrain(spec, where) if spec.dem else _LocalTerrain(spec, where)
 
 
 def _at(where: str, key: str) -> str:
-    """``where`` is a place in a mission file, or an option of the command line, which has no keys."""
+    """The place of a key in messages; ``where`` is a place in a mission file, or a command-line option (no keys)."""
     return where if where.startswith("-") else f"{where}.{key}" if where else key
 
 
@@ -268,10 +268,10 @@ def _sampled(count: int, step: int) -> NDArray[np.intp]:
 
 
 def _combined(hashes: Sequence[str]) -> str:
-    """The hash itself of one file; of several, the hash of their hashes in the order given."""
+    """The hash of a single file; for several files the hash of their hashes, in the order given."""
     return hashes[0] if len(hashes) == 1 else hashlib.sha256("\n".join(hashes).encode()).hexdigest()
 
 
 def _rounded(metres: float) -> float:
-    """Whole metres; below ten, millimetres (the papers' worlds are fine-grained)."""
+    """Rounded to whole metres; below 10 m to millimetres (the papers' worlds are fine-grained)."""
     return round(metres) if metres >= 10.0 else round(metres, 3)

@@ -1,4 +1,4 @@
-"""Room for an altitude profile over a ground track."""
+"""The tube: floor and ceiling for an altitude profile along a track."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from gcsplan.world.limits import Limits
 
 @dataclass(frozen=True, eq=False)
 class Tube:
-    """Room for an altitude profile over a ground track of legs, one piece after the other.
+    """Floor and ceiling for an altitude profile over a track of legs, piece by piece.
 
-    ``s_m`` (M + 1,): breakpoints, horizontal metres along the track. ``floor_m``, ``ceiling_m`` (M, 2): AMSL at
-    both ends of each piece, linear between (neighbouring pieces may jump); ``floor_m`` never below what
-    `Airspace.examine` demands, ``ceiling_m`` never above it; ``inf``/-inf where unbounded; floor +inf where
-    the ground is unknown. Zones are not in them: they stand in ``bands``.
+    ``s_m`` (M + 1,): breakpoints, horizontal metres along the track. ``floor_m``, ``ceiling_m`` (M, 2): AMSL at both
+    ends of each piece, linear between (neighbouring pieces may jump); ``floor_m`` is never below what
+    `Airspace.examine` demands, ``ceiling_m`` never above it; inf/-inf where unbounded; floor +inf where the ground is
+    unknown. Zones are not included: they are in ``bands``.
     """
 
     s_m: Floats
@@ -34,9 +34,11 @@ class Tube:
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """The track is horizontally within reach of a zone from ``s0_m`` to ``s1_m`` (one span, perhaps of several):
-    fly at or below ``bottom_m`` or at or above ``top_m``; each (K, 2) over pieces with breakpoints ``s_m``
-    (K + 1,), conservative as in `Tube`; bottom -inf: cannot be underflown; top +inf: cannot be overflown."""
+    """A span of the track, ``s0_m`` to ``s1_m``, that is horizontally within reach of a zone (a zone may have several).
+
+    A profile must stay at or below ``bottom_m`` or at or above ``top_m``; each (K, 2) over pieces with breakpoints
+    ``s_m`` (K + 1,), conservative as in `Tube`; bottom -inf: no flight below the zone; top +inf: no flight above it.
+    """
 
     zone: int
     s0_m: float
@@ -47,24 +49,25 @@ class Band:
 
 
 ROOM_M = 0.02
-"""Reach beyond what is demanded, which takes up what the check loses between the plane and the grid."""
+"""Extra reach, m, for the accuracy that the check loses between the plane and the grid."""
 
 FINE_ROOM_M = 0.002
-"""The same where the map is exact: the smallest pieces that the check cuts beside a cliff are half as large."""
+"""The same where the map is exact: twice the smallest pieces that the check cuts beside a cliff."""
 
 ZONE_ROOM_M = 0.05
 """The same beside a zone whose levels follow the ground."""
 
 MARGIN_M = 0.01
-"""Height beyond what is demanded: twice what the check's branch and bound resolves."""
+"""Extra height, m: twice what the check's branch and bound resolves."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reaches:
-    """How far from a place the ground counts, metres of the plane, for errors (near) and clearance (far); margins in.
+    """How far from a place the ground counts, metres of the plane: for errors (near), clearance (far); margins added.
 
-    Where the map is exact and nothing beside the place counts, nothing is spared: the check is exact there too.
-    ``near_margin_m``, ``far_margin_m``: heights to keep from what lies within. ``zone_m``: the reach of zones, bare.
+    If the map is exact and nothing beside the place counts, there is no margin: the check is exact there too.
+    ``near_margin_m``, ``far_margin_m``: extra heights to keep above what lies within the reach. ``zone_m``: the reach
+    of zones, without margins.
     """
 
     near_m: float
@@ -75,7 +78,7 @@ class Reaches:
 
     @classmethod
     def of(cls, limits: Limits, field: Field, scale: float) -> Reaches:
-        """Reaches that ``limits`` demand."""
+        """The reaches that ``limits`` demand."""
         near = limits.track_error_m * scale
         far = near + limits.horizontal_clearance_m * scale
         if field.affine:
@@ -96,9 +99,9 @@ def make_tube(
     grounds: Held,
     scale: float,
 ) -> Tube:
-    """The tube over ``track`` (N, 2); ``halo(of_top, reach_m)`` gives the surface's bounds. See `Tube`.
+    """The tube over ``track`` (N, 2); ``halo(of_top, reach_m)`` returns the surface's bounds. See `Tube`.
 
-    ``surfaces``, ``grounds``: the map with ground and top, and with the ground alone.
+    ``surfaces``: the map with ground and top; ``grounds``: the map with the ground for both.
     """
     reach = Reaches.of(limits, field, scale)
     bow = 0.0 if field.affine else BOW_M + 2.0 * field.error_m
@@ -139,7 +142,7 @@ def _bands(
     track: Floats, limits: Limits, field: Field, zones: Zones,
     halo: Callable[[bool, float], Held], reach: Reaches, grounds: Held,
 ) -> tuple[Band, ...]:  # fmt: skip
-    """One band for each span of the track within reach of a zone, by zone and way."""
+    """One band for each span of the track within reach of a zone, by zone and distance along the track."""
     error = limits.altitude_error_m
     wide = reach.far_m + ZONE_ROOM_M
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
@@ -152,12 +155,13 @@ def _bands(
             part = _between(track, length, s0, s1)
             ground = _pieces(grounds, around, around, around, part, (wide,) * 3)
             if not len(ground):
-                continue  # touched at one place, as far from it as is spared
+                continue  # touched at one place, with all of the extra reach between
             s = np.concatenate([[s0], s0 + ground[:, 0]])
             low, high = ground[:, 1:3], ground[:, 3:5]
         else:
             s, low, high = np.array([s0, s1]), np.zeros((1, 2)), np.zeros((1, 2))
-        # What is known of all the ground under the zone is a bound too; where ground is unknown there is no way past.
+        # Bounds over all the ground under the zone hold too; where ground is unknown, the zone can be neither overflown
+        # nor underflown.
         if agl[0]:
             low = np.fmax(low + (bottom - MARGIN_M), numbers[BAND_LOW])
             low = np.where(np.isnan(ground[:, 1:3]), -np.inf, low)

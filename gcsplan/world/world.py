@@ -10,12 +10,12 @@ from gcsplan.world.frame import Frame
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """``frame`` is the only way in from degrees; ``airspace`` knows metres alone."""
+    """``frame`` is the only conversion from degrees; ``airspace`` knows only metres."""
 
     frame: Frame
     airspace: Airspace
 
     def ground_amsl(self, lat_deg: float, lon_deg: float) -> float:
-        """Ground at a place, AMSL metres; NaN where unknown."""
+        """Ground at a place, metres AMSL; NaN where unknown."""
         east, north = self.frame.to_plane(lat_deg, lon_deg)
         return float(self.airspace.surface.ground_at(east, north))
