@@ -20,18 +20,18 @@ ALL = {
     "swarm": "gcsplan.planners.swarm.compiled:UNIT",
     "turns": "gcsplan.planners.turns.compiled:UNIT",
 }
-"""Each is made in a process of its own, since numba reads its options once."""
+"""Kernel units by name. Each is made in its own process, because numba reads its options once."""
 
 OPTIONS = {
-    # For any processor, and not yet cut to vectors of some width.
+    # For any processor, not vectorised.
     False: {"CPU_NAME": "generic", "CPU_FEATURES": "", "LOOP_VECTORIZE": "0", "SLP_VECTORIZE": "0"},
-    # Cut to vectors of four numbers, which processors without such vectors take two by two.
+    # Vectorised for vectors of four numbers; processors without such vectors compute two at a time.
     True: {"CPU_NAME": "haswell", "CPU_FEATURES": "", "LOOP_VECTORIZE": "1", "SLP_VECTORIZE": "1"},
 }
 
 
 def main(names: list[str]) -> None:
-    """Make each and say how large it is."""
+    """Make each unit and print its size."""
     if not set(names) <= set(ALL):
         raise SystemExit(f"usage: python -m gcsplan.native [{' | '.join(ALL)}] …: without a name, all of them")
     if len(names) != 1:

@@ -1,4 +1,4 @@
-"""The forms of kernels' arguments: what Python hands in, and the slots of eight bytes that machine code takes."""
+"""The forms of kernels' arguments: what Python passes, and the slots of eight bytes that machine code takes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Form:
 
     @property
     def slots(self) -> str:
-        """As `struct` packs them: a number in one slot, an array as its address and its lengths."""
+        """The format for `struct`: a number in one slot, an array as its address and its lengths."""
         if self.dimensions:
             return "Q" + self.dimensions * "q"
         return "d" if self.letters == "f8" else "q"
@@ -53,9 +53,9 @@ def read_forms(text: str) -> tuple[Form, ...]:
 
 
 def slots_of(form: Form, argument: Any) -> tuple[Any, ...]:
-    """The contents of the slots of one argument. Raises TypeError where it has not the form that is wanted.
+    """The contents of the slots of one argument. Raises TypeError if an array does not have the form.
 
-    Of an array it is the address: whoever holds the slots must hold the array.
+    For an array this is its address: whoever holds the slots must hold the array.
     """
     if not form.dimensions:
         return (argument,)
@@ -66,13 +66,13 @@ def slots_of(form: Form, argument: Any) -> tuple[Any, ...]:
         )
     if not argument.size:
         return (0, *argument.shape)
-    # The quick way to an address works for what may be written only.
+    # The fast way to an address works only for writable arrays.
     address = _address_of(_over(argument)) if argument.flags.writeable else argument.ctypes.data
     return (address, *argument.shape)
 
 
 class Held:
-    """Arguments whose slots are made ready once, for many calls; they stand in for those arguments."""
+    """Arguments whose slots are prepared once, for many calls; an instance is passed in place of those arguments."""
 
     __slots__ = ("arguments", "forms", "slots", "text")
 
@@ -85,5 +85,5 @@ class Held:
         ]
 
     def __reduce__(self) -> tuple[type[Held], tuple[Any, ...]]:
-        """A copy, here or in another process, has arrays of its own, and their addresses."""
+        """Pickle forms and arguments: a copy, in this or another process, has its own arrays and their addresses."""
         return Held, (self.text, *self.arguments)

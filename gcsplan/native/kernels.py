@@ -1,4 +1,4 @@
-"""Kernels that Python calls: their machine code found or made at the first call."""
+"""Kernels that Python calls; their machine code is found or made at the first call."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from gcsplan.native.form import Held, read_forms, slots_of
 from gcsplan.native.machine import Machine
 
 FORMAT = "2"
-"""How kernels are called."""
+"""Version of the calling convention of kernels."""
 
 
 class Kernels:
     """Kernels that are compiled together.
 
-    ``folder``: where their source lies; ``sources``: names of all files that they are made from; ``forms``: by the
-    name of each kernel the forms of its arguments (`read_forms`), it gives back an int; ``module``: the dotted name
-    of the module where numba functions of these names stand, imported only when they must be compiled from source.
+    ``folder``: the folder of their source; ``sources``: names of all files that they are made from; ``forms``: by the
+    name of each kernel, the forms of its arguments (`read_forms`); a kernel returns an int; ``module``: the dotted name
+    of the module that holds numba functions of these names, imported only if they must be compiled from source.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Kernels:
         return self.folder / f"{self.name}{shelf.SUFFIX}"
 
     def digest(self) -> str | None:
-        """Of everything that the intermediate form depends on; None where the sources are not at hand."""
+        """The digest of everything that the intermediate form depends on; None if the sources cannot be read."""
         return shelf.digest_of(self.sources, repr((FORMAT, sorted(self.forms.items()))))
 
     def __getitem__(self, name: str) -> Callable[..., int]:
@@ -78,7 +78,7 @@ class Kernels:
         return {name: _callable(name, addresses[name], text) for name, text in self.forms.items()}
 
     def _compile(self, machine: Machine, shipped: bytes | None) -> bytes:
-        """Machine code, from what is shipped if that can be read."""
+        """Machine code, from the shipped form if that can be read."""
         if shipped is not None:
             with notice.compiling(self.name, quick=True):
                 code = machine.compile(shipped)
@@ -92,10 +92,10 @@ class Kernels:
 
 
 def _callable(name: str, address: int, text: str) -> Callable[..., int]:
-    """A function of Python that hands its arguments to machine code at ``address``."""
+    """A Python function that passes its arguments to machine code at ``address``."""
     forms = read_forms(text)
     pack = struct.Struct("=" + "".join(form.slots for form in forms)).pack
-    # numba's own convention: where the result goes, where an exception would go, then the arguments; 0 is well.
+    # numba's own convention: address for the result, address for an exception, then the arguments; status 0 is success.
     raw = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p)(address)
 
     def call(*arguments: Any) -> int:

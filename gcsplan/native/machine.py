@@ -1,4 +1,4 @@
-"""LLVM for the machine at hand: bitcode to machine code, and machine code into memory."""
+"""LLVM for this machine: from bitcode to machine code, and machine code into memory."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import llvmlite  # type: ignore[import-untyped]
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
 _CALLED = ("hypot", "sqrt", "floor", "ceil", "sin", "cos", "asin", "atan2", "fmod", "memset", "memcpy")
-"""What machine code may call; everything else is in it."""
+"""External functions that machine code may call; it contains everything else."""
 
 _engines: list[Any] = []  # machine code lives as long as its engine
 
 
 def llvm_version() -> str:
-    """The version of LLVM within llvmlite; bitcode of a newer major one is not read."""
+    """The version of LLVM within llvmlite; bitcode of a newer major version cannot be read."""
     return ".".join(str(part) for part in llvm.llvm_version_info)
 
 
@@ -30,7 +30,7 @@ class Machine:
         self._cpu = llvm.get_host_cpu_name()
         try:
             self._features = llvm.get_host_cpu_features().flatten()
-        except RuntimeError:  # not known on every platform: then the processor's name says enough
+        except RuntimeError:  # not known on every platform: there the processor's name is enough
             self._features = ""
 
     @property
@@ -39,9 +39,9 @@ class Machine:
         return str(llvmlite.__version__), self._triple, self._cpu, self._features
 
     def compile(self, bitcode: bytes) -> bytes | None:
-        """Machine code; None where this LLVM cannot read the bitcode.
+        """Machine code; None if this LLVM cannot read the bitcode.
 
-        The bitcode has been through LLVM's passes; here it is only brought to the machine's own instructions.
+        The bitcode has been through LLVM's passes; here it is only translated to the machine's own instructions.
         """
         target = self._target()
         try:
@@ -54,12 +54,12 @@ class Machine:
         return bytes(target.emit_object(module))
 
     def link(self, code: bytes, names: Sequence[str]) -> dict[str, int]:
-        """Put machine code into memory; addresses of its functions."""
+        """Load machine code into memory; return the addresses of its functions."""
         empty = llvm.parse_assembly("")
         empty.triple = self._triple
         engine = llvm.create_mcjit_compiler(empty, self._target())  # from here on LLVM sees the process' functions
         if not all(llvm.address_of_symbol(name) for name in _CALLED):
-            # What the C library does not show, numba brings along.
+            # numba provides what the C library does not export.
             importlib.import_module("numba.core.registry").cpu_target.target_context  # noqa: B018
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()

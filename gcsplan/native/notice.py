@@ -1,4 +1,4 @@
-"""Telling whoever waits that kernels are being compiled."""
+"""Notices to listeners that kernels are being compiled."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SLOW = "compiling the kernels from source (once, up to two minutes)"
 
 @contextmanager
 def told(listener: Callable[[str], None]) -> Iterator[None]:
-    """While it lasts, ``listener`` is called with a sentence before kernels are compiled; never in later runs."""
+    """In this context ``listener`` is called with a sentence before kernels are compiled; never if they are cached."""
     _listeners.append(listener)
     try:
         yield
@@ -23,7 +23,7 @@ def told(listener: Callable[[str], None]) -> Iterator[None]:
 
 @contextmanager
 def compiling(name: str, *, quick: bool) -> Iterator[None]:
-    """Say that the kernels ``name`` are compiled now."""
+    """Report that the kernels ``name`` are compiled now."""
     for listener in tuple(_listeners):
         listener(f"{QUICK if quick else SLOW}: {name}")
     yield

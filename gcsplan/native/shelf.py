@@ -1,10 +1,10 @@
-"""Where the intermediate form of kernels lies beside their source, and machine code in a cache on disk.
+"""Stores the intermediate form of kernels beside their source, and machine code in a cache on disk.
 
 Machine code is run as it is found: whoever can write to the cache can run anything as the user of this process. So it
-is taken only from a regular file that belongs to that user and that nobody else can write to, in a folder (0700) of
-which the same is true. A folder of ours with a wider mode is tightened, and emptied if others could write to it; where
-the cache belongs to somebody else, or is nowhere, kernels are compiled in memory. The digest in front of the code tells
-a file that is not whole, and nothing about who wrote it. The shipped form has the trust of the package that it lies in.
+is taken only from a regular file that belongs to that user and that nobody else can write to, in a folder (0700) for
+which the same holds. A folder of ours with a wider mode is tightened, and emptied if others could write to it. If the
+cache belongs to somebody else, or there is no place for one, kernels are compiled in memory. The digest in front of the
+code detects an incomplete file; it does not show who wrote it. The shipped form has the trust of its package.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from pathlib import Path
 SUFFIX = ".kernels"
 MAX_CODE_BYTES = 64_000_000
 NEWEST = 8
-"""Of the same kernels, so many machine codes are kept: for versions side by side."""
+"""Newest machine codes of the same kernels that are kept, for versions side by side."""
 
 OLD_PART_S = 86_400.0
-"""A file that was being written so long ago never will be."""
+"""An unfinished file older than this, s, is abandoned."""
 
-_CHECK = 32  # bytes of the digest before what is kept
+_CHECK = 32  # bytes of the digest before the kept code
 _SUFFIX_OF_CODE = ".code"
 _SUFFIX_OF_PART = ".part"
 
 
 def digest_of(sources: Sequence[Path], more: str) -> str | None:
-    """Of the files' contents and ``more``; None where they are not there to be read."""
+    """The digest of the files' contents and ``more``; None if a file cannot be read."""
     told = hashlib.sha256(more.encode())
     try:
         for path in sources:
@@ -46,7 +46,7 @@ def digest_of(sources: Sequence[Path], more: str) -> str | None:
 
 
 def read_shipped(path: Path, digest: str | None) -> bytes | None:
-    """The bitcode in ``path``, if it was made from sources of that digest (None: whatever they were); else None."""
+    """The bitcode in ``path`` if it was made from sources with ``digest`` (None: from any sources); else None."""
     try:
         head, _, body = path.read_bytes().partition(b"\n")
         if digest is not None and json.loads(head)["sources"] != digest:
@@ -57,13 +57,13 @@ def read_shipped(path: Path, digest: str | None) -> bytes | None:
 
 
 def write_shipped(path: Path, digest: str, made_with: dict[str, str], bitcode: bytes) -> None:
-    """Put bitcode beside its sources."""
+    """Write bitcode beside its sources."""
     head = json.dumps({"sources": digest, **made_with}, sort_keys=True)
-    _replace(path, head.encode() + b"\n" + zlib.compress(bitcode, 9), mode=0o644)  # read by all who share the package
+    _replace(path, head.encode() + b"\n" + zlib.compress(bitcode, 9), mode=0o644)  # all who share the package read it
 
 
 def read_kept(name: str) -> bytes | None:
-    """Machine code of that name from the cache, if it is there, whole, and nobody else could have put it there."""
+    """Machine code of that name from the cache, if it is there, is whole, and nobody else could have put it there."""
     try:
         folder = _cache()
         if folder is None or not _is_private(folder):
@@ -78,7 +78,7 @@ def read_kept(name: str) -> bytes | None:
 
 
 def keep(name: str, code: bytes) -> bool:
-    """Keep machine code in the cache; whether there is one of ours alone. Older code is dropped."""
+    """Write machine code to the cache; return False if there is no cache of ours alone. Older code is dropped."""
     try:
         folder = _cache()
         if folder is None:
@@ -94,9 +94,9 @@ def keep(name: str, code: bytes) -> bool:
 
 
 def _cache() -> Path | None:
-    """The user's cache, or one in what NUMBA_CACHE_DIR says; None where no absolute path is known.
+    """The user's cache, or one in the folder of NUMBA_CACHE_DIR; None if no absolute path is known.
 
-    A relative path would mean another folder, perhaps somebody else's, in every directory that one works in.
+    A relative path would mean another folder, perhaps somebody else's, in every working directory.
     """
     told = os.environ.get("NUMBA_CACHE_DIR")
     try:
@@ -115,8 +115,8 @@ def _cache() -> Path | None:
 
 
 def _is_private(folder: Path) -> bool:
-    """Whether a folder is this user's and, now at the latest, nobody else's. Raises OSError where it is not there."""
-    if os.name != "posix":  # the user's own folder has a list of who may do what, which modes do not show
+    """Whether a folder is this user's and, once tightened, nobody else's. Raises OSError if it does not exist."""
+    if os.name != "posix":  # the user's own folder has an access list, which modes do not show
         return folder.is_dir()
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
@@ -125,7 +125,7 @@ def _is_private(folder: Path) -> bool:
             return False
         if told.st_mode & 0o077:
             os.fchmod(handle, 0o700)
-        if told.st_mode & 0o022:  # who could write here may have put something here
+        if told.st_mode & 0o022:  # whoever could write here may have put something here
             for name in os.listdir(handle):
                 if name.endswith((_SUFFIX_OF_CODE, _SUFFIX_OF_PART)):
                     os.unlink(name, dir_fd=handle)
@@ -140,7 +140,7 @@ def _open_plainly(path: str, flags: int) -> int:
 
 
 def _is_trusted(told: os.stat_result) -> bool:
-    """Whether an opened file is a regular one of this user's, with this name alone, that nobody else can write to."""
+    """Whether an open file is a regular file of this user, with only this name, that nobody else can write to."""
     if not stat.S_ISREG(told.st_mode) or told.st_size > MAX_CODE_BYTES:
         return False
     if os.name != "posix":
@@ -162,7 +162,7 @@ def _replace(path: Path, content: bytes, *, mode: int) -> None:
 
 
 def _forget_others(folder: Path, name: str) -> None:
-    """Drop all but the newest of the same kernels (every change of source or machine leaves one), and cut-off parts."""
+    """Drop all but the newest codes of the same kernels (each change of source or machine adds one), and abandoned parts."""
     kind = name.split("-")[0]
 
     def age(path: Path) -> float:
@@ -179,5 +179,5 @@ def _forget_others(folder: Path, name: str) -> None:
 
 
 def name_of_code(kind: str, key: str) -> str:
-    """The file name of the machine code of some kernels for a machine."""
+    """The file name of some kernels' machine code for a machine."""
     return f"{kind}-{key[:32]}{_SUFFIX_OF_CODE}"

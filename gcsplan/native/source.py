@@ -1,4 +1,4 @@
-"""From numba functions to LLVM's bitcode: the slow half, done by a developer or where the shipped form is stale."""
+"""From numba functions to LLVM's bitcode: the slow half, done by a developer, or if the shipped form is stale."""
 
 # mypy: disable-error-code="no-untyped-call,no-untyped-def,untyped-decorator"
 from __future__ import annotations
@@ -24,21 +24,21 @@ _DTYPES = {"f8": np.float64, "f4": np.float32, "i8": np.int64, "i4": np.int32, "
 
 
 def options(**wanted: object) -> dict[str, Any]:
-    """Those compiler options that this numba knows; without the others kernels are the same, but slower."""
+    """The compiler options that this numba knows; without the others kernels are the same, but slower."""
     return {name: value for name, value in wanted.items() if hasattr(CPUTargetOptions, name)}
 
 
 INSIDE = options(
     nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True, _nrt=False
 )
-"""Options of kernels and of what they call: dividing by zero gives inf or NaN, and nothing is allocated."""
+"""Options of kernels and of the functions that they call: division by zero gives inf or NaN; nothing is allocated."""
 
 
-# Arguments are never two views of one array, and sums may be made in any order: that order, and what stands in one
-# vector, are then a part of the intermediate form, the same for everybody.
+# Arguments are never two views of one array, and sums may be computed in any order. That order, and what is put into
+# one vector, then become part of the intermediate form, the same for everybody.
 CPUTargetOptions.noalias = TargetOptions.Mapping("noalias")
 VECTORS = options(fastmath={"reassoc", "nsz"}, noalias=True)
-"""Further options of kernels that are cut to vectors before they are shipped."""
+"""Further options of kernels that are vectorised before they are shipped."""
 
 _ANY_ORDER = re.compile(
     r"(?m)^(\s+(?:%\S+ = )?(?:tail )?(?:f(?:add|sub|mul|div|rem|neg|cmp|ptrunc|pext)|phi|select|call)) "
@@ -100,7 +100,7 @@ def array_at(typingctx, block, position, like, shape):
 
 @intrinsic
 def result_of(typingctx, value):
-    """What a kernel gives back, as an int64; 0 where it gives back nothing."""
+    """A kernel's return value as an int64; 0 if it returns nothing."""
     if not isinstance(value, types.Integer | types.Boolean | types.NoneType):
         raise TypingError(f"a kernel gives back an int or nothing, not {value}")
 
@@ -113,9 +113,9 @@ def result_of(typingctx, value):
 
 
 def bitcode(kernels: Mapping[str, tuple[Any, tuple[Form, ...]]], *, vectors: bool = False) -> bytes:
-    """One module with a function of each name, that takes addresses and lengths for arrays.
+    """One module with a function of each name; the functions take addresses and lengths for arrays.
 
-    ``vectors``: the kernels were made with `VECTORS`; from here on the order of every sum stands fast.
+    ``vectors``: the kernels were made with `VECTORS`; from here on the order of every sum is fixed.
     """
     whole = None
     for name, (function, forms) in kernels.items():
@@ -141,13 +141,15 @@ def bitcode_of_plain(
     *,
     vectors: bool = False,
 ) -> bytes:
-    """The same of plain functions. ``others``: by the identity of whatever modules know under a name, the plain
-    function that stands behind it and that kernels call; kernels included.
+    """The same for plain functions.
+
+    ``others``: the plain functions, kernels included, that kernels call; each by the id of the object that modules know
+    under its name.
     """
     scopes: dict[int, dict[str, Any]] = {}
 
     def compiled(function: Callable[..., Any]) -> Any:
-        """Its numba self, in a copy of its module where all of these functions are theirs."""
+        """Its numba function, in a copy of its module in which all these functions are numba's."""
         plain = cast(FunctionType, function)
         scope = scopes.setdefault(id(plain.__globals__), dict(plain.__globals__))
         twin = FunctionType(plain.__code__, scope, plain.__name__, plain.__defaults__, plain.__closure__)

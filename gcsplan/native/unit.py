@@ -1,4 +1,4 @@
-"""Kernels written as plain functions and marked as such: numba is imported only where they must be compiled.
+"""Kernels written as plain functions and marked as such; numba is imported only if they must be compiled.
 
     UNIT = Unit("planners", Path(__file__).parent, "gcsplan.planners", ("track_kernels", "lattice.search_kernels"))
 
@@ -6,7 +6,7 @@
     def inner(x, y): ...
 
     @UNIT.kernel("f8[,] i8 f8[]")
-    def outer(a, k, out): ...      # fills arrays; gives back an int or nothing (0)
+    def outer(a, k, out): ...      # fills arrays; returns an int or nothing (0)
 
 `outer` is then called with arrays of exactly these forms (see `gcsplan.native.form`), and runs as machine code.
 """
@@ -26,11 +26,12 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class Unit(Kernels):
-    """Kernels of some modules of a package that are compiled together.
+    """Kernels in some modules of a package that are compiled together.
 
-    ``modules``: all of them that hold a marked function or a constant that one uses, dotted names within ``package``;
-    ``more``: further files that they depend on, beside them. ``vectors``: loops over arrays are cut to vectors before
-    they are shipped, sums in an order that is then fixed; no argument of a function may be a view of another's array.
+    ``modules``: all modules that hold a marked function or a constant that one uses, as dotted names within
+    ``package``; ``more``: further files, beside the modules, that they depend on. ``vectors``: loops over arrays are
+    vectorised before they are shipped, sums in an order that is then fixed; no argument of a function may be a view of
+    another's array.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class Unit(Kernels):
         self._kernels: dict[str, Callable[..., Any]] = {}
 
     def device(self, function: Function) -> Function:
-        """Mark a function that kernels call. From Python it can be called too, as the plain function that it is."""
+        """Mark a function that kernels call. Python can call it too, as a plain function."""
         self._plain[id(function)] = function
         return function
 

@@ -1,4 +1,4 @@
-"""The compiled kernels of the exact check, as Python calls them."""
+"""The compiled kernels of the exact check, in the form in which Python calls them."""
 
 from __future__ import annotations
 
@@ -47,18 +47,18 @@ SURFACE, ONE_SURFACE, HALO, ZONES = "f8[] f8[,] f8[,]", "f8[] f8[,]", _HALO, _ZO
 """Forms of arguments that stay the same over many calls: the map with both surfaces or one, a halo, the zones."""
 
 FOUND = "f8[,] f8[,,] i8[] i8[,] f8[,]"
-"""Forms of where `judge` puts what it finds."""
+"""Forms of the arrays into which `judge` writes its results."""
 
 
 class Room(threading.local):
-    """Room for `judge` to work in, one for each thread, made ready again before each call."""
+    """Work arrays for `judge`, one set for each thread, reset before each call."""
 
     def __init__(self) -> None:
         self._size = (-1, -1)
         self._out = np.zeros(12)
 
     def __call__(self, most_corners: int, zones: int) -> Held:
-        """For polygons of so many corners, and so many zones."""
+        """The work arrays for polygons of at most ``most_corners`` corners, and ``zones`` zones."""
         if self._size != (most_corners, zones):
             self._seen = np.empty(zones, np.int64)
             self._list = np.arange(zones)

@@ -1,4 +1,4 @@
-"""The kernels that Python calls, as it calls them: halos, zones and demands by their parts."""
+"""The kernels that Python calls, with the parts of halos, zones and demands as separate arguments."""
 
 from __future__ import annotations
 

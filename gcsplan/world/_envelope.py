@@ -1,8 +1,8 @@
-"""Kernels: bounds of a surface over and beside a ground track, and around points.
+"""Kernels: bounds of a surface over and beside a track, and around points.
 
-The height under a straight line is a quadratic in each cell; it is cut until a chord, lifted by what the quadratic
-rises above it (or lowered by what it dips below), lies within `CHORD_M`. What lies beside the line, within reach, is
-bounded by reach times the steepest slope there, or by the highest and lowest node, whichever is tighter.
+The height under a straight line is a quadratic in each cell. It is cut until a chord lies within `CHORD_M`, after the
+chord is raised by the quadratic's rise above it (or lowered by its dip below it). The surface beside the line, within
+reach, is bounded by reach times the steepest slope there, or by the highest and lowest node, whichever is tighter.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from gcsplan.world._sweep_terrain import EDGE
 
 CHORD_M = 0.05
 MOST_CUTS = 64  # of the line in one cell
-NEAR_UNKNOWN_M = 10.0  # pieces are cut to this beside unknown ground, so that little of the track is lost to it
-MOST_CELLS = 16  # looked at one by one for the slope beside a piece; more are bounded by the halo
+NEAR_UNKNOWN_M = 10.0  # pieces are cut to this beside unknown ground, so that little of the track is lost
+MOST_CELLS = 16  # examined one by one for the slope beside a piece; if there are more, the halo bounds them
 
 
 @device
@@ -44,9 +44,9 @@ def steepest_in(m, z, slopes, i, j, c0, r0, c1, r1):  # type: ignore[no-untyped-
 
 @device
 def lift_beside(m, z, halo, ea, na, eb, nb, c0, r0, c1, r1, i, j, reach):  # type: ignore[no-untyped-def]
-    """How much higher than a short segment in cell (i, j) the surface may lie within ``reach``; NaN where unknown.
+    """How much higher than a short segment in cell (i, j) the surface may lie within ``reach``, m; NaN where unknown.
 
-    The segment's ends in the plane, then in the grid.
+    The segment's ends are given in the plane, then in the grid.
     """
     if halo.slope[j, i] == math.inf:
         return math.nan
@@ -62,7 +62,7 @@ def lift_beside(m, z, halo, ea, na, eb, nb, c0, r0, c1, r1, i, j, reach):  # typ
 
 @device
 def put(rows, count, s, low0, low1, near0, near1, far0, far1):  # type: ignore[no-untyped-def]
-    """Add a piece that ends at ``s`` if there is room; the new number of pieces."""
+    """Add a piece that ends at ``s`` if it fits into ``rows``; return the new number of pieces."""
     if count < len(rows):
         rows[count, 0] = s
         rows[count, 1], rows[count, 2] = low0, low1
@@ -73,18 +73,18 @@ def put(rows, count, s, low0, low1, near0, near1, far0, far1):  # type: ignore[n
 
 @device
 def put_unknown(rows, count, s):  # type: ignore[no-untyped-def]
-    """Add a piece over unknown ground; the new number of pieces."""
+    """Add a piece over unknown ground; return the new number of pieces."""
     return put(rows, count, s, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
 @device
 def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, rows):  # type: ignore[no-untyped-def]
-    """Cut a ground track (N, 2) into pieces and bound the surface over each; their number.
+    """Cut a track (N, 2) into pieces and bound the surface over each; return the number of pieces.
 
-    Into ``rows``, as far as there is room: s at the end of the piece in metres along the track; lower bound of the
-    ground within ``low_m`` at both ends; upper bound of the top within ``near_m``; the same within ``far_m``. Linear
-    between; NaN where the ground within reach is unknown. ``under``, ``beside``, ``beyond``: halos of the ground and
-    of the top for the three reaches, each made for its reach and the bow.
+    Fill ``rows``, as many as fit: s at the end of the piece in metres along the track; lower bound of the ground within
+    ``low_m`` at both ends; upper bound of the top within ``near_m``; the same within ``far_m``. Bounds are linear
+    between; NaN where the ground within reach is unknown. ``under``, ``beside``, ``beyond``: halos of the ground and of
+    the top for the three reaches, each made for its reach plus the bow.
     """
     count = 0
     s_start = 0.0
@@ -152,7 +152,7 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, r
                     va, vb = c0 + pa * dc, r0 + pa * dr
                     u, v = min(max(wa - ii, 0.0), 1.0), min(max(wb - jj, 0.0), 1.0)
                     g1, t1 = ga + gb * u + gc * v + gd * u * v, ta + tu * u + tv * v + td * u * v
-                    # The chord and the quadratic: a positive bulge lies below the chord, a negative one above it.
+                    # A positive bulge of the quadratic lies below the chord, a negative one above it.
                     low0, low1 = g0 - max(g_bulge, 0.0), g1 - max(g_bulge, 0.0)
                     up0, up1 = t0 - min(t_bulge, 0.0), t1 - min(t_bulge, 0.0)
                     near0, near1, far0, far1 = up0, up1, up0, up1
@@ -194,8 +194,8 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, r
 def around(m, z, halo, sign, points, reach_m, out):  # type: ignore[no-untyped-def]
     """Upper bound of ``sign·height`` within ``reach_m`` of each point (N, 2) of the plane; NaN where unknown.
 
-    The tightest of three: the gradient at the point where the disc lies in one cell; the highest corner of the cells'
-    parts in the disc's own box; the halo's. ``out`` (N,).
+    The tightest of three bounds: by the gradient at the point, if the disc lies in one cell; by the highest corner of
+    the cells' parts in the disc's box; by the halo. ``out`` (N,).
     """
     rows, cols = z.shape
     for p in range(len(points)):

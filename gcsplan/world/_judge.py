@@ -33,18 +33,18 @@ from gcsplan.world._sweep_terrain import (
 )
 from gcsplan.world._sweep_zones import meets
 
-FEW_ZONES = 24  # up to so many boxes are looked through faster than the lattice
+FEW_ZONES = 24  # up to this many, a look through all boxes is faster than the lattice
 
 
 @inlined
 def judge_terrain(  # type: ignore[no-untyped-def]
     m, ground, top, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst, leg
 ):
-    """Ground, obstacles and ceilings of one leg; False at the first violation unless ``full``.
+    """Judge ground, obstacles and ceilings of one leg; return False at the first violation unless ``full``.
 
     ``near``, ``far``: halos of the top for the track error and for the clearance; ``over``: of the ground for the track
-    error. ``worst[leg, kind]``: depth (for coverage, how far unknown ground reaches in) and fraction. Lowest height
-    above top and where, then highest above ground, are left in ``out[8:11]``; the rest of ``out`` is `sweep`'s.
+    error. ``worst[leg, kind]``: depth (for coverage, how far unknown ground reaches in) and fraction. ``out[8:11]``:
+    lowest height above top, its fraction, and highest above ground; the rest of ``out`` is `sweep`'s.
     """
     fine = True
     track_m = track * want.scale
@@ -58,7 +58,7 @@ def judge_terrain(  # type: ignore[no-untyped-def]
             if column or want.clearance_m <= 0.0:
                 continue
             halo, need, reach = far, altitude, track_m + want.clearance_m * want.scale
-            # Where even the steepest slope does not lift the ground to the flight level, there is nothing to look for.
+            # Skip the search if even the steepest slope does not lift the ground to the flight level.
             same = near.cols == far.cols and near.rows == far.rows
             if same and out[LOW] - altitude >= (out[REACH] + want.clearance_m * want.scale) * out[STEEPEST]:
                 continue
@@ -95,7 +95,7 @@ def judge_terrain(  # type: ignore[no-untyped-def]
 
 @inlined
 def candidates(zone, lat, bucket, near, west, south, east, north, seen, stamp, list_of):  # type: ignore[no-untyped-def]
-    """Number of zones whose boxes overlap a box, put into ``list_of`` once each."""
+    """Put the zones whose boxes overlap a box into ``list_of``, once each; return their number."""
     count = 0
     zones = len(zone)
     cols, rows = int(lat[3]), int(lat[4])
@@ -127,16 +127,16 @@ def judge(  # type: ignore[no-untyped-def]
     m, ground, top, near, far, over, zs, start, end, column, track, altitude, want, full,
     ok, found, worst, nearest, hit, hit_at, stack, out, events, seen, list_of,
 ):  # fmt: skip
-    """Judge every leg; the number of zones broken.
+    """Judge every leg; return the number of zone violations.
 
     ``m``, ``ground``, ``top``: map, surfaces; ``near``, ``far``, ``over``: halos, see `judge_terrain`; ``zs``: zones.
     ``start``, ``end`` (n, 3), ``column``, ``track``, ``altitude`` (n,): as in `Legs`.
 
     ``ok`` (n,): no violation. With ``full`` also ``found`` (n, 4): lowest height above top, its fraction, highest above
-    ground, zone clearance; ``worst`` (n, 7, 2) by kind: depth (NaN where there is none; 1 for a climb too steep) and
-    fraction; ``nearest`` (n,) zone; and, as far as there is room, ``hit`` (leg, zone) and ``hit_at`` (signed distance,
-    fraction). ``stack`` (256, 8), ``out`` (12,), ``events`` (two for each corner), ``seen`` (all -1) and
-    ``list_of`` (0, 1, …) by zone: room to work in.
+    ground, zone clearance; ``worst`` (n, 7, 2) by kind: depth (NaN if there is none; 1 for a climb too steep) and
+    fraction; ``nearest`` (n,) zone; and, as many as fit, ``hit`` (leg, zone) and ``hit_at`` (signed distance,
+    fraction). ``stack`` (256, 8), ``out`` (12,), ``events`` (two for each corner), ``seen`` (all -1) and ``list_of``
+    (0, 1, …) by zone: work arrays.
     """
     zone = zs.table
     zones = len(zone)
@@ -146,7 +146,7 @@ def judge(  # type: ignore[no-untyped-def]
         e1, n1, h1 = end[i, 0], end[i, 1], end[i, 2]
         flat = math.sqrt((e1 - e0) ** 2 + (n1 - n0) ** 2)
         over_top = max(h0, h1) + altitude[i] - want.max_amsl_m
-        # A slope without limit is inf, and inf times a leg that only climbs is NaN, which nothing exceeds.
+        # A slope without limit is inf, and inf times the 0 m run of a vertical leg is NaN, which nothing exceeds.
         up = not column[i] and h1 - h0 > flat * want.max_climb
         down = not column[i] and h0 - h1 > flat * want.max_descent
         fine = not (up or down or over_top > TOUCH_M)

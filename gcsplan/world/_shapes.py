@@ -1,4 +1,4 @@
-"""Where a ground track is within reach of zones, and how deep inside a polygon a leg comes."""
+"""Where a track is within reach of zones, and how deep inside a zone a leg comes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gcsplan.world.zones import Circle
 
 
 def spans(track: Floats, zones: Zones, within_m: float, over_ground_m: float) -> list[tuple[int, float, float]]:
-    """(zone, s0_m, s1_m) of each span of ``track`` (N, 2) within reach of a zone, by zone and way.
+    """(zone, s0_m, s1_m) of each span of ``track`` (N, 2) within reach of a zone, by zone and distance along the track.
 
     The reach is ``within_m``, or ``over_ground_m`` for a zone with a level over ground.
     """
@@ -53,7 +53,7 @@ def spans(track: Floats, zones: Zones, within_m: float, over_ground_m: float) ->
     found.sort()
     merged: list[tuple[int, float, float]] = []
     for k, s0, s1 in found:
-        # A span that goes on into the next leg is one span.
+        # A span that continues on the next leg is one span.
         if merged and merged[-1][0] == k and s0 <= merged[-1][2] + 1e-6:
             merged[-1] = (k, merged[-1][1], max(merged[-1][2], s1))
         else:
@@ -81,7 +81,7 @@ def _polygon(corners: Floats, unit: Floats, reach: float, length: float) -> list
     out: list[tuple[float, float]] = []
     done = 0.0
     for a, b in [*marks, (length, length)]:
-        # A gap between two parts is inside or outside as a whole; what is inside belongs to the span.
+        # A gap between two parts is entirely inside or outside the polygon; an inside gap belongs to the span.
         inside = a > done and np.searchsorted(crossings, 0.5 * (a + done)) % 2 == 1
         first = done if inside else a
         if out and first <= out[-1][1]:
@@ -99,7 +99,7 @@ MOST_LOOKS = 200_000
 def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, float]:
     """Greatest distance from a polygon's border of a segment's point inside it, and where on the segment (0 … 1).
 
-    Never too small, and too large by `DEEP_M` or `DEEP_PART` of it at most; 0 where no part is inside. For reports.
+    Never too small, and too large by at most `DEEP_M` or `DEEP_PART` of it; 0 if no part is inside. For reports.
     """
     length = float(np.hypot(*(end - start)))
     best, at, looks = 0.0, 0.5, 0
@@ -109,7 +109,7 @@ def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, 
         k = int(depth.argmax())
         if depth[k] > best:
             best, at = float(depth[k]), float(middle[k])
-        # The distance from a border changes by no more than the way; outside, negative, it does too.
+        # The signed distance from the border changes by no more than the distance moved, inside and outside.
         looks += len(middle)
         spare = max(DEEP_M, DEEP_PART * best) if looks < MOST_LOOKS else np.inf
         open_ = middle[depth + half * length > best + spare]
@@ -120,7 +120,7 @@ def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, 
 
 
 def deepest_in_circle(shape: Circle, radius_m: float, p: Floats, q: Floats) -> tuple[float, float]:
-    """How deep a segment gets into a circle, and where on it."""
+    """How deep a segment gets into a circle, m, and where on it."""
     way, to = q - p, np.array([shape.east_m, shape.north_m]) - p
     square = float(way @ way)
     t = min(max(float(to @ way) / square, 0.0), 1.0) if square > 0.0 else 0.0
@@ -142,10 +142,10 @@ def _depth_inside(corners: Floats, p: Floats) -> Floats:
 
 
 def grown_edges(along: Floats, aside: Floats, reach: float) -> tuple[Floats, Floats, Floats]:
-    """Of each edge of a polygon, grown by ``reach``: the part of a line in it, and where the line crosses the edge.
+    """For each edge of a polygon, grown by ``reach``: the part of a line within it, and where the line crosses it.
 
-    ``along``, ``aside`` (…, N) are the corners' places along and beside the line. Begins above ends (inf, -inf) where
-    no part is met, and NaN where nothing is crossed.
+    ``along``, ``aside`` (…, N) are the corners' coordinates along and beside the line. If no part is met, the beginning
+    is above the end (inf, -inf); if nothing is crossed, the crossing is NaN.
     """
     along1, aside1 = np.roll(along, -1, axis=-1), np.roll(aside, -1, axis=-1)
     low, high = np.full(along.shape, np.inf), np.full(along.shape, -np.inf)

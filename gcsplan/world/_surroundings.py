@@ -1,4 +1,4 @@
-"""What lies around each cell of a surface, in one pass over it: the kernel of `_halo`."""
+"""The bounds around each cell of a surface, in one pass over it: the kernel of `_halo`."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ SLOPE, HIGH, LOW, LOST = range(4)
 
 @device
 def surroundings(z, step_x, step_y, cols, rows, box, room, slope, high, low):  # type: ignore[no-untyped-def]
-    """Fill a ``box`` (first row, that after the last, the same of columns) of a `Halo` of nodes ``z``: ``slope``,
-    ``high``, ``low`` (rows - 1, cols - 1). ``room`` for as many as are worked on at once, and what is around them."""
+    """Fill a ``box`` of a `Halo` of nodes ``z``: ``slope``, ``high``, ``low`` (rows - 1, cols - 1).
+
+    ``box``: first row, end of rows, first column, end of columns. ``room``: work array for a block and its
+    surroundings.
+    """
     n, m = min(box[1], slope.shape[0]), min(box[3], slope.shape[1])
     tall, wide = room.shape[0] - 2 * rows, room.shape[2] - 2 * cols
     for top in range(box[0], n, tall):
@@ -28,7 +31,7 @@ def surroundings(z, step_x, step_y, cols, rows, box, room, slope, high, low):  #
                     any_lost = True
             fields = 4 if any_lost else 3
             for i in range(height):
-                # Which cells are not known themselves, before they are spread.
+                # Which cells are themselves unknown, before that is spread.
                 lost, out = room[rows + i, LOST, cols:], slope[top + i, left : left + width]
                 for j in range(width):
                     out[j] = lost[j]
@@ -43,8 +46,10 @@ def surroundings(z, step_x, step_y, cols, rows, box, room, slope, high, low):  #
 
 @device
 def _look_at(z, step_x, step_y, row, left, count, into):  # type: ignore[no-untyped-def]
-    """Steepest slope, highest and lowest (negative) node of ``count`` cells of a row, and which are not known; whether
-    any is not. Beyond the border nothing is known."""
+    """Fill in steepest slope, highest and lowest (negated) node and unknown flag of ``count`` cells of a row.
+
+    Return whether any is unknown. Beyond the border everything is unknown.
+    """
     n, m = z.shape[0] - 1, z.shape[1] - 1
     slope, high, low, lost = into[SLOPE], into[HIGH], into[LOW], into[LOST]
     first, last = (max(-left, 0), min(m - left, count)) if 0 <= row < n else (count, count)
@@ -83,7 +88,7 @@ def _look_at(z, step_x, step_y, row, left, count, into):  # type: ignore[no-unty
 
 @device
 def _spread_along(line, count, window):  # type: ignore[no-untyped-def]
-    """Greatest of ``window`` places from each on, for all that have so many."""
+    """Replace each place by the greatest of the ``window`` places from it on, wherever there are that many."""
     done, left = 1, count
     while done < window:
         shift = min(done, window - done)
@@ -96,7 +101,7 @@ def _spread_along(line, count, window):  # type: ignore[no-untyped-def]
 
 @device
 def _spread_down(room, k, count, width, window):  # type: ignore[no-untyped-def]
-    """The same of rows, of field ``k``."""
+    """The same across rows, for field ``k``."""
     done, left = 1, count
     while done < window:
         shift = min(done, window - done)
@@ -110,7 +115,7 @@ def _spread_down(room, k, count, width, window):  # type: ignore[no-untyped-def]
 
 @device
 def _put(line, any_lost, slope, high, low, left, width):  # type: ignore[no-untyped-def]
-    """Write a row of what was spread; in ``slope`` stand those that are not known themselves."""
+    """Write a row of the spread values; ``slope`` holds the flags of the cells that are themselves unknown."""
     of_slope, of_high, of_low, near = line[SLOPE], line[HIGH], line[LOW], line[LOST]
     slope, high, low = slope[left : left + width], high[left : left + width], low[left : left + width]
     for j in range(width):

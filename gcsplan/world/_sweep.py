@@ -1,7 +1,7 @@
-"""What every kernel of the exact check shares: the map to the grid, and plane geometry.
+"""Functions shared by all kernels of the exact check: the map to the grid, and plane geometry.
 
-Kernels are numba's, and only imported where they must be compiled: see `gcsplan.native`. Dividing by zero gives inf
-or NaN in them, as in numpy; NaN is unknown, so there is no fast math.
+Kernels are numba's, and imported only where they must be compiled: see `gcsplan.native`. In kernels a division by zero
+gives inf or NaN, as in numpy; NaN means unknown, so there is no fast math.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from gcsplan.world._shared import (
 from gcsplan.world.surface import DEGREE
 
 device = njit(**INSIDE)
-"""A function that only kernels call. Nothing is allocated in it: counting references would cost more than the rest."""
+"""A function that only kernels call. It allocates nothing: counting references would cost more than the rest."""
 
 inlined = njit(inline="always", **INSIDE)
-"""The same, with one caller, into which it is copied: that compiles faster than a function of its own."""
+"""The same for a function with one caller, into which it is copied: that compiles faster than a separate function."""
 
 steps_in_kernel = device(steps_of)
 
@@ -84,7 +84,7 @@ def plane_per_cell(m, e, n):  # type: ignore[no-untyped-def]
 
 @device
 def parts_of(m, length, bow_m):  # type: ignore[no-untyped-def]
-    """Number of parts of a leg whose bow is at most ``bow_m``, and the bow of each."""
+    """Number of parts of a leg so that each part's bow is at most ``bow_m``, and that bow."""
     bow = m[BEND] * length * length / 8.0
     parts = 1
     if bow > bow_m:
@@ -123,7 +123,7 @@ def point_segment(px, py, ax, ay, bx, by):  # type: ignore[no-untyped-def]
 
 @device
 def slab(start, step, low, high, t0, t1):  # type: ignore[no-untyped-def]
-    """The part of [t0, t1] where start + t·step lies within [low, high]; empty where the first exceeds the second."""
+    """The part of [t0, t1] where start + t·step lies within [low, high]; empty if the first exceeds the second."""
     if step == 0.0:
         return (t0, t1) if low <= start <= high else (1.0, 0.0)
     a, b = (low - start) / step, (high - start) / step
@@ -153,7 +153,7 @@ def segment_box(ax, ay, bx, by, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
 
 @device
 def within(ax, ay, dx, dy, x0, y0, x1, y1, reach):  # type: ignore[no-untyped-def]
-    """The part [t0, t1] of a segment that lies within ``reach`` of an upright box; t0 > t1 where none does.
+    """The part [t0, t1] of a segment that lies within ``reach`` of an upright box; t0 > t1 if none does.
 
     The box grown by a disc is the union of two boxes and four discs, and convex: the hull of the parts is exact.
     """

@@ -1,4 +1,4 @@
-"""Kernels: what lies beside a short segment, within reach: branch and bound over pieces of cells; unknown ground."""
+"""Kernels: the surface beside a short segment, within reach: branch and bound over pieces of cells; unknown ground."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from gcsplan.world._shared import BEND, ERROR_M, RESOLUTION_M, TOUCH_M
 from gcsplan.world._sweep import device, local_steps, segment_box, to_grid, within
 
 MOST_PIECES = 1_000_000
-"""Of one search; beyond it the demand counts as broken. Never met but by hostile input."""
+"""Most pieces of one search; beyond it the demand counts as broken. Only hostile input reaches it."""
 
-RESOLUTION = 0.1  # of itself: to this the depth of a break is surely resolved, beside RESOLUTION_M
+RESOLUTION = 0.1  # part of itself to which the depth of a break is resolved, if more than RESOLUTION_M
 SPOKES = 16
 SMALLEST_M = 1e-3
 
 
 @device
 def bar_above(depth):  # type: ignore[no-untyped-def]
-    """What a break must exceed to be news, when one of ``depth`` is known: by 5 mm or a tenth."""
+    """The depth that a new break must exceed to count if one of ``depth`` is known: 5 mm or a tenth more."""
     return depth + max(RESOLUTION_M, RESOLUTION * depth) if depth > TOUCH_M else TOUCH_M
 
 
@@ -25,7 +25,7 @@ def bar_above(depth):  # type: ignore[no-untyped-def]
 def unknown_near(m, z, halo_c, halo_r, e0, n0, e1, n1, reach, i, j):  # type: ignore[no-untyped-def]
     """Distance from a short segment in cell (i, j) to the nearest unknown patch, and where on the segment.
 
-    Only patches up to ``halo_c`` columns and ``halo_r`` rows away are looked at; ``inf`` if there is none.
+    Only patches up to ``halo_c`` columns and ``halo_r`` rows away are examined; ``inf`` if there is none.
     """
     rows, cols = z.shape
     c0, r0 = to_grid(m, e0, n0)
@@ -46,11 +46,10 @@ def unknown_near(m, z, halo_c, halo_r, e0, n0, e1, n1, reach, i, j):  # type: ig
 
 @device
 def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):  # type: ignore[no-untyped-def]
-    """Worst break of the demand along a short segment: its depth and where on the segment (< 0: no news).
+    """Worst break of the demand along a short segment: its depth and where on the segment (< 0: none worse).
 
-    ``best`` is the depth already known. With ``full`` the worst is resolved to 5 mm or a tenth, else the first
-    break ends the search. Unknown cells are passed over: they are judged elsewhere. The third value is the number of
-    pieces that were cut.
+    ``best`` is the depth already known. With ``full`` the worst is resolved to 5 mm or a tenth, else the first break
+    ends the search. Unknown cells are skipped: they are judged elsewhere. The third value is the number of pieces cut.
     """
     rows, cols = z.shape
     length = math.hypot(e1 - e0, n1 - n0)
@@ -78,7 +77,7 @@ def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):
             if not (high + need - lowest > bar) or math.isnan(za + zb + zc + zd):
                 continue
             kb, kc, kd = zb - za, zc - za, za - zb - zc + zd
-            # The whole cell goes through the same mill as its pieces, as the one child of nothing.
+            # The whole cell is processed like its pieces, as the only child without a parent.
             u0, v0, um, vm, u1, v1, ul, vl = 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
             children, size = 1, 0
             while children:
@@ -96,7 +95,7 @@ def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):
                             stack[size, 6] = high - min(min(p, q), min(s, t))
                             size += 1
                     u0, v0, um, vm = ul, vl, u1, v1
-                # The deeper half is looked into first.
+                # The deeper half is searched first.
                 if size == before + 2 and stack[before, 4] > stack[before + 1, 4]:
                     for k in range(7):
                         stack[before, k], stack[before + 1, k] = stack[before + 1, k], stack[before, k]
@@ -126,7 +125,7 @@ def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):
 
 @device
 def beside_point(m, z, sign, e, n, h, need, reach):  # type: ignore[no-untyped-def]
-    """Deepest break at `SPOKES` places around a point, ``reach`` away from it; -inf where all of them are unknown."""
+    """Deepest break at `SPOKES` places around a point, ``reach`` away from it; -inf if all of them are unknown."""
     rows, cols = z.shape
     c, r = to_grid(m, e, n)
     sx, sy = local_steps(m, e, n, e, n, reach)

@@ -1,13 +1,13 @@
 """Kernels: a leg against a bilinear surface, exactly.
 
-A demand is ``sign·(altitude − height(q)) >= need`` for every point q within ``reach`` of the leg's point, for the whole
-of the leg: sign 1 for heights from below (min AGL, terrain clearance), −1 for the ground from above (max AGL).
+A demand is ``sign·(altitude − height(q)) >= need`` for every point q within ``reach`` of the leg's point, along the
+whole leg: sign 1 for heights from below (min AGL, terrain clearance), −1 for the ground from above (max AGL).
 
-Along a leg that is straight in the grid the height under it is a quadratic in each cell, so its extremes there are
-closed forms. For the points beside the line there are two tiers. The first is a bound: they lie no higher than the
-line's own ground by reach times the steepest slope within reach, nor than the highest node there. Where that bound
-breaks the demand, the second decides: branch and bound over pieces of cells, since a bilinear patch has its extremes
-over an upright box at the box's corners.
+Along a leg that is straight in the grid the height under it is a quadratic in each cell, so its extremes there have
+closed forms. Points beside the line are judged in two tiers. The first is a bound: these points are higher than the
+line's own ground by at most reach times the steepest slope within reach, and no higher than the highest node there. If
+that bound breaks the demand, the second tier decides: branch and bound over pieces of cells, because a bilinear patch
+has its extremes over an upright box at the box's corners.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from gcsplan.world._sweep import device, parts_of, slab, to_grid
 from gcsplan.world._sweep_beside import bar_above, beside_point, deepest, unknown_near
 
 EDGE = 1e-9  # columns or rows by which a leg along the border may seem to lie beyond it
-INSIDE = 1e-6  # columns or rows from the border within which the fast look leaves the leg to the thorough one
-GROUP_M, GROUP_BOW_M = 500.0, 0.003  # longest stretch, and its bow, that the second tier is given at once
+INSIDE = 1e-6  # columns or rows from the border within which `glance` leaves the leg to `sweep`
+GROUP_M, GROUP_BOW_M = 500.0, 0.003  # longest stretch, m, and its bow, that the second tier judges at once
 
-# What `sweep` leaves behind, by place.
+# Indices of `sweep`'s results in ``out``.
 LOW, LOW_AT, DEPTH, DEPTH_AT, UNKNOWN, UNKNOWN_AT, STEEPEST, REACH = range(8)
 CUT = 11  # pieces cut by the second tier so far, of all legs
 
@@ -46,10 +46,10 @@ def least_in_cell(sign, kd, turn, before, after, t, tb):  # type: ignore[no-unty
 
 @device
 def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out):  # type: ignore[no-untyped-def]
-    """The first tier alone, fast: 1 where the demand is surely kept, -1 where the line itself breaks it, 0 unsure.
+    """The first tier alone, fast: 1 if the demand is surely kept, -1 if the line itself breaks it, 0 if unsure.
 
-    With ``full`` the whole leg is looked at; then, if 1, ``out`` is as `sweep` leaves it; without, the lowest there is
-    a lower bound. Near unknown ground and at the border it is never sure.
+    With ``full`` the whole leg is examined; if the result is 1, ``out`` is then as `sweep` leaves it. Without ``full``
+    the lowest in ``out`` is a lower bound. Near unknown ground and at the border the result is never 1.
     """
     rows, cols = z.shape
     parts, bow = parts_of(m, math.sqrt((e1 - e0) ** 2 + (n1 - n0) ** 2), BOW_M)
@@ -91,7 +91,7 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
             after = h + tb * rise - sign * (za + kb * u + kc * v + kd * u * v)
             slope = slopes[j, i]
             turn = dc * dr * (tb - t) * (tb - t)
-            # A quarter of the bulge is the most that the line can dip below its lower end.
+            # The line dips below its lower end by at most a quarter of the bulge.
             least = min(agl, after) + min(0.25 * sign * kd * turn, 0.0)
             if not (0.0 <= slope < math.inf and least - r * slope >= need):
                 if not full:
@@ -119,12 +119,12 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
 
 @device
 def sweep(m, z, slopes, extremes, halo_c, halo_r, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full, out):  # type: ignore[no-untyped-def]
-    """Hold one leg to one demand; False at the first break found, unless ``full``.
+    """Judge one leg against one demand; return False at the first break found, unless ``full``.
 
     ``slopes``, ``extremes``: the surface's halo, of ``halo_c`` columns and ``halo_r`` rows. ``out``: lowest
     ``sign·(altitude − height)`` on the line and where; depth of the worst break (more than `TOUCH_M` is one) and where;
-    distance to the nearest unknown patch, looked for within reach, and where; steepest slope within the halo of the
-    cells on the way, ``inf`` with unknown patches among them; the reach with the line's bow.
+    distance to the nearest unknown patch, searched within reach, and where; steepest slope within the halo of the cells
+    under the leg, ``inf`` if unknown patches are among them; the reach with the line's bow.
     """
     rows, cols = z.shape
     length = math.hypot(e1 - e0, n1 - n0)
@@ -139,7 +139,7 @@ def sweep(m, z, slopes, extremes, halo_c, halo_r, sign, e0, n0, h0, e1, n1, h1, 
     out[LOW], out[LOW_AT], out[DEPTH], out[DEPTH_AT] = math.inf, 0.0, -math.inf, 0.0
     out[UNKNOWN], out[UNKNOWN_AT], out[STEEPEST], out[REACH] = math.inf, 0.0, 0.0, r
     cb, rb = to_grid(m, e0, n0)
-    # The worst on the line itself comes first, so that little is left to look for beside it.
+    # The worst break on the line itself is found first, so that most of the search beside it can be skipped.
     pending = False
     for round_ in range(2 if full else 1):
         beside = r > 0.0 and (round_ == 1 or not full)

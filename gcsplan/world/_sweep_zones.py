@@ -1,8 +1,8 @@
 """Kernels: a leg against no-fly zones.
 
-A zone whose levels are both above mean sea level is met exactly, by closed forms: the part of the leg at its heights,
-and that part's distance from its shape. Where a level follows the ground, branch and bound over pieces of cells finds
-the nearest point of the shape whose own heights, on its own ground, the leg meets.
+A zone whose levels are both above mean sea level is compared exactly, by closed forms: the part of the leg at the
+zone's heights, and that part's distance from the zone's shape. If a level follows the ground, branch and bound over
+pieces of cells finds the nearest point of the shape at which the leg meets the heights that the zone has there.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ from gcsplan.world._sweep import (
 from gcsplan.world._sweep_beside import MOST_PIECES, SMALLEST_M
 
 ACROSS_M = 0.02
-"""Size to which pieces are cut beside a zone whose levels follow the ground."""
+"""Size, m, to which pieces are cut beside a zone whose levels follow the ground."""
 
 ZONE_BOW_M = 0.003
 
 GLIMPSES = 8
-"""Places on a leg that are looked at before all of it, where only a yes or no is wanted."""
+"""Places on a leg that are examined before all of it, if only a yes or no is needed."""
 
 
 @device
@@ -78,7 +78,7 @@ def signed_distance(zone, vertex, k, e, n):  # type: ignore[no-untyped-def]
 
 @device
 def approach(zone, vertex, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
-    """Least distance of a segment from a zone's shape and where on the segment; of a circle it is signed."""
+    """Least distance of a segment from a zone's shape, and where on the segment; from a circle it is signed."""
     radius = zone[k, RADIUS]
     if radius >= 0.0:
         d, t = point_segment(zone[k, EAST], zone[k, NORTH], ax, ay, bx, by)
@@ -112,8 +112,9 @@ def approach(zone, vertex, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
 def enters(zone, vertex, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-def]
     """Whether a segment passes through the open inside of a polygon, by more than touching it.
 
-    Between neighbours among its crossings with the edges' lines and the feet of the vertices on it, the distance from
-    each edge only grows or only shrinks, so in the middle the segment is about half as far from the border as it gets.
+    The segment is split at its crossings with the edges' lines and at the feet of the vertices on it. Between
+    neighbouring splits the distance from each edge only grows or only shrinks, so in the middle of a part the segment
+    is about half as far from the border as it gets.
     """
     first, last = int(zone[k, FIRST]), int(zone[k, LAST])
     dx, dy = bx - ax, by - ay
@@ -150,7 +151,7 @@ def enters(zone, vertex, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-
 
 @device
 def at_heights(h0, dh, floor_m, ceiling_m, altitude_m):  # type: ignore[no-untyped-def]
-    """The part of [0, 1] where h0 + t·dh, give or take ``altitude_m``, meets the open (floor, ceiling)."""
+    """The part of [0, 1] where h0 + t·dh, plus or minus ``altitude_m``, meets the open interval (floor, ceiling)."""
     if not floor_m < ceiling_m:
         return 1.0, 0.0
     return slab(h0, dh, floor_m - altitude_m + TOUCH_M, ceiling_m + altitude_m - TOUCH_M, 0.0, 1.0)
@@ -158,10 +159,10 @@ def at_heights(h0, dh, floor_m, ceiling_m, altitude_m):  # type: ignore[no-untyp
 
 @device
 def nearest_conflict(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, cutoff, stack, full):  # type: ignore[no-untyped-def]
-    """Least distance from a short segment to a point of a zone's shape at whose place it meets the zone's heights.
+    """Least distance from a short segment to a point of a zone's shape where it meets the zone's heights, and where.
 
-    Found only below ``cutoff``, else inf; and where on the segment. Unknown ground: the zone is met at any height.
-    Without ``full`` the first one ends the search; with it the least is resolved to 1 cm or a hundredth.
+    Only distances below ``cutoff`` are found, else inf. Over unknown ground the zone is met at any height. Without
+    ``full`` the first one found ends the search; with it the least is resolved to 1 cm or a hundredth.
     """
     rows, cols = z.shape
     dh = h1 - h0
@@ -195,7 +196,7 @@ def nearest_conflict(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, 
                 kb, kc = z[j, i + 1] - za, z[j + 1, i] - za
                 kd = za - z[j, i + 1] - z[j + 1, i] + z[j + 1, i + 1]
                 known = not math.isnan(kb + kc + kd)
-            # The whole cell goes through the same mill as its pieces: as the one child of nothing.
+            # The whole cell is processed like its pieces, as the only child without a parent.
             size = 0
             u0, v0, um, vm, u1, v1, ul, vl = 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
             children = 1
@@ -264,10 +265,10 @@ def nearest_conflict(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, 
 
 @device
 def glimpsed(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, t0, t1, altitude_m):  # type: ignore[no-untyped-def]
-    """Whether a place on the leg itself, of a few between ``t0`` and ``t1``, lies in a zone and at its heights there.
+    """Whether one of a few places on the leg itself, from ``t0`` to ``t1``, lies in a zone and at its heights.
 
-    If so the zone is broken, and the search for the nearest such place, which takes long near the zone's levels, would
-    find it too. If not, nothing is known.
+    If so, the zone is broken; the search for the nearest such place would find it too, but takes long near the zone's
+    levels. If not, nothing is known.
     """
     rows, cols = z.shape
     floor_agl, ceiling_agl = zone[k, FLOOR_AGL] != 0.0, zone[k, CEILING_AGL] != 0.0
@@ -298,7 +299,7 @@ def meets(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stac
     """Whether a leg breaks a zone; its signed distance from the shape at the worst point, and where on the leg.
 
     Without a break the distance is the least at which the leg meets the zone's heights (for a zone over ground a lower
-    bound, never below ``reach``), inf where it does not.
+    bound, never below ``reach``), inf if it does not meet them.
     """
     t0, t1 = at_heights(h0, h1 - h0, zone[k, BAND_LOW], zone[k, BAND_HIGH], altitude_m)
     if t0 > t1:
@@ -316,7 +317,7 @@ def meets(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stac
         return False, dist, where
     if zone[k, FLOOR_AGL] == 0.0 and zone[k, CEILING_AGL] == 0.0:
         return True, dist, where
-    # The levels follow the ground: look along the part that is near the zone's box.
+    # The levels follow the ground: search along the part that is near the zone's box.
     cutoff = max(bound, SMALLEST_M)
     t0, t1 = slab(e0, de, zone[k, WEST_E] - reach - 1.0, zone[k, EAST_E] + reach + 1.0, t0, t1)
     if t0 <= t1:

@@ -1,4 +1,4 @@
-"""Zones as the kernels want them."""
+"""Zones as the arrays that the kernels take."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ MOST_SQUARES = 128  # of the lattice, along one side
 
 
 def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale: float) -> Zones:
-    """Arrays of ``zones``; radii become metres of the plane, levels over ground are bounded over the zone's ground."""
+    """Arrays of ``zones``; radii become metres of the plane, levels over ground get bounds over the zone's ground."""
     table = np.zeros((len(zones), ZONE_NUMBERS))
     vertices: list[Floats] = []
     corners = 0
@@ -74,13 +74,13 @@ def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale
 def _cells(box: Floats, surface: Surface, field: Field) -> tuple[int, int, int, int]:
     """First and last column and row of the cells that a box of the plane may touch; beyond the DEM too."""
     f = np.linspace(0.0, 1.0, 9)
-    if not field.affine:  # beyond the fitted square the map says nothing, and no leg is judged there
+    if not field.affine:  # beyond the fitted square the map is not valid, and no leg is judged there
         middle = np.array(surface.grid.centre * 2)
         box = np.clip(box, middle - 1.05 * surface.grid.scale_m, middle + 1.05 * surface.grid.scale_m)
     east, north = box[0] + f * (box[2] - box[0]), box[1] + f * (box[3] - box[1])
     e, n = (a.ravel() for a in np.meshgrid(east, north))
     at = surface.grid(e, n)
-    # Between the lattice's points the map strays by its bend; one cell and a half more is far beyond that.
+    # Between the lattice's points the map deviates by its bend; a cell and a half more is far beyond that.
     spare = 1.5 + field.bend * (box[2] - box[0] + box[3] - box[1]) ** 2 / min(field.step_x, field.step_y)
     low, high = np.floor(at.min(axis=0) - spare), np.floor(at.max(axis=0) + spare)
     low, high = np.maximum(low, -1e9), np.minimum(high, 1e9)
@@ -88,7 +88,7 @@ def _cells(box: Floats, surface: Surface, field: Field) -> tuple[int, int, int, 
 
 
 def _ground_range(cell: tuple[int, int, int, int], ground: Floats) -> tuple[float, float]:
-    """Lowest and highest node of the cells; without bound where one of them is unknown."""
+    """Lowest and highest node of the cells; infinite if one of them is unknown."""
     rows, cols = ground.shape
     i0, i1, j0, j1 = cell
     part = ground[max(j0, 0) : max(j1 + 2, 0), max(i0, 0) : max(i1 + 2, 0)]
@@ -98,7 +98,7 @@ def _ground_range(cell: tuple[int, int, int, int], ground: Floats) -> tuple[floa
 
 
 def _lattice(box: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
-    """Coarse squares over all zones, and the zones of each, one after the other."""
+    """The lattice of coarse squares over all zones, and the zones of each square, one square after the other."""
     if not len(box):
         return np.array([0.0, 0.0, 1.0, 1.0, 1.0]), np.zeros(2, np.int64), np.zeros(0, np.int64)
     west, south = box[:, 0].min(), box[:, 1].min()

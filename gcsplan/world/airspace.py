@@ -266,7 +266,7 @@ class Airspace:
         return out.reshape(e.shape)
 
     def _held(self, of_top: bool, reach_m: float, start: Floats, end: Floats) -> Held:
-        """The kernels' halo of top or ground for a reach, along lines between places (N, 2 or more); made once per size."""
+        """The kernels' halo of top or ground for a reach and lines between places (N, 2+); made once per size in cells."""
         f = self._field
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))

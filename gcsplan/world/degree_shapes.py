@@ -1,7 +1,7 @@
-"""Circles and polygons given in degrees, brought into the plane: cut to what is near enough to matter.
+"""Circles and polygons in degrees, converted to the plane and cut to the part near enough to matter.
 
-The plane has no place for points a quarter of the globe away, and bends long edges. So zones and fences come in here:
-polygons, whose edges are straight in degrees, are cut in degrees to the mission's neighbourhood and then projected.
+The plane cannot hold points a quarter of the globe away, and it bends long edges. So zones and fences are converted
+here: polygons, whose edges are straight in degrees, are cut in degrees to the mission's neighbourhood and projected.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 Corner = tuple[float, float]
 
 LARGEST_RADIUS_M = 100_000.0
-"""A circle in the plane is one on the ground only where the plane's scale hardly changes over it."""
+"""Largest radius, m: a circle in the plane is one on the ground only where the plane's scale hardly changes over it."""
 
 EDGE_BOW_M = 0.05
-"""An edge is straight in degrees; it is cut until its pieces in the plane are this near to it."""
+"""An edge is straight in degrees; it is cut until its pieces in the plane are this near to it, m."""
 
 FAR_M = 1.6 * FARTHEST_M
-"""Beyond this from the frame's origin no mission goes."""
+"""No mission goes farther than this from the frame's origin, m."""
 
 
 def near_circle(centre: Corner, radius_m: float, frame: Frame, *, local: bool = False) -> Circle | None:
-    """The circle around (latitude, longitude), or (east_m, north_m) where ``local``; None where it is too far away.
+    """The circle around (latitude, longitude), or (east_m, north_m) if ``local``; None if it is too far away.
 
     ``radius_m`` is at most `LARGEST_RADIUS_M`.
     """
@@ -44,9 +44,9 @@ def near_circle(centre: Corner, radius_m: float, frame: Frame, *, local: bool = 
 
 
 def near_polygons(ring: Sequence[Corner], frame: Frame) -> list[Polygon]:
-    """The parts of a polygon (latitude, longitude; simple, not closed) within `FAR_M`; none where it is too far away.
+    """The parts of a polygon (latitude, longitude; simple, not closed) within `FAR_M`; none if it is too far away.
 
-    Its edges are cut as `EDGE_BOW_M` asks.
+    Its edges are cut to keep `EDGE_BOW_M`.
     """
     points = unwrapped(ring, frame.lon_deg)
     tall = math.degrees(FAR_M / 6_350_000.0)
@@ -74,16 +74,16 @@ def near_polygons(ring: Sequence[Corner], frame: Frame) -> list[Polygon]:
 
 
 def counter_clockwise(vertices: Floats) -> Polygon:
-    """The polygon of ``vertices`` (N, 2) east_m, north_m in either direction."""
+    """The counter-clockwise polygon of ``vertices`` (N, 2) east_m, north_m, listed in either direction."""
     x, y = vertices[:, 0], vertices[:, 1]
     area = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
     return Polygon(np.ascontiguousarray(vertices if area > 0.0 else vertices[::-1]))
 
 
 def outline_of(points: Sequence[Corner], *, local: bool = False) -> tuple[list[Corner], str]:
-    """The corners without repetitions and not closed, and why they are no simple polygon ("" where they are one).
+    """The corners, not closed and without repetitions, and why they are no simple polygon ("" if they are one).
 
-    ``points`` are (latitude, longitude), or (east_m, north_m) where ``local``.
+    ``points`` are (latitude, longitude), or (east_m, north_m) if ``local``.
     """
     ring = [p for i, p in enumerate(points) if i == 0 or p != points[i - 1]]
     if len(ring) > 1 and ring[0] == ring[-1]:
@@ -97,16 +97,16 @@ def outline_of(points: Sequence[Corner], *, local: bool = False) -> tuple[list[C
 
 
 def unwrapped(points: Sequence[Corner], near_lon_deg: float) -> Floats:
-    """(N, 2) longitude, latitude; the first one near ``near_lon_deg``, each within half a turn of the one before."""
+    """(N, 2) longitude, latitude; the first near ``near_lon_deg``, each within half a turn of the one before."""
     p = np.asarray(points, float)
     steps = np.diff(p[:, 1], prepend=near_lon_deg)
     lon = near_lon_deg + np.cumsum((steps + 180.0) % 360.0 - 180.0)
-    # Adding up steps loses bits: each longitude is given back exactly, but for whole turns.
+    # The sum of steps loses bits, so each longitude is returned exactly, plus whole turns.
     return np.stack([p[:, 1] + 360.0 * np.round((lon - p[:, 1]) / 360.0), p[:, 0]], axis=-1)
 
 
 def _cut_edges(ring: Floats, frame: Frame) -> Floats:
-    """The ring (N, 2) longitude, latitude with every edge cut into equal pieces, near to their chords in the plane."""
+    """The ring (N, 2) longitude, latitude with every edge cut into equal pieces near their chords in the plane."""
     following = np.roll(ring, -1, axis=0)
     bow = frame.bow_m(ring[:, ::-1], following[:, ::-1])
     pieces = np.maximum(1, np.ceil(np.sqrt(bow / EDGE_BOW_M))).astype(int)

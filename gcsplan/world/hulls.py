@@ -1,7 +1,7 @@
-"""How far convex regions of the plane lie from points and polygons, many regions at once.
+"""Distances of convex regions of the plane from points and polygons, for many regions at once.
 
-A region is the convex hull of a few points. All of its border lies on segments between pairs of them, and all of those
-lie in it, so that no hull is ever built: distances are the least over all pairs, insides the union of all triangles.
+A region is the convex hull of a few points. Its border lies on segments between pairs of them, and all such segments
+lie in it, so no hull is ever built: the distance is the least over all pairs, the inside the union of all triangles.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from gcsplan.arrays import Bools, Floats
 
 AT_ONCE = 1_000_000
 MEETS = -1.0
-"""Not 0, which is to touch: touching is legal, where nothing is demanded besides."""
+"""Overlap; not 0, which is touching: touching is legal if no clearance is required."""
 
 
 def to_point(regions: Floats, point: Floats) -> Floats:
@@ -35,7 +35,7 @@ def to_polygon(regions: Floats, corners: Floats) -> Floats:
 
 def _to_polygon(regions: Floats, corners: Floats) -> Floats:
     after = np.roll(corners, -1, axis=0)
-    # The polygon's edges from the region's points, and the region's pairs from the polygon's corners.
+    # Distances of the region's points from the polygon's edges, and of the polygon's corners from the region's pairs.
     away = regions[:, :, None] - corners
     best = _to_segment(away, after - corners).min(axis=(1, 2))
     meets = _inside(regions, corners).any(axis=1)
@@ -58,14 +58,14 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def _to_segment(away: Floats, step: Floats) -> Floats:
-    """Distance of a point ``away`` from a segment's start from that segment."""
+    """Distance from a segment of a point; ``away``: the point from the segment's start; ``step``: the segment."""
     square = np.maximum((step * step).sum(axis=-1), 1e-30)
     part = np.clip((away * step).sum(axis=-1) / square, 0.0, 1.0)
     return np.asarray(np.linalg.norm(away - part[..., None] * step, axis=-1))
 
 
 def _holds(regions: Floats, points: Floats) -> Bools:
-    """(M, P) whether each region holds points (M, P, 2) of its own."""
+    """(M, P) whether each region contains its own points (M, P, 2)."""
     held = np.zeros(points.shape[:2], np.bool_)
     for i, j, k in combinations(range(regions.shape[1]), 3):
         a, b, c = (regions[:, n, None] for n in (i, j, k))

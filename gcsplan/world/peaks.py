@@ -15,10 +15,10 @@ from gcsplan.world.surface import GridMap
 Box = tuple[float, float, float, float]
 
 WANTED_ERROR_M = 0.01
-"""The gridded surface lies at most this far above the true one, where `MAX_NODES` affords it."""
+"""The gridded surface lies at most this far above the true one, m, if `MAX_NODES` permits."""
 
 MAX_NODES = 4_000_000
-_COARSEST = 32  # cells along the shorter side, at least
+_COARSEST = 32  # least number of cells along the shorter side
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +42,13 @@ def peaks_grid(base_m: float, peaks: Sequence[Peak], box: Box, most_nodes: int |
     """Heights (rows, cols) and grid of ``base_m`` plus the peaks over ``box``.
 
     Between the nodes the bilinear surface is never below the true one: a chord lies below a concave curve by at most
-    ``h²/8`` times its curvature, so each node is raised by that bound over the cells around it. Where that would take
-    more than `MAX_NODES`, the grid is coarser; with ``most_nodes`` InputError is raised instead, beyond so many.
+    ``h²/8`` times its curvature, so each node is raised by that bound over the cells around it. If that needs more than
+    `MAX_NODES` nodes, the grid is coarser. With ``most_nodes`` InputError is raised instead, if that many do not
+    suffice.
     """
     west, south, east, north = box
     width, height = east - west, north - south
-    # The steepest curvature anywhere in the box, cell by cell, decides the spacing.
+    # The sharpest curvature anywhere in the box, cell by cell, decides the spacing.
     coarse = 256
     fraction = np.arange(coarse + 1) / coarse
     xs: Floats = west + width * fraction
@@ -108,8 +109,8 @@ def _squares(at: Floats, centre: float, decay: float) -> tuple[Floats, Floats]:
 def _bend(near: Floats, far: Floats, hill: bool) -> Floats:
     """Largest concave part of the second derivative over t in [near, far], in units of 2·height/decay².
 
-    The second derivative is ``(2t - 1)·exp(-t)``: on a hill its negative is the concave part, falling until t = 0.5
-    and nothing beyond; in a pit the derivative itself, largest at t = 1.5.
+    The second derivative is ``(2t - 1)·exp(-t)``. On a hill its negative is the concave part: it falls to 0 at t = 0.5
+    and is 0 beyond. In a pit the concave part is the derivative itself, largest at t = 1.5.
     """
     with np.errstate(under="ignore"):
         if hill:

@@ -1,4 +1,4 @@
-"""The ground as one bilinear surface on its raster's own grid, reachable from the plane without a degree."""
+"""The ground as one bilinear surface on its raster's own grid, with a map to it from the plane without degrees."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TERMS = tuple((i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i))
 
 @dataclass(frozen=True, eq=False)
 class GridMap:
-    """Plane to grid by one polynomial: (east_m, north_m) -> (col, row), 0 at the first node.
+    """The map from the plane to the grid as one polynomial: (east_m, north_m) -> (col, row), 0 at the first node.
 
     ``coefficients`` (TERMS, 2) over ``u^i v^j`` with ``u = (east_m - centre[0]) / scale_m`` and ``v`` likewise.
     ``error_m`` bounds its distance from the true projection inside the fitted box.
@@ -43,7 +43,7 @@ class GridMap:
         basis = _basis((e - centre[0]) / scale_m, (n - centre[1]) / scale_m)
         coefficients, *_ = np.linalg.lstsq(basis, np.stack([col, row], axis=-1), rcond=None)
         fitted = cls(np.ascontiguousarray(coefficients), centre, scale_m, 0.0)
-        # The residual between the nodes is bounded on a lattice that none of them lies on, doubled.
+        # Bound the residual on a lattice that shares no point with the fit's nodes, and double it.
         f = np.linspace(-1.0, 1.0, 40)
         e, n = (a.ravel() for a in np.meshgrid(centre[0] + scale_m * f, centre[1] + scale_m * f))
         col, row = exact(e, n)
@@ -105,11 +105,11 @@ def _basis(u: Floats, v: Floats) -> Floats:
 class Surface:
     """Ground and what stands on it.
 
-    ``ground_m`` (rows, cols): height of each node, AMSL metres; NaN is unknown, never ground; bilinear between
-    nodes. ``top_m``: ground plus obstacles (trees, buildings), the same array where there are none; it counts
-    for min AGL and clearance, not for max AGL. ``grid`` maps the plane to nodes. ``info`` is what the outputs
-    say of the source (``dem_sha256``, ``vertical_datum``, ``resolution_m``, ``bare_dem``). ``goes_on``: past which
-    sides (first column, first row, last column, last row) the terrain is known too, but not loaded here.
+    ``ground_m`` (rows, cols): height of each node, metres AMSL; NaN is unknown, never ground; bilinear between nodes.
+    ``top_m``: ground plus obstacles (trees, buildings), the same array if there are none; it counts for min AGL and
+    clearance, not for max AGL. ``grid`` maps the plane to nodes. ``info`` describes the source in the outputs
+    (``dem_sha256``, ``vertical_datum``, ``resolution_m``, ``bare_dem``). ``goes_on``: beyond which sides (first column,
+    first row, last column, last row) the terrain is known too, but not loaded here.
     """
 
     ground_m: Floats
@@ -129,11 +129,11 @@ class Surface:
             raise ValueError(f"ground {self.ground_m.shape} and top {self.top_m.shape} differ in shape")
 
     def ground_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
-        """Ground, AMSL metres, at points of the plane; NaN where unknown."""
+        """Ground, metres AMSL, at points of the plane; NaN where unknown."""
         return _bilinear(self.ground_m, self.grid(east_m, north_m))
 
     def top_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
-        """Ground plus obstacles, AMSL metres, at points of the plane; NaN where unknown."""
+        """Ground plus obstacles, metres AMSL, at points of the plane; NaN where unknown."""
         return _bilinear(self.top_m, self.grid(east_m, north_m))
 
 
@@ -146,7 +146,7 @@ def _bilinear(z: Floats, at: Floats) -> Floats:
     j = np.clip(np.floor(r).astype(np.intp), 0, rows - 2)
     u, v = c - i, r - j
 
-    # A weight of zero must not let an unknown neighbour through as 0 · NaN.
+    # A weight of zero must remove an unknown neighbour, but 0 · NaN is NaN.
     def part(weight: Floats, height: Floats) -> Floats:
         return np.where(weight == 0.0, 0.0, weight * height)
 

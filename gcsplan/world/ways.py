@@ -1,6 +1,6 @@
-"""Many straight ways at once: how high the ground is under each, and which zones each meets.
+"""Many straight lines at once: how high the ground is under each, and which zones each meets.
 
-What `Airspace.tube` is for one track, for hundreds of lines that are to be flown level, with the same kernels and the
+It does for hundreds of lines to be flown level what `Airspace.tube` does for one track, with the same kernels and the
 same margins: never below what `Airspace.examine` demands.
 """
 
@@ -44,16 +44,16 @@ Ints = NDArray[np.intp]
 BOX_LOW, BOX_HIGH = [WEST_E, SOUTH_N], [EAST_E, NORTH_N]
 WIDER = 1.6
 UNUSED = -1e9
-"""A reach that the kernel need not look within."""
+"""A reach for which the kernel need not look for anything."""
 
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """K times that a way comes within reach of a zone; all arrays (K,).
+    """K crossings, each of a line within reach of a zone; all arrays (K,).
 
-    From ``s0_m`` to ``s1_m`` along the way (the hull, where there are several parts): fly at or below ``bottom_m`` or
-    at or above ``top_m`` AMSL; -inf, inf where there is no below or above. Altitude errors are in them. ``begins``: the
-    way begins within reach of it.
+    From ``s0_m`` to ``s1_m`` along the line (the hull, if there are several parts) a flight must stay at or below
+    ``bottom_m`` or at or above ``top_m`` AMSL; -inf, inf if no flight below or above is possible. Altitude errors
+    are included. ``begins``: whether the line begins within reach of the zone.
     """
 
     way: Ints
@@ -67,10 +67,10 @@ class Crossings:
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """What N bundles of ways cover, for zones, which are met by it exactly.
+    """The regions that N bundles of lines cover; zones are compared with them exactly.
 
-    ``regions`` (N, K, 2): the convex hull of these points; the first two are the ends of where the bundle begins.
-    ``extra_m`` (N,): by how much, in metres of the plane, it is wider than the limits' errors make it.
+    ``regions`` (N, K, 2): the convex hull of these points; the first two are the ends of the segment on which the
+    bundle begins. ``extra_m`` (N,): by how much, in metres of the plane, it is wider than the limits' errors make it.
     """
 
     regions: Floats
@@ -79,12 +79,12 @@ class Swept:
 
 @dataclass(frozen=True, eq=False)
 class Ways:
-    """What N ways meet.
+    """What N lines meet.
 
-    ``clear_m`` (N,): the lowest AMSL level over the whole way that meets no ground or obstacle within errors and
-    clearance; ``legal_m`` (N,): that keeps min AGL too; +inf over unknown ground. ``ceiling_m`` (N,): the highest
-    level that keeps max AGL. By piece (P,): the way, how far along it begins (of its two ends the nearer to the start),
-    and the two floors over it.
+    ``clear_m`` (N,): the lowest AMSL level over the whole line that meets no ground or obstacle within errors and
+    clearance; ``legal_m`` (N,): the lowest that also keeps min AGL; both +inf over unknown ground. ``ceiling_m`` (N,):
+    the highest level that keeps max AGL. For each piece (P,): its line, the distance along the line of its end nearer
+    to the start, and the two floors over it.
     """
 
     clear_m: Floats
@@ -100,10 +100,10 @@ class Ways:
 def over(
     air: Airspace, starts: Floats, ends: Floats, limits: Limits, wide_m: float = 0.0, swept: Swept | None = None
 ) -> Ways:
-    """The ways from each of ``starts`` (N, 2) straight to its ``ends`` (N, 2), all widened by ``wide_m`` of the plane.
+    """The lines from each of ``starts`` (N, 2) straight to its ``ends`` (N, 2), all widened by ``wide_m`` of the plane.
 
-    Errors and clearance of ``limits`` are in; a way of no length stands for its point. ``swept``: what the ways stand
-    for, which lies within ``wide_m`` of them: zones that it does not meet are left out.
+    Errors and clearance of ``limits`` are included; a line of no length stands for its point. ``swept``: the regions
+    that the lines represent, which lie within ``wide_m`` of them: zones that do not meet these regions are left out.
     """
     starts, ends = (np.ascontiguousarray(a, dtype=np.float64) for a in (starts, ends))
     reach = Reaches.of(limits, air._field, air.scale)
@@ -134,13 +134,14 @@ def over(
 def _pieces(
     air: Airspace, starts: Floats, ends: Floats, reaches: tuple[float, float, float], *, of_top: bool
 ) -> tuple[Ints, Floats, Floats]:
-    """The way of each piece, how far along it begins, and the kernel's rows (of the ground alone unless ``of_top``).
+    """The line of each piece, the distance along it at which the piece begins, and the kernel's rows.
 
-    Every other way is walked backwards, so that one track leads over all of them: out, and home, and out again.
+    Both surfaces are the ground unless ``of_top``. Every other line is followed backwards, so that one track covers all
+    of them: out, home, out again.
     """
     n = len(starts)
     still = np.hypot(*(ends - starts).T) == 0.0
-    if still.any():  # the kernel knows no way of no length: a hair instead
+    if still.any():  # the kernel takes no line of no length: 0.1 mm instead
         ends = np.where(still[:, None], ends + np.array([1e-4, 0.0]), ends)
     track = np.empty((2 * n, 2))
     back = np.arange(n) % 2 == 1
@@ -161,7 +162,7 @@ def _pieces(
     after = np.cumsum(length)
     begin = np.concatenate([[0.0], rows[:-1, 0]])
     leg = np.minimum(np.searchsorted(after, 0.5 * (begin + rows[:, 0]), side="right"), 2 * n - 2)
-    own = leg % 2 == 0  # the others lead from way to way
+    own = leg % 2 == 0  # the others lead from line to line
     leg, begin, rows = leg[own], begin[own], rows[own]
     way = leg // 2
     base = np.concatenate([[0.0], after])[leg]
@@ -170,7 +171,7 @@ def _pieces(
 
 
 def _few(reach_m: float, air: Airspace) -> float:
-    """A reach that is no less, one of few: each has a halo made for it, which holds for smaller ones too."""
+    """A reach that is no less, rounded up to one of few: a halo is made for each, and holds for smaller reaches too."""
     cell = min(air._field.step_x, air._field.step_y)
     if reach_m <= cell:
         return reach_m
@@ -224,7 +225,8 @@ def _crossings(
         b = starts[way[follow]] + s1[follow, None] * unit[way[follow]]
         part, _, rows = _pieces(air, a, b, (wide, wide, UNUSED), of_top=False)
         low, high = np.full(len(follow), np.inf), np.full(len(follow), -np.inf)
-        # What is known of all the ground under the zone is a bound too; where ground is unknown there is no way past.
+        # Bounds over all the ground under the zone hold too; where ground is unknown, the zone can be neither overflown
+        # nor underflown.
         row = table[zone[follow]]
         with np.errstate(invalid="ignore"):
             unknown = np.isnan(rows[:, 1:3]).any(axis=1)
@@ -241,14 +243,14 @@ def _crossings(
 
 
 def _apart(regions: Floats, row: Floats, vertex: Floats) -> Floats:
-    """How far regions lie from a zone, negative where they overlap."""
+    """How far regions lie from a zone, m; negative where they overlap."""
     if row[RADIUS] >= 0.0:
         return hulls.to_point(regions, row[[EAST, NORTH]]) - float(row[RADIUS])
     return hulls.to_polygon(regions, vertex[int(row[FIRST]) : int(row[LAST])])
 
 
 def _in_circle(away: Floats, unit: Floats, radius: float, length: Floats) -> tuple[Floats, Floats]:
-    """From where to where (empty: first > last) each line from the origin along ``unit`` lies in a disc ``away``."""
+    """First and last place (empty: first > last) at which each line from the origin along ``unit`` is in a disc."""
     middle = (away * unit).sum(axis=1)
     aside = away[:, 1] * unit[:, 0] - away[:, 0] * unit[:, 1]
     half = np.sqrt(np.maximum((radius - np.abs(aside)) * (radius + np.abs(aside)), 0.0))

@@ -29,8 +29,8 @@ class Obstacles:
     """R obstacles in the way of N returns, altitudes AMSL.
 
     ``high`` (N,): the highest altitude at which each return begins. For each obstacle (R,): ``back``, the index of its
-    return; its bottom and top; ``base`` and ``limit``: the lowest altitude of the return there is ``max(base, min(h,
-    limit))``; ``what``: `GROUND`, `MAX_AMSL`, `MAX_AGL` or a zone's index.
+    return; its bottom and top; ``base`` and ``limit``: the lowest altitude of the return there
+    is ``max(base, min(h, limit))``; ``what``: `GROUND`, `MAX_AMSL`, `MAX_AGL` or a zone's index.
     """
 
     high: Floats
