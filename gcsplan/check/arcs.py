@@ -158,7 +158,7 @@ class _Run:
         half = np.array([0.5 * self.radius * abs(c.turn) for c in self.corners])
         tangent = np.array([c.tangent for c in self.corners])
         self.straight_m = self.long_m - tangent[:-1] - tangent[1:]
-        # Arcs may overlap by `FIT_M`: then the aircraft flies less than both, and climbs as much.
+        # Arcs may overlap by `FIT_M`: the aircraft then flies less than both arcs and still climbs the whole altitude.
         self.flown_m = half[:-1] + self.straight_m + half[1:]
         self.half_m = half
 
@@ -278,7 +278,7 @@ class _Run:
             kept.append(track[-1])
         places = [self._place(p, z) for p, z, _ in kept]
         if not self.corners[k].turn:
-            places[0] = s.start  # exactly the same numbers
+            places[0] = s.start  # exactly, without a conversion to the plane and back
         if not self.corners[k + 1].turn:
             places[-1] = s.end
         for i, (a, b) in enumerate(pairwise(places)):
@@ -316,7 +316,7 @@ class _Run:
         whole = max(float(self.flown_m[k]), 1e-9)
         leaves, reaches = z0 + slope * a.tangent, z1 - slope * b.tangent
         first, last = self.half_m[k] / whole, 1.0 - self.half_m[k + 1] / whole
-        # Over half an arc: all between the way point's altitude and both altitudes computed for its other end.
+        # Over half an arc: the band from the way point's altitude to both altitudes computed for the arc's other end.
         for corner, at, other, even in (
             (a, z0, leaves, z0 + (z1 - z0) * first), (b, z1, reaches, z0 + (z1 - z0) * last),
         ):  # fmt: skip

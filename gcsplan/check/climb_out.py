@@ -280,7 +280,7 @@ def slant_shortage(
         starts.append(p - [0.0, 0.0, clearance(p[2])])
         ends.append(q - [0.0, 0.0, clearance(q[2])])
         low = p[2] - touch[2] < error / SPARED - 1e-9
-        # On the strip there is no track error.
+        # So near to the touch point the aircraft is over the landing strip: no track error.
         track.append(reach_m if low else limits.track_error_m + reach_m)
         height.append(0.0)
     plain = Limits(min_agl_m=0.0)
@@ -301,7 +301,7 @@ def circle_missing_m(low: Floats, reach_m: float, limits: Limits, air: Airspace)
 
 
 def bare(air: Airspace) -> Airspace:
-    """The airspace over bare ground, without what stands beside the strip."""
+    """The airspace over bare ground: what stands beside the landing strip does not count."""
     surface = air.surface
     if surface.top_m is surface.ground_m:
         return air

@@ -98,7 +98,7 @@ class _Cutter:
             begun = off if last is None else self._leave(last, s, off, stops)
             if s.column:
                 if last is None and s.kind == "land" and self._has_place(s.seq):
-                    begun = _Off()  # from the circle it flies to its place first
+                    begun = _Off()  # it leaves the circle for the landing place first
                 found += self._parts(s, (0.0, 1.0), self._beyond(replace(begun, height_m=0.0), s), fading=False)
                 climbed = s.kind == "takeoff" and self.mission.autopilot is Autopilot.PX4
                 off = _Off(0.0, self.tuning.px4_height_m if climbed else 0.0)
@@ -192,7 +192,7 @@ class _Cutter:
         if aside_m <= 1e-9 and height_m <= 0.0:
             return
         for one in (s, *self.twins.get(_way(s), ())):
-            # In the terrain frame height follows the ground: such a leg is not cut.
+            # In the terrain frame height follows the ground: such a leg stays whole.
             for a, b in [(0.0, 1.0)] if one.terrain else pairwise(cuts):
                 left = 1.0 - a if fading else 1.0
                 band_m = height_m if one.kind == "rtl" else left * height_m

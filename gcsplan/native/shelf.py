@@ -135,7 +135,7 @@ def _is_private(folder: Path) -> bool:
 
 
 def _open_plainly(path: str, flags: int) -> int:
-    """Open no link, and wait for no pipe."""
+    """Open a file, but no link, and without waiting if it is a pipe."""
     return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
 
 
@@ -162,7 +162,7 @@ def _replace(path: Path, content: bytes, *, mode: int) -> None:
 
 
 def _forget_others(folder: Path, name: str) -> None:
-    """Drop all but the newest codes of the same kernels (each change of source or machine adds one), and abandoned parts."""
+    """Drop all but the newest codes of the same kernels (each change of source or machine adds one) and old parts."""
     kind = name.split("-")[0]
 
     def age(path: Path) -> float:

@@ -15,7 +15,7 @@ from gcsplan.world._sweep_beside import unknown_near
 from gcsplan.world._sweep_terrain import EDGE
 
 CHORD_M = 0.05
-MOST_CUTS = 64  # of the line in one cell
+MOST_CUTS = 64  # most parts of the line in one cell
 NEAR_UNKNOWN_M = 10.0  # pieces are cut to this beside unknown ground, so that little of the track is lost
 MOST_CELLS = 16  # examined one by one for the slope beside a piece; if there are more, the halo bounds them
 

@@ -65,7 +65,7 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
             cb, rb = to_grid(m, e1, n1)
         else:
             cb, rb = to_grid(m, e0 + (e1 - e0) * (first + share), n0 + (n1 - n0) * (first + share))
-        # Also false for NaN, where the map gives nothing.
+        # Also false for NaN, where the map is not valid.
         far_c, far_r = cols - 1 - INSIDE, rows - 1 - INSIDE
         if not (INSIDE < c0 < far_c and INSIDE < cb < far_c and INSIDE < r0 < far_r and INSIDE < rb < far_r):
             return 0

@@ -37,7 +37,7 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Level, Zone
 
 BOX = [WEST_E, SOUTH_N, EAST_E, NORTH_N]
-MOST_SQUARES = 128  # of the lattice, along one side
+MOST_SQUARES = 128  # most squares of the lattice along one side
 
 
 def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale: float) -> Zones:

@@ -266,7 +266,7 @@ class Airspace:
         return out.reshape(e.shape)
 
     def _held(self, of_top: bool, reach_m: float, start: Floats, end: Floats) -> Held:
-        """The kernels' halo of top or ground for a reach and lines between places (N, 2+); made once per size in cells."""
+        """The kernels' halo of top or ground for a reach, along lines (N, 2 or more); one for each size in cells."""
         f = self._field
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))
@@ -372,7 +372,7 @@ class Airspace:
         return value, at
 
 
-ZONE = 7  # after the kernel's kinds
+ZONE = 7  # follows the kernel's kinds
 _KINDS: dict[int, Kind] = {
     ZONE: "zone", MIN_AGL: "min_agl", TERRAIN: "terrain_clearance", MAX_AGL: "max_agl", MAX_AMSL: "max_amsl",
     COVERAGE: "coverage", CLIMB: "climb", DESCENT: "descent",

@@ -92,7 +92,7 @@ def _heights(dataset: Any, lat: Floats | None, lon: Floats | None) -> Floats:
     names = [name or "" for name in dataset.descriptions]
     band = names.index(_UNDULATION) + 1 if _UNDULATION in names else 1
     row = (t.f - lat) / -t.e - 0.5
-    around = cols * t.a >= 360.0 - 1e-6  # then the first column follows the last
+    around = cols * t.a >= 360.0 - 1e-6  # around the globe: the first column follows the last
     col = ((lon - t.c) % 360.0) / t.a - 0.5
     col = np.where(col < -1e-9, col + 360.0 / t.a, col) if around else col
     row, col = np.clip(row, *_kept(row, rows - 1)), col if around else np.clip(col, *_kept(col, cols - 1))

@@ -12,7 +12,7 @@ TALLEST_M = 250.0
 """A canopy cell above this, m (or below -1 m) is an undeclared nodata value: unknown. The tallest tree has 116 m."""
 
 _PAD_CELLS = 0.02  # of a DEM cell: far above the bows of pixel edges and the fit's error
-_CHUNK_CELLS = 200_000  # a hundred megabytes of corners and indices
+_CHUNK_CELLS = 200_000  # at once: a hundred megabytes of corners and indices
 
 
 def canopy_on(ground: Window, canopy: Window, *, unknown_m: float = np.nan) -> Floats:

@@ -193,7 +193,7 @@ def _crossings(
     for k in np.flatnonzero(near).tolist():
         row = table[k]
         if row[FLOOR_AGL] == row[CEILING_AGL] and not row[FLOOR] < row[CEILING]:
-            continue  # upside down: nothing is inside
+            continue  # the floor is not below the ceiling: nothing is inside
         within = reach.far_m + wide_m + (ZONE_ROOM_M if over_ground[k] else 0.0)
         if row[RADIUS] >= 0.0:
             s0, s1 = _in_circle(row[[EAST, NORTH]] - starts, unit, float(row[RADIUS]) + within, length)

@@ -80,7 +80,7 @@ def obstacles_of_returns(
     distance = np.hypot(*(end - start).T)
     own = trace.track_m[parts.stretch] * air.scale
     regions, bow = _swept(trace, sides, target)
-    reach = 0.5 * np.hypot(*(regions[:, 1] - regions[:, 0]).T)  # a part is straight in the plane, or a column
+    reach = 0.5 * np.hypot(*(regions[:, 1] - regions[:, 0]).T)  # half the length of a part, straight or a column
     extra = reach + own + bow * air.scale
     there_m = at_home_m(limits)
     away = np.flatnonzero(distance + reach > there_m)
