@@ -1,7 +1,8 @@
 """By how much a limit is broken: a leg that is moved by this depth keeps the limit.
 
 The exact check resolves the ground beside a leg only as finely as a yes or no needs, so its depth of a violation is
-exact to about a tenth. The depth reported here was tried: the leg, moved by it, passes.
+exact to about a tenth. The depth reported here was tried: the leg, moved by it, passes, unless `TRIES` steps found
+no such depth.
 """
 
 from __future__ import annotations

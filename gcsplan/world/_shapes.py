@@ -99,7 +99,8 @@ MOST_LOOKS = 200_000
 def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, float]:
     """Greatest distance from a polygon's border of a segment's point inside it, and where on the segment (0 … 1).
 
-    Never too small, and too large by at most `DEEP_M` or `DEEP_PART` of it; 0 if no part is inside. For reports.
+    Never too small, and too large by at most `DEEP_M` or `DEEP_PART` of it, unless `MOST_LOOKS` places end the search
+    early; 0 if no part is inside. For reports.
     """
     length = float(np.hypot(*(end - start)))
     best, at, looks = 0.0, 0.5, 0

@@ -250,7 +250,7 @@ def _apart(regions: Floats, row: Floats, vertex: Floats) -> Floats:
 
 
 def _in_circle(away: Floats, unit: Floats, radius: float, length: Floats) -> tuple[Floats, Floats]:
-    """First and last place (empty: first > last) at which each line from the origin along ``unit`` is in a disc."""
+    """First and last place (empty: first > last) of each line from the origin along ``unit`` in a disc at ``away``."""
     middle = (away * unit).sum(axis=1)
     aside = away[:, 1] * unit[:, 0] - away[:, 0] * unit[:, 1]
     half = np.sqrt(np.maximum((radius - np.abs(aside)) * (radius + np.abs(aside)), 0.0))
