@@ -1,24 +1,24 @@
-"""`Download`: read a list from a vehicle. We ask, item by item and in order; the vehicle answers.
+"""`Download`: read a list from a vehicle. We request item by item, in order; the vehicle answers.
 
 =============  =============  =============================================================================
 state          event          what happens
 =============  =============  =============================================================================
-IDLE           START          REQUEST_LIST goes out
-LISTING        RETRY          REQUEST_LIST again
-LISTING        COUNT          REQUEST_INT 0 goes out
-LISTING        EMPTY          COUNT 0: final ACK, accepted with no items
-LISTING        REFUSED        COUNT above what can be held: nothing is asked for
-FETCHING       ITEM           the one that was asked for: the next is asked for; any other is passed over
-FETCHING       RETRY          the same REQUEST_INT again
-FETCHING       LAST_ITEM      final ACK, accepted
-LISTING, …     AGAIN          busy, confused, silent, or the list changed: pause, then start anew from REQUEST_LIST
-PAUSING        RETRY          REQUEST_LIST
-…              REFUSED        an ACK that will not change, or items in the old float form
-ENDED          LAST_ITEM      the final ACK again: the first one was lost
+IDLE           START          send REQUEST_LIST
+LISTING        RETRY          send REQUEST_LIST again
+LISTING        COUNT          send REQUEST_INT 0
+LISTING        EMPTY          COUNT 0: send the final ACK; accepted with no items
+LISTING        REFUSED        COUNT above what the vehicle can hold: request nothing
+FETCHING       ITEM           the requested item came: request the next; any other item is ignored
+FETCHING       RETRY          send the same REQUEST_INT again
+FETCHING       LAST_ITEM      send the final ACK; accepted
+LISTING, …     AGAIN          vehicle busy, confused or silent, or list changed: pause, then start over
+PAUSING        RETRY          send REQUEST_LIST
+…              REFUSED        an ACK that a repetition will not change, or items in the old float form
+ENDED          LAST_ITEM      send the final ACK again: the first one was lost
 =============  =============  =============================================================================
 
-PX4 takes requests in order only; when an old one comes late it says ERROR once and ignores all that follow. ArduPilot
-answers DENIED while it is being written to. Both are reasons to start anew, with nothing kept from before.
+PX4 accepts requests in order only; when an old one arrives late it answers ERROR once and ignores all that follow.
+ArduPilot answers DENIED while somebody writes to it. In both cases the download starts over and keeps no item.
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ from gcsplan.mavlink.protocol.outcome import (
 
 _BUSY = frozenset({ERROR, INVALID, INVALID_SEQUENCE, DENIED, CANCELLED})
 _MOST_ITEMS = 65535
-_RESTARTS = 16  # with pauses of 1.5 s much longer than the 8 s for which ArduPilot denies after a broken upload
+_RESTARTS = 16  # × pauses of 1.5 s: much longer than the 8 s for which ArduPilot denies after a broken upload
 
 
 class State(Label):
-    """Where a download is."""
+    """The states of a download."""
 
     IDLE = auto()
     LISTING = auto()
@@ -72,7 +72,7 @@ class State(Label):
 
 
 class Event(Label):
-    """What can happen to it."""
+    """The events of a download."""
 
     START = auto()
     RETRY = auto()
@@ -92,7 +92,7 @@ S, E = State, Event
 class Download(Machine):
     """Read ``vehicle``'s list. When ``outcome`` is `Accepted`, ``items`` is the whole list in wire order.
 
-    ``most``: what the vehicle can hold; one that announces more is not asked for anything.
+    ``most``: the number of items that the vehicle can hold; if it announces more, no item is requested.
     """
 
     ROLE = "download"
@@ -133,14 +133,14 @@ class Download(Machine):
         self._items: list[MissionItem] = []
         self._count: int | None = None
         self._restarts = 0
-        self._tries = 0  # of the question that is open
+        self._tries = 0  # repetitions of the request that awaits its answer
         self._first_asked_at = self._asked_at = 0.0
         self._heard_at = 0.0
         self._round_trip_s = self._quickest_s = 0.0
 
     @property
     def items(self) -> tuple[MissionItem, ...]:
-        """The items in wire order; whole only with an `Accepted` outcome."""
+        """The items in wire order; complete only if ``outcome`` is `Accepted`."""
         return tuple(self._items)
 
     @property
@@ -149,17 +149,17 @@ class Download(Machine):
         return Progress("read back", len(self._items), self._count or 0)
 
     def start(self, now: float) -> list[Packet]:
-        """Ask for the list."""
+        """Send REQUEST_LIST."""
         self._step(E.START)
         return self._ask_list(now)
 
     def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
-        """Give up and tell the vehicle so."""
+        """End with an unknown outcome and send ACK CANCELLED."""
         self.stop(Unknown(why))
         return [self._to_vehicle(Ack(CANCELLED, self.mission_type))]
 
     def stop(self, outcome: Outcome) -> None:
-        """End, and ask no more."""
+        """End with ``outcome`` and request no more."""
         if self.outcome is None:
             self._end(E.CANCEL, outcome)
 
@@ -177,7 +177,7 @@ class Download(Machine):
 
     @property
     def _wait_s(self) -> float:
-        """Until an item is asked for again: a slow link must not fill up with repeated questions."""
+        """Seconds until an item is requested again: repeated requests must not fill up a slow link."""
         return min(max(self.timers.item_s, 1.5 * self._round_trip_s), 2 * self.timers.response_s)
 
     def _react(self, message: MissionMessage, now: float) -> list[Packet]:
@@ -223,7 +223,7 @@ class Download(Machine):
         if len(self._items) == self._count:
             return self._finish(E.LAST_ITEM)
         self._step(E.ITEM)
-        if late_question:  # let it arrive before the next one is asked
+        if late_question:  # let the repeated request arrive before the next one is sent
             self._tries, self._deadline = -1, now + self._round_trip_s
             return []
         return self._ask_item(now)
@@ -233,11 +233,11 @@ class Download(Machine):
         return [self._to_vehicle(Ack(ACCEPTED, self.mission_type))]
 
     def _measure(self, now: float, late_question: bool = False) -> None:
-        """The slowest round trip, slowly forgotten, and the quickest.
+        """Update the slowest round trip (decays by 10 % each time) and the quickest, both in seconds.
 
-        A repeated question is not measured (Karn's rule), unless its answer comes sooner than any before: then it
-        answers the first question, and the second is still on its way. PX4 ends a download when that arrives after the
-        next.
+        A repeated request is not measured (Karn's rule) unless its answer comes sooner than any answer before: then it
+        answers the first request, and the repeated one is still on its way. PX4 ends a download if that one arrives
+        after the next request.
         """
         took = now - self._first_asked_at
         if self._tries == 0:
@@ -247,7 +247,7 @@ class Download(Machine):
 
     def _judge(self, code: int, now: float) -> None:
         if code == ACCEPTED:
-            return  # of an earlier transfer
+            return  # a late ACK of an earlier transfer
         if code in _BUSY:
             self._again(now, code_words(code))
         else:

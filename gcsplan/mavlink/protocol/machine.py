@@ -1,11 +1,11 @@
-"""What `Upload`, `Clear` and `Download` share: timers, one table of transitions each, and whose packets count.
+"""The base class of `Upload`, `Clear` and `Download`: timers, the transition table, and the filter for packets.
 
-Time is an argument and packets are values: ``start(now)``, ``receive(packet, now)`` and ``on_timer(now)`` return what
-is to be sent, ``deadline`` is when `on_timer` wants to be called next. Nothing here opens a socket or reads a clock.
+Time is an argument and packets are values: ``start(now)``, ``receive(packet, now)`` and ``on_timer(now)`` return the
+packets to send, and ``deadline`` is the next time to call `on_timer`. Nothing here opens a socket or reads a clock.
 
 Two rules, after h11's state machine. (1) A state changes only through the machine's ``TABLE``, (state, event) → state.
-(2) What the vehicle sends is never an error: a packet that does not count now is another event, or none. An event of
-our own that is not in the table (a second ``start``) is a bug, `ImpossibleTransition`.
+(2) A packet from the vehicle never raises an error: one that does not fit the state is another event, or is ignored.
+An event of our own that is not in the table (a second ``start``) is a bug and raises `ImpossibleTransition`.
 """
 
 from __future__ import annotations
@@ -22,11 +22,12 @@ from gcsplan.mavlink.protocol.outcome import Outcome
 
 @dataclass(frozen=True, slots=True)
 class Timers:
-    """Seconds; the first three are those that the protocol guide recommends.
+    """Waiting times of a transfer, in seconds; the first three fields have the protocol guide's recommended values.
 
-    ``response_s``: wait for an answer before asking again, ``retries`` times. ``item_s``: the same for an item of a
-    download, for as long as the vehicle is heard of. ``silence_s``: how long an upload waits for a vehicle that has
-    asked for items (ArduPilot itself gives up after 8 s). ``stall_s``: how long it may ask for nothing new.
+    ``response_s``: wait for an answer before the message is repeated, at most ``retries`` times. ``item_s``: the same
+    for an item of a download, repeated as long as the vehicle answers at all. ``silence_s``: wait of an upload for the
+    next request of a vehicle that has requested items (ArduPilot itself gives up after 8 s). ``stall_s``: the longest
+    time in which an upload accepts only requests for items that were requested before.
     """
 
     response_s: float = 1.5
@@ -45,13 +46,13 @@ class Timers:
 
     @property
     def patience_s(self) -> float:
-        """How long all tries of one question take together."""
+        """Seconds that all tries of one message take together."""
         return self.response_s * (self.retries + 1)
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """``done`` of ``total`` items; ``phase`` is a word: upload, read back, clear."""
+    """``done`` of ``total`` items are transferred; ``phase`` is one of: upload, read back, clear."""
 
     phase: str
     done: int
@@ -60,24 +61,24 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Not yet: ask again at ``until``."""
+    """A gate's answer "not yet": call the gate again at time ``until``."""
 
     until: float
 
 
 Gate = Callable[[float], "Wait | Outcome | None"]
-"""Asked before anything is written to a vehicle: None lets it pass, an outcome ends the transfer with it."""
+"""Called with the time before a COUNT or CLEAR_ALL is sent: None permits it, an outcome ends the transfer with it."""
 
 
 def always(now: float) -> None:
-    """A gate that lets everything pass."""
+    """Permit everything: the default gate."""
 
 
 CANCELLED_BY_US = "cancelled by us"
 
 
 class Label(Enum):
-    """A state or an event; each exists once, so that its identity is its hash, which is quick."""
+    """A state or an event. Each member exists once, so its identity serves as its hash, which is fast."""
 
     __hash__ = object.__hash__
 
@@ -107,23 +108,23 @@ class Machine:
 
     @property
     def deadline(self) -> float | None:
-        """When `on_timer` wants to be called; None before the start and after the end."""
+        """The next time to call `on_timer`; None before the start and after the end."""
         return self._deadline
 
     def receive(self, packet: Packet, now: float) -> list[Packet]:
-        """Take ``packet`` in, whoever sent it, and return the answers."""
+        """Process ``packet``, from any sender, and return the answers."""
         if not self.concerns(packet):
             return []
         return self._react(packet.message, now)
 
     def on_timer(self, now: float) -> list[Packet]:
-        """What is due at ``now``; nothing before the deadline."""
+        """Return the packets that are due at ``now``: none before the deadline."""
         if self._deadline is None or now < self._deadline:
             return []
         return self._expire(now)
 
     def concerns(self, packet: Packet) -> bool:
-        """From our vehicle, to us or to everybody, about our kind of list."""
+        """Whether ``packet`` comes from our vehicle, is addressed to us or to everybody, and is of our list's type."""
         source, target = packet.source, packet.target
         return (
             source.sysid == self.vehicle.sysid
@@ -135,24 +136,24 @@ class Machine:
 
     @property
     def answers(self) -> Sequence[Item]:
-        """What a request gets, by seq, at any time between `start` and `cancel`; most machines answer none."""
+        """The item that answers a request, by seq, at any time between `start` and `cancel`; empty by default."""
         return ()
 
     def answered(self, seqs: Iterable[int], now: float) -> None:
-        """Take note of requests that got their answer already."""
+        """Record requests for ``seqs`` that were already answered."""
 
     @property
     def mark(self) -> tuple[int, ...]:
-        """How far it has come; grows with every item that is asked for or read for the first time."""
+        """A measure of progress: grows with every item that is requested or read for the first time."""
         return (self.progress.done,)
 
     @property
     def progress(self) -> Progress:
-        """Items done so far."""
+        """Items transferred so far."""
         raise NotImplementedError
 
     def stop(self, outcome: Outcome) -> None:
-        """End with ``outcome`` and send nothing: the vehicle may be another one by now."""
+        """End with ``outcome`` and send nothing, because the link may lead to another vehicle by now."""
         raise NotImplementedError
 
     def _step(self, event: Label) -> None:
@@ -178,7 +179,7 @@ class Machine:
 
 
 def checked_type(mission_type: int, allowed: range = range(3)) -> int:
-    """``mission_type`` if it is a kind of list: 0 mission, 1 fence, 2 rally (255 all, where allowed)."""
+    """Return ``mission_type`` if it is in ``allowed`` (0 mission, 1 fence, 2 rally); else raise InputError."""
     if mission_type not in allowed:
         raise InputError(f"mission type must be 0 (mission), 1 (fence) or 2 (rally), given {mission_type}")
     return mission_type

@@ -1,6 +1,6 @@
-"""The mission protocol's messages as plain values: what `transfer` and the loopback vehicle speak.
+"""The mission protocol's messages as plain values, which `transfer` and the loopback vehicle exchange.
 
-`link` translates them from and to MAVLink frames; nothing here knows a socket or a clock.
+`wire` translates them to and from pymavlink's messages. Nothing here uses a socket or a clock.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from gcsplan.mavlink.mission.mission import MISSION, MissionItem
 
 
 class Address(NamedTuple):
-    """System and component id; 0 is everybody."""
+    """System and component id; as a target, 0 means every system or every component."""
 
     sysid: int
     compid: int
@@ -36,7 +36,7 @@ class RequestList:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """MISSION_REQUEST_INT (51), or with ``legacy`` MISSION_REQUEST (40); both are answered with `Item`."""
+    """MISSION_REQUEST_INT (51), or MISSION_REQUEST (40) if ``legacy``; the answer to both is an `Item`."""
 
     seq: int
     mission_type: int = MISSION
@@ -55,7 +55,7 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class LegacyItem(Item):
-    """MISSION_ITEM (39), the old form: degrees as float32, some 0.4 m coarse; never taken for an `Item` that counts."""
+    """MISSION_ITEM (39), the old form: degrees as float32, which resolve about 0.4 m; a download refuses it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ MissionMessage = Count | RequestList | Request | Item | Ack | ClearAll
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """A message with its envelope."""
+    """A message with its sender and its addressee."""
 
     source: Address
     target: Address

@@ -1,4 +1,4 @@
-"""How a transfer ends: accepted, refused, unknown, or stopped by us; the vehicle's codes in words, each with a cure."""
+"""The outcomes of a transfer: accepted, refused, unknown, or stopped by us; and the vehicle's codes in words."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
 INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
 OURS = -1
-"""Not a code of the vehicle: we refuse what it says."""
+"""Not a MAV_MISSION_RESULT: we refuse what the vehicle announces."""
 
 _CODES: dict[int, tuple[str, str]] = {
     ACCEPTED: ("accepted", ""),
@@ -36,18 +36,18 @@ _CODES: dict[int, tuple[str, str]] = {
 
 
 def code_words(code: int) -> str:
-    """A MAV_MISSION_RESULT in words, without the cure."""
+    """Return the meaning of a MAV_MISSION_RESULT in words, without the remedy."""
     return _CODES.get(code, (f"code {code}, which MAVLink does not define", ""))[0]
 
 
 def code_cure(code: int) -> str:
-    """What to do about a MAV_MISSION_RESULT; empty where nothing helps."""
+    """Return what the user can do about a MAV_MISSION_RESULT; empty for ACCEPTED."""
     return _CODES.get(code, ("", "update this program or the firmware"))[1]
 
 
 @dataclass(frozen=True, slots=True)
 class Accepted:
-    """The vehicle said so; ``opaque_id`` is its name for what it holds now, 0 where it gives none."""
+    """The vehicle accepted; ``opaque_id`` is its id of the list that it holds now, 0 if it sends none."""
 
     opaque_id: int = 0
 
@@ -57,7 +57,10 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """The vehicle said no: MAV_MISSION_RESULT ``code``, and the item at fault where it is known."""
+    """The vehicle refused: MAV_MISSION_RESULT ``code``, and ``seq`` of the item at fault where it is known.
+
+    ``what`` replaces the standard words for the code. ``code`` is `OURS` where we refused.
+    """
 
     code: int
     seq: int | None = None
@@ -78,7 +81,7 @@ class Refused:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """The outcome is unknown until the list is read back. ``silent``: the vehicle did not answer at all."""
+    """What the vehicle holds is unknown until it is read back. ``silent``: the vehicle did not answer at all."""
 
     why: str
     silent: bool = False
@@ -89,7 +92,7 @@ class Unknown:
 
 @dataclass(frozen=True, slots=True)
 class Changed:
-    """We stopped: the vehicle is no longer as it was when it was checked. ``reason`` is a word: armed, moved, …"""
+    """We stopped because the vehicle has changed since it was checked. ``reason`` is one word: armed, moved, …"""
 
     reason: str
     why: str

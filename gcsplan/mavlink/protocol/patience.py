@@ -1,4 +1,4 @@
-"""How long a conversation may take: the user's timeout is the longest time without progress, and bounds the whole."""
+"""The time limits of a transfer: the user's timeout limits the time without progress and, per item, the whole."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from gcsplan.errors import InputError
 
 TIMEOUT_S = 60.0
 ITEM_S = 2.0
-"""What every item adds to the whole: seconds."""
+"""Seconds that each item adds to the limit of the whole transfer."""
 
 
 def checked_timeout_s(timeout_s: float) -> float:
-    """``timeout_s`` if it is one. Raises InputError."""
+    """Return ``timeout_s`` if it lies within 0 … 3600 s (0 excluded); else raise InputError."""
     if not 0.0 < timeout_s <= 3600.0:
         raise InputError(f"a timeout must lie within 0 … 3600 s, given {timeout_s:g}")
     return timeout_s
 
 
 class Patience:
-    """``timeout_s`` without progress end it, and the same with `ITEM_S` an item on top ends it with progress.
+    """Two limits: ``timeout_s`` without progress, and ``timeout_s`` plus `ITEM_S` per item in all, even with progress.
 
-    ``items`` None: not known before the vehicle has said it.
+    ``items`` is None if the number is unknown until the vehicle reports it.
     """
 
     def __init__(self, timeout_s: float, items: int | None, now: float) -> None:
@@ -30,13 +30,14 @@ class Patience:
 
     @property
     def deadline(self) -> float:
-        """When it ends if nothing happens."""
+        """The time at which the transfer must end unless there is progress before."""
         return min(self._moved_on + self.timeout_s, self._started + self.timeout_s + ITEM_S * self._items)
 
     def over(self, mark: tuple[int, ...], total: int, now: float) -> str | None:
-        """Why it is over, in words; None while it is not.
+        """Return in words why the time is over at ``now``; None if it is not.
 
-        ``mark`` grows with every step forward, ``total`` is how many items there are if that is not known before.
+        ``mark`` grows with every step of progress. ``total`` is the number of items reported by the vehicle; it is used
+        only if ``items`` was None.
         """
         if not self._known:
             self._items = max(self._items, total)

@@ -1,13 +1,13 @@
 """The mission protocol without sockets and without a clock: `Upload`, `Download`, `Clear`, and `VerifiedUpload`.
 
-`VerifiedUpload` is what a session runs: upload, settle what is unknown by reading back, compare, and begin again while
-that can help. Only a list that was read back whole and equal is ever called verified::
+A session runs `VerifiedUpload`: it uploads, reads back, compares, and starts over while that can help. Reading back
+also decides an unknown outcome. Only a list that was read back whole and equal is called verified::
 
     upload ── accepted, unknown, error ──► read back ── equal ──► verified
-       ▲  └── refused, nothing asked ──► refused   │
-       └────────────── differs, upload not accepted ┴── accepted: somebody else changed it, or it went bad: differs
+       ▲  └── refused, no request ──► refused      │
+       └──────────── differs, upload not accepted ─┴── differs, upload accepted: another station wrote, or corrupted
 
-Before each announcement a gate is asked whether the vehicle is still the one that was checked, and as it was.
+Before each COUNT, a gate decides whether the vehicle is still the one that was checked and still in that state.
 """
 
 from __future__ import annotations
@@ -52,17 +52,17 @@ __all__ = [
     "VerifiedUpload",
 ]
 
-_READS = 2  # times that reading back is tried after one upload
+_READS = 2  # tries to read back after one upload
 _LIST = {MISSION: "mission", FENCE: "fence", RALLY: "list of rally points"}
 
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """How a verified upload ended.
+    """The result of a verified upload.
 
-    ``verified``: the list was read back and equals what was sent, as the autopilot keeps it. ``read_back`` is what
-    is on board in wire order, None where it could not be read. ``differences`` holds excused ones too (home).
-    ``on_board``: what the vehicle holds now, in words, where it is not the list that was sent.
+    ``verified``: the list was read back and equals the sent list as the autopilot stores it. ``read_back``: the list on
+    board in wire order, None if it could not be read. ``differences``: includes excused ones (home). ``on_board``: what
+    the vehicle holds now, in words; empty if ``verified``.
     """
 
     outcome: Outcome
@@ -85,8 +85,8 @@ class _Phase(Enum):
 class VerifiedUpload:
     """Upload ``items`` (wire order) to ``vehicle``, read them back and compare, at most ``attempts`` times.
 
-    Used like the machines that it is made of; ``result`` is None until it has ended. ``gate``: of `machine`.
-    ``most``: the vehicle cannot hold a longer list; one that it announces is not read.
+    It has the interface of the machines that it runs. ``result`` is None until the end. ``gate``: see `machine`.
+    ``most``: the number of items that the vehicle can hold; a longer list that it announces is not read.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class VerifiedUpload:
         self._gate = gate
         self._hold_most = max(most, len(items))
         self._last_read: tuple[MissionItem, ...] | None = None
-        self._read_of: Upload | None = None  # after which it was read
+        self._read_of: Upload | None = None  # the upload after which `_last_read` was read
         self._began_before = False
         self._items = tuple(items)
         self._most = attempts
@@ -127,7 +127,7 @@ class VerifiedUpload:
 
     @property
     def deadline(self) -> float | None:
-        """When `on_timer` wants to be called."""
+        """The next time to call `on_timer`; None before the start and after the end."""
         if self._phase is _Phase.PAUSE:
             return self._pause_until
         child = self._child
@@ -135,19 +135,19 @@ class VerifiedUpload:
 
     @property
     def progress(self) -> Progress:
-        """Of the part that runs now."""
+        """Progress of the machine that runs now."""
         child = self._child or self._download or self._upload
         return child.progress
 
     @property
     def retries(self) -> int:
-        """Questions that had to be repeated so far, and whole uploads."""
+        """Number of repeated messages so far, plus repeated uploads."""
         child = self._child
         return self._retries + (child.retries if child and child.outcome is None else 0) + self._attempt - 1
 
     @property
     def mark(self) -> tuple[int, ...]:
-        """How far it has come; grows with every item that is asked for or read for the first time."""
+        """A measure of progress: grows with every item that is requested or read for the first time."""
         return (self._attempt, self._reads, self.progress.done)
 
     @property
@@ -159,14 +159,17 @@ class VerifiedUpload:
         return {_Phase.UPLOAD: self._upload, _Phase.READ: self._download}.get(self._phase)
 
     def start(self, now: float) -> list[Packet]:
-        """Announce the list."""
+        """Announce the list with COUNT."""
         if self._phase is not _Phase.IDLE:
             raise ImpossibleTransition("verified upload: START is impossible twice", where=f"vehicle {self.vehicle}")
         self._phase = _Phase.UPLOAD
         return self._upload.start(now) + self._advance(now)
 
     def receive(self, packet: Packet, now: float) -> list[Packet]:
-        """Take ``packet`` in and return the answers. Items are answered in every phase: it may still be receiving."""
+        """Process ``packet`` and return the answers.
+
+        Requests for items are answered in every phase, because the vehicle may still be receiving.
+        """
         if self._phase is _Phase.IDLE:
             return []
         out = self._upload.receive(packet, now)
@@ -176,22 +179,22 @@ class VerifiedUpload:
 
     @property
     def answers(self) -> Sequence[Item]:
-        """What a request gets, by seq, in every phase."""
+        """The item that answers a request, by seq, in every phase."""
         return self._upload.answers
 
     def answered(self, seqs: Iterable[int], now: float) -> None:
-        """Take note of requests that got their answer already."""
+        """Record requests for ``seqs`` that were already answered."""
         self._upload.answered(seqs, now)
 
     def on_timer(self, now: float) -> list[Packet]:
-        """What is due at ``now``."""
+        """Return the packets that are due at ``now``."""
         if self._phase is _Phase.PAUSE:
             return self._wake(now) if now >= self._pause_until else []
         child = self._child
         return child.on_timer(now) + self._advance(now) if child else []
 
     def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
-        """Give up and say so; what is on board is then unknown."""
+        """End with an unknown outcome and notify the vehicle."""
         if self.result is not None:
             return []
         child = self._child
@@ -207,7 +210,7 @@ class VerifiedUpload:
         )  # fmt: skip
 
     def stop(self, outcome: Outcome) -> None:
-        """End with ``outcome``, and answer nothing from now on: the vehicle may be another one by now."""
+        """End with ``outcome`` and answer no more: the link may lead to another vehicle by now."""
         if self.result is not None:
             return
         child = self._child
@@ -216,7 +219,7 @@ class VerifiedUpload:
         self._end_changed(outcome)
 
     def _end_changed(self, outcome: Outcome) -> list[Packet]:
-        """End where nothing more is asked: what is on board is what was read last, unless it was written to since."""
+        """End without further reading: the last list read counts as on board unless items were requested since."""
         untouched = self._read_of is self._upload or not self._upload.began
         return self._end(outcome, self._last_read if untouched else None)
 
@@ -260,7 +263,7 @@ class VerifiedUpload:
         return self._read(now)
 
     def _may_help(self) -> bool:
-        """Whether another attempt can change an outcome: a bare error is what a busy vehicle says."""
+        """Whether another attempt can change the outcome: a busy vehicle answers ERROR, so ERROR may pass."""
         outcome = self._upload.outcome
         if isinstance(outcome, Refused):
             same_item_again = outcome.seq is not None and outcome == self._refused_before
@@ -314,9 +317,9 @@ def on_board(
     mission_type: int = MISSION,
     began: bool = True,
 ) -> str:
-    """What the vehicle holds after an upload of ``sent`` that did not end verified, in words, and what to do.
+    """Describe what the vehicle holds after an upload of ``sent`` that was not verified, and what the user should do.
 
-    ``read`` None: it could not be read. ``began``: the vehicle had asked for items.
+    ``read``: the list that was read back, None if it could not be read. ``began``: the vehicle had requested items.
     """
     name = _LIST[mission_type]
     if read is None:

@@ -1,23 +1,23 @@
-"""`Upload` and `Clear`: our side of writing a list to a vehicle. The vehicle asks, we answer.
+"""`Upload` and `Clear`: our side of writing a list to a vehicle. The vehicle requests items, we answer.
 
 =============  =============  =============================================================================
 state          event          what happens
 =============  =============  =============================================================================
-IDLE           START          COUNT goes out, as soon as the gate lets it
-ANNOUNCED      RETRY          COUNT again, through the gate: nothing was asked yet
-ANNOUNCED      ASKED          the item goes out; from here on nothing is ever sent unasked
-SENDING        ASKED          the item goes out: any seq in range, in any order, again and again
-…              ALL_ASKED      … and with it every item has been asked for at least once
-ALL_SENT       TAKEN          ACK 0 after every item was asked: accepted
-…              DOUBT          an ACK that may be stale, or not the end: wait a moment for the next request
-DOUBTING       ASKED          it was not the end
-…              TIMEOUT        the doubt, or the silence, becomes the outcome
-ENDED          ASKED          the item goes out all the same: the vehicle may be finishing, or starting over
+IDLE           START          send COUNT as soon as the gate permits
+ANNOUNCED      RETRY          send COUNT again if the gate permits: no item was requested yet
+ANNOUNCED      ASKED          send the item; from now on only requests are answered, nothing else is sent
+SENDING        ASKED          send the item: any seq in range, in any order, any number of times
+…              ALL_ASKED      the same, and every item has now been requested at least once
+ALL_SENT       TAKEN          ACK 0 after every item was requested: accepted
+…              DOUBT          an ACK that may be stale or premature: wait ``response_s`` for the next request
+DOUBTING       ASKED          the ACK was not the end: go on
+…              TIMEOUT        the doubtful ACK, or the silence, becomes the outcome
+ENDED          ASKED          send the item nevertheless: the vehicle may be finishing, or starting over
 =============  =============  =============================================================================
 
-No item is sent on a timer, no request rewinds anything. Why ACKs are doubted: one of an earlier transfer may be late;
-PX4 answers a duplicated COUNT with ERROR and goes on; ArduPilot answers duplicated items with INVALID_SEQUENCE and
-goes on. An ERROR after the last item says nothing about what is on board.
+No item is sent on a timer, and no request resets what was recorded. ACKs are doubted because one of an earlier
+transfer may be late, PX4 answers a duplicated COUNT with ERROR and goes on, and ArduPilot answers duplicated items with
+INVALID_SEQUENCE and goes on. An ERROR after the last item does not show what is on board.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _MOST_ITEMS = 65535
 
 
 class State(Label):
-    """Where an upload or a clearing is."""
+    """The states of an upload or a clearing."""
 
     IDLE = auto()
     ANNOUNCED = auto()
@@ -68,7 +68,7 @@ class State(Label):
 
 
 class Event(Label):
-    """What can happen to it."""
+    """The events of an upload or a clearing."""
 
     START = auto()
     RETRY = auto()
@@ -86,8 +86,8 @@ S, E = State, Event
 class Upload(Machine):
     """Send ``items`` in wire order (seq is the index) to ``vehicle``.
 
-    ``outcome`` is `Accepted`, `Refused` or `Unknown` once it has ended. Raises InputError for an empty list (use
-    `Clear`: COUNT 0 hangs some vehicles) or one beyond 65535 items.
+    ``outcome`` is `Accepted`, `Refused` or `Unknown` at the end, or the gate's. Raises InputError for an empty list
+    (use `Clear`: COUNT 0 hangs some vehicles) and for more than 65535 items.
     """
 
     ROLE = "upload"
@@ -136,46 +136,46 @@ class Upload(Machine):
             raise InputError(f"a list holds at most {_MOST_ITEMS} items, given {len(self.items)}")
         self._asked: set[int] = set()
         self._last_asked: int | None = None
-        self._highest = -1  # of this round; a vehicle that asks for item 0 again has begun a new one
+        self._highest = -1  # seq requested in this round; a request for item 0 begins a new round
         self._rounds = 0
-        self._gives_up_at = 0.0  # nothing new asked until then: a stall
+        self._gives_up_at = 0.0  # a stall if no new item is requested by this time
         self._doubt: Outcome | None = None
         self._cancelled = False
         self._announced = 0
-        self.barred = False  # the gate has ended it
+        self.barred = False  # whether the gate ended the upload
 
     @property
     def progress(self) -> Progress:
-        """Items that the vehicle has asked for so far."""
+        """Items that the vehicle has requested so far."""
         return Progress("upload", len(self._asked), len(self.items))
 
     @property
     def began(self) -> bool:
-        """Whether the vehicle has asked for anything: from then on its old list may be gone."""
+        """Whether the vehicle has requested any item: from then on its old list may be gone."""
         return bool(self._asked)
 
     def start(self, now: float) -> list[Packet]:
-        """Announce the list."""
+        """Announce the list with COUNT."""
         self._step(E.START)
         return self._announce(now)
 
     @property
     def answers(self) -> Sequence[Item]:
-        """What a request gets, by seq, at any time between `start` and `cancel`."""
+        """The item that answers a request, by seq, at any time between `start` and `cancel`."""
         return [self._item(seq) for seq in range(len(self.items))]
 
     def answered(self, seqs: Iterable[int], now: float) -> None:
-        """Take note of requests that got their answer already."""
+        """Record requests for ``seqs`` that were already answered."""
         for seq in seqs:
             self._asked_for(seq, now)
 
     def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
-        """Give up and say so (ArduPilot does not listen); the outcome is unknown from the first request on."""
+        """End with an unknown outcome and send ACK CANCELLED (which ArduPilot ignores)."""
         self.stop(Unknown(why))
         return [self._to_vehicle(Ack(CANCELLED, self.mission_type))]
 
     def stop(self, outcome: Outcome) -> None:
-        """End, and answer nothing from now on."""
+        """End with ``outcome`` and answer no more requests."""
         if self.outcome is None:
             self._end(E.CANCEL, outcome)
         self._cancelled = True
@@ -203,7 +203,7 @@ class Upload(Machine):
 
     def _answer(self, seq: int, now: float) -> list[Packet]:
         if not self._announced or self._cancelled:
-            return []  # to a list that was not announced: somebody else's request
+            return []  # we announced nothing, so the request is for somebody else's list
         self._asked_for(seq, now)
         return [self._to_vehicle(self._item(seq))]
 
@@ -240,7 +240,7 @@ class Upload(Machine):
         self._deadline = now + self.timers.response_s
 
     def _doubtful(self, code: int, complete: bool) -> Outcome:
-        """What an ACK means if nothing more comes."""
+        """Return the outcome that a doubtful ACK stands for if no further request follows."""
         if code == ACCEPTED:
             count = f"{len(self._asked)} of {len(self.items)} items"
             return Unknown(f"the vehicle said accepted after asking for {count}: an answer to an earlier transfer?")
@@ -270,7 +270,7 @@ class Upload(Machine):
 
 
 class Clear(Machine):
-    """Clear a list: CLEAR_ALL until it is acknowledged. ``mission_type`` may be ALL (255)."""
+    """Clear a list: send CLEAR_ALL until it is acknowledged. ``mission_type`` may be ALL (255)."""
 
     ROLE = "clear"
     TABLE: ClassVar[Mapping[Any, Any]] = {
@@ -297,21 +297,21 @@ class Clear(Machine):
 
     @property
     def progress(self) -> Progress:
-        """One step."""
+        """0 of 1 until the end, then 1 of 1."""
         return Progress("clear", int(self.outcome is not None), 1)
 
     def start(self, now: float) -> list[Packet]:
-        """Ask for it."""
+        """Send CLEAR_ALL as soon as the gate permits."""
         self._step(E.START)
         return self._ask(now)
 
     def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
-        """Give up."""
+        """End with an unknown outcome and send nothing."""
         self.stop(Unknown(why))
         return []
 
     def stop(self, outcome: Outcome) -> None:
-        """End, and ask no more."""
+        """End with ``outcome`` and send no more CLEAR_ALL."""
         if self.outcome is None:
             self._end(E.CANCEL, outcome)
 

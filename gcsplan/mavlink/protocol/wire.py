@@ -1,7 +1,7 @@
-"""Mission messages as plain values ⇄ pymavlink's messages of the ardupilotmega dialect (common and more).
+"""Conversion between mission messages as plain values and pymavlink's (ardupilotmega dialect, includes common).
 
-The field ``opaque_id`` of COUNT and ACK is newer than pymavlink's dialects: it is read from and appended to the
-payload by hand where the dialect does not know it.
+The field ``opaque_id`` of COUNT and ACK is newer than pymavlink's dialects. Where the dialect lacks it, this module
+reads it from the payload and appends it to the payload itself.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from gcsplan.mavlink.protocol.messages import (
     RequestList,
 )
 
-# A corrupted frame must never count, whatever the environment says (MAV_IGNORE_CRC).
+# A corrupted frame must never be accepted, even if the environment sets MAV_IGNORE_CRC.
 dialect.MAVLINK_IGNORE_CRC = 0
 
-_COUNT_ID_AT, _ACK_ID_AT = 5, 4  # where opaque_id begins in the payloads
+_COUNT_ID_AT, _ACK_ID_AT = 5, 4  # byte offset of opaque_id in the payloads
 _UNPLACED = 1e7  # MISSION_ITEM carries degrees
 
 
@@ -53,7 +53,7 @@ class _AckWithId(dialect.MAVLink_mission_ack_message):  # type: ignore[misc]
 
 
 def encode(message: MissionMessage, target: Address) -> Any:
-    """The pymavlink message for ``message`` to ``target``."""
+    """Return the pymavlink message for ``message`` to ``target``."""
     return _ENCODERS[type(message)](message, target)
 
 
@@ -105,7 +105,7 @@ _ENCODERS: dict[type, Callable[[Any, Address], Any]] = {
 
 
 def decode(message: Any) -> Packet | None:
-    """The packet in a pymavlink message that was received; None if it is not of the mission protocol."""
+    """Return the packet in a received pymavlink message; None if it does not belong to the mission protocol."""
     decoder = _DECODERS.get(message.get_type())
     if decoder is None:
         return None
