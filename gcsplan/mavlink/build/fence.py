@@ -1,9 +1,9 @@
 """No-fly zones as the items of a MAVLink fence, and back.
 
-A fence item is a circle or one corner of a polygon and has **no height**: a zone with a floor or a ceiling does not
-fit. It is left out, or on request becomes a fence from the ground to the sky. A circle keeps its radius,
-rounded up to whole centimetres; a polygon's corners lie within `STRAIGHT_M` of its outline. Items are in frame 0:
-ArduPilot refuses frame 2, and no autopilot keeps the altitude.
+A fence item is a circle or one corner of a polygon and has **no height**, so it cannot express a zone with a floor or a
+ceiling. Such a zone is left out, or on request becomes a fence from the ground to the sky. A circle's radius is rounded
+up to whole centimetres; the polygon of the fence deviates from a zone's outline by at most `STRAIGHT_M`. Items are in
+frame 0: ArduPilot refuses frame 2, and no autopilot stores the altitude.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from gcsplan.world.frame import Frame
 
 STRAIGHT_M = 0.1
-"""A corner of the outline that lies this near to the line between its neighbours is left out."""
+"""Metres: a corner of the outline that lies within this of the line between its kept neighbours is left out."""
 
-MOST_CORNERS = 255  # of one polygon on ArduPilot: the number is kept in a byte (AC_PolyFence_loader.cpp)
+MOST_CORNERS = 255  # of one polygon on ArduPilot, which stores the number in a byte (AC_PolyFence_loader.cpp)
 STORAGE_BYTES = {Autopilot.ARDUCOPTER: 560, Autopilot.ARDUPLANE: 672}  # StorageManager.cpp, StorageFence
 HEAD_BYTES, CIRCLE_BYTES, POLYGON_BYTES, CORNER_BYTES = 5, 13, 2, 8  # AC_PolyFence_loader.cpp; 42 circles fit a copter
 
@@ -39,7 +39,7 @@ HEAD_BYTES, CIRCLE_BYTES, POLYGON_BYTES, CORNER_BYTES = 5, 13, 2, 8  # AC_PolyFe
 class Area:
     """One area of a fence in the plane; ``inclusion``: the vehicle must stay inside.
 
-    ``shapes``: its parts near the frame: none of an area far away, several where several parts are near.
+    ``shapes``: its parts near the frame's origin: none if the area is far away, several if several parts are near.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """A fence for one autopilot: its items in wire order, the zones in it, and what a user should know (``notes``).
+    """A fence for one autopilot: its items in wire order, the zones in it, and remarks for the user (``notes``).
 
     ``left_out`` names the zones that a fence cannot express.
     """
@@ -61,10 +61,10 @@ class Fence:
 
 
 def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infinite: bool = False) -> Fence:
-    """The fence that keeps an aircraft out of ``zones``.
+    """Return the fence that keeps an aircraft out of ``zones``.
 
-    Zones with a floor or a ceiling are left out and named; with ``infinite`` they count as if without. A circle
-    inside another one is dropped. Raises InputError where the autopilot cannot keep so much.
+    Zones with a floor or a ceiling are left out and named; with ``infinite`` they are included without floor and
+    ceiling. A circle inside another one is dropped. Raises InputError if the autopilot cannot store the fence.
     """
     notes: list[str] = []
     bounded = [z for z in zones if z.floor is not None or z.ceiling is not None]
@@ -89,10 +89,10 @@ def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infin
 
 
 def areas_of(items: Sequence[MissionItem], frame: Frame) -> list[Area]:
-    """The areas of a fence from its wire items; return points (5000) are passed over.
+    """Return the areas of a fence from its wire items; return points (5000) are skipped.
 
-    Raises InputError for a polygon that is not whole or not simple, a radius that is not positive or beyond
-    `LARGEST_RADIUS_M`, places off the globe, and other commands.
+    Raises InputError for a polygon that is incomplete or not simple, a radius that is not positive or beyond
+    `LARGEST_RADIUS_M`, latitudes or longitudes out of range, and other commands.
     """
     areas: list[Area] = []
     index = 0
@@ -127,7 +127,7 @@ def _circle_of(item: MissionItem, index: int, frame: Frame) -> tuple[Circle, ...
 
 
 def _polygon_of(items: Sequence[MissionItem], index: int, frame: Frame) -> tuple[int, tuple[Polygon, ...]]:
-    """How many items the polygon that begins there has, and its parts near the frame."""
+    """Return the number of items of the polygon that begins at ``index``, and its parts near the frame's origin."""
     first = items[index]
     count = first.params[0]
     corners = items[index : index + int(count)] if math.isfinite(count) and count >= 3 else []
@@ -150,7 +150,7 @@ def _corner(item: MissionItem, index: int) -> tuple[float, float]:
 def _circle(circle: Circle, frame: Frame) -> list[MissionItem]:
     lat, lon = (float(x) for x in frame.to_degrees(circle.east_m, circle.north_m))
     cm = circle.radius_m * 100.0
-    radius_m = math.ceil(cm - max(1e-6, 1.2e-7 * cm)) / 100.0  # its float32 is the same number
+    radius_m = math.ceil(cm - max(1e-6, 1.2e-7 * cm)) / 100.0  # whole centimetres stay the same after float32
     return [MissionItem(CIRCLE_OUT, GLOBAL, (radius_m, 0.0, 0.0, 0.0), degrees_e7(lat), degrees_e7(lon))]
 
 
@@ -166,8 +166,8 @@ def _corners(zone: Zone, frame: Frame) -> list[MissionItem]:
 
 
 def _straightened(ring: Floats) -> Floats:
-    """The ring without corners that lie on the line between those that are kept, within `STRAIGHT_M`."""
-    start = int(np.hypot(*(ring - ring.mean(axis=0)).T).argmax())  # a corner for certain
+    """Return the ring without the corners that lie within `STRAIGHT_M` of the line between kept ones."""
+    start = int(np.hypot(*(ring - ring.mean(axis=0)).T).argmax())  # the farthest point is certainly a corner
     points = np.roll(ring, -start, axis=0)
     kept = [0]
     while kept[-1] < len(points):
@@ -212,7 +212,7 @@ def _require_storage(zones: Sequence[Zone], items: Sequence[MissionItem], autopi
 
 
 def _holds(outer: Zone, inner: Zone, first: bool) -> bool:
-    """True where a circle holds another one; of two that are the same the ``first`` holds the other."""
+    """Whether circle ``outer`` contains circle ``inner``; of two equal circles the ``first`` contains the other."""
     a, b = outer.shape, inner.shape
     if not (isinstance(a, Circle) and isinstance(b, Circle)):
         return False

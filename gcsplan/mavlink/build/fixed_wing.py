@@ -1,9 +1,9 @@
-"""A fixed wing's mission on the wire: take-off straight ahead, way points that are flown by, and how it ends.
+"""A fixed wing's mission items: take-off straight ahead, fly-by way points, and the end.
 
-- NAV_TAKEOFF: param1 is the least pitch in whole degrees; ArduPlane holds the heading it is launched on. The place of
-  the item is where the climb-out leads to: it tells the launching person and the check the heading.
-- NAV_WAYPOINT: param2, the acceptance radius, is the tangent length of the corner, rounded up to whole metres: there
-  the turn begins. ArduPlane keeps a byte of it, so a corner that needs more becomes two way points on one arc.
+- NAV_TAKEOFF: param1 is the minimum pitch in whole degrees; ArduPlane holds the heading of its launch. The item's
+  location is the end of the climb-out, which shows that heading to the launching person and to the check.
+- NAV_WAYPOINT: param2, the acceptance radius, is the tangent length of the corner, rounded up to whole metres: the
+  turn begins there. ArduPlane stores it in one byte, so a corner that needs more becomes two way points on one arc.
 - No DO_LAND_START before a landing: with it ArduPlane does not arm unless RTL_AUTOLAND is set.
 """
 
@@ -28,25 +28,25 @@ __all__ = ["build_wing", "flown_m", "parted", "pitch_deg", "tangents_m", "thinne
 
 
 FARTHEST_ACCEPTED_M = 255.0
-"""What ArduPlane keeps of an acceptance radius at most."""
+"""Largest acceptance radius that ArduPlane stores, in metres (one byte)."""
 
 ROUNDED_M = 1e-3
-"""A tangent less than this beyond whole metres is not rounded up: the turn then begins this late at most."""
+"""Metres: a tangent that exceeds whole metres by less is not rounded up, so a turn begins at most this much late."""
 
 LEAST_ACCEPTED_M = 1.0
 
 
 NEAREST_M, SLIGHT_M = 3.0, 0.5
-"""Way points nearer to each other than the first are joined, if the arc at one of them begins within the second."""
+"""Metres: of two way points nearer to each other than `NEAREST_M`, one with a tangent under `SLIGHT_M` is dropped."""
 
 
 def pitch_deg(vehicle: Vehicle) -> int:
-    """The pitch of its take-off: whole degrees, not above ``max_climb_deg``."""
+    """Return the take-off pitch: whole degrees, at most ``max_climb_deg``."""
     return math.floor(vehicle.limits.max_climb_deg + 1e-9)
 
 
 def turns_of(points: Floats) -> Floats:
-    """(N - 2,) turn at each inner point, radians, left positive; 0 where the path ends."""
+    """(N - 2,) turn at each inner point, radians, left positive; 0 beside a leg without horizontal length."""
     way = np.diff(points[:, :2], axis=0)
     heading = np.arctan2(way[:, 1], way[:, 0])
     turn = (np.diff(heading) + math.pi) % (2.0 * math.pi) - math.pi
@@ -55,13 +55,13 @@ def turns_of(points: Floats) -> Floats:
 
 
 def tangents_m(points: Floats, radius_m: float) -> Floats:
-    """(N,) how far before and behind each point its arc reaches; 0 at both ends."""
+    """(N,) tangent length at each point, metres: its arc reaches that far before and behind it; 0 at both ends."""
     inner = radius_m * np.tan(0.5 * np.minimum(np.abs(turns_of(points)), math.pi - 1e-6))
     return np.concatenate([[0.0], inner, [0.0]])
 
 
 def flown_m(points: Floats, radius_m: float) -> Floats:
-    """(N - 1,) metres flown over ground from the middle of one point's arc to the middle of the next one's."""
+    """(N - 1,) horizontal metres flown from the middle of each point's arc to the middle of the next one's."""
     tangent = tangents_m(points, radius_m)
     half = np.concatenate([[0.0], 0.5 * radius_m * np.abs(turns_of(points)), [0.0]])
     run = np.hypot(*np.diff(points[:, :2], axis=0).T)
@@ -69,7 +69,7 @@ def flown_m(points: Floats, radius_m: float) -> Floats:
 
 
 def thinned(points: Floats, radius_m: float) -> Floats:
-    """``points`` without those that hardly turn and lie so near to another one that no turn fits between; ends stay."""
+    """Return ``points`` without slight turns that lie so near to a neighbour that both arcs do not fit; ends stay."""
     while len(points) > 2:
         tangent = tangents_m(points, radius_m)
         run = np.hypot(*np.diff(points[:, :2], axis=0).T)
@@ -84,9 +84,9 @@ def thinned(points: Floats, radius_m: float) -> Floats:
 
 
 def parted(points: Floats, radius_m: float) -> Floats:
-    """``points`` with each corner that needs more acceptance than there is replaced by two on the same arc.
+    """Return ``points`` with each corner too large for `FARTHEST_ACCEPTED_M` replaced by two corners on the same arc.
 
-    Their altitudes are those of the middles of their halves, so that the altitude along what is flown stays.
+    The altitude of each new corner is that at the middle of its half of the arc, so the altitude flown is unchanged.
     """
     while True:
         tangent = tangents_m(points, radius_m)
@@ -107,7 +107,7 @@ def parted(points: Floats, radius_m: float) -> Floats:
 
 
 def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float, float], order: Order) -> Mission:
-    """The mission that flies ``path`` (way points to be flown by) between the ends that ``order.wing`` gives."""
+    """Return the mission that flies ``path`` (fly-by way points) between the ends in ``order.wing``."""
     wing = order.wing
     assert wing is not None
     if order.hold_s > 0 or order.gate_utc is not None:
@@ -121,7 +121,7 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
     base = datum if order.altitude_frame == "relative" else 0.0
     frame = m.RELATIVE if order.altitude_frame == "relative" else m.GLOBAL
     cm = _heights_cm(points, base, vehicle)
-    # The turn at the first point is from the climb-out, that at the last into the glide.
+    # The first point turns from the climb-out into the path, the last one from the path into the glide.
     whole = np.array([wing.leaves, *points, *([] if wing.touch is None else [wing.touch])])
     tangent = tangents_m(whole, radius)[1 : len(points) + 1]
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
@@ -158,10 +158,10 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
 
 
 def _heights_cm(points: Floats, base_m: float, vehicle: Vehicle) -> NDArray[np.int_]:
-    """Heights over ``base_m`` in whole centimetres, no leg as it is flown steeper than its limit by the rounding."""
+    """Return heights above ``base_m`` in whole centimetres; rounding makes no flown leg steeper than its limit."""
     wanted = (points[:, 2] - base_m) * 100.0
     run_cm = flown_m(points, vehicle.turn_radius_m) * 100.0 - 3.0
-    # Arcs are judged by their chords, which are shorter by less than a thousandth.
+    # The check judges arcs by their chords, which are shorter by less than a thousandth.
     up, down = 0.999 * vehicle.limits.max_climb_slope, 0.999 * vehicle.limits.max_descent_slope
     cm = np.rint(wanted).astype(int)
     for i in range(1, len(cm) - 1):

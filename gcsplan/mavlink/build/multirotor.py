@@ -1,7 +1,7 @@
-"""From a path in metres to a `Mission` on the wire.
+"""Conversion of a path in metres to a `Mission`.
 
-Altitudes go out in whole centimetres, degrees in whole 1e-7; the path's planner kept margins for both (`MARGINS`).
-Legs are split until the line straight in the plane and the one straight in degrees lie within `BOW_M`, so that it
+Altitudes are sent in whole centimetres, degrees in whole 1e-7; the planner kept margins for both (`MARGINS`). Legs are
+split until the line straight in the plane and the line straight in degrees lie within `BOW_M` of each other, so that it
 does not matter which of the two an autopilot flies.
 """
 
@@ -26,14 +26,14 @@ COPTER_ACCEPTANCE_M = 2.0  # ArduCopter WPNAV_RADIUS, default
 
 
 def acceptance_radius_m(vehicle: Vehicle) -> float:
-    """The acceptance radius: ArduCopter's own parameter; elsewhere the track error, sent with each item."""
+    """Return the acceptance radius: ArduCopter's own parameter; else the track error, sent with each item (1 … 255)."""
     if vehicle.autopilot is Autopilot.ARDUCOPTER:
         return COPTER_ACCEPTANCE_M
     return min(max(1.0, math.floor(vehicle.limits.track_error_m)), 255.0)
 
 
 def corner_m(vehicle: Vehicle) -> float:
-    """The margin that a planner keeps for corners that are cut by more than ``track_error_m``; mostly 0."""
+    """Return the planner's margin for corners that are cut by more than ``track_error_m``; mostly 0."""
     if vehicle.turn_radius_m > 0.0 or math.isinf(vehicle.corner_accel_m_s2):
         return 0.0
     radius_m = acceptance_radius_m(vehicle)
@@ -41,9 +41,9 @@ def corner_m(vehicle: Vehicle) -> float:
 
 
 def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float, float], order: Order) -> Mission:
-    """The mission that flies ``path``: take-off at home, its points, and ``order.end``.
+    """Return the mission that flies ``path``: take-off at home, its points, and ``order.end``.
 
-    The path begins above home at take-off altitude and ends above the goal. The result is not yet judged.
+    The path begins above home at take-off altitude and ends above the goal. The mission is not yet checked.
     """
     if order.wing is not None:
         return build_wing(path, world, vehicle, home_deg, order)
@@ -51,7 +51,7 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
     home = Home.at(*home_deg, round(datum, 2))
     points = _spaced(path.points, 2.0 * acceptance_radius_m(vehicle) if order.spaced else 0.0)
     terrain = order.altitude_frame == "terrain"
-    if terrain:  # cut legs keep their height above ground between the ends, as they are flown
+    if terrain:  # split legs in height above ground, because the autopilot interpolates that height along a leg
         ground = world.airspace.surface.ground_at(points[:, 0], points[:, 1])
         points = np.column_stack([points[:, :2], points[:, 2] - ground])
     points = split_legs(points, world)
@@ -106,7 +106,7 @@ def _gate(order: Order, vehicle: Vehicle) -> MissionItem:
 
 
 def _spaced(points: NDArray[np.float64], apart_m: float) -> NDArray[np.float64]:
-    """Drop inner points nearer than ``apart_m`` to the one kept before them or to the last; the ends stay."""
+    """Drop inner points nearer than ``apart_m`` to the previous kept point or to the last point; keep the ends."""
     kept = [points[0]]
     for p in points[1:-1]:
         if np.linalg.norm(p - kept[-1]) >= apart_m and np.linalg.norm(p - points[-1]) >= apart_m:
@@ -115,7 +115,7 @@ def _spaced(points: NDArray[np.float64], apart_m: float) -> NDArray[np.float64]:
 
 
 def _round_heights(points: NDArray[np.float64], base_m: float, vehicle: Vehicle) -> NDArray[np.int_]:
-    """Heights over ``base_m`` in whole centimetres, without a leg growing steeper than its limit by the rounding."""
+    """Return heights above ``base_m`` in whole centimetres; rounding makes no leg steeper than its limit."""
     wanted = (points[:, 2] - base_m) * 100
     run_cm = np.hypot(*np.diff(points[:, :2], axis=0).T) * 100 - 3.0
     up, down = vehicle.limits.max_climb_slope, vehicle.limits.max_descent_slope

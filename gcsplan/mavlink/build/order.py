@@ -1,4 +1,4 @@
-"""What the mission around a path is to be, and what a planner keeps for the wire: common to every kind of aircraft."""
+"""The requested mission around a path, and the planner's margins for rounding on the wire, for every aircraft type."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LONGEST_LEG_M = 5000.0
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """What a planner keeps for the wire: rounding in height, rounding and bow in the plane, slope for both."""
+    """Margins that a planner keeps for the wire: rounding of altitudes, rounding and bow of tracks, slope for both."""
 
     altitude_m: float = 0.02
     track_m: float = 0.03
@@ -33,12 +33,12 @@ MARGINS = Margins()
 
 @dataclass(frozen=True, slots=True)
 class Wing:
-    """The ends of a fixed wing's mission, east_m, north_m and amsl_m.
+    """The ends of a fixed wing's mission; points are (east_m, north_m, amsl_m).
 
-    ``top``: where the climb-out ends, straight ahead of home. ``touch``: where the glide from the last way point ends,
-    on the ground; None without a landing. ``circle_m``: radius of a circle at the goal. ``up``: the circle, around this
-    place and to this altitude, in which it climbs behind ``top``, and ``up_m`` its radius (negative: anticlockwise);
-    None: it climbs straight.
+    ``top``: end of the climb-out, straight ahead of home. ``touch``: end of the glide from the last way point, on the
+    ground; None without a landing. ``circle_m``: radius of the circle at the goal, m. ``up``: centre and final altitude
+    of a climbing circle after ``top``; None: it climbs straight. ``up_m``: the radius of that circle, m (negative:
+    anticlockwise).
     """
 
     top: Point
@@ -49,18 +49,18 @@ class Wing:
 
     @property
     def leaves(self) -> Point:
-        """Where the first leg begins."""
+        """The point at which the first leg begins."""
         return self.top if self.up is None else self.up
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What the mission around a path is to be; ``speed_m_s`` None is the fastest cruise.
+    """The requested mission around a path; ``speed_m_s`` None means the fastest cruise.
 
-    ``spaced`` drops way points nearer to their neighbours than two acceptance radii. ``hold_s``: so many seconds the
-    vehicle waits in the air above its start (the gate) before it sets out; only multicopters can (`Vehicle.can_hold`).
-    ``gate_utc``: instead, it waits until that hour, minute and second of the day, UTC; only ArduCopter can.
-    ``wing``: the ends of a fixed wing's mission, None for all that stands in the air.
+    ``spaced``: drop way points nearer to their neighbours than two acceptance radii. ``hold_s``: seconds to wait in the
+    air above the start (the gate) before departure; only multicopters can (`Vehicle.can_hold`). ``gate_utc``: wait
+    there until this hour, minute and second of the day, UTC, instead; only ArduCopter can. ``wing``: the ends of a
+    fixed wing's mission, None for aircraft that can hover.
     """
 
     end: End = "land"
@@ -73,11 +73,11 @@ class Order:
 
 
 def split_legs(points: NDArray[np.float64], world: World) -> NDArray[np.float64]:
-    """(N, 3) points with legs cut to `LONGEST_LEG_M` and until each bow is within `BOW_M`."""
+    """(N, 3) points with legs cut to at most `LONGEST_LEG_M` and until the bow of each is at most `BOW_M`."""
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
     bow = world.frame.bow_m(places[:-1], places[1:])
     run = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    parts = np.maximum(np.ceil(run / LONGEST_LEG_M), np.ceil(np.sqrt(bow / BOW_M)))  # a bow shrinks with n²
+    parts = np.maximum(np.ceil(run / LONGEST_LEG_M), np.ceil(np.sqrt(bow / BOW_M)))  # n parts: bow / n²
     cut = [points[:1]]
     for a, b, n in zip(points[:-1], points[1:], np.maximum(parts, 1).astype(int), strict=True):
         cut.append(a + (b - a) * (np.arange(1, n + 1) / n)[:, None])

@@ -1,7 +1,7 @@
-"""What `.waypoints` and `.plan` have in common: one item's numbers as text, and back, without losing a bit.
+"""The part that `.waypoints` and `.plan` share: one item's numbers as text, and back, without losing a bit.
 
-Degrees are written so that they name their wire integer exactly, params and altitudes with the fewest digits that
-give the same float32 again. What a reader of strangers' files takes for an item is decided here, once for both.
+Degrees are written with enough decimals to give their wire integer exactly, params and altitudes with the fewest
+digits that read back as the same float32. `read_item` validates the items of both formats.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from gcsplan.mavlink.mission.mission import (
 )
 
 MAX_BYTES = 20_000_000
-"""A mission file beyond this is not read."""
+"""Largest mission file that is read, in bytes."""
 
 MAX_ITEMS = 10_000
-"""A mission beyond this is not read; autopilots take 650 to a few thousand."""
+"""Most items of a mission that is read; autopilots accept 650 to a few thousand."""
 
 FRAMES = (GLOBAL, NO_POSITION, RELATIVE, TERRAIN)
 
@@ -39,7 +39,7 @@ PLAIN_XY = frozenset(
         cmd.SCRIPT_TIME, cmd.ATTITUDE_TIME,
     }
 )  # fmt: skip
-"""Commands whose param5 and param6 are numbers, whatever their frame (common.xml, ArduPilot's AP_Mission): region of
+"""Commands whose param5 and param6 are plain numbers in every frame (common.xml, ArduPilot's AP_Mission): region of
 interest offset, camera, gimbal flags, user commands, scripts, attitude."""
 
 
@@ -51,14 +51,14 @@ HAS_PLACE = frozenset(
         cmd.DO_SET_ROI_LOCATION, cmd.DO_SET_ROI,
     }
 )  # fmt: skip
-"""Mission commands that common.xml gives a location, so that an unset one means something."""
+"""Mission commands that have a location in common.xml, so that an unset location has a meaning."""
 
 
 @dataclass(frozen=True, slots=True)
 class MissionFileRead:
-    """A mission from a file, and what its reader should know of it (``notes``, sentences for people).
+    """A mission from a file, with remarks for the user (``notes``, whole sentences).
 
-    ``fence`` and ``rally`` are the wire items of the file's other two lists, where it has them.
+    ``fence`` and ``rally`` are the wire items of the file's other two lists, empty if it has none.
     """
 
     mission: Mission
@@ -68,14 +68,14 @@ class MissionFileRead:
 
 
 def in_degrees(command: int, frame: int) -> bool:
-    """True where x and y are degrees times 1e7, and not plain numbers."""
+    """Whether x and y are degrees times 1e7 and not plain numbers."""
     return FRAME_SYNONYMS.get(frame, frame) != NO_POSITION and command not in PLAIN_XY
 
 
 def float32_text(value: float) -> str:
-    """The shortest decimal text that reads back as the float32 ``value``, a whole number without a point.
+    """Return the shortest decimal text that reads back as the float32 ``value``; whole numbers have no point.
 
-    Raises ValueError for NaN and infinity: the text formats have no word for them.
+    Raises ValueError for NaN and infinity, which the text formats cannot express.
     """
     if not math.isfinite(value):
         raise ValueError(f"{value} cannot be written as a number")
@@ -89,22 +89,22 @@ def float32_text(value: float) -> str:
 
 
 def degrees_text(e7: int) -> str:
-    """Degrees with eight decimals of the wire integer ``e7``, exact."""
+    """Return the wire integer ``e7`` as exact degrees with eight decimals."""
     whole, part = divmod(abs(e7), 10**7)
     return f"{'-' if e7 < 0 else ''}{whole}.{part:07d}0"
 
 
 def degrees_e7_of(degrees: float) -> int:
-    """The wire integer of degrees as they stand in a file: rounded in decimals, so that no half is lost in binary.
+    """Return the wire integer of degrees from a file, rounded half to even in decimal arithmetic.
 
-    ``degrees`` is finite and below 1e6.
+    Binary arithmetic could round a decimal half the wrong way. ``degrees`` is finite and below 1e6.
     """
     return int(Decimal(repr(degrees)).scaleb(7).to_integral_value(ROUND_HALF_EVEN))
 
 
 @dataclass(frozen=True, slots=True)
 class RawItem:
-    """An item as a file gives it: numbers in the file's own units, not yet judged. NaN is "not given"."""
+    """An item as it stands in a file: numbers in the file's own units, not yet validated. NaN means "not set"."""
 
     command: float
     frame: float
@@ -116,12 +116,12 @@ class RawItem:
 
 
 def whole(value: float, low: int, high: int) -> int | None:
-    """``value`` as an integer within [low, high], or None."""
+    """Return ``value`` as an integer if it is whole and within [low, high]; else None."""
     return int(value) if math.isfinite(value) and value == math.floor(value) and low <= value <= high else None
 
 
 def read_item(raw: RawItem, problems: list[Problem], where: str) -> MissionItem | None:
-    """The wire item of ``raw``, frames made plain; or None, with what is wrong added to ``problems``."""
+    """Return the wire item of ``raw`` with frame synonyms replaced; or None, and add every mistake to ``problems``."""
     before = len(problems)
 
     def bad(message: str) -> None:
@@ -166,9 +166,9 @@ def _xy(command: int, frame: int, raw: RawItem, bad: Callable[[str], None]) -> t
 
 
 def check_writable(mission: Mission, *, nan: bool) -> None:
-    """Raise InputError for items that a file cannot carry so that they read back the same.
+    """Raise InputError if a file cannot hold the items so that they read back the same.
 
-    ``nan``: the format has a word for "not given" (.plan has, .waypoints has not), except for an altitude.
+    ``nan``: the format can express "not set" (.plan can, .waypoints cannot), except for an altitude.
     """
     problems: list[Problem] = []
 
@@ -194,9 +194,10 @@ def check_writable(mission: Mission, *, nan: bool) -> None:
 
 
 def jumps_to_file(mission: Mission) -> tuple[MissionItem, ...]:
-    """The items with cmd.DO_JUMP targets as files count them: home is 0, the first item 1, for every autopilot.
+    """Return the items with DO_JUMP targets in the files' numbering: home is 0, the first item 1, for every autopilot.
 
-    On the wire ArduPilot counts so too; PX4 has no home item and counts from 0. InputError for a jump to nowhere.
+    ArduPilot's wire numbering is the same; PX4 has no home item and counts from 0. Raises InputError for a jump to an
+    item that does not exist.
     """
     first = mission.first_seq
     renumbered = {first + index: index + 1 for index in range(len(mission.items))}
@@ -206,7 +207,7 @@ def jumps_to_file(mission: Mission) -> tuple[MissionItem, ...]:
 def jumps_from_file(
     items: Sequence[MissionItem], index_of: Mapping[int, int], first_seq: int, where: str
 ) -> tuple[MissionItem, ...]:
-    """The items with cmd.DO_JUMP targets as wire seq; ``index_of``: the file's number of an item to its index."""
+    """Return the items with DO_JUMP targets as wire seq; ``index_of`` maps the file's item number to the index."""
     return _jumps(items, {number: index + first_seq for number, index in index_of.items()}, first_seq, where)
 
 

@@ -1,4 +1,4 @@
-"""Mission files of either format: what is on the disk becomes a `Mission`, whatever its name says."""
+"""Reading a mission file of either format, which is recognised by its content, not by its name."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def read_mission_file(
 ) -> MissionFileRead:
     """Read a `.waypoints` or `.plan` file; its content decides which it is. The mission is named after the file.
 
-    ``autopilot`` None takes a `.plan`'s own; a `.waypoints` file names none, so there it must be given, or
-    ``otherwise`` be there for it, and the notes say so. ``home_hint`` is the home of a file that has none. Raises
-    InputError for everything that is wrong, with line or key.
+    ``autopilot`` None means the one that a `.plan` names. A `.waypoints` file names none: there, ``autopilot`` None
+    means ``otherwise``, and the notes say so. ``home_hint`` is the home for a file that has none. Raises InputError
+    for every mistake, with line or key.
     """
     file = Path(path)
     where = str(path)
@@ -68,7 +68,7 @@ def _text(file: Path, where: str) -> str:
         raise InputError(f"cannot be read: {error.strerror or error}", where=where) from None
     except ValueError:
         raise InputError("not a file name", where=repr(where)) from None
-    # A pipe or a device could keep its reader waiting for ever.
+    # A pipe or a device could block its reader for ever.
     if not regular:
         raise InputError("a mission file is wanted, and this is not a regular file", where=where)
     if len(data) > MAX_BYTES:

@@ -1,8 +1,8 @@
 """The fence and the rally points of a `.plan` file: JSON to wire items, and back.
 
-A circle is one item (5003 in, 5004 out: radius), a polygon one for each corner (5001 in, 5002 out: their number), a
-rally point one (5100). ``inclusion: false`` is a zone to stay out of. Fence points are in frame 0: an autopilot takes
-2 for none of them, and keeps no altitude.
+A circle is one item (5003 inclusion, 5004 exclusion; param1 is the radius), a polygon has one item per corner (5001
+inclusion, 5002 exclusion; param1 is the number of corners), a rally point is one item (5100). ``inclusion: false``
+marks an area to stay out of. Fence points are in frame 0: no autopilot accepts frame 2 for them or stores an altitude.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MAX_PROBLEMS = 20
 
 
 def json_number(value: float) -> float | int | None:
-    """A float32 as JSON has it: null for NaN, whole numbers without a point."""
+    """Return a float32 as a JSON number: null for NaN, whole numbers without a point."""
     if math.isnan(value):
         return None
     text = float32_text(value)
@@ -28,7 +28,7 @@ def json_number(value: float) -> float | int | None:
 
 
 def json_float(value: object) -> float | None:
-    """A JSON number as float, NaN for null, None for anything else."""
+    """Return a JSON number as float, NaN for null, None for anything else."""
     if value is None:
         return math.nan
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -40,7 +40,7 @@ def json_float(value: object) -> float | None:
 
 
 def fence_json(fence: Sequence[MissionItem]) -> dict[str, Any]:
-    """``geoFence`` of wire items. Raises InputError for a polygon that is not whole and for other commands."""
+    """Return the ``geoFence`` object for wire items. Raises InputError for an incomplete polygon or another command."""
     circles, polygons = [], []
     rest = list(fence)
     while rest:
@@ -60,12 +60,15 @@ def fence_json(fence: Sequence[MissionItem]) -> dict[str, Any]:
 
 
 def rally_json(rally: Sequence[MissionItem]) -> dict[str, Any]:
-    """``rallyPoints`` of wire items."""
+    """Return the ``rallyPoints`` object for wire items."""
     return {"points": [[r.lat_deg, r.lon_deg, json_number(r.z)] for r in rally], "version": 2}
 
 
 def fence_items(fence: object, where: str, notes: list[str]) -> tuple[MissionItem, ...]:
-    """The wire items of a ``geoFence``; none where there is none. Raises InputError with every mistake found."""
+    """Return the wire items of a ``geoFence``, none if it is missing. Raises InputError with every mistake found.
+
+    At most `MAX_PROBLEMS` mistakes are collected.
+    """
     if not isinstance(fence, dict):
         return ()
     problems: list[Problem] = []
@@ -90,7 +93,7 @@ def fence_items(fence: object, where: str, notes: list[str]) -> tuple[MissionIte
 
 
 def rally_items(rally: object, where: str) -> tuple[MissionItem, ...]:
-    """The wire items of ``rallyPoints``, [latitude, longitude, metres above home] each. Raises InputError."""
+    """Return the wire items of ``rallyPoints``, [latitude, longitude, metres above home] each. Raises InputError."""
     problems: list[Problem] = []
     items: list[MissionItem] = []
     points = _list(rally.get("points"), f"{where}.points", problems) if isinstance(rally, dict) else []

@@ -1,8 +1,9 @@
-"""`.plan` files (QGroundControl's JSON), written so that QGroundControl, MAVSDK and Mission Planner take them.
+"""`.plan` files (QGroundControl's JSON), written so that QGroundControl, MAVSDK and Mission Planner can load them.
 
-For PX4 this is the file to load: it keeps home apart from the items and has a word (null) for NaN. Survey and corridor
-items are read as the simple items that QGroundControl stored inside them, landing patterns as those that it makes of
-them; other complex items are refused. ``doJumpId`` counts from 1 for every autopilot; a DO_JUMP names one.
+This is the format to use for PX4: it keeps home apart from the items and expresses NaN as null. Survey and corridor
+items are read as the simple items that QGroundControl stored inside them, landing patterns as the items that
+QGroundControl generates; other complex items are refused. ``doJumpId`` counts from 1 for every autopilot, and the
+target of a DO_JUMP is a ``doJumpId``.
 """
 
 from __future__ import annotations
@@ -48,10 +49,10 @@ def write_plan(
     fence: Sequence[MissionItem] = (),
     rally: Sequence[MissionItem] = (),
 ) -> str:
-    """The text of a `.plan` file; `read_plan` gives the same mission again.
+    """Return the text of a `.plan` file, from which `read_plan` returns the same mission.
 
-    ``vehicle`` gives the speeds that QGroundControl reckons with where the mission sets none. ``fence`` and ``rally``
-    are the wire items of the other two lists (5001 … 5004, 5100). Raises InputError for what the format cannot carry.
+    ``vehicle`` supplies the speed that QGroundControl shall assume if the mission sets none. ``fence`` and ``rally``
+    are the wire items of the other two lists (5001 … 5004, 5100). Raises InputError for what the format cannot hold.
     """
     check_writable(mission, nan=True)
     items = jumps_to_file(mission)
@@ -108,15 +109,15 @@ def _item(item: MissionItem, number: int) -> dict[str, Any]:
 
 
 def read_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint: Home | None = None) -> Mission:
-    """The mission in ``text``; see `parse_plan`."""
+    """Return the mission in ``text``; see `parse_plan`."""
     return parse_plan(text, autopilot=autopilot, where=where, home_hint=home_hint).mission
 
 
 def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint: Home | None = None) -> MissionFileRead:
-    """The mission in ``text`` and what is to be said of it.
+    """Return the mission in ``text`` with notes for the user.
 
-    ``autopilot`` None takes the file's own; one that differs from the file's is an InputError. ``home_hint`` is the
-    home of a file without one. Raises InputError with every mistake found (the first twenty), each with its key.
+    ``autopilot`` None means the one that the file names; another one than the file's raises InputError. ``home_hint``
+    is the home for a file without one. Raises InputError with the first twenty mistakes, each with its key.
     """
     if len(text) > MAX_BYTES:
         raise InputError(f"a mission file of more than {MAX_BYTES // 10**6} MB is not read", where=where)
@@ -221,7 +222,7 @@ def _home(value: object, hint: Home | None, place: str, notes: list[str]) -> Hom
 
 
 class _Items:
-    """Collects the simple items of a plan, and what is wrong with them."""
+    """Collects the simple items of a plan and their mistakes."""
 
     def __init__(self, autopilot: Autopilot, where: str, notes: list[str], *, typeless: bool) -> None:
         self.autopilot, self.where, self.notes, self.typeless = autopilot, where, notes, typeless

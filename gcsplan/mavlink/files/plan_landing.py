@@ -1,7 +1,7 @@
 """QGroundControl's landing patterns: a complex item of a `.plan` as the simple items that are sent for it.
 
-As QGroundControl makes them (LandingComplexItem.cc, `appendMissionItems`): DO_LAND_START, a speed and the end of photos
-and video where they are asked for, the final approach (LOITER_TO_ALT, or a way point), and the landing.
+The items are those of QGroundControl (LandingComplexItem.cc, `appendMissionItems`): DO_LAND_START; where requested a
+speed change and the end of photos and video; the final approach (LOITER_TO_ALT or a way point); and the landing.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LANDINGS = {"fwLandingPattern": LAND, "vtolLandingPattern": VTOL_LAND}
 
 
 def landing_entries(entry: dict[str, Any]) -> list[dict[str, Any]] | None:
-    """The simple items, as a plan has them, of a landing pattern; None where its places are missing."""
+    """Return a landing pattern's simple items in a plan's JSON form; None if its coordinates are missing."""
     land = entry.get("landCoordinate")
     approach = entry.get("landingApproachCoordinate", entry.get("loiterCoordinate"))
     if not (isinstance(land, list) and isinstance(approach, list) and len(land) == len(approach) == 3):

@@ -1,10 +1,9 @@
-"""`.waypoints` files ("QGC WPL 110"): written for the strictest reader, read as any program writes them.
+"""`.waypoints` files ("QGC WPL 110"): written for the strictest reader, read in every variant that programs write.
 
-Written: TABs, LF, home as row 0 for every autopilot, exact numbers, no comments. Read besides: spaces and commas,
-CRLF, a byte order mark, blank lines and ``#`` comments (Mission Planner), six decimals and ``nan`` params
-(MAVProxy, pymavlink's mavwp), the old header 120 without a home row (QGroundControl). In 110 row 0 *is* home, as
-QGroundControl and ArduPilot take it: a file that begins with a real item there would lose it without a word, so such
-a file is refused.
+Written: TABs, LF, home as row 0 for every autopilot, exact numbers, no comments. Also read: spaces and commas, CRLF, a
+byte order mark, blank lines and ``#`` comments (Mission Planner), six decimals and ``nan`` params (MAVProxy,
+pymavlink's mavwp), the old header 120 without a home row (QGroundControl). In version 110, QGroundControl and
+ArduPilot treat row 0 as home and would silently lose a real item there, so a file that begins with one is refused.
 """
 
 from __future__ import annotations
@@ -40,16 +39,16 @@ MAX_LINE = 1000
 MAX_PROBLEMS = 20
 HOME_ROW = "0 1 0 16 0 0 0 0 <lat> <lon> <AMSL> 1"
 
-# No two parts of it can match the same digits, so that a long line of them takes no more than one pass.
+# No two parts of the pattern can match the same digits, so a long run of digits takes only one pass.
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _SPLIT = re.compile(r"[\t ,]+")
 
 
 def write_waypoints(mission: Mission) -> str:
-    """The text of a `.waypoints` file; `read_waypoints` gives the same mission again.
+    """Return the text of a `.waypoints` file, from which `read_waypoints` returns the same mission.
 
-    DO_JUMP targets are the file's own row numbers. Raises InputError for what the format has no word for, NaN above
-    all: it has none for "keep the heading", so a mission that is to be written gives such params a number.
+    DO_JUMP targets are the file's own row numbers. Raises InputError for what the format cannot express, above all NaN:
+    for example, a NaN yaw ("keep the heading") must be replaced by a number before.
     """
     check_writable(mission, nan=False)
     home = mission.home
@@ -67,20 +66,20 @@ def write_waypoints(mission: Mission) -> str:
 
 
 def _float64_text(value: float) -> str:
-    # Home's altitude is the one number of a mission that is not a float32: all its digits are kept.
+    # Home's altitude is the only number of a mission that is not a float32, so all its digits are kept.
     return repr(float(value)).removesuffix(".0")
 
 
 def read_waypoints(text: str, *, autopilot: Autopilot, where: str, home_hint: Home | None = None) -> Mission:
-    """The mission in ``text``; see `parse_waypoints`."""
+    """Return the mission in ``text``; see `parse_waypoints`."""
     return parse_waypoints(text, autopilot=autopilot, where=where, home_hint=home_hint).mission
 
 
 def parse_waypoints(text: str, *, autopilot: Autopilot, where: str, home_hint: Home | None = None) -> MissionFileRead:
-    """The mission in ``text`` and what is to be said of it.
+    """Return the mission in ``text`` with notes for the user.
 
-    ``where`` names the file in messages. ``home_hint`` is the home of a file that has none (first seq 1, header 120,
-    or a home row of zeros). Raises InputError with every mistake found (the first twenty), each with its line.
+    ``where`` names the file in messages. ``home_hint`` is the home for a file that has none (first seq 1, header 120,
+    or a home row of zeros). Raises InputError with the first twenty mistakes, each with its line.
     """
     if len(text) > MAX_BYTES:
         raise InputError(f"a mission file of more than {MAX_BYTES // 10**6} MB is not read", where=where)
@@ -99,7 +98,7 @@ def parse_waypoints(text: str, *, autopilot: Autopilot, where: str, home_hint: H
 
 
 class _Row:
-    """One row: its line in the file, seq, numbers, and how many decimals its coordinates are written with."""
+    """One row: its line number in the file, seq, numbers, and the number of decimals of latitude and longitude."""
 
     __slots__ = ("decimals", "line", "raw", "seq")
 
@@ -207,7 +206,7 @@ def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str,
 def _home(row: _Row, where: str) -> Home:
     raw = row.raw
     place = f"{where}:{row.line}"
-    # Command 0 is what Mission Planner writes for a home that it does not know.
+    # Mission Planner writes command 0 for an unknown home.
     if raw.command not in (0, WAYPOINT) or raw.frame not in (GLOBAL, 5):
         raise InputError(
             f"row 0 must be home ('{HOME_ROW}'), given command {raw.command:g} in frame {raw.frame:g}: read as home, "

@@ -1,6 +1,6 @@
-"""Autopilot profiles, one table: what each calls itself, what it accepts, and what it stores of what it accepts.
+"""Autopilot profiles in one table: the ids that each autopilot reports, what it accepts, and what it stores of that.
 
-Facts and their sources stand beside the numbers; `stored_ardupilot` and `stored_px4` hold the rules for items.
+Sources stand beside the numbers; `stored_ardupilot` and `stored_px4` hold the rules for items.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ _TYPE_NAMES = {
 }  # fmt: skip
 
 ALTITUDE_LIMIT_M = 83_000.0
-"""ArduPilot keeps centimetres in 24 bits and refuses more (``LOCATION_ALT_MAX_M``)."""
+"""Largest altitude, either sign, in metres: ArduPilot stores centimetres in 24 bits (``LOCATION_ALT_MAX_M``)."""
 
 
 @dataclass(frozen=True, slots=True)
 class AutopilotProfile:
     """What one autopilot accepts and stores.
 
-    ``max_items`` counts wire items, home included where it is one. ``stored(item)`` is what reads back;
-    ``refuses(item)`` says why it is not taken, empty where it is. ``atomic``: a mission is swapped in whole at the end
-    of an upload, so that a broken upload leaves the old one. ``holds_s``: how long a broken upload keeps the vehicle
-    busy.
+    ``max_items`` counts wire items, including home where home is one. ``stored(item)`` returns the item that reads
+    back; ``refuses(item)`` returns why the autopilot refuses it, empty if it accepts it. ``atomic``: the new mission
+    replaces the old one only at the end of an upload, so a broken upload leaves the old one. ``holds_s``: seconds for
+    which a broken upload keeps the vehicle busy.
     """
 
     autopilot: Autopilot
@@ -66,7 +66,7 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
         "ArduCopter",
         ARDUPILOTMEGA,
         _COPTERS,
-        max_items=650,  # measured; 15 bytes each in the storage of a 16 KB board (StorageManager.cpp)
+        max_items=650,  # measured; an item takes 15 bytes in the storage of a 16 KB board (StorageManager.cpp)
         atomic=False,  # MissionItemProtocol_Waypoints.cpp: COUNT truncates, items replace one by one
         holds_s=8.0,  # MissionItemProtocol.h: upload_timeout_ms
         stored=stored_by_copter,
@@ -77,7 +77,7 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
         "ArduPlane",
         ARDUPILOTMEGA,
         _PLANES,
-        max_items=650,  # ArduPlane's own layout holds 655; one figure for both keeps the smaller
+        max_items=650,  # ArduPlane's own layout holds 655; the smaller number is used for both
         atomic=False,
         holds_s=8.0,
         stored=stored_by_plane,
@@ -100,29 +100,29 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
 
 
 def profile_of(autopilot: Autopilot) -> AutopilotProfile:
-    """The profile of ``autopilot``."""
+    """Return the profile of ``autopilot``."""
     return _TABLE[autopilot]
 
 
 def stored(item: Item, autopilot: Autopilot) -> Item:
-    """``item`` as ``autopilot`` reads it back."""
+    """Return ``item`` as it reads back from ``autopilot``."""
     return _TABLE[autopilot].stored(item)
 
 
 def max_items(autopilot: Autopilot, mission_type: int = MISSION) -> int:
-    """The longest list of that kind: of fence points 70 (84 on ArduPlane, 64 on PX4), of rally points 32."""
+    """Return the most items of that list: fence 70 (84 on ArduPlane, 64 on PX4), rally points 32."""
     if mission_type == MISSION:
         return _TABLE[autopilot].max_items
-    if mission_type == FENCE:  # polygon vertices; circles take more storage on ArduPilot: 42 of them
+    if mission_type == FENCE:  # polygon vertices; circles take more storage on ArduPilot, which holds 42
         return {Autopilot.ARDUCOPTER: 70, Autopilot.ARDUPLANE: 84, Autopilot.PX4: 64}[autopilot]
     return 32
 
 
 def altitude_of_cm(cm: int, autopilot: Autopilot) -> float:
-    """Metres as float32 to send so that exactly ``cm`` centimetres are stored.
+    """Return the metres (float32) to send so that exactly ``cm`` centimetres are stored.
 
-    ArduPilot cuts towards zero after a float32 product, so half a centimetre is sent on top, away from zero.
-    Raises InputError beyond what the autopilot can keep.
+    ArduPilot truncates towards zero after a float32 product, so half a centimetre is added, away from zero. Raises
+    InputError beyond `ALTITUDE_LIMIT_M`.
     """
     if abs(cm) >= ALTITUDE_LIMIT_M * 100:
         raise InputError(f"an altitude must lie within ±{ALTITUDE_LIMIT_M:.0f} m, given {cm / 100} m")
@@ -132,10 +132,10 @@ def altitude_of_cm(cm: int, autopilot: Autopilot) -> float:
 
 
 def encode_altitude(altitude_m: float, autopilot: Autopilot, toward: Literal["up", "down"]) -> float:
-    """``altitude_m`` in whole centimetres as float32 to send: a bound from below rounds up, one from above down.
+    """Return the float32 to send for ``altitude_m`` rounded to whole centimetres ``toward`` up or down.
 
-    What lies within a hundred-thousandth of a millimetre of a whole centimetre is that centimetre. Raises InputError
-    for NaN, infinity, and what the autopilot cannot keep.
+    A lower limit rounds up, an upper limit down. A value within 1e-8 m of a whole centimetre counts as that centimetre.
+    Raises InputError for NaN, infinity, and altitudes beyond `ALTITUDE_LIMIT_M`.
     """
     if not math.isfinite(altitude_m):
         raise InputError(f"an altitude must be a number of metres, given {altitude_m}")
@@ -147,15 +147,15 @@ def encode_altitude(altitude_m: float, autopilot: Autopilot, toward: Literal["up
 
 
 def autopilot_name(mav_autopilot: int) -> str:
-    """A MAV_AUTOPILOT in words."""
+    """Return a MAV_AUTOPILOT in words."""
     return _AUTOPILOT_NAMES.get(mav_autopilot, f"autopilot kind {mav_autopilot}")
 
 
 def type_name(mav_type: int) -> str:
-    """A MAV_TYPE in words."""
+    """Return a MAV_TYPE in words."""
     return _TYPE_NAMES.get(mav_type, f"vehicle type {mav_type}")
 
 
 def is_generic(mav_autopilot: int) -> bool:
-    """True for a peer that does not say which autopilot it is."""
+    """Whether a peer does not report which autopilot it is."""
     return mav_autopilot in (GENERIC, INVALID)

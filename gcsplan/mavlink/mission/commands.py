@@ -1,7 +1,7 @@
-"""The one table of MAV_CMD numbers, and of what messages call them.
+"""The only table of MAV_CMD numbers, with the names that messages to the user use.
 
-A constant is named as in common.xml or ardupilotmega.xml, without MAV_CMD_ and without NAV_; five fence commands and
-the return have shorter names.
+A constant has its name from common.xml or ardupilotmega.xml without MAV_CMD_ and NAV_; five fence commands and the
+return have shorter names.
 """
 
 from __future__ import annotations
@@ -140,14 +140,14 @@ WORDS = {
     CIRCLE_OUT: "fence circle, exclusion",
     RALLY_POINT: "rally point",
 }
-"""What messages call a command."""
+"""Names of commands in messages to the user."""
 
 
 def command_name(command: int) -> str:
-    """A MAV_CMD in words."""
+    """Return a MAV_CMD in words."""
     return WORDS.get(command, f"command {command}")
 
 
 def is_nav(command: int) -> bool:
-    """True for a NAV command, which a mission waits for; the numbers of DO and CONDITION commands are greater."""
+    """Whether it is a NAV command, which the mission waits for; DO and CONDITION commands have larger numbers."""
     return command < LAST

@@ -1,8 +1,8 @@
-"""Compares what was read back with what was sent: by wire integers and float32, with the autopilot's own rounding.
+"""Comparison of a read-back list with the sent one, by wire integers and float32, after the autopilot's own rounding.
 
-A number is right if it equals what the autopilot is known to keep (`autopilots.stored`) or what was sent (peers that
-keep everything). Anything else is a `Difference`, for unknown commands too. ArduPilot's item 0 is the
-vehicle's own home: it is reported, but excused.
+A number is right if it equals what the autopilot is known to store (`autopilots.stored`) or what was sent (some peers
+store everything). Anything else is a `Difference`, also for unknown commands. ArduPilot's item 0 is the vehicle's own
+home: a difference there is reported but excused.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ YAW_TOLERANCE_DEG = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One number that is not as expected; ``seq`` is -1 for the list as a whole.
+    """One number that differs from the expected one; ``seq`` is -1 for the list as a whole.
 
-    ``excused``: known and harmless for the comparison (the vehicle's own home), reported all the same.
+    ``excused``: harmless and reported nevertheless (the vehicle's own home).
     """
 
     seq: int
@@ -47,7 +47,7 @@ class Difference:
 def compare(
     sent: Sequence[MissionItem], read: Sequence[MissionItem], autopilot: Autopilot, mission_type: int = MISSION
 ) -> list[Difference]:
-    """Every difference between a list in wire order and what was read back of it; see `faults` for those that count."""
+    """Return every difference between a sent list and its read-back, in wire order; `faults` drops excused ones."""
     found: list[Difference] = []
     if len(sent) != len(read):
         count = str(len(sent))
@@ -61,7 +61,7 @@ def compare(
 
 
 def faults(differences: Iterable[Difference]) -> tuple[Difference, ...]:
-    """The differences that are not excused: none means that the list on board is the one that was sent."""
+    """Return the differences that are not excused; none means that the list on board is the one that was sent."""
     return tuple(d for d in differences if not d.excused)
 
 
@@ -103,7 +103,7 @@ def _item(
 
 
 def _altitudes(ours: MissionItem, kept: MissionItem, autopilot: Autopilot) -> tuple[float, ...]:
-    """The float32s that may come back: ArduPilot's versions turn the same centimetres into two of them."""
+    """Return the float32 altitudes that may read back: ArduPilot's versions convert centimetres in two ways."""
     if autopilot.is_ardupilot and kept.z == read_back_altitudes(stored_cm(ours.z))[0]:
         return read_back_altitudes(stored_cm(ours.z))
     return (kept.z,)

@@ -1,7 +1,7 @@
-"""`Mission`: decoded wire items, the autopilot, and home. It is what is checked, written and sent.
+"""`Mission`: decoded wire items, the autopilot, and home. It is checked, written to files and sent to vehicles.
 
 Numbers are those of the wire: degrees times 1e7 as int32, everything else float32. Home is not among the items;
-`Mission.wire_items` puts it in front where the autopilot keeps it as item 0 (ArduPilot).
+`Mission.wire_items` puts it first for ArduPilot, which stores it as item 0.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.commands import WAYPOINT
 from gcsplan.vehicle import Autopilot
 
-# Frames (MAV_FRAME). The _INT twins 5, 6, 11 are synonyms: written as 0, 3, 10, both are read.
+# Frames (MAV_FRAME). The _INT frames 5, 6, 11 mean the same as 0, 3, 10: both are read, 0, 3, 10 are written.
 GLOBAL, NO_POSITION, RELATIVE, TERRAIN = 0, 2, 3, 10
 FRAME_SYNONYMS = {5: GLOBAL, 6: RELATIVE, 11: TERRAIN}
 
@@ -24,7 +24,7 @@ MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
 
 
 def float32(value: float) -> float:
-    """The float32 nearest to ``value``, as the wire carries it; ``inf`` beyond its range."""
+    """Return the float32 nearest to ``value``, as sent on the wire; ``±inf`` beyond its range."""
     try:
         return float(struct.unpack("<f", struct.pack("<f", value))[0])
     except OverflowError:
@@ -32,7 +32,7 @@ def float32(value: float) -> float:
 
 
 def degrees_e7(degrees: float) -> int:
-    """Degrees as the wire's integer: rounded, never truncated."""
+    """Return degrees as the wire's integer, times 1e7 and rounded, not truncated."""
     return round(degrees * 1e7)
 
 
@@ -41,7 +41,7 @@ class MissionItem:
     """One MISSION_ITEM_INT without its addresses and seq.
 
     ``params`` are param1..param4; ``x``, ``y`` latitude and longitude times 1e7 (or raw numbers for commands
-    without a place); ``z`` metres in ``frame``. Params and z are rounded to float32 on the way in.
+    without a location); ``z`` metres in ``frame``. The constructor rounds params and z to float32.
     """
 
     command: int
@@ -66,7 +66,7 @@ class MissionItem:
 
     @property
     def wire(self) -> bytes:
-        """The numbers as bytes, so that NaN equals NaN: params, x, y, z, command, frame, autocontinue."""
+        """The numbers as bytes, in which NaN equals NaN: params, x, y, z, command, frame, autocontinue."""
         return struct.pack(
             "<4fiifHBB", *self.params, self.x, self.y, self.z, self.command, self.frame, self.autocontinue
         )
@@ -84,7 +84,7 @@ class MissionItem:
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """Where the vehicle arms: wire degrees and real altitude."""
+    """The place where the vehicle arms: degrees times 1e7, and metres above mean sea level."""
 
     lat_e7: int
     lon_e7: int
@@ -92,17 +92,17 @@ class Home:
 
     @classmethod
     def at(cls, lat_deg: float, lon_deg: float, amsl_m: float) -> Home:
-        """Home from degrees."""
+        """Return the home at a place in degrees."""
         return cls(degrees_e7(lat_deg), degrees_e7(lon_deg), float(amsl_m))
 
     def as_item(self) -> MissionItem:
-        """ArduPilot's item 0."""
+        """Return ArduPilot's item 0."""
         return MissionItem(WAYPOINT, GLOBAL, (0.0, 0.0, 0.0, 0.0), self.lat_e7, self.lon_e7, self.amsl_m)
 
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """What one vehicle is to fly. ``items`` do not hold home. ``name`` is the vehicle's."""
+    """The mission of one vehicle. ``items`` exclude home. ``name`` is the vehicle's."""
 
     autopilot: Autopilot
     home: Home
@@ -129,9 +129,9 @@ class Mission:
         name: str = "",
         sysid: int = 1,
     ) -> Mission:
-        """A mission from items in wire order. On ArduPilot item 0 is home unless ``home`` overrides it.
+        """Return the mission of items in wire order. On ArduPilot item 0 is home unless ``home`` overrides it.
 
-        Raises InputError where home is in neither.
+        Raises InputError if neither contains a home.
         """
         items = tuple(wire)
         if autopilot.is_ardupilot:

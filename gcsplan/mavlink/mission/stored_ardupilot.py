@@ -1,8 +1,8 @@
-"""What ArduPilot stores of a mission item: 15 bytes each, so some numbers read back differently.
+"""What ArduPilot stores of a mission item: 15 bytes per item, so some numbers read back differently.
 
 Source: ArduPilot 4.6, ``AP_Mission.cpp`` (`mavlink_int_to_mission_cmd`, `mission_cmd_to_mavlink_int`, the packed
-structs of ``AP_Mission.h``), ``MissionItemProtocol_Fence.cpp`` and ``MissionItemProtocol_Rally.cpp``; the common
-commands were uploaded to and read back from an ArduCopter 4.6.0 in SITL.
+structs of ``AP_Mission.h``), ``MissionItemProtocol_Fence.cpp`` and ``MissionItemProtocol_Rally.cpp``. The common
+commands were also uploaded to an ArduCopter 4.6.0 in SITL and read back.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _M_PER_CM = float32(0.01)
 
 
 def _whole(value: float) -> int:
-    """``(int32_t)value``: towards zero. Beyond int32 C does not define it; x86 gives INT_MIN, as here."""
+    """``(int32_t)value``: truncate towards zero. C does not define it beyond int32; x86 gives INT_MIN, as here."""
     return int(value) if abs(value) < 2**31 else -(2**31)  # NaN compares False
 
 
@@ -57,33 +57,33 @@ def _flag(value: float) -> float:
     return 1.0 if value > 0 else 0.0
 
 
-# ── params that are packed in a way of their own ──────────────────────────────────────────────────────────────────
+# ── params with their own packing ─────────────────────────────────────────────────────────────────────────────────
 
 
 def _radius_u16(value: float) -> float:
-    """A radius in 16 bits, its turning direction in a flag."""
+    """A radius stored in 16 bits, with the turning direction in a flag."""
     return math.copysign(_u16(abs(value)), -1.0 if value < 0 else 1.0)
 
 
 def _direction(value: float) -> float:
-    """Of a loiter's radius the sign alone is kept."""
+    """A loiter radius of which only the sign is stored."""
     return -1.0 if value < 0 else 1.0
 
 
 def _land_direction(value: float) -> float:
-    """NAV_LAND's yaw: a flag as well, so that 0 and NaN read back as 1."""
+    """NAV_LAND's yaw, also stored as a flag, so that 0 and NaN read back as 1."""
     return -1.0 if value <= -FLT_EPSILON else 1.0
 
 
 def _byte(value: float) -> float:
-    """ArduPlane's acceptance radius and pass-by distance: whole metres up to 255."""
+    """ArduPlane's acceptance radius and pass-by distance, stored as whole metres up to 255."""
     return min(255.0, _u16(value))
 
 
 def _loiter_turns(params: Params) -> Params:
-    """Turns and radius share 16 bits, with flags for the direction, for turns below one and for radii beyond 255 m.
+    """Turns and radius, which share 16 bits, with flags for the direction, turns below one and radii beyond 255 m.
 
-    Negative turns spill into the radius' byte, as they do on board.
+    Negative turns overflow into the radius' byte, as they do on board.
     """
     turns, _, radius, _ = params
     fraction = 0 < turns < 1
@@ -100,12 +100,12 @@ def _payload_descent(value: float) -> float:
 
 
 def stored_cm(altitude_m: float) -> int:
-    """The whole centimetres that ArduPilot keeps of ``altitude_m``: a float32 product, cut towards zero."""
+    """Return the whole centimetres that ArduPilot stores: a float32 product, truncated towards zero."""
     return _whole(float32(float32(altitude_m) * _CM_PER_M))
 
 
 def read_back_altitudes(cm: int) -> tuple[float, float]:
-    """How stored centimetres read back, metres as float32: ``* 0.01f`` today, ``/ 100.0f`` before 4.1."""
+    """Return stored centimetres as they read back, float32 metres: ``* 0.01f`` today, ``/ 100.0f`` before 4.1."""
     return float32(float32(cm) * _M_PER_CM), float32(cm / 100.0)
 
 
@@ -113,7 +113,7 @@ def read_back_altitudes(cm: int) -> tuple[float, float]:
 
 
 class Rule(NamedTuple):
-    """What is kept of param1 … param4; ``located``: latitude, longitude, altitude and frame are kept too."""
+    """What is stored of param1 … param4; ``located``: latitude, longitude, altitude and frame are stored too."""
 
     located: bool
     params: tuple[Keep, Keep, Keep, Keep]
@@ -128,7 +128,7 @@ def _do(p1: Keep = _lost, p2: Keep = _lost, p3: Keep = _lost, p4: Keep = _lost) 
 
 
 RULES: dict[int, Rule] = {
-    cmd.WAYPOINT: _at(_u16),  # hold (ArduPlane: below)
+    cmd.WAYPOINT: _at(_u16),  # hold (ArduPlane: `_PLANE_WAYPOINT`)
     cmd.LOITER_UNLIM: _at(p3=_radius_u16),
     cmd.LOITER_TURNS: _at(),  # `_loiter_turns`
     cmd.LOITER_TIME: _at(_u16, p3=_direction, p4=_flag),
@@ -195,13 +195,13 @@ NAN_TAKEN = {
     cmd.WAYPOINT: (3,), cmd.LOITER_UNLIM: (3,), cmd.LAND: (3,), cmd.TAKEOFF: (3,), cmd.VTOL_TAKEOFF: (3,),
     cmd.VTOL_LAND: (2, 3),
 }  # fmt: skip
-"""Commands of which a param (by index) may be NaN (`mavlink_int_to_mission_cmd`, `sanity_check_params`)."""
+"""Indices of the params that may be NaN, by command (`mavlink_int_to_mission_cmd`, `sanity_check_params`)."""
 
 _FRAMES = (0, 2, 3, 5, 6, 10, 11)
 
 
 def refused_by_copter(item: MissionItem) -> str:
-    """Why ArduCopter refuses ``item`` on upload; empty where it takes it, or is not known to refuse it."""
+    """Return why ArduCopter refuses ``item`` on upload; empty if it accepts it or is not known to refuse it."""
     for index, value in enumerate(item.params):
         if math.isinf(value) or (math.isnan(value) and index not in NAN_TAKEN.get(item.command, ())):
             return f"ArduPilot refuses param{index + 1} of command {item.command}, which is {value}"
@@ -214,19 +214,19 @@ def refused_by_copter(item: MissionItem) -> str:
 
 
 def refused_by_plane(item: MissionItem) -> str:
-    """Why ArduPlane refuses ``item`` on upload; empty where it takes it, or is not known to refuse it."""
+    """Return why ArduPlane refuses ``item`` on upload; empty if it accepts it or is not known to refuse it."""
     if item.command == cmd.SPLINE_WAYPOINT:
         return "ArduPlane takes no splines (command 82)"
     return refused_by_copter(item)
 
 
 def stored_by_copter(item: MissionItem) -> MissionItem:
-    """``item`` as ArduCopter reads it back."""
+    """Return ``item`` as it reads back from ArduCopter."""
     return _stored(item, RULES.get(item.command))
 
 
 def stored_by_plane(item: MissionItem) -> MissionItem:
-    """``item`` as ArduPlane reads it back."""
+    """Return ``item`` as it reads back from ArduPlane."""
     return _stored(item, _PLANE_WAYPOINT if item.command == cmd.WAYPOINT else RULES.get(item.command))
 
 
@@ -244,7 +244,7 @@ def _stored(item: MissionItem, rule: Rule | None) -> MissionItem:
         item.y,
         read_back_altitudes(stored_cm(item.z))[0],
     )
-    if rule is None:  # an unknown command: the same numbers are expected back, and a difference is reported
+    if rule is None:  # unknown command: expect the same numbers back, so that every difference is reported
         return located
     p1, p2, p3, p4 = (keep(value) for keep, value in zip(rule.params, item.params, strict=True))
     if item.command == cmd.LOITER_TURNS:
@@ -255,12 +255,12 @@ def _stored(item: MissionItem, rule: Rule | None) -> MissionItem:
 
 
 def _stored_fence(item: MissionItem) -> MissionItem:
-    """Fence points keep a place and one number; frame, altitude and autocontinue read back as 0."""
+    """Return a fence point as it reads back: location and param1 are stored; frame, altitude, autocontinue read 0."""
     first = item.params[0]
     if item.command in _FENCE_VERTEX:
         first = _u8(first)
     elif item.command in _FENCE_CIRCLE and 0 < first < 2**31 and first - int(first) < 0.001:
-        first = float32(float(int(first)))  # whole metres, to the millimetre, are kept as an integer
+        first = float32(float(int(first)))  # a radius less than 1 mm above whole metres is stored as an integer
     elif item.command == cmd.FENCE_RETURN_POINT:
         first = 0.0
     return MissionItem(item.command, GLOBAL, (first, 0.0, 0.0, 0.0), item.x, item.y, 0.0, False)

@@ -1,4 +1,4 @@
-"""What PX4 stores of a mission item: floats as they are, but only the params that a command uses; yaw in radians.
+"""What PX4 stores of a mission item: floats unchanged, but only the params that a command uses; yaw in radians.
 
 Source: PX4 1.15, ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavlink_mission_item`),
 ``navigation.h``, ``Limits.hpp`` (`radians`, `degrees`) and ``helper_functions.hpp`` (`wrap_2pi`).
@@ -44,7 +44,7 @@ def _vertices(value: float) -> float:
 
 
 def yaw(degrees: float) -> float:
-    """Degrees through float32 radians wrapped to 0 … 2π and back: -90 reads back as 270, NaN stays NaN."""
+    """Convert degrees to float32 radians within 0 … 2π and back: -90 reads back as 270, NaN stays NaN."""
     radians = float32(degrees * _RADIANS_PER_DEGREE)
     if not math.isfinite(radians):
         return math.nan
@@ -69,7 +69,7 @@ LOCATED: dict[int, _Rule] = {
     cmd.VTOL_TAKEOFF: _YAW,
     cmd.VTOL_LAND: _YAW,
     cmd.DO_SET_ROI_LOCATION: _NOTHING,
-    cmd.DO_SET_ROI: _NOTHING,  # at a place
+    cmd.DO_SET_ROI: _NOTHING,  # with a location
     cmd.DO_AUTOTUNE_ENABLE: _NOTHING,
     cmd.COMPONENT_ARM_DISARM: _NOTHING,
     cmd.CONDITION_GATE: _NOTHING,
@@ -80,7 +80,7 @@ LOCATED: dict[int, _Rule] = {
     cmd.CIRCLE_OUT: (_f32, _lost, _lost, _lost),
     cmd.RALLY_POINT: _NOTHING,
 }
-"""What is kept of param1 … param4 of commands with a place (frames 0, 3 and their twins)."""
+"""What is stored of param1 … param4 of commands with a location (frames 0 and 3, also as 5 and 6)."""
 
 PLACELESS = frozenset(
     {
@@ -95,17 +95,17 @@ PLACELESS = frozenset(
         cmd.DO_VTOL_TRANSITION, cmd.DO_WINCH,
     }
 )  # fmt: skip
-"""Commands that are taken in MAV_FRAME_MISSION (2) alone."""
+"""Commands that PX4 accepts in MAV_FRAME_MISSION (2); those that are not in `LOCATED`, in no other frame."""
 
 FENCE_AND_RALLY = frozenset({cmd.POLYGON_IN, cmd.POLYGON_OUT, cmd.CIRCLE_IN, cmd.CIRCLE_OUT, cmd.RALLY_POINT})
 _FENCE = range(cmd.FENCE_RETURN_POINT, cmd.CIRCLE_OUT + 1)
 
 YAW_COMMANDS = frozenset(command for command, rule in LOCATED.items() if rule[3] is yaw)
-"""Commands whose param4 goes through radians: a compiler may contract that product, so it is compared as an angle."""
+"""Commands whose param4 PX4 converts to radians; a compiler may contract the product, so it is compared as an angle."""
 
 
 def refused_by_px4(item: MissionItem) -> str:
-    """Why PX4 refuses ``item`` on upload; empty where it takes it."""
+    """Return why PX4 refuses ``item`` on upload; empty if it accepts it."""
     frame = FRAME_SYNONYMS.get(item.frame, item.frame)
     if frame not in (GLOBAL, RELATIVE, NO_POSITION):
         return f"PX4 takes no item in frame {item.frame}" + (" (above terrain)" if frame == TERRAIN else "")
@@ -128,7 +128,7 @@ def refused_by_px4(item: MissionItem) -> str:
 
 
 def stored_by_px4(item: MissionItem) -> MissionItem:
-    """``item`` as PX4 reads it back in ITEM_INT, with frames 5 and 6 written as 0 and 3."""
+    """Return ``item`` as it reads back from PX4 in MISSION_ITEM_INT, with frames 5 and 6 written as 0 and 3."""
     frame = FRAME_SYNONYMS.get(item.frame, item.frame)
     if frame == NO_POSITION:
         params = item.params
