@@ -1,1 +1,1 @@
-"""Vehicles over a link: sockets, frames, the clock, who is there, and what a user calls (`session`)."""
+"""Vehicles over a link: sockets, frames, the clock, the vehicle's state, and the public functions (`session`)."""

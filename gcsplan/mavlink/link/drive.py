@@ -1,4 +1,4 @@
-"""A protocol machine on a channel: `drive` is the task that runs it, under the eyes of `Recheck` and `Patience`."""
+"""`drive`: the task that runs a protocol machine on a channel, subject to `Recheck` and `Patience`."""
 
 from __future__ import annotations
 
@@ -16,52 +16,52 @@ from gcsplan.mavlink.protocol.patience import Patience
 
 
 class Driven(Protocol):
-    """A sans-IO machine as `drive` needs it."""
+    """The interface of a protocol machine that `drive` needs."""
 
     vehicle: Address
 
     @property
     def answers(self) -> Sequence[Item]:
-        """What a request gets, by seq, at any time between `start` and `cancel`."""
+        """The item that answers a request, by seq, at any time between `start` and `cancel`."""
         ...
 
     def answered(self, seqs: Iterable[int], now: float) -> None:
-        """Take note of requests that got their answer already."""
+        """Record requests for ``seqs`` that were already answered."""
         ...
 
     @property
     def deadline(self) -> float | None:
-        """When `on_timer` is due; None once it has ended."""
+        """The next time to call `on_timer`; None once it has ended."""
         ...
 
     def start(self, now: float) -> list[Packet]:
-        """Begin."""
+        """Start and return the first packets."""
         ...
 
     def receive(self, packet: Packet, now: float) -> list[Packet]:
-        """Take a packet in."""
+        """Process a packet and return the answers."""
         ...
 
     def on_timer(self, now: float) -> list[Packet]:
-        """Do what is due."""
+        """Return the packets that are due at ``now``."""
         ...
 
     @property
     def mark(self) -> tuple[int, ...]:
-        """How far it has come; it grows with every step forward."""
+        """A measure of progress, which grows with every step."""
         ...
 
     @property
     def progress(self) -> Progress:
-        """Items done so far."""
+        """Items transferred so far."""
         ...
 
     def cancel(self, now: float, why: str = ...) -> list[Packet]:
-        """End early, with a word to the vehicle."""
+        """End early and notify the vehicle."""
         ...
 
     def stop(self, outcome: Outcome) -> None:
-        """End early, without one."""
+        """End early without notifying the vehicle."""
         ...
 
 
@@ -73,10 +73,10 @@ def drive(
     patience: Patience | None = None,
     progress: Callable[[], None] | None = None,
 ) -> Steps[None]:
-    """The task that runs ``machine`` to its end; it is cancelled if the task is closed before (Ctrl-C).
+    """Run ``machine`` to its end, as a task; if the task is closed before (Ctrl-C), cancel the machine.
 
-    ``recheck`` says which messages count and when the vehicle is no longer the one to write to, ``patience`` when it
-    has taken too long.
+    ``recheck`` decides which messages count and whether the vehicle is still the right one; ``patience`` decides when
+    the transfer has taken too long.
     """
     clock, prompt = channel.link.clock, channel.link.prompt
     channel.prepared = prepared = prompt.prepare(machine.answers, machine.vehicle)
@@ -139,7 +139,7 @@ def _ended_early(machine: Driven, channel: Channel, recheck: Recheck | None, pat
 
 
 def _give_up(machine: Driven, channel: Channel, recheck: Recheck | None, why: str) -> None:
-    """End ``machine``, with a word to the vehicle unless it has fallen silent: another one may stand there now."""
+    """End ``machine`` and notify the vehicle, unless it has fallen silent: the link may lead to another one now."""
     if recheck and recheck.shut:
         machine.stop(Unknown(why))
     else:

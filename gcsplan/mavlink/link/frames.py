@@ -1,8 +1,8 @@
-"""Bytes to MAVLink messages and back: framing, checksums, signatures. Garbage costs nothing but itself.
+"""Conversion between bytes and MAVLink messages: framing, checksums, signatures.
 
-pymavlink's own stream parser throws away as many bytes as a corrupted header claims, the good frames among them, and
-keeps its buffer for ever while it is never empty. Here a frame that does not check is one byte of garbage, and the
-buffer never holds more than one frame.
+After a corrupted header, pymavlink's own stream parser discards as many bytes as that header claims, including good
+frames, and its buffer grows as long as it is never empty. Here, a frame with a wrong checksum costs only its first
+byte, so the good frames behind it are kept, and the buffer never holds more than one frame.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from gcsplan.mavlink.protocol.messages import Address
 _MARKERS = re.compile(b"[\xfd\xfe]")
 _MARKER_BYTES = (0xFD, 0xFE)
 _V2, _SIGNED = 0xFD, 0x01
-_SIGNING_EPOCH_S = 1_420_070_400  # 2015-01-01, in units of 10 µs from there
+_SIGNING_EPOCH_S = 1_420_070_400  # Unix time of 2015-01-01, from which signatures count units of 10 µs
 GOOD: Final = "good"
 LATE: Final = "late"
 BAD: Final = "bad"
@@ -38,12 +38,12 @@ def _checksum(data: bytes) -> int:
 
 
 checksum: Callable[[bytes], int] = getattr(dialect, "mcrf4xx", None) or _checksum
-"""MAVLink's checksum, CRC-16/MCRF4XX: in C where pymavlink has it so, a tenth of the time."""
+"""MAVLink's checksum, CRC-16/MCRF4XX; pymavlink's C version, if present, takes a tenth of the time."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class SigningKey:
-    """32 secret bytes. Never shown."""
+    """32 secret bytes, never printed."""
 
     secret: bytes
 
@@ -56,9 +56,10 @@ class SigningKey:
 
 
 def signing_key(file: Path | str | None = None, variable: str = KEY_VARIABLE) -> SigningKey | None:
-    """The key from ``file`` (32 raw bytes, or 64 hexadecimal digits), else from the environment (digits), else None.
+    """Return the key from ``file`` (32 raw bytes or 64 hexadecimal digits), else from the environment (digits).
 
-    Raises InputError for one that cannot be read or has another size; the message does not hold the key.
+    None if there is neither. Raises InputError for a key that cannot be read or has another size; the message does not
+    contain the key.
     """
     if file is not None:
         try:
@@ -78,12 +79,12 @@ def _from_hex(raw: bytes, where: str) -> SigningKey:
 
 
 class Signing:
-    """The signing state that all parsers and the writer of one link share; without a key it signs nothing.
+    """The signing state that all parsers and the writer of one link share; without a key nothing is signed.
 
-    A signed frame counts once, and only if it was signed after this link was opened: a vehicle takes over the time of
-    those whom it hears, so whoever still signs with an older one has not heard us, and may be a recording. What the
-    signature does not fit changes nothing: a forged time must not shut the true stream out. What was rightly signed
-    and comes late is `LATE`: it proves nothing, but it may speak against the one who is heard (a second vehicle).
+    A signed frame counts once, and only if it was signed after this link was opened. A vehicle adopts the newest time
+    that it hears, so a frame with an older time comes from somebody who has not heard us, or from a recording. A frame
+    with a wrong signature does not change the state: a forged time must not lock the true stream out. A correctly
+    signed frame that arrives late is `LATE`: it confirms nothing, but may show that there is a second vehicle.
     """
 
     def __init__(
@@ -101,11 +102,11 @@ class Signing:
 
     @property
     def active(self) -> bool:
-        """Whether there is a key."""
+        """Whether a key is set."""
         return bool(self._secret)
 
     def judge(self, frame: bytes) -> Literal["good", "late", "bad"]:
-        """Whether a frame whose checksum fits may count; everything may without a key."""
+        """Judge the signature of a frame with a correct checksum; without a key every frame is `GOOD`."""
         if not self._secret:
             return GOOD
         if frame[0] != _V2 or not frame[2] & _SIGNED:
@@ -125,20 +126,21 @@ class Signing:
 
 
 class FrameParser:
-    """Messages out of bytes. ``bad`` counts frames that did not check, ``unsigned`` those without a valid signature.
+    """Parses bytes into messages.
 
-    A message has the attribute ``late`` beside pymavlink's own, of `Signing`.
+    ``bad`` counts frames with a wrong checksum or signature, ``unsigned`` those with a missing, wrong or late
+    signature. A message has the attribute ``late`` (see `Signing`) in addition to pymavlink's own.
     """
 
     def __init__(self, signing: Signing | None = None) -> None:
-        self._mav = dialect.MAVLink(None)  # it has no key: signatures are our affair
+        self._mav = dialect.MAVLink(None)  # without a key, because `Signing` checks signatures
         self._signing = signing or Signing()
         self._rest = b""
         self.bad = 0
         self.unsigned = 0
 
     def feed(self, data: bytes, *, datagram: bool = False) -> list[Any]:
-        """Every message that ``data`` completes. A ``datagram`` ends with its last frame, a stream goes on."""
+        """Return every message that ``data`` completes. A ``datagram`` ends with its last frame, a stream goes on."""
         buffer, carried = self._rest + data, len(self._rest)
         messages: list[Any] = []
         position, rest = 0, b""
@@ -152,15 +154,15 @@ class FrameParser:
                 rest = rest or buffer[start:]
                 if not datagram:
                     break
-                position = start + 1  # a damaged length must not hide the frames behind it
+                position = start + 1  # a corrupted length must not hide the frames behind it
                 continue
             end = start + length
             if _is_unknown_kind(buffer, start):
                 if datagram and start < carried:
-                    position = start + 1  # of two datagrams, and nobody can tell: the next one may be whole
+                    position = start + 1  # spans two datagrams and cannot be verified: the next frame may be whole
                     continue
                 if end == len(buffer) and not datagram:
-                    rest = buffer[start:]  # what follows tells whether it is a frame
+                    rest = buffer[start:]  # only the next byte shows whether this is a frame
                     break
                 position = end if end == len(buffer) or buffer[end] in _MARKER_BYTES else start + 1
                 continue
@@ -170,12 +172,12 @@ class FrameParser:
                 continue
             if self._is_taken(message, buffer[start:end]):
                 messages.append(message)
-            position, rest = end, b""  # a bad signature is no frame's beginning: what follows must not wait for it
+            position, rest = end, b""  # a whole frame, even if badly signed: an incomplete one before it was garbage
         self._rest = rest
         return messages
 
     def _decode(self, frame: bytes) -> Any:
-        """The message in a whole frame; None if its checksum does not fit."""
+        """Return the message in a whole frame; None if its checksum is wrong."""
         try:
             return self._mav.decode(bytearray(frame))
         except dialect.MAVError:
@@ -183,7 +185,7 @@ class FrameParser:
             return None
 
     def _is_taken(self, message: Any, frame: bytes) -> bool:
-        """Whether the signature lets a message count, which learns whether it came late."""
+        """Whether the signature is acceptable; also set the message's attribute ``late``."""
         verdict = self._signing.judge(frame)
         if verdict != GOOD:
             self.bad += 1
@@ -193,26 +195,26 @@ class FrameParser:
 
 
 def _is_unknown_kind(buffer: bytes, start: int) -> bool:
-    """Whether the message id is none that we know: then nobody here can check its checksum."""
+    """Whether the message id is unknown, in which case the checksum cannot be verified."""
     if buffer[start] != _V2:
         return buffer[start + 5] not in dialect.mavlink_map
     return int.from_bytes(buffer[start + 7 : start + 10], "little") not in dialect.mavlink_map
 
 
 def _frame_length(buffer: bytes, start: int) -> int:
-    """Bytes of the frame that begins at ``start``; -1: not yet known; 0: none begins here."""
+    """Return the length in bytes of the frame at ``start``; -1: not yet known; 0: no frame begins here."""
     if len(buffer) - start < 3:
         return -1
     if buffer[start] != _V2:
         return int(buffer[start + 1]) + 8
     flags = buffer[start + 2]
     if flags & ~_SIGNED:
-        return 0  # flags that we do not know: by the standard, not ours to read
+        return 0  # the standard says to discard frames with unknown incompatibility flags
     return int(buffer[start + 1]) + 12 + (13 if flags & _SIGNED else 0)
 
 
 class FrameWriter:
-    """Messages to bytes, with sequence numbers and signatures."""
+    """Packs messages into bytes, with sequence numbers and signatures."""
 
     def __init__(self, us: Address, signing: Signing | None = None) -> None:
         self._mav = dialect.MAVLink(None, us.sysid, us.compid)
@@ -222,17 +224,17 @@ class FrameWriter:
 
     @property
     def signs(self) -> bool:
-        """Whether what it packs is signed."""
+        """Whether it signs the frames."""
         return bool(self._mav.signing.sign_outgoing)
 
     def pack(self, message: Any) -> bytes:
-        """The frame of ``message``."""
+        """Return the frame of ``message``."""
         self._mav.seq = self.number()
         frame: bytes = message.pack(self._mav)
         return frame
 
     def number(self) -> int:
-        """The number of the next frame, 0 … 255 and round again, for one that is packed elsewhere."""
+        """Take the next sequence number, 0 … 255 cyclically; also used for frames that are packed elsewhere."""
         number = self._next
         self._next = number + 1 & 255
         return number

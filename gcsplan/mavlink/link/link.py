@@ -1,9 +1,9 @@
-"""A link: one socket or serial port, the vehicles behind it, and the clock. The only place where time is read.
+"""A link: one socket or serial port, the vehicles behind it, and the clock that all tasks use.
 
-Frames are routed by (system id, component id); every system is answered at the address where it was heard, and where a
-channel has pinned its vehicle's address, there alone. `pump` runs any number of tasks on any number of links in one
-thread: a fleet takes as long as its slowest vehicle. A task is a generator that yields the time until which it may
-sleep, and is woken before that by what its vehicle sends. What goes wrong in one task, of whatever kind, ends it alone.
+Frames are routed by (system id, component id). A system is answered at the address where it was last heard, or at the
+address that its channel has pinned. `pump` runs any number of tasks on any number of links in one thread, so a fleet
+takes as long as its slowest vehicle. A task is a generator that yields the time until which it may sleep; a message
+from its vehicle wakes it earlier. An error in one task ends only that task.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ Steps = Generator[float, None, T]
 GCS = Address(255, 190)
 """System and component id that ground stations use (MAV_COMP_ID_MISSIONPLANNER)."""
 
-_MOST_PEERS = 260  # a system id each, and some strangers
+_MOST_PEERS = 260  # one per system id, and some strangers
 _MOST_WAITING = 4096
 _FORGET_S = 10.0
-_IDLE_S = 0.1  # a machine hears of prompt answers, and progress is shown, at least so often
+_IDLE_S = 0.1  # longest time between updates of machines (about prompt answers) and of progress
 
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """One message: who sent it (ids and address), and the pymavlink message itself.
+    """One received message: the sender's ids and address, and the pymavlink message itself.
 
-    ``late``: rightly signed, but not newer than what was heard before. It counts for nothing, and may count against
-    who speaks.
+    ``late``: correctly signed but not newer than earlier messages. It cannot confirm anything, but it may show that
+    there is a second vehicle.
     """
 
     source: Address
@@ -53,9 +53,9 @@ class Heard:
 
 
 class Channel:
-    """What one system says on a link: an inbox, bounded, and a way to answer.
+    """The messages of one system on a link: a bounded inbox, and methods to answer.
 
-    Not in the inbox are requests that were answered on the spot: their seqs are in ``prepared.asked``.
+    Requests that were answered promptly are not in the inbox; their seqs are in ``prepared.asked``.
     """
 
     def __init__(self, link: Link, sysid: int) -> None:
@@ -66,21 +66,21 @@ class Channel:
         self.peer: Peer | None = None
 
     def pin(self, peer: Peer | None) -> None:
-        """Answer at ``peer`` from now on, whoever else speaks under the same system id."""
+        """Send only to ``peer`` from now on, even if others use the same system id."""
         self.peer = peer
 
     @property
     def waits(self) -> bool:
-        """Whether there is something to take, or to take note of."""
+        """Whether there are messages in the inbox, or promptly answered requests to record."""
         return bool(self.inbox or (self.prepared and self.prepared.asked))
 
     def take(self) -> Iterable[Heard]:
-        """Everything that has come since the last time."""
+        """Yield and remove the messages in the inbox."""
         while self.inbox:
             yield self.inbox.popleft()
 
     def send(self, message: Any, to: Address) -> bool:
-        """Send a pymavlink message."""
+        """Send a pymavlink message; False if the address of ``to`` is unknown."""
         return self.link.send(message, to) if self.peer is None else self.link.send(message, to, self.peer)
 
     def send_packets(self, packets: Iterable[Packet]) -> None:
@@ -92,10 +92,9 @@ class Channel:
 class Link:
     """An open link. Use it as a context manager, or `close` it.
 
-    ``us`` are our own ids; with ``key`` every frame is signed and unsigned ones are dropped; ``heartbeat_s`` is the
-    interval of our ground-station heartbeat, None for none. ``clock``, ``transport`` and ``wait`` can be had from
-    elsewhere, for simulated time, and so can ``signing``. Raises InputError for a bad URL, LinkError if it does
-    not open.
+    ``us``: our own ids. ``key``: sign every frame and drop unsigned ones. ``heartbeat_s``: interval of our
+    ground-station heartbeat, None for no heartbeat. ``clock``, ``transport``, ``wait`` and ``signing`` can be replaced,
+    for example for simulated time. Raises InputError for a bad URL, LinkError if it does not open.
     """
 
     def __init__(
@@ -139,44 +138,44 @@ class Link:
 
     @property
     def url(self) -> str:
-        """The link's URL in pymavlink's way."""
+        """The link's URL in pymavlink's notation."""
         return self.endpoint.url
 
     @property
     def place(self) -> str:
-        """The address really used; tells the port if a free one was asked for."""
+        """The address actually used, with the real port if port 0 (any free one) was requested."""
         return self.transport.place
 
     @property
     def garbage(self) -> int:
-        """Frames that did not check."""
+        """Number of frames with a wrong checksum, or with a missing, wrong or late signature."""
         return self._bad + sum(parser.bad for parser in self._parsers.values())
 
     @property
     def unsigned(self) -> int:
-        """Frames that were dropped because their signature is missing or wrong."""
+        """Number of frames whose signature is missing, wrong or late."""
         return self._unsigned + sum(parser.unsigned for parser in self._parsers.values())
 
     def channel(self, sysid: int) -> Channel:
-        """A new inbox for one system id; `drop` it when done."""
+        """Return a new channel for one system id; `drop` it when done."""
         channel = Channel(self, sysid)
         self._channels.setdefault(sysid, []).append(channel)
         return channel
 
     def drop(self, channel: Channel) -> None:
-        """Forget ``channel``."""
+        """Remove ``channel``."""
         mine = self._channels.get(channel.sysid, [])
         if channel in mine:
             mine.remove(channel)
 
     def knows(self, to: Address) -> bool:
-        """Whether there is an address to send to."""
+        """Whether an address to send to is known for ``to``."""
         return self._peer(to) is not None
 
     def send(self, message: Any, to: Address, peer: Peer | None = None) -> bool:
-        """Send a pymavlink message to ``peer``, by default where ``to`` was heard; False where nobody knows the way.
+        """Send a pymavlink message to ``peer``, by default where ``to`` was heard; False if no address is known.
 
-        sysid 0 is everybody.
+        System id 0 means every known peer.
         """
         if to.sysid == 0:
             peers = [p for p in dict.fromkeys((*self._heard_at, self.transport.default)) if p is not None]
@@ -191,16 +190,16 @@ class Link:
         return True
 
     def poll(self) -> None:
-        """Read what is there into the inboxes, and send our heartbeat if it is due."""
+        """Move received messages into the inboxes, and send our heartbeat if it is due."""
         now = self.clock()
         for peer, data in self.transport.read():
             self._take_in(peer, data, now)
         self._beat(now)
 
     def answer(self, until: float) -> bool:
-        """Instead of `poll`: give prompt answers until ``until``, or a short silence, or something else comes.
+        """Replace `poll`: answer requests promptly until ``until``, a short silence, or any other message.
 
-        Whether anything came. A link that has no answers ready says no at once.
+        Return whether anything was received; False at once if no answers are prepared.
         """
         if not self.prompt or not isinstance(self.transport, Udp):
             return False
@@ -242,7 +241,7 @@ class Link:
     def _route(self, peer: Peer, message: Any, now: float) -> None:
         source = Address(message.get_srcSystem(), message.get_srcComponent())
         if source == self.us:
-            return  # our own voice, from a hub
+            return  # our own message, sent back by a hub
         if not message.late:
             self._routes[source] = peer
             self._routes[source.sysid] = peer
@@ -264,7 +263,7 @@ class Link:
 
 
 class PumpJob(Generic[T]):
-    """One task of `pump` with its result or error."""
+    """One task for `pump`, with its result or error."""
 
     def __init__(self, channel: Channel, steps: Steps[T]) -> None:
         self.channel = channel
@@ -275,25 +274,25 @@ class PumpJob(Generic[T]):
         self._steps = steps
 
     def advance(self) -> None:
-        """Run to the next pause."""
+        """Run the task to its next pause."""
         try:
             self.wake_at = next(self._steps)
         except StopIteration as stop:
             self.result, self.ended = stop.value, True
         except GcsplanError as error:
             self.error, self.ended = error, True
-        except Exception as error:  # a bug: the other vehicles' tasks have nothing to do with it
+        except Exception as error:  # a bug, which must not end the other vehicles' tasks
             _log.exception("a task for system %d failed", self.channel.sysid)
             words = f"internal error, a bug in gcsplan: {type(error).__name__}: {error}; what is on board is not known"
             self.error, self.ended = GcsplanError(words, where=f"vehicle {self.channel.sysid}"), True
 
     def close(self) -> None:
-        """End it early; its machine says goodbye to the vehicle."""
+        """End the task early; its machine then notifies the vehicle."""
         self._steps.close()
 
 
 def pump(jobs: Sequence[PumpJob[T]]) -> None:
-    """Run all ``jobs`` to their ends, together. Errors stay with their job."""
+    """Run all ``jobs`` concurrently to their ends. Each job stores its own error."""
     if not jobs:
         return
     links = list({id(job.channel.link): job.channel.link for job in jobs}.values())
@@ -319,7 +318,7 @@ def pump(jobs: Sequence[PumpJob[T]]) -> None:
 
 
 def run(channel: Channel, steps: Steps[T]) -> T:
-    """Run one task to its end and return its result; raises what it raises."""
+    """Run one task to its end and return its result; raise its error if it fails."""
     job = PumpJob(channel, steps)
     pump([job])
     if job.error is not None:

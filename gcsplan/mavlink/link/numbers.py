@@ -1,7 +1,7 @@
-"""Numbers that come over the wire, whoever sent them: NaN, infinity and what lies out of range are no number.
+"""Validation of numbers received over the wire: NaN, infinity and values out of range are rejected.
 
-Everything that is calculated from a vehicle's messages goes through here first. Mission items are not: they are
-compared bit for bit, and NaN has a meaning in them.
+Every number from a vehicle's messages passes through here before it is used in a calculation. Mission items do not:
+they are compared bit for bit, and NaN has a meaning in them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ _MOST_HEIGHT_M = 100_000.0
 
 
 class Place(NamedTuple):
-    """Degrees, and metres above mean sea level."""
+    """A position in degrees and metres above mean sea level."""
 
     lat_deg: float
     lon_deg: float
@@ -21,7 +21,7 @@ class Place(NamedTuple):
 
 
 def finite(value: object) -> float | None:
-    """``value`` as a float; None where it is NaN, infinite or no number at all."""
+    """Return ``value`` as a float; None if it is NaN, infinite or not a number."""
     if not isinstance(value, (int, float)):
         return None
     try:
@@ -32,13 +32,13 @@ def finite(value: object) -> float | None:
 
 
 def whole(value: object, low: int, high: int) -> int | None:
-    """``value`` as a whole number within ``low`` … ``high``; None where it is none."""
+    """Return ``value`` as a whole number within ``low`` … ``high``; None if it is not one."""
     number = finite(value)
     return int(number) if number is not None and number == int(number) and low <= number <= high else None
 
 
 def place(lat_e7: object, lon_e7: object, alt_mm: object) -> Place | None:
-    """A place from 1e-7 degrees and millimetres; None where it is none on earth, or 0, 0: no fix."""
+    """Return the place for 1e-7 degrees and millimetres; None if out of range, or at 0, 0, which means no fix."""
     lat, lon = whole(lat_e7, -900_000_000, 900_000_000), whole(lon_e7, -1_800_000_000, 1_800_000_000)
     height_mm = finite(alt_mm)
     if lat is None or lon is None or height_mm is None or (lat, lon) == (0, 0):

@@ -1,4 +1,4 @@
-"""Failsafe, return, fence and corner parameters: which are read, and what they mean for a mission. Never written."""
+"""Failsafe, return, fence and corner parameters: which are read, and what they mean for a mission; none is written."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ _PX4 = (
 GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
     Autopilot.ARDUCOPTER: _COPTER, Autopilot.ARDUPLANE: _PLANE, Autopilot.PX4: _PX4,
 }  # fmt: skip
-"""What is read of each autopilot. Names in one group are one parameter in different versions."""
+"""Parameters that are read before a mission is sent. Names in one group are one parameter in different versions."""
 
 FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
     Autopilot.ARDUCOPTER: (("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ACTION",)),
     Autopilot.ARDUPLANE: (("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ACTION",)),
     Autopilot.PX4: (("GF_ACTION",),),
 }
-"""What is read when a fence is sent."""
+"""Parameters that are read before a fence is sent."""
 
 _RETURN_ALTITUDE = {"RTL_ALT": 0.01, "RTL_ALT_M": 1.0, "ALT_HOLD_RTL": 0.01, "RTL_ALTITUDE": 1.0, "RTL_RETURN_ALT": 1.0}
 _FAILSAFES = {
@@ -53,14 +53,14 @@ _FAILSAFES = {
     "FS_GCS_ENABL": "loss of the ground station", "NAV_DLL_ACT": "loss of the ground station",
     "BATT_FS_LOW_ACT": "a low battery", "COM_LOW_BAT_ACT": "a low battery",
 }  # fmt: skip
-_ALTITUDE_FENCE, _CIRCLE_FENCE, _POLYGON_FENCE = 1, 2, 4  # bits of FENCE_TYPE; the circle is that around home
+_ALTITUDE_FENCE, _CIRCLE_FENCE, _POLYGON_FENCE = 1, 2, 4  # bits of FENCE_TYPE; the circle is the one around home
 _SAME_M = 0.5
 
 
 def decode_value(message: Any, mav_autopilot: int) -> float:
-    """The number in a PARAM_VALUE: ArduPilot casts to float, PX4 puts an integer's bytes in the float's place.
+    """Return the number in a PARAM_VALUE: ArduPilot casts to float, PX4 stores an integer's bytes in the float field.
 
-    NaN where it holds none: NaN itself, infinity, a float that no float32 holds.
+    NaN if it is not a number: NaN, infinity, or a float beyond float32.
     """
     integer = message.param_type <= dialect.MAV_PARAM_TYPE_INT32
     try:
@@ -73,7 +73,7 @@ def decode_value(message: Any, mav_autopilot: int) -> float:
 
 
 def parameter_name(message: Any) -> str:
-    """The name in a PARAM_VALUE."""
+    """Return the name in a PARAM_VALUE."""
     name = message.param_id
     return name if isinstance(name, str) else bytes(name).split(b"\0")[0].decode(errors="replace")
 
@@ -87,10 +87,10 @@ class _Extent:
 def judge_parameters(
     values: Values, mission: Mission, *, rtl_rel_home_m: float | None = None, expected: Values | None = None
 ) -> list[str]:
-    """What of ``values`` does not fit ``mission``, in words; nothing is changed on board.
+    """Return in words which ``values`` do not fit ``mission``; nothing is changed on board.
 
-    ``rtl_rel_home_m``: the return altitude that the mission was checked with. ``expected``: what the user wants
-    parameters to be, by name.
+    ``rtl_rel_home_m``: the return altitude that the mission was checked with, m above home. ``expected``: the values
+    that the user expects, by name.
     """
     label = profile_of(mission.autopilot).label
     if not values:
@@ -112,7 +112,7 @@ def judge_parameters(
 
 
 def judge_fence_parameters(values: Values) -> list[str]:
-    """Whether a fence that is sent will be enforced, in words; nothing is changed on board."""
+    """Return in words why a fence may not be enforced on board; nothing is changed on board."""
     if not values:
         return ["no parameters could be read: whether the fence is enforced is not known"]
     values, found = _numbers(values)
@@ -127,13 +127,13 @@ def judge_fence_parameters(values: Values) -> list[str]:
 
 
 def _numbers(values: Values) -> tuple[Values, list[str]]:
-    """Those of ``values`` that are numbers, and a line for each that is none."""
+    """Return the finite ones of ``values``, and a line of text for each other one."""
     good = {name: value for name, value in values.items() if math.isfinite(value)}
     return good, [f"{name} on board is no number: it was not compared" for name in values if name not in good]
 
 
 def _bits(value: float) -> int:
-    """A set of bits that came as a float; what is none has no bit set."""
+    """Return a bit set that was received as a float; 0 if it is not a whole number."""
     return whole(value, 0, 2**31 - 1) or 0
 
 

@@ -1,4 +1,4 @@
-"""May this mission go to this vehicle, as it stands there now? All reasons against it at once, in words."""
+"""Preflight: whether a list may be sent to a vehicle in its present state, with all reasons against it in words."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def preflight(
     allow_armed: bool = False,
     ignore_position: bool = False,
 ) -> list[str]:
-    """Warnings about sending ``items`` (wire order) to a vehicle in ``state``.
+    """Return the warnings about sending ``items`` (wire order) to a vehicle in ``state``.
 
-    ``start`` is where the mission begins; ``ground_amsl_m`` the ground there, by default the altitude of ``start``.
-    Raises VehicleRefused with every reason against it; ``reason`` is the first one's word.
+    ``start``: where the mission begins. ``ground_amsl_m``: the ground altitude there, by default that of ``start``.
+    Raises VehicleRefused with every reason against it; its ``reason`` is the first one's word.
     """
     against, warnings = objections(
         state, items, autopilot, mission_type=mission_type, start=start, ground_amsl_m=ground_amsl_m,
@@ -67,7 +67,7 @@ def objections(
     allow_armed: bool = False,
     ignore_position: bool = False,
 ) -> tuple[Reasons, list[str]]:
-    """What `preflight` has against it, a word and a text each, and its warnings."""
+    """Return the reasons against sending, each a word and a text, and the warnings; arguments as in `preflight`."""
     against: list[tuple[str, str]] = []
     warnings: list[str] = []
     _identity(state, autopilot, against, warnings)
@@ -108,7 +108,7 @@ def _identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warni
 
 
 def rivals_words(state: VehicleState) -> str:
-    """That several vehicles have the number, and what to do about it."""
+    """Return the message that several vehicles have the same system id, and what to do about it."""
     return (
         f"{state.sources} autopilots speak as system {state.address.sysid}: give each vehicle its own number, or leave "
         f"one of them off the link"
@@ -186,14 +186,14 @@ def _position(state: VehicleState, start: Home, ground_m: float, against: Reason
 
 
 def apart_m(a: VehicleState, b: VehicleState) -> float | None:
-    """Metres between the two places; None where one of them is not known."""
+    """Return the metres between two vehicles' positions; None if one of them is unknown."""
     if a.lat_deg is None or a.lon_deg is None or b.lat_deg is None or b.lon_deg is None:
         return None
     return distance_m(a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg)
 
 
 def distance_m(lat_a: float, lon_a: float, lat_b: float, lon_b: float) -> float:
-    """Great-circle distance in metres between two places in degrees (haversine on the mean sphere)."""
+    """Return the great-circle distance in metres between two places in degrees (haversine on the mean sphere)."""
     a, b = math.radians(lat_a), math.radians(lat_b)
     h = math.sin((b - a) / 2) ** 2 + math.cos(a) * math.cos(b) * math.sin(math.radians(lon_b - lon_a) / 2) ** 2
     return 2 * _EARTH_RADIUS_M * math.asin(min(1.0, math.sqrt(h)))

@@ -1,15 +1,15 @@
-"""Is the vehicle that we write to still the one that was checked, and still as it was?
+"""Repeated checks that the vehicle we write to is still the one that was checked, and in the same state.
 
-Preflight looks once, and a transfer takes minutes on a bad link: meanwhile the vehicle may be armed, carried off or
-switched off, and another one with its number may speak up. So its address on the link is pinned, what others say
-under its number does not count, and preflight is repeated
+Preflight runs once, but a transfer takes minutes on a bad link. Meanwhile the vehicle may be armed, carried away or
+switched off, and another one with its system id may appear. So its address on the link is pinned, messages from other
+addresses under its system id are ignored, and preflight is repeated
 
-- before everything that begins to write: each announcement of a list, each request to clear one (`gate`);
-- on all that comes in: a vehicle elsewhere, of another kind, or two that take turns at its address end the transfer;
-- after a silence, before another item is answered: who speaks again may be somebody else;
+- before each write: each COUNT and each CLEAR_ALL (`gate`);
+- on each incoming message: a vehicle at another place, of another type, or two at the same address end the transfer;
+- after a silence, before another item is sent: the vehicle that is heard then may be another one;
 - after the read-back (`last_look`).
 
-A look counts only if heartbeat and position have come since it was wanted; they are asked for.
+Such a look is valid only with a heartbeat and a position received since it began; both are requested.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from gcsplan.mavlink.protocol.outcome import Changed, Outcome, Unknown
 Judge = Callable[[VehicleState], tuple[Reasons, list[str]]]
 
 LOOK_S = 10.0
-"""So long a look waits for a vehicle that has fallen silent."""
+"""Seconds that a look waits for a vehicle that has fallen silent."""
 _TELLING = frozenset({"HEARTBEAT", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "ATTITUDE", "SYSTEM_TIME"})
 _RECENT_S = 1.5
 _ASK_AGAIN_S = 0.5
@@ -38,13 +38,13 @@ _AGAIN_S = 0.1
 _REQUEST_MESSAGE, _HEARTBEAT, _GLOBAL_POSITION_INT = 512, 0, 33
 _MOVED = frozenset({"wrong_place", "wrong_height"})
 _AT_ONCE = frozenset({"wrong_place", "wrong_autopilot"})
-"""What ends a transfer in the middle: it may be another vehicle. One that was armed gets its list whole."""
+"""Reasons that end a running transfer, because it may be another vehicle. If it was armed, the transfer completes."""
 
 
 class Recheck:
-    """Holds on to the vehicle in ``state``, which was found on ``channel`` and has passed ``judge``.
+    """Follows the vehicle in ``state``, which was found on ``channel`` and has passed ``judge``.
 
-    ``may_move``: where it is does not matter. ``standby_s``: how long one that reboots is waited for.
+    ``may_move``: its position may change. ``standby_s``: seconds to wait for a vehicle that reboots.
     """
 
     def __init__(
@@ -70,51 +70,51 @@ class Recheck:
         self._silent_until = -math.inf
         self._news = False
         self._stop: Outcome | None = None
-        self._began: float | None = None  # of the look that is under way
+        self._began: float | None = None  # start of the current look
         self._since = 0.0
         self._ask_at = -math.inf
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """What the vehicle has said to people."""
+        """The vehicle's status texts."""
         return tuple(self._watch.texts)
 
-    # what drives a machine asks
+    # called by `drive`
 
     @property
     def shut(self) -> bool:
-        """Whether the vehicle was silent for so long that nothing is answered before the next look."""
+        """Whether the vehicle was silent for `FRESH_S`, so that nothing is answered before the next look."""
         return self._shut
 
     @property
     def wary(self) -> bool:
-        """Whether a request has to be looked at before it is answered: it may show that there are two vehicles."""
+        """Whether requests must be checked before they are answered, because there may be two vehicles."""
         return self._shut or self._stop is not None or self._watch.contested
 
     @property
     def deadline(self) -> float:
-        """When `stops` wants to be called."""
+        """The next time to call `stops`."""
         if self._began is not None:
             return min(self._ask_at, self._channel.link.clock() + _AGAIN_S)
         return math.inf if self._shut else self._contact + FRESH_S
 
     def note(self, heard: Heard, now: float) -> None:
-        """Take in everything that comes under the vehicle's system id."""
+        """Record any message received under the vehicle's system id."""
         if heard.peer == self._channel.peer and heard.source == self._address and not heard.late:
             self.contact(now)
         self._watch.note(heard, now)
         self._news = self._news or heard.message.get_type() in _TELLING or self._watch.contested
 
     def contact(self, now: float) -> None:
-        """The vehicle was heard at its address."""
+        """Record that the vehicle was heard at its address."""
         self._shut_after_silence(now)
         self._contact = now
 
     def admits(self, heard: Heard, message: MissionMessage, now: float) -> bool:
-        """Whether a mission message counts: it comes from the vehicle's address.
+        """Whether a mission message counts, which requires that it comes from the vehicle's address.
 
-        A request is answered only while nothing speaks against it, what it shows itself included, and not after a
-        silence.
+        A request also requires that no message so far, itself included, shows another vehicle, and that the vehicle was
+        not silent since the last look.
         """
         if heard.peer != self._channel.peer or not isinstance(message, Request):
             return heard.peer == self._channel.peer
@@ -122,7 +122,7 @@ class Recheck:
         return self._stop is None and not self._shut
 
     def stops(self, now: float) -> Outcome | None:
-        """Why the transfer is to end here and now; None where it may go on. Sends what a look has to ask."""
+        """Return the outcome with which the transfer must end now; None if it may go on. Sends requests for a look."""
         self._shut_after_silence(now)
         self._judge_news(now)
         if self._stop is None and self._shut and self._contact > self._silent_until:
@@ -132,13 +132,13 @@ class Recheck:
         return self._stop
 
     def gate(self, now: float) -> Wait | Outcome | None:
-        """Before something is written: `machine.Gate`."""
+        """Return whether a write is permitted at ``now``: a `machine.Gate`."""
         return self._stop or self._look(now)
 
     # looks
 
     def last_look(self) -> Steps[Outcome | None]:
-        """After the read-back: a `Changed` outcome, None where all is as it was; Unknown after silence."""
+        """Look after the read-back: return `Changed`, None if nothing changed, or `Unknown` after silence."""
         clock = self._channel.link.clock
         self._longest_s, self._began = LOOK_S, None
         self._begin(clock(), clock())
@@ -156,7 +156,7 @@ class Recheck:
     def _look(self, now: float, *, boots: bool = False) -> Wait | Outcome | None:
         state = self._watch.state(now)
         since = now - _RECENT_S if self._began is None else self._since
-        since = max(since, self._watch.newcomer_at())  # ours must be heard beside it, and then they are two
+        since = max(since, self._watch.newcomer_at())  # hear ours after a newcomer appears, to see that there are two
         if state is None or state.beat_at < since or (state.located and state.placed_at < since):
             self._begin(now, since)
             return self._waits(now) or Unknown(self._unseen(state, since, now))
@@ -183,7 +183,7 @@ class Recheck:
     def _objections(self, state: VehicleState) -> Reasons:
         against, _ = self._judge(state)
         if not self._first.located and state.located:
-            self._first = state  # its place was not heard in time: it is held to the first one that is
+            self._first = state  # its position was not known at first: compare with the first one reported
         first = self._first
         if not self._may_move and not first.armed and not any(word in _MOVED for word, _ in against):
             away_m = apart_m(first, state)
@@ -197,7 +197,7 @@ class Recheck:
             self._stop = self._stop or self._another(now)
 
     def _another(self, now: float) -> Outcome | None:
-        """Whether what speaks from the vehicle's address cannot be the vehicle that was checked."""
+        """Return the outcome if messages from the vehicle's address show another or a second vehicle; else None."""
         state = self._watch.state(now)
         if state is None:
             return None
@@ -221,7 +221,7 @@ class Recheck:
 
 
 def request_message(to: Any, kind: int) -> Any:
-    """MAV_CMD_REQUEST_MESSAGE for one message of ``kind``."""
+    """Return MAV_CMD_REQUEST_MESSAGE to ``to`` for one message with the id ``kind``."""
     return dialect.MAVLink_command_long_message(*to, _REQUEST_MESSAGE, 0, kind, 0, 0, 0, 0, 0, 0)
 
 

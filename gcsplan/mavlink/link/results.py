@@ -1,4 +1,4 @@
-"""What a session hands back: how an upload, a comparison or a clearing ended, as data and as an error."""
+"""The result of a session: the outcome of an upload, a comparison or a clearing, as data and as an error."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LISTS = {MISSION: "mission", FENCE: "fence", RALLY: "list of rally points"}
 
 
 def outcome_word(outcome: Outcome) -> OutcomeWord:
-    """The outcome for summaries."""
+    """Return the outcome as one word for summaries; a `Changed` vehicle counts as refused."""
     if isinstance(outcome, Accepted):
         return "accepted"
     return "refused" if isinstance(outcome, (Refused, Changed)) else "unknown"
@@ -25,14 +25,14 @@ def outcome_word(outcome: Outcome) -> OutcomeWord:
 
 @dataclass(frozen=True, slots=True)
 class UploadResult:
-    """One list and one vehicle.
+    """The result for one list and one vehicle.
 
-    ``verified`` is True only if the list was read back whole, equals what was sent as the autopilot keeps it, and
-    passed the caller's check again. ``reason``: the outcome in words. ``on_board``: what the vehicle holds, where
-    that is not what was sent. ``read_back`` is in wire order; ``mission`` the same as a Mission (missions only).
-    ``failed_check``: why the read-back does not pass the check. ``simulated`` is the caller's word for the vehicle.
-    ``changed``: a word for what became of the vehicle since it was checked (armed, moved, ambiguous, …), ``change``
-    the same in a sentence; nothing was sent since that was seen. ``state``: the vehicle as it was found.
+    ``verified`` is True only if the list was read back whole, equals the sent list as the autopilot stores it, and
+    passed the caller's check again. ``reason``: the outcome in words. ``on_board``: what the vehicle holds, if that is
+    not the sent list. ``read_back``: in wire order; ``mission``: the same as a Mission (missions only).
+    ``failed_check``: why the read-back fails the check. ``simulated``: the caller says that the vehicle is simulated.
+    ``changed``: one word for how the vehicle changed since it was checked (armed, moved, ambiguous, …), ``change``: the
+    same as a sentence; nothing was sent after the change was seen. ``state``: the vehicle's state when it was found.
     """
 
     vehicle: str
@@ -60,11 +60,11 @@ class UploadResult:
 
     @property
     def faults(self) -> tuple[Difference, ...]:
-        """The differences that count."""
+        """The differences that are not excused."""
         return faults(self.differences)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the fixed keys, and those that have something to say."""
+        """Return a dict for JSON: the fixed keys, and the others that are not empty."""
         fixed: dict[str, Any] = {
             "url": self.url,
             "outcome": self.outcome,
@@ -87,7 +87,7 @@ class UploadResult:
         return fixed | {key: value for key, value in more.items() if value}
 
     def error(self) -> GcsplanError | None:
-        """The error that this result amounts to; None if it is verified, and the vehicle still as it was."""
+        """Return the error for this result; None if it is verified and the vehicle has not changed."""
         where = f"{self.vehicle or 'vehicle'} (system {self.sysid})"
         if self.verified and self.changed:
             words = f"the new {_LISTS[self.mission_type]} IS on board, read back and equal to what was sent, but "
@@ -111,7 +111,7 @@ class UploadResult:
         return LinkError(f"the outcome is {self.reason}{tail}", where=where)
 
     def raise_for_outcome(self) -> None:
-        """Raise `error`, if there is one."""
+        """Raise the error of `error` if there is one."""
         error = self.error()
         if error is not None:
             raise error

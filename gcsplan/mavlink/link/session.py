@@ -1,11 +1,11 @@
-"""What a user calls: find a vehicle, upload to it and prove that it holds what was sent; download, verify, clear.
+"""The public functions: find a vehicle, upload to it and verify what it holds; download, compare, clear.
 
     with Link("udpout:127.0.0.1:14560") as link:
         result = upload_mission(link, mission, verdict=verdict)
         result.raise_for_outcome()
 
-An upload is: the passing verdict, `preflight`, failsafe parameters read, `VerifiedUpload` (upload, settle the unknown
-by reading back, compare), and the caller's check once more on what was read back. The steps are in `tasks`.
+An upload requires a passing verdict. It runs `preflight`, reads the failsafe parameters, runs `VerifiedUpload` (upload,
+read back, compare), and repeats the caller's check on the list that was read back. The steps are in `tasks`.
 """
 
 from __future__ import annotations
@@ -59,11 +59,11 @@ T = TypeVar("T")
 
 
 class Checked(Protocol):
-    """A verdict, as far as an upload needs it."""
+    """The part of a verdict that an upload needs."""
 
     @property
     def safe(self) -> bool | None:
-        """True only if every limit was judged and holds."""
+        """True only if every limit was judged and is kept."""
         ...
 
     @property
@@ -90,7 +90,7 @@ EndCall = Callable[[UploadOrder, UploadResult | GcsplanError], None]
 def discover(
     link: Link, sysid: int, timeout_s: float = 10.0, *, listen_s: float = 1.5, standby_s: float = 0.0
 ) -> VehicleState:
-    """What system ``sysid`` says of itself. Raises LinkError if nobody answers, naming the other direction."""
+    """Return the state that system ``sysid`` reports. Raises LinkError, with hints, if nobody answers."""
     watch = Watch(sysid)
     return _run(
         link, sysid, lambda c: discover_steps(c, watch, timeout_s=timeout_s, listen_s=listen_s, standby_s=standby_s)
@@ -106,11 +106,11 @@ def upload_mission(
     judge: Judge | None = None,
     progress: ProgressCall | None = None,
 ) -> UploadResult:
-    """Upload ``mission`` to the vehicle with its system id, and prove it.
+    """Upload ``mission`` to the vehicle with its system id, and verify it by reading back.
 
     Raises CheckFailed without a passing ``verdict`` of this very mission (unless ``options.unchecked``),
-    VehicleRefused if it may not go to that vehicle as it stands, LinkError if nobody answers. How the transfer itself
-    ended is in the result.
+    VehicleRefused if the vehicle's state does not permit it, LinkError if nobody answers. The result states how the
+    transfer itself ended.
     """
     result = upload_fleet([UploadOrder(link, mission, verdict, options or SessionOptions(), judge, progress)])[0]
     if isinstance(result, GcsplanError):
@@ -119,10 +119,10 @@ def upload_mission(
 
 
 def upload_fleet(orders: Sequence[UploadOrder], *, ended: EndCall | None = None) -> list[UploadResult | GcsplanError]:
-    """Several uploads at once, on one link or several; results in the order given, an error in place of a result.
+    """Run several uploads at once, on one link or several; return results or errors in the order of ``orders``.
 
-    ``ended(order, outcome)`` is called as each of them ends. Raises CheckFailed, and sends nothing to anybody, unless
-    every mission has its passing verdict; InputError where two missions are meant for one vehicle.
+    ``ended(order, outcome)`` is called as each of them ends. Raises CheckFailed, before anything is sent, unless every
+    mission has its passing verdict; InputError if two missions are for the same vehicle.
     """
     for order in orders:
         require_verdict(order.mission, order.verdict, unchecked=order.options.unchecked)
@@ -150,7 +150,7 @@ class ListOrder:
 
 
 def upload_lists(orders: Sequence[ListOrder], mission_type: int) -> list[UploadResult | GcsplanError]:
-    """Fences (1) or rally points (2) of several vehicles at once, each proved; results as of `upload_fleet`."""
+    """Upload fences (1) or rally points (2) of several vehicles at once and verify each; results as `upload_fleet`."""
     _require_list(mission_type)
 
     def starting(order: ListOrder) -> Callable[[Channel], Steps[UploadResult]]:
@@ -163,10 +163,10 @@ def upload_lists(orders: Sequence[ListOrder], mission_type: int) -> list[UploadR
 def clear_fleet(
     orders: Sequence[UploadOrder], seen: Mapping[str, VehicleState | None]
 ) -> list[UploadResult | GcsplanError]:
-    """Clear the mission on every vehicle of ``orders``, all at once, and read back that it is gone.
+    """Clear the mission on every vehicle of ``orders``, all at once, and verify by reading back that it is gone.
 
-    ``seen``: by mission name the vehicle that was uploaded to; one that speaks from another address is left alone.
-    Results in the order given, an error in place of a result: a vehicle that is armed, or gone, keeps what it has.
+    ``seen``: by mission name, the vehicle that was uploaded to; one at another address is not touched. Returns results
+    or errors in the order of ``orders``: a vehicle that is armed or does not answer keeps its mission.
     """
 
     def starting(order: UploadOrder) -> Callable[[Channel], Steps[UploadResult]]:
@@ -197,7 +197,7 @@ def _together(
 
 
 def _telling(steps: Steps[UploadResult], order: UploadOrder, ended: EndCall | None) -> Steps[UploadResult]:
-    """``steps``, and how they ended told to the caller at once: the others of the fleet may take much longer."""
+    """Run ``steps`` and report their end to the caller at once, because the rest of the fleet may take much longer."""
     try:
         result = yield from steps
     except GcsplanError as error:
@@ -210,7 +210,7 @@ def _telling(steps: Steps[UploadResult], order: UploadOrder, ended: EndCall | No
 
 
 def require_verdict(mission: Mission, verdict: Checked | None, *, unchecked: bool = False) -> None:
-    """Raises CheckFailed unless ``verdict`` is a passing one of ``mission``, or ``unchecked``."""
+    """Raise CheckFailed unless ``verdict`` is a passing verdict of ``mission``, or ``unchecked`` is set."""
     if unchecked:
         return
     where = mission.name or f"system {mission.sysid}"
@@ -234,7 +234,7 @@ def upload_items(
     options: SessionOptions | None = None,
     name: str = "",
 ) -> UploadResult:
-    """Upload a fence (1) or rally points (2), and prove it. Raises as `upload_mission` does, but for the verdict."""
+    """Upload a fence (1) or rally points (2) and verify it. Raises as `upload_mission`, but needs no verdict."""
     _require_list(mission_type)
     task = Task(name, sysid, autopilot, tuple(items), mission_type, options or SessionOptions())
     return _run(link, sysid, lambda channel: uploading(channel, task))
@@ -248,7 +248,7 @@ def _require_list(mission_type: int) -> None:
 def download_items(
     link: Link, sysid: int, mission_type: int = MISSION, *, options: SessionOptions | None = None
 ) -> tuple[MissionItem, ...]:
-    """The list on board in wire order. Raises LinkError or VehicleRefused if it cannot be read."""
+    """Return the list on board in wire order. Raises LinkError or VehicleRefused if it cannot be read."""
     settings = options or SessionOptions()
 
     def steps(channel: Channel) -> Steps[tuple[MissionItem, ...]]:
@@ -268,9 +268,10 @@ def download_mission(
     name: str = "",
     options: SessionOptions | None = None,
 ) -> Mission:
-    """The mission on board. PX4 keeps no home in it: ``home``, else the one that the vehicle reports, else its place.
+    """Return the mission on board.
 
-    Raises InputError where no home is known, LinkError or VehicleRefused if it cannot be read.
+    PX4 stores no home in it: there, home is ``home``, else the home that the vehicle reports, else its position. Raises
+    InputError if no home is known, LinkError or VehicleRefused if the list cannot be read.
     """
     settings = options or SessionOptions()
 
@@ -292,7 +293,7 @@ def verify_mission(
 ) -> UploadResult:
     """Read the mission on board and compare it with ``mission``; nothing is written.
 
-    Raises LinkError or VehicleRefused if it cannot be read; what differs is in the result.
+    Raises LinkError or VehicleRefused if it cannot be read; the result holds the differences.
     """
     task = Task.of(mission, options or SessionOptions(), judge)
     return _run(link, mission.sysid, lambda channel: verifying(channel, task))
@@ -301,16 +302,16 @@ def verify_mission(
 def clear_mission(
     link: Link, sysid: int, mission_type: int = MISSION, *, options: SessionOptions | None = None, name: str = ""
 ) -> UploadResult:
-    """Clear one list, or mission, fence and rally points (255), and read back that nothing is left.
+    """Clear one list, or mission, fence and rally points (255), and verify by reading back that nothing is left.
 
-    Raises VehicleRefused (armed, or being flown) and LinkError.
+    Raises VehicleRefused (for example: armed, or the mission is being flown) and LinkError.
     """
     kinds = (MISSION, FENCE, RALLY) if mission_type == ALL else (mission_type,)
     return _run(link, sysid, lambda channel: clearing(channel, name, kinds, options or SessionOptions()))
 
 
 def _same_mission(a: Mission, b: Mission) -> bool:
-    """Equal to the bit, NaN included."""
+    """Whether two missions are equal bit for bit, including NaN."""
     same = (a.autopilot, a.home, a.sysid) == (b.autopilot, b.home, b.sysid)
     return same and [item.wire for item in a.items] == [item.wire for item in b.items]
 

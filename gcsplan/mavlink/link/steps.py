@@ -1,4 +1,4 @@
-"""Conversations beside the mission protocol, as tasks for `link.pump`: find a vehicle, read its parameters."""
+"""Exchanges outside the mission protocol, as tasks for `link.pump`: find a vehicle, read its parameters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gcsplan.mavlink.protocol.messages import Address
 _AUTOPILOT_VERSION, _GLOBAL_POSITION_INT, _HOME_POSITION = 148, 33, 242
 _DOES_NOT_EXIST = 1  # MAV_PARAM_ERROR
 _ASK_AGAIN_S = 0.5
-_ASKED_TIMES, _GENERIC_ASKED_TIMES = 4, 2  # one that calls itself generic is taken without a position as well
+_ASKED_TIMES, _GENERIC_ASKED_TIMES = 4, 2  # a vehicle that reports a generic autopilot may never report a position
 _PARAMETER_S = 2.0
 _NO_PARAMETERS_S = 1.0
 
@@ -23,10 +23,10 @@ _NO_PARAMETERS_S = 1.0
 def discover_steps(
     channel: Channel, watch: Watch, *, timeout_s: float, listen_s: float, standby_s: float = 0.0
 ) -> Steps[VehicleState]:
-    """Wait for an autopilot's heartbeat, ask it what it can and where it is, and listen for rivals.
+    """Wait for an autopilot's heartbeat, request its capabilities and position, and listen for rivals.
 
-    ``listen_s``: how long to listen after the first heartbeat (heartbeats come once a second). ``standby_s``: how
-    long to wait for one that is still booting. Raises LinkError after ``timeout_s`` without a heartbeat.
+    ``listen_s``: seconds to listen after the first heartbeat (heartbeats come once a second). ``standby_s``: seconds to
+    wait for a vehicle that is still booting. Raises LinkError after ``timeout_s`` without a heartbeat.
     """
     clock = channel.link.clock
     started = clock()
@@ -62,13 +62,13 @@ def parameter_steps(
     watch: Watch,
     recheck: Recheck | None = None,
 ) -> Steps[dict[str, float]]:
-    """The values of those parameters that the vehicle has; at most two seconds, one if it gives none.
+    """Return the values of those parameters that the vehicle has; takes at most 2 s, or 1 s if none arrives.
 
-    A value that is no number is NaN.
+    A value that is not a number is NaN.
     """
     clock = channel.link.clock
     values: dict[str, float] = {}
-    unknown: set[str] = set()  # the vehicle said that it has none of that name
+    unknown: set[str] = set()  # names that the vehicle reported as missing
     started, ask_at = clock(), clock()
 
     def missing() -> list[str]:
@@ -98,7 +98,7 @@ def parameter_steps(
 
 
 def dead_link(link: Link, sysid: int, timeout_s: float) -> LinkError:
-    """Why nobody answers, as far as it can be told from here, and what to try."""
+    """Return the error for a link without the vehicle's heartbeat, with likely causes and what to try."""
     others = sorted(s for s in link.heard_systems if s != sysid)
     hints = []
     if others:
@@ -124,7 +124,7 @@ def _note(channel: Channel, watch: Watch) -> None:
 
 def _is_booting(state: VehicleState) -> bool:
     if state.system_status == UNINIT and is_generic(state.mav_autopilot):
-        return False  # it does not say
+        return False  # it does not report its state
     return state.system_status < STANDBY
 
 

@@ -1,4 +1,4 @@
-"""The tasks behind `session`: each a generator for `link.pump`, about one vehicle, from finding it to the result."""
+"""The tasks behind `session`: each is a generator for `link.pump` that handles one vehicle from discovery to result."""
 
 from __future__ import annotations
 
@@ -47,22 +47,22 @@ from gcsplan.vehicle import Autopilot
 
 ProgressCall = Callable[[str, Progress], None]
 Judge = Callable[[Mission, Mapping[str, float]], str | None]
-"""The check again, with the parameters that were read: None if it passes, else why not."""
+"""Repeats the caller's check with the parameters that were read: None if it passes, else the reason."""
 
-# The most that is read of a list. ArduPilot: 64 KB of missions on an SD card (BRD_SD_MISSION) at 15 bytes an item.
+# Longest list that is read. ArduPilot: 64 KB of missions on an SD card (BRD_SD_MISSION) at 15 bytes per item.
 _MOST_HELD = {ARDUPILOTMEGA: 4369, MAV_PX4: 2000}
 _MOST_HELD_BY_ANY = 4369
 
 
 @dataclass(frozen=True, slots=True)
 class SessionOptions:
-    """How to go about it. ``unchecked`` sends without a verdict; ``simulated`` is only passed on to the result.
+    """Options of a session. ``unchecked``: send without a verdict. ``simulated``: only copied to the result.
 
-    ``discover_s``: wait for a first heartbeat; ``listen_s``: listen for rivals after it; ``standby_s``: wait for a
-    vehicle that is booting. ``ground_amsl_m``: DEM height at the start, by default the altitude of the mission's home.
-    ``timeout_s``: the longest time without progress of a transfer, of `Patience`; it bounds ``discover_s`` and
-    ``standby_s`` too.
-    ``rtl_rel_home_m`` and ``expected_parameters`` are what the parameters on board are compared with.
+    ``discover_s``: seconds to wait for a first heartbeat; ``listen_s``: to listen for rivals after it; ``standby_s``:
+    to wait for a vehicle that is booting. ``ground_amsl_m``: DEM altitude at the start, by default the altitude of the
+    mission's home. ``timeout_s``: longest time without progress of a transfer (see `Patience`); it also limits
+    ``discover_s`` and ``standby_s``. The parameters on board are compared with ``rtl_rel_home_m`` and
+    ``expected_parameters``.
     """
 
     unchecked: bool = False
@@ -86,7 +86,7 @@ class SessionOptions:
 
 @dataclass(frozen=True)
 class Task:
-    """One list in wire order for one vehicle; ``mission`` where it is one, else a fence or rally points."""
+    """One list in wire order for one vehicle; ``mission``: set for a mission, None for a fence or rally points."""
 
     name: str
     sysid: int
@@ -102,7 +102,7 @@ class Task:
     def of(
         cls, mission: Mission, options: SessionOptions, judge: Judge | None, progress: ProgressCall | None = None
     ) -> Task:
-        """The task of sending ``mission``."""
+        """Return the task of sending ``mission``."""
         return cls(
             mission.name, mission.sysid, mission.autopilot, mission.wire_items(), MISSION, options, mission, judge,
             progress,
@@ -110,7 +110,7 @@ class Task:
 
 
 def finding(channel: Channel, watch: Watch, options: SessionOptions) -> Steps[VehicleState]:
-    """Find the vehicle, and wait for it while it boots."""
+    """Find the vehicle and wait while it boots."""
     return discover_steps(
         channel, watch, timeout_s=min(options.discover_s, options.timeout_s), listen_s=options.listen_s,
         standby_s=min(options.standby_s, options.timeout_s),
@@ -118,7 +118,7 @@ def finding(channel: Channel, watch: Watch, options: SessionOptions) -> Steps[Ve
 
 
 def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
-    """Find, preflight, read parameters, upload and prove. Raises VehicleRefused, LinkError."""
+    """Find the vehicle, run preflight, read parameters, upload and verify. Raises VehicleRefused, LinkError."""
     clock, options = channel.link.clock, task.options
     watch = Watch(task.sysid)
     state = yield from finding(channel, watch, options)
@@ -173,7 +173,7 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
 
 
 def _terms(task: Task) -> dict[str, Any]:
-    """What preflight holds a vehicle to, the first time and every time."""
+    """Return the arguments of preflight, for the first run and every repetition."""
     options = task.options
     return {
         "mission_type": task.mission_type, "start": task.mission.home if task.mission else None,
@@ -191,7 +191,7 @@ def _holding(
 def _parameters(
     channel: Channel, task: Task, state: VehicleState, watch: Watch, recheck: Recheck
 ) -> Steps[tuple[list[str], dict[str, float]]]:
-    """What the parameters on board have against the list, in words; and their values, as far as they are read."""
+    """Read the parameters on board; return warnings about those that do not fit the list, and the values read."""
     options, mission = task.options, task.mission
     warnings: list[str] = []
     values: dict[str, float] = {}
@@ -209,7 +209,7 @@ def _parameters(
 def reading(
     channel: Channel, state: VehicleState, mission_type: int, options: SessionOptions, recheck: Recheck | None = None
 ) -> Steps[Download]:
-    """Read one list whole, from the address that ``state`` was heard at. Raises VehicleRefused, LinkError."""
+    """Read one whole list from the address at which ``state`` was heard. Raises VehicleRefused, LinkError."""
     channel.pin(state.peer)
     machine = Download(
         us=channel.link.us, vehicle=state.address, mission_type=mission_type, timers=options.timers,
@@ -230,7 +230,7 @@ def reading(
 
 
 def looking_at(channel: Channel, options: SessionOptions) -> Steps[tuple[VehicleState, Recheck]]:
-    """Find a vehicle that is to be read from, and hold on to it. Raises VehicleRefused where two have its number."""
+    """Find a vehicle to read from and pin its address. Raises VehicleRefused if two vehicles have its system id."""
     watch = Watch(channel.sysid)
     state = yield from finding(channel, watch, options)
     _require_one(state)
@@ -238,7 +238,7 @@ def looking_at(channel: Channel, options: SessionOptions) -> Steps[tuple[Vehicle
 
 
 def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
-    """Read the list and compare; nothing is written."""
+    """Read the list and compare it with the task's; nothing is written."""
     state, recheck = yield from looking_at(channel, task.options)
     started = channel.link.clock()
     read = yield from reading(channel, state, task.mission_type, task.options, recheck)
@@ -250,9 +250,9 @@ def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
 def clearing(
     channel: Channel, name: str, kinds: tuple[int, ...], options: SessionOptions, same: VehicleState | None = None
 ) -> Steps[UploadResult]:
-    """Clear each of ``kinds`` and read back that nothing is left. Raises VehicleRefused, LinkError.
+    """Clear each of ``kinds`` and verify by reading back that nothing is left. Raises VehicleRefused, LinkError.
 
-    ``same``: the vehicle that is meant, as it was seen before: another one is left alone.
+    ``same``: the intended vehicle as it was seen before; another one is not touched.
     """
     clock = channel.link.clock
     watch = Watch(channel.sysid)
@@ -274,7 +274,7 @@ def clearing(
         if isinstance(machine.outcome, (Refused, Changed)):
             reason = machine.outcome.reason if isinstance(machine.outcome, Changed) else ""
             raise VehicleRefused(f"not cleared: {machine.outcome}", where=f"vehicle {channel.sysid}", reason=reason)
-        read = yield from reading(channel, state, kind, options, recheck)  # settles a lost answer as well
+        read = yield from reading(channel, state, kind, options, recheck)  # also decides if the ACK was lost
         retries += read.retries
         left += 0 if kind == MISSION and len(read.items) == 1 else len(read.items)  # ArduPilot's home may stay
     return UploadResult(
@@ -327,7 +327,7 @@ def result_of(
     texts: tuple[str, ...],
     values: Mapping[str, float] = MappingProxyType({}),
 ) -> UploadResult:
-    """What became of ``task``, with the caller's check of what was read back under the parameters that were read."""
+    """Return the result of ``task``; the caller's check is repeated on the read-back with the parameters read."""
     mission: Mission | None = None
     failed: str | None = None
     if task.mission and settled.read_back:
@@ -360,7 +360,7 @@ def result_of(
 
 
 def _other_home(mission: Mission, read: tuple[MissionItem, ...]) -> list[str]:
-    """ArduPilot's item 0 is where it will count relative altitudes from, unless it is armed elsewhere."""
+    """Warn if ArduPilot's item 0 is away from the mission's start: relative altitudes count from it until arming."""
     if not mission.autopilot.is_ardupilot or (read[0].x, read[0].y) == (0, 0):
         return []
     theirs, ours = Home(read[0].x, read[0].y, read[0].z), mission.home

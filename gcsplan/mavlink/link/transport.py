@@ -1,7 +1,7 @@
-"""Sockets and serial ports behind one small face: bytes in with the peer they came from, bytes out to a peer.
+"""Sockets and serial ports behind one small interface: received bytes with their peer, and bytes sent to a peer.
 
-Nothing here blocks longer than the opening of a connection. An opened transport is read when one of its ``handles``
-is readable; one without handles (serial ports on Windows) is polled.
+Only opening a connection may block. An open transport is read when one of its ``handles`` is readable; one without
+handles (serial ports on Windows) is polled.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Heard = tuple[Peer, bytes]
 Clock = Callable[[], float]
 
 _DATAGRAM = 65535
-_BURST = 256  # datagrams or reads at one go, so that a flood cannot starve the timers
+_BURST = 256  # most datagrams per read, so that a flood cannot starve the timers
 _SILENCE_S = 0.02
 _CONNECT_S = 5.0
 _RECONNECT_S = 1.0
@@ -32,36 +32,36 @@ _MOST_CLIENTS = 32
 
 
 class Transport(Protocol):
-    """``datagrams``: what one read gives is whole. ``default``: the peer of whoever has not been heard yet."""
+    """A socket or port. ``datagrams``: one read gives whole frames. ``default``: peer for addresses not yet heard."""
 
     datagrams: bool
     default: Peer | None
 
     @property
     def handles(self) -> Sequence[int]:
-        """File descriptors to wait for; none: poll."""
+        """File descriptors to wait for; empty if the transport must be polled."""
         ...
 
     @property
     def place(self) -> str:
-        """The address that is really used."""
+        """The address that is actually used."""
         ...
 
     def read(self) -> list[Heard]:
-        """What has come, without waiting."""
+        """Return what was received, without waiting."""
         ...
 
     def write(self, data: bytes, peer: Peer) -> None:
-        """Send to ``peer``, without waiting; what cannot be sent is lost, as it is in the air."""
+        """Send to ``peer`` without waiting; data that cannot be sent is lost, as on a radio link."""
         ...
 
     def close(self) -> None:
-        """Close it for good."""
+        """Close the transport for good."""
         ...
 
 
 def open_transport(endpoint: Endpoint) -> Transport:
-    """Open ``endpoint``. Raises LinkError that says what failed and names the other direction."""
+    """Open ``endpoint``. Raises LinkError that states the cause and suggests the other direction."""
     try:
         if endpoint.kind == "udp":
             return Udp(endpoint)
@@ -78,15 +78,15 @@ def open_transport(endpoint: Endpoint) -> Transport:
 
 
 def wait_readable(transports: Sequence[Transport], timeout_s: float) -> None:
-    """Sleep until one of ``transports`` can be read or ``timeout_s`` is over."""
+    """Sleep until one of ``transports`` is readable or ``timeout_s`` has passed."""
     timeout_s = max(0.0, timeout_s)
     handles = [handle for transport in transports for handle in transport.handles]
     if any(not transport.handles for transport in transports):
-        timeout_s = min(timeout_s, 0.005)  # one that can only be polled
+        timeout_s = min(timeout_s, 0.005)  # one of them must be polled
     if not handles:
         time.sleep(timeout_s)
         return
-    with contextlib.suppress(OSError, ValueError):  # closed meanwhile: the read will tell
+    with contextlib.suppress(OSError, ValueError):  # closed meanwhile: the next read handles it
         select.select(handles, [], [], timeout_s)
 
 
@@ -97,7 +97,7 @@ def _resolve(endpoint: Endpoint, kind: socket.SocketKind) -> tuple[socket.Addres
 
 
 def _patience_s(sock: socket.socket) -> float | None:
-    """The timeout that makes ``sock`` wait for a short silence; None where the kernel was told and keeps the time."""
+    """Return the timeout for `_SILENCE_S` on ``sock``; None (blocking) if the kernel accepted it as a socket option."""
     try:
         silence = struct.pack("@ll", 0, round(_SILENCE_S * 1e6))  # struct timeval
         for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
@@ -109,7 +109,7 @@ def _patience_s(sock: socket.socket) -> float | None:
 
 
 class Udp:
-    """One UDP socket. What the network says about unreachable peers is passed over: the timers know better."""
+    """One UDP socket. ICMP errors about unreachable peers are ignored, because the timers detect silence anyway."""
 
     datagrams = True
 
@@ -154,9 +154,9 @@ class Udp:
         return heard
 
     def exchange(self, answer: Callable[[Peer, bytes], bytes | None], until: float, clock: Clock) -> list[Heard]:
-        """Answer datagram after datagram: until one has no answer, which is returned, or a short silence, or ``until``.
+        """Answer datagrams until one has no answer (it is returned), or until a short silence, or until ``until``.
 
-        A socket that waits by itself: every datagram costs two system calls less than `wait_readable` and `read`.
+        The socket itself waits, which saves two system calls per datagram compared with `wait_readable` and `read`.
         """
         receive, send = self._socket.recvfrom, self._socket.sendto
         try:
@@ -167,7 +167,7 @@ class Udp:
                 if reply is None:
                     return [(peer, data)]
                 send(reply, peer)
-        except OSError:  # silence, ICMP, or closed meanwhile
+        except OSError:  # timeout, ICMP error, or closed meanwhile
             return []
         finally:
             with contextlib.suppress(OSError):
@@ -183,7 +183,7 @@ class Udp:
 
 
 class _Stream:
-    """One TCP connection with what could not be sent at once."""
+    """One TCP connection, with a buffer for bytes that could not be sent at once."""
 
     def __init__(self, sock: socket.socket) -> None:
         sock.setblocking(False)
@@ -207,7 +207,7 @@ class _Stream:
         return data
 
     def write(self, data: bytes) -> None:
-        if len(self._unsent) + len(data) <= _MOST_UNSENT:  # beyond that the other end is not reading: lost, as by radio
+        if len(self._unsent) + len(data) <= _MOST_UNSENT:  # beyond that the peer does not read: drop, as radio would
             self._unsent += data
         self.flush()
 
@@ -229,7 +229,7 @@ class _Stream:
 
 
 class TcpClient:
-    """A connection that we make, and make again when it breaks (a vehicle that reboots)."""
+    """A connection that we open, and open again when it breaks (for example when the vehicle reboots)."""
 
     datagrams = False
     default: Peer | None = "tcp"
@@ -255,7 +255,7 @@ class TcpClient:
 
     @property
     def place(self) -> str:
-        """The other end's address."""
+        """The peer's address."""
         host, port = self._address[:2]
         return f"{host}:{port}"
 
@@ -276,7 +276,7 @@ class TcpClient:
 
 
 class TcpServer:
-    """Connections that others make to us."""
+    """Connections that peers open to us."""
 
     datagrams = False
     default: Peer | None = None
@@ -333,7 +333,7 @@ class Serial:
     default: Peer | None = "serial"
 
     def __init__(self, endpoint: Endpoint) -> None:
-        import serial  # not needed by any other link
+        import serial  # no other link needs pyserial
 
         self._port = serial.Serial(endpoint.device, endpoint.baud, timeout=0, write_timeout=1.0)
         self.place = endpoint.place
@@ -349,7 +349,7 @@ class Serial:
         try:
             data = self._port.read(4096)
         except OSError:
-            time.sleep(0.05)  # unplugged: readable for ever
+            time.sleep(0.05)  # unplugged: select reports it readable for ever
             return []
         return [("serial", bytes(data))] if data else []
 

@@ -1,4 +1,4 @@
-"""Where a vehicle is reached: pymavlink's and MAVSDK's ways of writing it, and which direction was understood.
+"""Link URLs in pymavlink's and MAVSDK's notations, and the direction that each one means.
 
 ========================================  =====================================================
 ``udpin:HOST:PORT``, ``udp:…``            listens (``udp:`` listens, as in pymavlink)
@@ -41,7 +41,7 @@ _MOST_BAUD = 12_000_000
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """One end of a link. ``listens``: others come to us; else we go to them. ``host`` is empty for serial ports."""
+    """Our end of a link. ``listens``: peers come to us; else we go to them. ``host``: empty for serial ports."""
 
     kind: Literal["udp", "tcp", "serial"]
     listens: bool
@@ -59,14 +59,14 @@ class Endpoint:
 
     @property
     def url(self) -> str:
-        """Written in pymavlink's way."""
+        """The URL in pymavlink's notation."""
         if self.kind == "serial":
             bare = _BARE_DEVICE.fullmatch(self.device)
             return f"{self.device},{self.baud}" if bare else f"serial://{self.device}:{self.baud}"
         return f"{self._scheme(self.listens)}:{self.place}"
 
     def understood(self) -> str:
-        """One clause that says what will be done: ``udpout: sends to 127.0.0.1:14560``."""
+        """Return one clause about what the link does: ``udpout: sends to 127.0.0.1:14560``."""
         if self.kind == "serial":
             return f"serial: opens {self.place}"
         if self.kind == "udp":
@@ -74,7 +74,7 @@ class Endpoint:
         return f"tcpin: waits for connections on {self.place}" if self.listens else f"tcp: connects to {self.place}"
 
     def other_direction(self) -> str:
-        """What to try if nobody answers: the same place the other way round."""
+        """Return what to try if nobody answers: the same place in the other direction."""
         if self.kind == "serial":
             return "another device or baud rate"
         turned = self._scheme(not self.listens) + ":" + self.place
@@ -87,7 +87,7 @@ class Endpoint:
 
 
 def parse_url(text: str) -> Endpoint:
-    """Read ``text``; raises InputError that names the forms there are. Port 0 listens on any free port."""
+    """Parse ``text``. Raises InputError that lists the known forms. Port 0 listens on any free port."""
     given = text.strip()
     bare = _BARE_DEVICE.fullmatch(given)
     if bare:

@@ -1,6 +1,6 @@
-"""What a vehicle says of itself: heartbeats, position, capabilities and texts, folded into a `VehicleState`.
+"""The state that a vehicle reports: heartbeats, position, capabilities and texts, combined into a `VehicleState`.
 
-What one address says is kept apart from what another says: two vehicles with one number must not be taken for one.
+Reports are kept separately for each address, so that two vehicles with the same system id are not taken for one.
 """
 
 from __future__ import annotations
@@ -31,28 +31,27 @@ CAN_MISSION_INT, CAN_TERRAIN, CAN_FENCE, CAN_RALLY = 4, 512, 16384, 32768
 
 _AUTOPILOT_COMPID = 1
 _NO_AUTOPILOT_TYPES = frozenset({5, 6, 18, 26, 27, 30, 31, 32, 33, 34, 36, 37, 38, 39, 40, 41, 42, 44})
-"""Ground stations, trackers, companion computers, gimbals, cameras and the like."""
+"""MAV_TYPEs that are no autopilot: ground stations, trackers, companion computers, gimbals, cameras and the like."""
 
 FRESH_S = 3.0
-"""Heartbeats come once a second: one that is older than this was missed."""
+"""Seconds for which a report counts as current. Heartbeats come once a second, so a longer gap means lost ones."""
 _MOST_SOURCES = 64
 _MOST_TEXTS = 20
-_ODD_S = 5.0  # messages are held up on their way, but not for longer
-_FASTEST = 2.0  # a vehicle's clock against ours
+_ODD_S = 5.0  # longest delay of a message on its way
+_FASTEST = 2.0  # largest factor by which a vehicle's clock runs faster than ours
 _LEAP_M = 300.0
 _METRES_A_DEGREE = 111_195.0
 
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
-    """One vehicle as it reports itself; None where it did not.
+    """The state that one vehicle reports; a field is None if the vehicle did not report it.
 
-    ``address`` is its autopilot's, ``peer`` where on the link it speaks from. ``system_status`` is a MAV_STATE,
-    ``amsl_m`` metres above mean sea level, ``capabilities`` MAV_PROTOCOL_CAPABILITY bits. ``sources`` counts those
-    who speak as an autopilot under this system id: more than one are two vehicles with one number. ``texts`` are its
-    last messages to people. ``beat_at`` and ``placed_at`` are when the last heartbeat and position came (the clock of
-    the link, -inf: never).
-    ``just_at``: another place, too far for it to have come from there, where it was a moment ago.
+    ``address``: its autopilot's ids; ``peer``: its address on the link. ``system_status``: a MAV_STATE. ``amsl_m``:
+    metres above mean sea level. ``capabilities``: MAV_PROTOCOL_CAPABILITY bits. ``sources``: number of autopilots heard
+    under this system id; more than one means several vehicles with the same id. ``texts``: its last status texts.
+    ``beat_at`` and ``placed_at``: times of the last heartbeat and position (clock of the link; -inf: never).
+    ``just_at``: another position reported within `FRESH_S`, too far away for the vehicle to have moved there.
     """
 
     address: Address
@@ -74,7 +73,7 @@ class VehicleState:
 
     @property
     def what(self) -> str:
-        """Kind of autopilot and vehicle in words."""
+        """Autopilot and vehicle type in words."""
         return f"{autopilot_name(self.mav_autopilot)} ({type_name(self.mav_type)})"
 
     @property
@@ -83,13 +82,13 @@ class VehicleState:
         return self.lat_deg is not None and self.lon_deg is not None
 
     def can(self, capability: int) -> bool | None:
-        """Whether it says it can; None where it says nothing."""
+        """Whether it reports a capability; None if it reports no capabilities."""
         return None if self.capabilities is None else bool(self.capabilities & capability)
 
 
 @dataclass(slots=True)
 class _Source:
-    """Heartbeats of one kind from one component at one address."""
+    """Heartbeats with one autopilot and vehicle type, from one component at one address."""
 
     autopilot: int
     kind: int
@@ -100,16 +99,16 @@ class _Source:
     armed_at: float = -math.inf
 
     def overlaps(self, other: _Source) -> bool:
-        """Whether both were there at the same time."""
+        """Whether both were heard at the same time."""
         return self.first <= other.at and other.first <= self.at
 
 
 @dataclass(slots=True)
 class _Clock:
-    """The boot clock in one kind of an address's messages.
+    """The boot time in one type of message from one address.
 
-    A vehicle that reboots falls back, and one that was not heard for long is further on. Only where two take turns
-    does the clock both fall back and leap ahead of the time that has passed.
+    The boot time falls back when a vehicle reboots, and is further on when it was not heard for long. Only if two
+    vehicles take turns does it both fall back and advance by more than the time that has passed.
     """
 
     latest_s: float = -math.inf
@@ -121,24 +120,24 @@ class _Clock:
         ahead_s = boot_s - self.latest_s - _FASTEST * (now - self.latest_at)
         self.leapt = self.leapt or (self.latest_s > -math.inf and ahead_s > _ODD_S)
         self.fell = self.fell or boot_s < self.latest_s - _ODD_S
-        if boot_s >= self.latest_s or boot_s < self.latest_s - _ODD_S:  # a message that was overtaken is none of these
+        if boot_s >= self.latest_s or boot_s < self.latest_s - _ODD_S:  # ignore a message that was overtaken
             self.latest_s, self.latest_at = boot_s, now
 
     @property
     def of_two(self) -> bool:
-        """Whether it cannot be the clock of one vehicle."""
+        """Whether the times cannot come from the clock of one vehicle."""
         return self.fell and self.leapt
 
 
 @dataclass(slots=True)
 class _Told:
-    """What one component at one address says besides its heartbeats."""
+    """The reports of one component at one address, without its heartbeats."""
 
     clocks: dict[str, _Clock] = field(default_factory=dict)
     place: Place | None = None
     from_fix: bool = False
     placed_at: float = -math.inf
-    leaps: int = 0  # from one place to another, faster than anything moves
+    leaps: int = 0  # position changes faster than any vehicle moves
     leapt_from: Place | None = None
     leapt_at: float = -math.inf
     capabilities: int | None = None
@@ -152,10 +151,10 @@ _Key = tuple[int, Peer, int, int]  # and the kinds of autopilot and vehicle
 
 
 class Watch:
-    """Collects what one system id says; `note` takes every message, `state` is what it amounts to.
+    """Collects the messages of one system id: `note` records a message, `state` returns the resulting state.
 
-    ``texts`` are the last things said to people, ``said`` counts all of them. Once a vehicle is `pin`ned, the state is
-    that of the one that speaks from there, whoever else says it has the same number.
+    ``texts`` holds the last status texts, ``said`` counts all of them. Once a vehicle is `pin`ned, `state` is that of
+    the vehicle at the pinned address, even if others use the same system id.
     """
 
     def __init__(self, sysid: int) -> None:
@@ -168,11 +167,11 @@ class Watch:
         self._pinned_at = 0.0
 
     def pin(self, state: VehicleState, now: float) -> None:
-        """From now on the vehicle is the one in ``state``, and whoever else has its number is a rival for good."""
+        """Hold on to the vehicle in ``state``; from now on, anybody else with its system id is a rival."""
         self._pinned, self._pinned_at = (state.address.compid, state.peer), now
 
     def note(self, heard: Heard, now: float) -> None:
-        """Take one message in."""
+        """Record one message."""
         kind = heard.message.get_type()
         if heard.late:
             self._note_against(heard, kind, now)
@@ -188,7 +187,7 @@ class Watch:
             _TELLS[kind](told, heard.message, now)
 
     def _note_against(self, heard: Heard, kind: str, now: float) -> None:
-        """What proves nothing may still show that there are two: another clock, another place, armed."""
+        """Record a late message, which cannot confirm the state but can show a second vehicle or that it is armed."""
         m, told = heard.message, self._told.get((heard.source.compid, heard.peer))
         if told is None:
             return
@@ -204,24 +203,24 @@ class Watch:
                     source.armed_at = now
 
     def texts_since(self, said: int) -> tuple[str, ...]:
-        """The texts, as far as they are kept, after the first ``said`` of them."""
+        """Return the status texts after the first ``said`` of all, as far as they are still kept."""
         new = min(self.said - said, len(self.texts))
         return tuple(self.texts)[len(self.texts) - new :]
 
     @property
     def contested(self) -> bool:
-        """Whether another autopilot was heard under the number, now or before: ours may be there beside it."""
+        """Whether another autopilot than the pinned one was ever heard under the system id."""
         return self._pinned is not None and bool(self._others(self._pinned))
 
     def newcomer_at(self) -> float:
-        """When another autopilot was first heard under the number since the vehicle was pinned; -inf: none was."""
+        """Return when the latest other autopilot was first heard under the system id since `pin`; -inf: none."""
         if self._pinned is None:
             return -math.inf
         firsts = (self._span(voice)[0] for voice in self._others(self._pinned))
         return max((at for at in firsts if at >= self._pinned_at), default=-math.inf)
 
     def state(self, now: float) -> VehicleState | None:
-        """The state now; None before an autopilot's heartbeat."""
+        """Return the state at ``now``; None before the first heartbeat of an autopilot."""
         pilots = {key: s for key, s in self._sources.items() if _is_autopilot(key[0], s)}
         fresh = {key: s for key, s in pilots.items() if now - s.at <= FRESH_S} or pilots
         if self._pinned:
@@ -237,7 +236,7 @@ class Watch:
         )  # fmt: skip
         source, told = fresh[best], self._told.get(best[:2]) or _Told()
         lat, lon, amsl = told.place or (None, None, None)
-        armed = source.armed or now - source.armed_at <= FRESH_S  # two that take turns: one of them is
+        armed = source.armed or now - source.armed_at <= FRESH_S  # if two vehicles take turns, one of them is armed
         return VehicleState(
             Address(self.sysid, best[0]), source.autopilot, source.kind, armed, source.status,
             lat, lon, amsl, told.capabilities, self._rivals(best[:2]), told.home, tuple(self.texts),
@@ -246,7 +245,7 @@ class Watch:
         )  # fmt: skip
 
     def alike(self) -> bool:
-        """Whether all that comes from the pinned address can be of one autopilot: one kind, boot clock and place."""
+        """Whether all messages from the pinned address may come from one autopilot: one type, boot clock, position."""
         return self._pinned is None or self._rivals(self._pinned, here=True) == 1
 
     def _voices_at(self, voice: _Voice) -> int:
@@ -257,24 +256,24 @@ class Watch:
         return 2 if overlapping or taking_turns or (told is not None and told.leaps > 1) else 1
 
     def _rivals(self, mine: _Voice, *, here: bool = False) -> int:
-        """How many autopilots were heard at the same time as ``mine``, itself counted; ``here``: at its address."""
+        """Count the autopilots heard at the same time as ``mine``, including it; ``here``: only at its address."""
         first, until = self._span(mine)
         others = [voice for voice in self._others(mine) if not here or voice[1] == mine[1]]
         spans = [self._span(voice) for voice in others]
         return sum(begin <= until and first <= end for begin, end in spans) + self._voices_at(mine)
 
     def _others(self, mine: _Voice) -> set[_Voice]:
-        """Who else speaks as an autopilot."""
+        """Return the other components and addresses that are autopilots, or have the component id of ``mine``."""
         pilots = {
             key[:2]
             for key, s in self._sources.items()
             if _is_autopilot(key[0], s) and (key[0] == mine[0] or s.autopilot not in (GENERIC, INVALID))
         }
-        # One that sends no heartbeat, or whose heartbeats get lost, is there all the same.
+        # A vehicle whose heartbeats are missing or lost counts too.
         return (pilots | {voice for voice in self._told if voice[0] == mine[0]}) - {mine}
 
     def _span(self, voice: _Voice) -> tuple[float, float]:
-        """When a voice was heard first and last: anything that it says shows that it is there."""
+        """Return when a voice was first and last heard, by any message."""
         heard = [(s.first, s.at) for key, s in self._sources.items() if key[:2] == voice]
         if voice in self._told:
             heard.append((self._told[voice].first, self._told[voice].at))
@@ -327,7 +326,7 @@ def _put(told: _Told, found: Place, now: float, *, from_fix: bool) -> None:
 
 
 def _leap(a: Place, b: Place) -> bool:
-    """Whether two places of the last seconds are farther from each other than any vehicle flies meanwhile."""
+    """Whether two positions reported within `FRESH_S` are farther apart than any vehicle flies in that time."""
     north_m = (a.lat_deg - b.lat_deg) * _METRES_A_DEGREE
     turn_deg = (a.lon_deg - b.lon_deg + 180.0) % 360.0 - 180.0
     east_m = turn_deg * _METRES_A_DEGREE * math.cos(math.radians(a.lat_deg))

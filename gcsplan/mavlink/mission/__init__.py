@@ -1,1 +1,1 @@
-"""A mission as it is stored: its items, how each autopilot stores them, and how two are compared."""
+"""A mission as it is stored: its items, how each autopilot stores them, and how two missions are compared."""
