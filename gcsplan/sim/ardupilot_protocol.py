@@ -1,7 +1,7 @@
-"""How ArduPilot speaks the mission protocol: three independent lists, pulled with the legacy MISSION_REQUEST.
+"""ArduPilot's side of the mission protocol: three independent lists, requested with the legacy MISSION_REQUEST.
 
-Source: ArduPilot 4.6 ``MissionItemProtocol.cpp`` with its three children, and ``GCS_Common.cpp``. The rules of the
-tables stand in `board`.
+Source: ArduPilot 4.6 ``MissionItemProtocol.cpp`` with its three subclasses, and ``GCS_Common.cpp``. `board` states the
+rules of the tables.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from gcsplan.sim.misbehaviour import Faults
 
 
 class ArduPilotServer:
-    """Three independent lists; not atomic: COUNT cuts the old mission, every item replaces in place."""
+    """Three independent lists; not atomic: COUNT truncates the old mission, and every item replaces one in place."""
 
     def __init__(self, board: Board, faults: Faults, *, plane: bool) -> None:
         self._lists = {t: _ArduPilotList(t, board, faults, plane) for t in (MISSION, FENCE, RALLY)}
@@ -109,7 +109,7 @@ class _ArduPilotList:
         if self._phase is not Phase.RECEIVING:
             return []
         if now >= self._heard_at + self.GIVE_UP_S:
-            self._phase = Phase.IDLE  # whatever was replaced stays replaced
+            self._phase = Phase.IDLE  # items that were replaced stay replaced
             return [(self._partner, self._ack(CANCELLED))]
         return self._ask(now) if now >= self._asked_at + self.ASK_AGAIN_S else []
 
@@ -124,7 +124,7 @@ class _ArduPilotList:
 
     def _begin(self, message: Count, sender: Address, now: float) -> Out:
         stored = self._board.lists[self._type]
-        # Until the mission library has started there is no room at all.
+        # Until the mission library has started, its capacity is 0.
         full = self._board.booting or self._faults.no_space
         if message.count > (0 if full else storage.most_items(self._type, plane=self._plane)):
             return [(sender, self._ack(NO_SPACE))]
@@ -146,7 +146,7 @@ class _ArduPilotList:
 
     def _take(self, message: Item, sender: Address, now: float) -> Out:
         if self._type == MISSION and message.current in (2, 3):
-            return self._stray_item(message, sender, now)  # "guided" items: not in guided mode
+            return self._stray_item(message, sender, now)  # "guided" items are refused outside guided mode
         if message.seq != self._next:
             return [(sender, self._ack(INVALID_SEQUENCE))]
         if sender != self._partner:
@@ -208,7 +208,7 @@ class _ArduPilotList:
 
     def _clear_while_receiving(self, message: ClearAll, sender: Address, now: float) -> Out:
         if sender != self._partner:
-            return [(sender, self._ack(DENIED)), (sender, self._ack(ERROR))]  # both go out
+            return [(sender, self._ack(DENIED)), (sender, self._ack(ERROR))]  # ArduPilot sends both
         self._phase = Phase.IDLE
         return self._clear(message, sender, now)
 
@@ -233,10 +233,10 @@ class _ArduPilotList:
         if not message.legacy:
             return [(sender, Item(message.seq, item, self._type))]
         if self._type != MISSION:
-            # It sends fence and rally points with 1e-7 degrees in the fields of degrees: no place on earth, here 0, 0.
+            # ArduPilot sends degrees times 1e7 in these fields, which is no place on Earth; 0, 0 stands for that here.
             item = MissionItem(item.command, item.frame, item.params, z=item.z, autocontinue=item.autocontinue)
         return [(sender, LegacyItem(message.seq, through_float(item), self._type))]
 
     def _tell_item_or_deny(self, message: Request, sender: Address, now: float) -> Out:
-        # Only the new kind of request is denied during an upload.
+        # During an upload, ArduPilot denies only MISSION_REQUEST_INT.
         return self._tell_item(message, sender, now) if message.legacy else self._deny(message, sender, now)

@@ -1,4 +1,4 @@
-"""What ArduPilot keeps of an item: 15 bytes each, so some numbers come back different from how they were sent.
+"""What ArduPilot stores of an item: 15 bytes per item, so some numbers read back differently.
 
 Source: ArduPilot 4.6, ``AP_Mission.cpp`` (`sanity_check_params`, `mavlink_int_to_mission_cmd`,
 `mission_cmd_to_mavlink_int`), ``MissionItemProtocol_Fence.cpp``, ``MissionItemProtocol_Rally.cpp``,
@@ -26,13 +26,13 @@ from gcsplan.sim.board import (
 FLT_EPSILON = 1.1920929e-07
 
 
-# ── how one param is kept ─────────────────────────────────────────────────────────────────────────────────────────
+# ── how one param is stored ───────────────────────────────────────────────────────────────────────────────────────
 
 Keep = Callable[[float], float]
 
 
 def _whole(value: float) -> int:
-    """C's float to int32 on x86 and ARM as compiled for SITL: towards zero; what does not fit is INT_MIN."""
+    """C's conversion of float to int32 as compiled for SITL: truncate towards zero; what does not fit is INT_MIN."""
     return int(value) if math.isfinite(value) and abs(value) < 2**31 else -(2**31)
 
 
@@ -83,7 +83,7 @@ def _positive(value: float) -> float:
 _NOTHING = (_zero, _zero, _zero, _zero)
 _FIRST_U16 = (_u16, _zero, _zero, _zero)
 
-# Commands with a place: latitude, longitude, altitude and frame are kept, and of the params what is said here.
+# Commands with a location: latitude, longitude, altitude and frame are stored, and each param as listed here.
 _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
     cmd.WAYPOINT: _FIRST_U16,  # waypoint: hold
     cmd.LOITER_UNLIM: (_zero, _zero, _signed_u16, _zero),  # loiter unlimited: radius
@@ -106,7 +106,7 @@ _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
     cmd.DO_SET_ROI: _FIRST_U16,
 }
 
-# Commands without one: they read back in frame 0 at 0, 0, 0.
+# Commands without a location: they read back in frame 0 at 0, 0, 0.
 _PLACELESS: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
     cmd.RTL: _NOTHING,  # return to launch
     cmd.ALTITUDE_WAIT: (_same, _same, _u8, _zero),
@@ -144,7 +144,7 @@ _ALT_LIMIT_M = 83_000.0
 
 
 def keep_mission_item(item: MissionItem, *, plane: bool) -> MissionItem:
-    """``item`` as it will read back from a mission. Raises `Refused`."""
+    """Return ``item`` as it reads back from a mission. Raises `Refused`."""
     allowed = _NAN_ALLOWED.get(item.command, set())
     for index, value in enumerate(item.params):
         if math.isinf(value) or (math.isnan(value) and index not in allowed):
@@ -179,10 +179,10 @@ def _kept_params(keeps: tuple[Keep, Keep, Keep, Keep], item: MissionItem) -> tup
 
 
 def _loiter_turns(params: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    """One 16-bit word for both: turns below, radius above.
+    """Store turns in the lower byte and the radius in the upper byte of one 16-bit word.
 
-    Parts of one turn are 256ths; a radius beyond 255 m is in tens of metres, its sign is the direction. Nothing keeps
-    negative turns out of the upper byte: the whole word is set, and the radius reads back as 255.
+    Less than one turn is stored in 256ths; a radius beyond 255 m in tens of metres; the radius' sign is the direction.
+    Negative turns are not kept out of the upper byte: they set all its bits, and the radius reads back as 255.
     """
     turns, _, radius_m, exit_from = params
     part, far = 0 < turns < 1, abs(radius_m) > 255
@@ -193,7 +193,7 @@ def _loiter_turns(params: tuple[float, float, float, float]) -> tuple[float, flo
 
 
 def _need_place(item: MissionItem) -> None:
-    # Compared in float32, so that the limit is soft by some units.
+    # ArduPilot compares in float32, so the limit is inexact by some units.
     if float32(abs(item.x)) > 9e8:
         raise Refused(INVALID_X)
     if float32(abs(item.y)) > 1.8e9:
@@ -201,12 +201,12 @@ def _need_place(item: MissionItem) -> None:
 
 
 def in_whole_centimetres(altitude_m: float) -> float:
-    """An altitude through ArduPilot's storage: times 100 in float32, cut to whole cm, back times 0.01 in float32."""
+    """Return an altitude as ArduPilot reads it back: times 100 in float32, truncated to cm, times 0.01 in float32."""
     return float32(float32(0.01) * int(float32(float32(altitude_m) * 100.0)))
 
 
 def home_item(home: Home) -> MissionItem:
-    """Item 0 as it reads back: the vehicle's home, whatever was sent."""
+    """Return item 0 as it reads back: always the vehicle's home, not the item that was sent."""
     return MissionItem(cmd.WAYPOINT, GLOBAL, x=home.lat_e7, y=home.lon_e7, z=in_whole_centimetres(home.amsl_m))
 
 
@@ -217,9 +217,9 @@ _CIRCLE = {cmd.CIRCLE_IN, cmd.CIRCLE_OUT}
 
 
 def keep_fence_item(item: MissionItem) -> MissionItem:
-    """One fence item as it will read back, as far as it can be judged alone. Raises `Refused`.
+    """Return one fence item as it reads back. Raises `Refused` for mistakes that the item alone shows.
 
-    Frame 2 is refused, the altitude is dropped, the frame reads back as 0 and autocontinue as 0.
+    Frame 2 is refused, the altitude is dropped, and frame and autocontinue read back as 0.
     """
     if item.frame not in _FRAMES or item.frame == 2:
         raise Refused(UNSUPPORTED_FRAME)
@@ -229,7 +229,7 @@ def keep_fence_item(item: MissionItem) -> MissionItem:
             raise Refused(INVALID_PARAM1)
         kept = _u8(first)
     elif item.command in _CIRCLE:
-        # A radius within a millimetre above whole metres is kept as an integer.
+        # A radius less than 1 mm above whole metres is stored as an integer.
         kept = float(int(first)) if 0 < first < 2**31 and first - int(first) < 0.001 else first
     elif item.command == cmd.FENCE_RETURN_POINT:
         kept = 0.0
@@ -239,7 +239,7 @@ def keep_fence_item(item: MissionItem) -> MissionItem:
 
 
 def fence_is_valid(items: Sequence[MissionItem], storage_bytes: int) -> bool:
-    """The check of the whole fence at the end of an upload: whole polygons, positive radii, places, room."""
+    """Check a whole fence at the end of an upload: complete polygons, positive radii, locations, storage."""
     left, polygon, needed, returns = 0, (0, 0.0), 5, 0
     for item in items:
         first = item.params[0]
@@ -267,7 +267,7 @@ def fence_is_valid(items: Sequence[MissionItem], storage_bytes: int) -> bool:
 
 
 def keep_rally_item(item: MissionItem) -> MissionItem:
-    """A rally point as it will read back: whole metres, no params, autocontinue 0. Raises `Refused`."""
+    """Return a rally point as it reads back: whole metres, no params, autocontinue 0. Raises `Refused`."""
     if item.command != cmd.RALLY_POINT:
         raise Refused(UNSUPPORTED)
     _need_place(item)
@@ -280,15 +280,15 @@ def keep_rally_item(item: MissionItem) -> MissionItem:
     )
 
 
-# ── room ──────────────────────────────────────────────────────────────────────────────────────────────────────────
+# ── storage ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
 
 def most_items(mission_type: int, *, plane: bool) -> int:
-    """The longest list that COUNT may announce: storage of a 16 KB board, 15 bytes an item (8 a fence point)."""
+    """Return the most items that COUNT may announce: a 16 KB board's storage, 15 bytes per item, 8 per fence point."""
     copter = {MISSION: 650, FENCE: 70, RALLY: 46}
     return {MISSION: 655, FENCE: 84, RALLY: 50}[mission_type] if plane else copter[mission_type]
 
 
 def fence_storage_bytes(*, plane: bool) -> int:
-    """Room for the fence: 42 circles on Copter."""
+    """Return the bytes of storage for a fence: 42 circles on Copter."""
     return 672 if plane else 560

@@ -1,8 +1,8 @@
-"""What both autopilots' protocol machines share: the board that survives a reboot, ACK codes, phases.
+"""The common part of both autopilots' protocol machines: the board that survives a reboot, ACK codes, phases.
 
-Two rules hold for both machines. (1) What happens on a message is looked up in the machine's table under
-(phase, kind of message); a pair that is not in the table is ignored, as the autopilot ignores it. (2) A handler returns
-what goes out as ``(addressee, message)`` pairs and sends nothing itself.
+Two rules hold for both machines. (1) The machine's table maps (phase, message type) to a handler; a message without
+an entry is ignored, as the autopilot ignores it. (2) A handler returns the messages to send as
+``(addressee, message)`` pairs and sends nothing itself.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Out = list[tuple[Address, MissionMessage]]
 
 
 class Refused(Exception):
-    """The autopilot does not take the item; ``code`` is the MAV_MISSION_RESULT that it answers."""
+    """The autopilot refuses the item; ``code`` is the MAV_MISSION_RESULT that it answers."""
 
     def __init__(self, code: int) -> None:
         super().__init__(f"MAV_MISSION_RESULT {code}")
@@ -32,22 +32,22 @@ class Refused(Exception):
 
 
 class Phase(Enum):
-    """What a machine is doing."""
+    """The phase of a machine."""
 
     IDLE = auto()
-    RECEIVING = auto()  # an upload: it asks, the ground station answers
-    SENDING = auto()  # a download (PX4 alone keeps this state)
+    RECEIVING = auto()  # an upload: the vehicle requests items, the ground station answers
+    SENDING = auto()  # a download (only PX4 has this state)
 
 
 def through_float(item: MissionItem) -> MissionItem:
-    """``item`` with its place rounded as MISSION_ITEM carries it: float32 degrees, about 0.4 m at 36°."""
+    """Return ``item`` with its location rounded as in MISSION_ITEM: float32 degrees, about 0.4 m at 36°."""
     x, y = (round(float32(float32(v) * float32(1e-7)) * 1e7) for v in (item.x, item.y))
     return MissionItem(item.command, item.frame, item.params, x, y, item.z, item.autocontinue)
 
 
 @dataclass
 class Board:
-    """What survives a reboot, and what the aircraft is doing. On ArduPilot slot 0 of the mission is home's."""
+    """The stored lists, which survive a reboot, and the vehicle's state. On ArduPilot, slot 0 of a mission is home."""
 
     home: Home
     lists: dict[int, list[MissionItem]] = field(default_factory=lambda: {MISSION: [], FENCE: [], RALLY: []})
@@ -57,7 +57,7 @@ class Board:
     uploads: int = 0  # finished uploads of a mission
 
     def opaque_id(self, mission_type: int) -> int:
-        """A number that changes with the list."""
+        """Return a number that changes with the list."""
         return zlib.crc32(b"".join(item.wire for item in self.lists.get(mission_type, [])))
 
 
@@ -65,18 +65,18 @@ class MissionServer(Protocol):
     """An autopilot's side of the protocol for all its lists."""
 
     def receive(self, message: MissionMessage, sender: Address, now: float) -> Out:
-        """Answers to ``message``."""
+        """Return the answers to ``message``."""
         ...
 
     @property
     def deadline(self) -> float | None:
-        """When `on_timer` wants to be called, or None."""
+        """The next time to call `on_timer`, or None."""
         ...
 
     def on_timer(self, now: float) -> Out:
-        """What is due at ``now``."""
+        """Return the messages that are due at ``now``."""
         ...
 
     def reset(self) -> None:
-        """Forget every transfer, as a reboot does."""
+        """Drop every transfer, as a reboot does."""
         ...

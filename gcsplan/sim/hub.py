@@ -1,6 +1,6 @@
-"""Vehicles and their listeners, without sockets: bytes from a client in, bytes to clients out, time handed in.
+"""Vehicles and their listeners, without sockets: bytes from a client in, bytes to clients out; time is an argument.
 
-An answer goes to the client that spoke. What a vehicle says unasked goes to every client that was heard of lately.
+An answer goes to the client that sent the request. What a vehicle sends on its own goes to every client heard recently.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Client = Hashable
 Sent = list[tuple[Client, bytes]]
 
 MOST_CLIENTS = 16
-MOST_STATIONS = 64  # ground stations (system and component ids) whose whereabouts are remembered
+MOST_STATIONS = 64  # ground stations (system and component ids) whose client is remembered
 FORGOTTEN_AFTER_S = 60.0
 
 _log = logging.getLogger(__name__)
@@ -35,11 +35,10 @@ class _Listener:
 
 
 class Hub:
-    """One or many vehicles behind one port. ``always`` is a client that hears everything from the start.
+    """One or many vehicles behind one port.
 
-    With ``signing`` they sign what they say and take signed frames alone.
-
-    ``mishandled`` counts messages that raised: 0 unless there is a bug in here.
+    ``always``: a client that receives everything from the start. ``signing``: the vehicles sign their frames and accept
+    only signed ones. ``mishandled`` counts messages that raised an error, which only a bug in the simulator causes.
     """
 
     def __init__(
@@ -59,16 +58,16 @@ class Hub:
 
     @property
     def clients(self) -> list[Client]:
-        """Which clients hear what a vehicle sends of its own accord."""
+        """The clients that receive what a vehicle sends on its own."""
         heard = list(self._listeners)
         return heard if self._always is None or self._always in self._listeners else [self._always, *heard]
 
     def take(self, client: Client, data: bytes, now: float, *, datagram: bool = True) -> Sent:
-        """Take in what ``client`` sent: a whole datagram, or the next piece of a stream."""
+        """Process what ``client`` sent, a whole datagram or the next piece of a stream, and return the answers."""
         self.welcome(client, now)
         listener = self._listeners.pop(client)
         listener.heard_at = now
-        self._listeners[client] = listener  # the one heard last stands last
+        self._listeners[client] = listener  # keep the order of last contact
         while len(self._listeners) > MOST_CLIENTS:
             self.forget(next(iter(self._listeners)))
         sent: Sent = []
@@ -78,7 +77,7 @@ class Hub:
             try:
                 sent += self._handle(message, client, now)
             except (ArithmeticError, ValueError, TypeError, LookupError, AttributeError):
-                # A simulator that others test against must outlive its own bugs; its tests look at the count.
+                # A simulator that others test against must survive its own bugs; its tests check the count.
                 self.mishandled += 1
                 _log.exception("cannot handle %s", message.get_type())
         return sent
@@ -86,7 +85,7 @@ class Hub:
     def _handle(self, message: Message, client: Client, now: float) -> Sent:
         source = Address(message.get_srcSystem(), message.get_srcComponent())
         if any(v.sysid == source.sysid for v, *_ in self._vehicles):
-            return []  # our own words, reflected
+            return []  # our own message, sent back
         self._whereabouts[source] = client
         self._whereabouts.move_to_end(source)
         while len(self._whereabouts) > MOST_STATIONS:
@@ -118,17 +117,17 @@ class Hub:
 
     @property
     def deadline(self) -> float | None:
-        """When `on_timer` wants to be called, or None before it was called first."""
+        """The next time to call `on_timer`, or None if no vehicle needs it and it was never called."""
         due = (self._next_second, *(v.deadline for v, *_ in self._vehicles))
         return min((at for at in due if at is not None), default=None)
 
     def on_timer(self, now: float) -> Sent:
-        """What is due at ``now``; the first call starts the heartbeats."""
+        """Return what is due at ``now``; the first call starts the heartbeats."""
         sent: Sent = []
         for vehicle, *_ in self._vehicles:
             sent += self._routed(vehicle.on_timer(now))
         if self._next_second is None or now >= self._next_second:
-            # Not "+= 1": after a pause of the whole machine one heartbeat is due, not one for each second missed.
+            # Not "+= 1": after a pause of the machine one heartbeat is due, not one for each missed second.
             self._next_second = now + 1.0
             sent += self._unasked(now)
         return sent
@@ -146,13 +145,13 @@ class Hub:
         return sent
 
     def welcome(self, client: Client, now: float) -> None:
-        """A client that is there, though it may not have said a word: it does not wait a second for a heartbeat."""
+        """Add a client, which may not have sent anything yet, so that it gets a heartbeat at once."""
         if client not in self._listeners:
             self._listeners[client] = _Listener(now, FrameParser(self._signing))
             self._next_second = now
 
     def forget(self, client: Client) -> None:
-        """Drop a client that is gone."""
+        """Remove a client that has left."""
         self._listeners.pop(client, None)
         for station in [s for s, where in self._whereabouts.items() if where == client]:
             del self._whereabouts[station]

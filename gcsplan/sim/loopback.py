@@ -1,4 +1,4 @@
-"""Loopback vehicles for missions: each stands where its mission starts."""
+"""Loopback vehicles for missions: each stands at the start of its mission."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gcsplan.sim.vehicle import LoopbackVehicle
 
 @contextmanager
 def loopback_fleet(missions: Sequence[Mission]) -> Iterator[str]:
-    """A vehicle for each mission, on one free port of this machine; gives the URL where all of them answer."""
+    """Serve a vehicle for each mission on one free port of this machine; yield the URL at which all of them answer."""
     vehicles = [
         LoopbackVehicle(
             mission.sysid,

@@ -1,6 +1,7 @@
-"""What can go wrong on purpose: a bad link, a bad memory, a second ground station, a reboot. All drawn from a seed.
+"""Intentional faults: a bad link, bad memory, a second ground station, a reboot; random ones are drawn from a seed.
 
-`Misbehaviour` is the order, `Faults` what the protocol machines ask of it, `Channel` one direction of a bad link.
+`Misbehaviour` holds the settings, `Faults` is their interface for the protocol machines, `Channel` is one direction of
+a bad link.
 """
 
 from __future__ import annotations
@@ -20,23 +21,23 @@ from gcsplan.sim.board import Refused
 
 FIELDS = ("x", "y", "z", "param1", "param2", "param3", "param4", "command", "frame", "autocontinue")
 
-# The most packets that one direction holds back; what comes on top is lost, as in a full queue.
+# Most packets that one direction holds back; further ones are lost.
 QUEUE_LIMIT = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Misbehaviour:
-    """An order for trouble. Probabilities are for each packet and hold in both directions.
+    """The requested faults. Probabilities are per packet and apply in both directions.
 
     ``drop``, ``duplicate``, ``reorder``, ``delay``: probabilities 0 … 1; a delayed packet waits up to ``delay_s``, a
-    reordered one is overtaken by the next. ``corrupt``: seq of an item that is kept wrong, in ``corrupt_field``.
-    ``silent_after``: messages received, then nothing goes out any more, heartbeats included. ``reboot_at``: items
-    received, then it reboots for ``reboot_s``, silent for the first half and booting in the second; with
-    ``reboot_loses`` the mission is gone afterwards, else what had been stored stays. ``edit``: seq of an item that a
-    second ground station changes between the ACK and the read-back. ``stray_sysid``: another vehicle talks on the
-    same link, with wrong answers ahead of every right one. ``stale_type``: answers of another mission type, likewise.
-    ``answer_sysid``: the answers carry this system id instead of the vehicle's. ``refuse``: seq of an item that is
-    answered with the ACK ``refuse_code``. ``no_space``: every upload is answered with NO_SPACE. ``armed``: it is.
+    reordered one is overtaken by the next. ``corrupt``: seq of an item that is stored with a wrong ``corrupt_field``.
+    ``silent_after``: number of received messages after which nothing is sent, not even heartbeats. ``reboot_at``:
+    number of received items after which it reboots for ``reboot_s``, silent for the first half and booting in the
+    second; with ``reboot_loses`` the mission is then gone, else what was stored stays. ``edit``: seq of an item that a
+    second ground station changes between the ACK and the read-back. ``stray_sysid``: id of another vehicle on the same
+    link that sends wrong answers before every right one. ``stale_type``: another mission type of which wrong answers
+    come likewise. ``answer_sysid``: system id of the answers instead of the vehicle's. ``refuse``: seq of an item that
+    is answered with the ACK ``refuse_code``. ``no_space``: every upload gets NO_SPACE. ``armed``: the vehicle is armed.
     """
 
     drop: float = 0.0
@@ -85,7 +86,7 @@ class Misbehaviour:
 
     @classmethod
     def parse(cls, text: str) -> Misbehaviour:
-        """From ``"drop=0.1,duplicate=0.05,corrupt=7,seed=3"``; a flag may stand alone (``"armed,no_space"``).
+        """Parse ``"drop=0.1,duplicate=0.05,corrupt=7,seed=3"``; a flag needs no value (``"armed,no_space"``).
 
         Raises UsageError that lists every mistake.
         """
@@ -117,7 +118,7 @@ class Misbehaviour:
 
 
 def _parsed(kind: str, value: str) -> float | int | bool | str:
-    """``value`` as a field's type; ValueError says what is wanted."""
+    """Return ``value`` as a field's type. Raises ValueError that states what is expected."""
     if kind == "bool":
         if value.lower() in ("", "1", "true", "yes"):
             return True
@@ -140,7 +141,7 @@ def _parsed(kind: str, value: str) -> float | int | bool | str:
 
 
 class Faults:
-    """The part of a `Misbehaviour` that the protocol machines ask for while they store."""
+    """The faults of a `Misbehaviour` that the protocol machines apply while they store items."""
 
     def __init__(self, order: Misbehaviour) -> None:
         self._order = order
@@ -151,19 +152,19 @@ class Faults:
         return self._order.no_space
 
     def refuse(self, mission_type: int, seq: int) -> None:
-        """Raise `Refused` for the item that is to be refused."""
+        """Raise `Refused` if the item is the one to refuse."""
         if mission_type == MISSION and seq == self._order.refuse:
             raise Refused(self._order.refuse_code)
 
     def spoil(self, mission_type: int, seq: int, item: MissionItem) -> MissionItem:
-        """``item``, or what a bad memory makes of it."""
+        """Return ``item``, or its corrupted version if it is the one to corrupt."""
         if mission_type == MISSION and seq == self._order.corrupt:
             return spoilt(item, self._order.corrupt_field)
         return item
 
 
 def spoilt(item: MissionItem, field: str) -> MissionItem:
-    """``item`` with one field off by the least that matters: 1e-7°, a metre, one unit, another command or frame."""
+    """Return ``item`` with one field slightly wrong: by 1e-7°, 1 m or one unit, or with another command or frame."""
     if field in ("x", "y"):
         value = getattr(item, field)
         return dataclasses.replace(item, **{field: value + 1 if value < 2**31 - 1 else value - 1})
@@ -186,7 +187,7 @@ def _another(value: float) -> float:
 
 
 class Channel:
-    """One direction of a bad link: packets go in, and come out later, twice, in another order, or not at all."""
+    """One direction of a bad link: packets come out at once, later, twice, in another order, or not at all."""
 
     OVERTAKEN_WITHIN_S = 0.2
 
@@ -197,7 +198,7 @@ class Channel:
         self._pushed = 0
 
     def push(self, packet: Packet, now: float) -> None:
-        """Take one packet in."""
+        """Add one packet."""
         order, rng = self._order, self._rng
         copies = 0 if rng.random() < order.drop else 2 if rng.random() < order.duplicate else 1
         overtaken, self._held = self._held, []
@@ -217,11 +218,11 @@ class Channel:
 
     @property
     def deadline(self) -> float | None:
-        """When the next packet comes out by itself, or None."""
+        """The time at which the next packet comes out, or None."""
         return min([entry[0] for entry in self._queue[:1]] + [entry[0] for entry in self._held], default=None)
 
     def due(self, now: float) -> list[Packet]:
-        """The packets that have come through by ``now``, in their order."""
+        """Remove and return the packets that have come through by ``now``, in order."""
         out = []
         while self._queue and self._queue[0][0] <= now:
             out.append(heapq.heappop(self._queue)[2])
@@ -230,6 +231,6 @@ class Channel:
         return out
 
     def clear(self) -> None:
-        """Lose everything under way."""
+        """Drop all packets under way."""
         self._queue.clear()
         self._held.clear()

@@ -1,9 +1,9 @@
-"""Flies tracks in simulated time: fixed steps, all vehicles of all runs at once.
+"""Flight along tracks in simulated time: fixed steps, all vehicles of all runs at once.
 
-A lane is one vehicle in one run: lane ``r · vehicles + v``. Its state is how far along its track it is, how fast, and
-what speed is commanded of it. In one step it gains speed up to what the commanded speed, the piece, the wind and the
-braking distance to everything ahead allow; a step of uniform acceleration is exact, so the length of a step matters
-only where a limit begins within it.
+A lane is one vehicle in one run: lane ``r · vehicles + v``. Its state is the distance along its track, its speed, and
+the commanded speed. In each step it accelerates up to the limit set by the commanded speed, the piece, the wind and the
+braking distance to everything ahead. A step of uniform acceleration is exact, so the step length matters only if a
+limit begins within a step.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ Integers = NDArray[np.intp]
 STEP_S = 0.1
 SAMPLE_STEPS = 2
 SAMPLE_S = STEP_S * SAMPLE_STEPS
-"""The flown track is kept so often."""
+"""Seconds between recorded samples of the flight."""
 CRAWL_M_S = 0.05
-"""The slowest that a vehicle is in a corner: nothing stops but at a stop."""
+"""Lowest speed in a corner, m/s: a vehicle comes to rest only at a stop."""
 HEADWAY_M_S = 0.3
-"""Against a wind that is too strong it creeps on."""
+"""Lowest speed over ground, m/s, against a wind that is too strong for the vehicle."""
 PATIENCE = 4.0
-"""A lane that takes so many times longer than in still air, and `SPARE_S`, is given up."""
+"""All lanes are given up this many times the longest flight in still air, plus `SPARE_S`, after the last departure."""
 SPARE_S = 300.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Flown:
-    """What was flown. L lanes, sampled at ``times_s`` (J,), seconds since the fleet's common start.
+    """The flown motion of L lanes, sampled at ``times_s`` (J,), seconds since the fleet's common start.
 
-    ``along_m`` (J, L): how far along its track each lane was; ``offset_m`` (J, L, 3) how far off it, in east, north
-    and up, zero without weather. ``begin_s``, ``arrive_s``, ``end_s`` (L,): leaving the ground, reaching the goal,
-    being down (or at the last point); NaN where that never came. ``hold_s`` (L,): how long it stood in the air.
-    ``stops`` holds for each lane the (node, time reached, time left) of every stop.
+    ``along_m`` (J, L): distance along its track; ``offset_m`` (J, L, 3): offset from it in east, north and up, None
+    without weather. ``begin_s``, ``arrive_s``, ``end_s`` (L,): times of leaving the ground, of reaching the goal, and
+    of touch-down (or reaching the last point); NaN if never. ``hold_s`` (L,): seconds of standing in the air.
+    ``stops``: for each lane, (node, time reached, time left) of every stop.
     """
 
     tracks: tuple[Track, ...]
@@ -58,15 +58,15 @@ class Flown:
     stops: tuple[tuple[tuple[int, float, float], ...], ...]
 
     def track_of(self, lane: int) -> Track:
-        """The track of a lane."""
+        """Return the track of a lane."""
         return self.tracks[lane % len(self.tracks)]
 
     def points(self, lane: int) -> Floats:
-        """(J, 3) where a lane was at each sample."""
+        """(J, 3) positions of a lane at each sample."""
         return self._places(lane, self.times_s, self.along_m[:, lane])
 
     def trace(self, lane: int, *, leaves: bool = False) -> Trace:
-        """What a lane flew, from leaving the ground to its end; every node of its track is in it."""
+        """Return the trace of a lane, from leaving the ground to its end; it includes every node of the track."""
         track = self.track_of(lane)
         s = np.concatenate([[0.0], np.cumsum(track.length_m)])
         end_s = self.end_s[lane] if np.isfinite(self.end_s[lane]) else self.times_s[-1]
@@ -99,7 +99,7 @@ class Flown:
 
 
 class _Ways:
-    """All tracks' pieces in one row, and for each piece where its run ends."""
+    """The pieces of all tracks in one array each, and for each piece the next stop."""
 
     def __init__(self, tracks: Sequence[Track]) -> None:
         length = [t.length_m for t in tracks]
@@ -118,20 +118,20 @@ class _Ways:
         self.stop_node = np.concatenate([_next_stop(t) for t in tracks])
         self.stop_at = np.concatenate([a[_next_stop(t)] for t, a in zip(tracks, along, strict=True)])
         self.hold = np.concatenate([t.hold_s[_next_stop(t)] for t in tracks])
-        # A place just before the stop, so that what lies there is still this run's.
+        # Just before the stop, so that a look-up there finds a piece before the stop.
         self.before_stop = np.nextafter(self.stop_at, -math.inf)
         self.stops_after = self.end >= self.stop_at
         self.last = np.concatenate([_next_stop(t) == len(t.points) - 1 for t in tracks])
 
     def calm_s(self) -> float:
-        """About as long as the longest flight in still air takes, seconds; acceleration and corners not counted."""
+        """Return about the seconds of the longest flight in still air, without acceleration."""
         slow = np.maximum(np.minimum(self.cap, self.command), CRAWL_M_S)
         holds = np.where(self.stops_after & np.isfinite(self.hold), self.hold, 0.0)
         return float(np.add.reduceat((self.end - self.begin) / slow + holds, self.first).max())
 
 
 def _next_stop(track: Track) -> Integers:
-    """(N - 1,) the node at which the vehicle next stops, for each piece; the last node is one."""
+    """(N - 1,) the next node at which the vehicle stops, for each piece; the last node is always a stop."""
     n = len(track.points)
     stops = np.where(track.hold_s != PASSED, np.arange(n), n - 1)[1:]
     return np.minimum.accumulate(stops[::-1])[::-1].astype(np.intp)
@@ -143,7 +143,7 @@ def fly(
 ) -> Flown:  # fmt: skip
     """Fly every track, each released at its ``depart_s``, in ``runs`` runs of different weather.
 
-    In still air all runs are the same. Run number ``first_run`` + r has its own weather, whatever else is flown.
+    In still air all runs are the same. The weather of run ``first_run`` + r does not depend on the other runs.
     """
     weather = weather or Weather()
     ways = _Ways(tracks)
@@ -183,7 +183,7 @@ class _Lanes:
         self.piece = np.tile(ways.first, runs)
         self.s, self.v = np.zeros(n), np.zeros(n)
         self.command = ways.command[self.piece]
-        self.clock = np.zeros(n)  # each lane's own: after a stop within a step it is behind
+        self.clock = np.zeros(n)  # each lane's own time, which is behind after a stop within a step
         self.wait = depart_s + np.tile([max(float(t.hold_s[0]), 0.0) for t in tracks], runs)
         self.done = np.zeros(n, np.bool_)
         self.begin, self.arrive, self.ended = self.wait.copy(), np.full(n, np.nan), np.full(n, np.nan)
@@ -191,7 +191,7 @@ class _Lanes:
         self.stops: list[list[tuple[int, float, float]]] = [[(0, 0.0, float(w))] for w in self.wait]
 
     def advance(self, to_s: float, wind: Floats | None) -> None:
-        """Bring every lane to ``to_s``."""
+        """Advance every lane to the time ``to_s``."""
         ways = self._ways
         b = to_s - self.clock
         waited = np.minimum(self.wait, b)
@@ -204,12 +204,12 @@ class _Lanes:
         self.command = np.where((v > 0.0) & (command < self.command), slower, command)
         accel = ways.accel[k]
         over_ground = self.command if wind is None else np.minimum(self.command, self._headway(k, wind))
-        # What counts is what holds where the step ends: within a step it may come into a corner, or out of one.
+        # The limits at the end of the step count, because a step may lead into a corner or out of one.
         there = self._piece_at(k, np.minimum(s + v * b, ways.before_stop[k]))
         with np.errstate(divide="ignore"):
             cap = np.minimum(ways.cap[there], over_ground / ways.level[there])
             slow = v >= np.minimum(ways.cap[k], over_ground / ways.level[k])
-            # Out of a slow piece it gains speed from where that ends, not from where the step began.
+            # After a slow piece, acceleration begins at the end of that piece, not at the start of the step.
             after = np.where(slow & (there != k), b - (ways.begin[there] - s) / np.maximum(v, CRAWL_M_S), b)
         half = 0.5 * accel * b
         ahead = half**2 + ways.square[there] + 2.0 * accel * (ways.end[there] - s) - 2.0 * half * v
@@ -218,7 +218,7 @@ class _Lanes:
         steady = np.maximum(cap, v - 2.0 * half)
         faster = np.minimum(np.minimum(v + accel * np.clip(after, 0.0, b), steady), braked)
         left = ways.stop_at[k] - s
-        # Faster: at full acceleration, then steady. Slower: evenly, as `braked` was worked out.
+        # Speeding up: full acceleration, then constant speed. Slowing down: uniform, as assumed for `braked`.
         gone = np.where(faster > v, faster * b - (faster - v) ** 2 / (2.0 * accel), 0.5 * (v + faster) * b)
         gone[b <= 0.0] = 0.0
         stops = ((gone >= left) | (2.0 * left <= v * b)) & (b > 0.0)
@@ -230,7 +230,7 @@ class _Lanes:
         self.piece = np.where(stops | self.done, self.piece, self._piece_at(k, self.s))
 
     def _piece_at(self, k: Integers, s: Floats) -> Integers:
-        """The pieces at ``s`` (L,), which lie on ``k`` or after it and before the next stop."""
+        """Return the pieces at ``s`` (L,): piece ``k`` or a later one before the next stop."""
         ends, k = self._ways.end, k.copy()
         behind = np.flatnonzero(s >= ends[k])
         while len(behind):
@@ -240,7 +240,7 @@ class _Lanes:
         return k
 
     def _stop(self, lane: int, since_s: float, v: float, faster: float, left_m: float) -> None:
-        """A lane comes to its stop ``left_m`` further on, in a step that began at ``since_s`` with the speed ``v``."""
+        """Stop a lane ``left_m`` ahead, in a step that began at ``since_s`` with the speed ``v``."""
         ways, k = self._ways, int(self.piece[lane])
         accel, within_s = float(ways.accel[k]), float(self.clock[lane]) - since_s
         if accel >= AT_ONCE_M_S2:
@@ -263,7 +263,7 @@ class _Lanes:
         self.piece[lane] = first + node
 
     def _headway(self, k: Integers, wind: Floats) -> Floats:
-        """The most over ground along the course: what the airspeed leaves when the wind is held against."""
+        """Return the highest speed over ground along the course while the vehicle crabs into the wind."""
         course = self._ways.course[k]
         tail = (course * wind).sum(axis=1)
         cross = course[:, 0] * wind[:, 1] - course[:, 1] * wind[:, 0]

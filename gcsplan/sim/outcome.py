@@ -1,4 +1,4 @@
-"""How a rehearsal ended: what every vehicle did in every run, and what of it was not as it should be."""
+"""The result of a rehearsal: how every vehicle flew in every run, and which requirements were violated."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
 SHOWN = 8
-"""So many violations are named in an error's message."""
+"""Most violations that an error's message names."""
 MEETING_STEP_S = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One vehicle's part: its mission with its verdict, and when it leaves and should arrive by plan.
+    """One vehicle's part in a rehearsal: its mission with its verdict, and its planned departure and arrival.
 
-    ``depart_s``, ``arrive_s``: seconds since the fleet's common start, ``arrive_s`` None where nothing is planned.
-    ``airborne``: it begins at the top of its take-off (missions of papers); ``leaves``: it is gone when it arrives.
+    ``depart_s``, ``arrive_s``: seconds since the fleet's common start; ``arrive_s`` is None if none is planned.
+    ``airborne``: it begins at the top of its take-off (missions from papers); ``leaves``: it is gone when it arrives.
     """
 
     vehicle: Vehicle
@@ -41,8 +41,10 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What a fleet is held to. ``order``: names in the order of arrival, empty where any will do. ``separation_m``
-    None: the least distance is reported, and not judged. A landed vehicle is in the way for ``pad_clear_s``."""
+    """The requirements of a fleet.
+
+    ``order``: names in the required order of arrival, empty if any order is allowed. ``separation_m`` None: the least
+    distance is reported but not judged. ``pad_clear_s``: seconds for which a landed vehicle blocks its place."""
 
     order: tuple[str, ...] = ()
     separation_m: float | None = None
@@ -51,7 +53,7 @@ class Terms:
 
 @dataclass(frozen=True, slots=True)
 class Breach:
-    """Something that went wrong: its worst instance in words, and in how many runs it happened."""
+    """A violated requirement: its worst instance in words, and the number of runs in which it happened."""
 
     kind: str
     vehicles: tuple[str, ...]
@@ -60,7 +62,7 @@ class Breach:
     runs: int
 
     def describe(self, of_runs: int) -> str:
-        """One line."""
+        """Return one line; ``of_runs``: the number of all runs."""
         return self.message if of_runs == 1 else f"{self.message} (in {self.runs} of {of_runs} runs)"
 
     def as_dict(self) -> dict[str, Any]:
@@ -73,7 +75,7 @@ class Breach:
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """One vehicle in all runs. ``arrive_s`` and ``end_s`` of each run (NaN: never); heights are the least of all."""
+    """One vehicle in all runs. ``arrive_s``, ``end_s``: of each run (NaN: never). ``min_agl_m``: least of all runs."""
 
     name: str
     depart_s: float
@@ -87,18 +89,18 @@ class Performance:
 
     @property
     def errors_s(self) -> tuple[float, ...]:
-        """Arrival late (early: negative), of each run; infinite where it never arrived. Empty without a plan."""
+        """Arrival minus plan of each run (late: positive); infinite if it never arrived. Empty without a plan."""
         if self.planned_s is None:
             return ()
         return tuple(math.inf if math.isnan(a) else a - self.planned_s for a in self.arrive_s)
 
     @property
     def p95_s(self) -> float | None:
-        """95 % of the runs are no farther from the plan."""
+        """95th percentile of the absolute arrival error over the runs, s; None without a plan."""
         return percentile_95([abs(e) for e in self.errors_s])
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; a single run's arrival stands in ``arrive_s``, of several it is the median."""
+        """Return a dict for JSON; ``arrive_s`` is the median of the runs."""
         errors = self.errors_s
         worst = max(errors, key=abs, default=None)
         return {
@@ -113,9 +115,10 @@ class Performance:
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """The whole. ``closest`` is the nearest that any two came in any run, None where no two flew at a time.
+    """The result of a rehearsal.
 
-    ``simulator``: who flew, ``gcsplan`` or ``sitl``. ``weather`` is what it was flown in, for people and JSON.
+    ``closest``: the least distance of any two vehicles in any run, None if no two flew at the same time.
+    ``simulator``: ``gcsplan`` or ``sitl``. ``weather``: the simulated weather, for output.
     """
 
     simulator: str
@@ -133,23 +136,23 @@ class Rehearsal:
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """What of the missions was not flown."""
+        """The parts of the missions that were not flown."""
         return tuple(f"{v.name}: {what}" for v in self.vehicles for what in v.not_flown)
 
     @property
     def safe(self) -> bool | None:
-        """True, False, or None where nothing went wrong but something was not flown."""
+        """False if a requirement was violated, else None if something was not flown, else True."""
         if self.breaches:
             return False
         return None if self.not_judged else True
 
     @property
     def p95_s(self) -> float | None:
-        """95 % of all arrivals of all vehicles are no farther from the plan."""
+        """95th percentile of the absolute arrival error over all vehicles and runs, s."""
         return percentile_95([abs(e) for v in self.vehicles for e in v.errors_s])
 
     def error(self, *, allow_unjudged: bool = False) -> CheckFailed | None:
-        """The error that this amounts to; None if all is well."""
+        """Return the error for this result; None if all is well. ``allow_unjudged``: accept parts not flown."""
         if self.breaches:
             lines = [b.describe(self.runs) for b in self.breaches[:SHOWN]]
             rest = len(self.breaches) - SHOWN
@@ -182,12 +185,12 @@ class Rehearsal:
         }  # fmt: skip
 
     def rows(self) -> list[dict[str, str]]:
-        """A table row for each vehicle."""
+        """Return a table row for each vehicle."""
         return [_row(v, self.runs) for v in self.vehicles]
 
 
 def percentile_95(values: Sequence[float]) -> float | None:
-    """The smallest value that 95 % of ``values`` do not exceed; None of none."""
+    """Return the smallest of ``values`` that 95 % of them do not exceed; None if there are none."""
     return sorted(values)[math.ceil(0.95 * len(values)) - 1] if values else None
 
 
@@ -219,13 +222,13 @@ def _median(values: Sequence[float]) -> float | None:
 
 
 def _number(value: float | None) -> float | None:
-    """For JSON: no infinities, and no more digits than there is sense in."""
+    """Return a number for JSON: None for infinity and NaN, else rounded to 7 decimals."""
     return None if value is None or not math.isfinite(value) else round(value, 7)
 
 
 @dataclass
 class Tally:
-    """Counts run after run what `Rehearsal` tells. ``energy_j`` of each vehicle's flight."""
+    """Accumulates the runs of a rehearsal; `result` returns the `Rehearsal`."""
 
     parts: Sequence[Part]
     world: World
@@ -245,7 +248,7 @@ class Tally:
         self._lowest: list[Judged | None] = [None] * len(self.parts)
 
     def add(self, traces: Sequence[Trace]) -> None:
-        """One run, the traces in the order of the parts."""
+        """Add one run; ``traces`` are in the order of the parts."""
         self.runs += 1
         self._seen = set()
         for i, (part, trace) in enumerate(zip(self.parts, traces, strict=True)):
@@ -264,7 +267,7 @@ class Tally:
         self._separation(traces)
 
     def breach(self, kind: str, vehicles: tuple[str, ...], message: str, by: float, more: object = None) -> None:
-        """Note a breach; of one kind the worst is kept, and each run counts once."""
+        """Record a breach; of one kind, vehicle set and ``more``, keep the worst and count each run once."""
         key = (kind, vehicles, more)
         was = self._breaches.get(key)
         runs = (was.runs if was else 0) + (key not in self._seen)
@@ -305,7 +308,7 @@ class Tally:
         self, simulator: str, seed: int, weather: dict[str, Any], energy_j: Sequence[float],
         not_flown: Sequence[tuple[str, ...]],
     ) -> Rehearsal:  # fmt: skip
-        """What it all amounts to."""
+        """Return the rehearsal's result. ``energy_j``: of each vehicle's flight, J."""
         performances = []
         for i, part in enumerate(self.parts):
             low = self._lowest[i]
@@ -330,7 +333,7 @@ class Tally:
 
 
 def energy_of(points: np.ndarray[Any, np.dtype[np.float64]], hold_s: float, vehicle: Vehicle) -> float:
-    """Joules for a flown line (M, 3) and standing in the air (krill paper, Table 1; wind costs nothing in it)."""
+    """Return the joules for a flown path (M, 3) and ``hold_s`` of hovering (krill paper, Table 1; wind is ignored)."""
     delta = np.diff(points, axis=0)
     energy = vehicle.energy
     return float(

@@ -1,4 +1,4 @@
-"""A small table of parameters, with the names, types and defaults of each autopilot, for those who ask.
+"""A small table of parameters that simulated vehicles report, with each autopilot's names, types and defaults.
 
 Sources: parameter lists of ArduCopter 4.6, ArduPlane 4.6 and PX4 1.15 (defaults of a quadrotor).
 """
@@ -118,36 +118,36 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
 
 
 class Parameters:
-    """The parameters of one vehicle, in alphabetical order as autopilots list them."""
+    """The parameters of one vehicle, in alphabetical order, as autopilots list them."""
 
     def __init__(self, autopilot: Autopilot, sysid: int) -> None:
         own_id = {} if autopilot is Autopilot.PX4 else {"SYSID_THISMAV": _i(sysid, INT16)}
         self._table = dict(sorted({**_TABLES[autopilot], **own_id}.items()))
         if autopilot is Autopilot.PX4:
             self._table["MAV_SYS_ID"] = _i(sysid)
-        # PX4 puts an integer's bytes into the float field, ArduPilot its value.
+        # PX4 stores an integer's bytes in the float field, ArduPilot its value.
         self._bytewise = autopilot is Autopilot.PX4
 
     def __len__(self) -> int:
         return len(self._table)
 
     def names(self) -> list[str]:
-        """All names in order: a parameter's index is its place here."""
+        """Return all names in order: a parameter's index is its place in this list."""
         return list(self._table)
 
     def value(self, name: str) -> float:
-        """The value; KeyError if there is none of that name."""
+        """Return a parameter's value. Raises KeyError for an unknown name."""
         return self._table[name].value
 
     def on_wire(self, name: str) -> tuple[float, int]:
-        """``(param_value, param_type)`` as PARAM_VALUE carries them."""
+        """Return ``(param_value, param_type)`` as in PARAM_VALUE."""
         parameter = self._table[name]
         if self._bytewise and parameter.kind != REAL32:
             return float(struct.unpack("<f", struct.pack("<i", int(parameter.value)))[0]), parameter.kind
         return parameter.value, parameter.kind
 
     def set_from_wire(self, name: str, wire: float) -> bool:
-        """Take a PARAM_SET; False where the name is unknown or the value does not fit."""
+        """Apply the value of a PARAM_SET; return False if the name is unknown or the value does not fit."""
         parameter = self._table.get(name)
         if parameter is None:
             return False

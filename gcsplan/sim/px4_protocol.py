@@ -1,6 +1,6 @@
-"""How PX4 speaks the mission protocol: one transfer at a time, in order, and the list is swapped at the end.
+"""PX4's side of the mission protocol: one transfer at a time, in order, and the new list replaces the old at the end.
 
-Source: PX4 ``mavlink_mission.cpp`` and ``mavlink_mission.h``. The rules of the table stand in `board`.
+Source: PX4 ``mavlink_mission.cpp`` and ``mavlink_mission.h``. `board` states the rules of the table.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from gcsplan.sim.misbehaviour import Faults
 
 
 class Px4Server:
-    """One transfer at a time for all lists; atomic: the new list is swapped in after its last item."""
+    """One transfer at a time for all lists; atomic: the new list replaces the old one after its last item."""
 
     ASK_AGAIN_S = 0.25
     GIVE_UP_S = 5.0
@@ -62,7 +62,7 @@ class Px4Server:
             (Phase.SENDING, RequestList): self._list_while_busy,
             (Phase.SENDING, Request): self._tell_item,
             (Phase.SENDING, Ack): self._stop_sending,
-            # Ignored: a request while idle or receiving, CLEAR_ALL while busy.
+            # Ignored: a request while idle or receiving, CLEAR_ALL during a transfer.
         }
 
     def reset(self) -> None:
@@ -95,7 +95,7 @@ class Px4Server:
         if self._phase is Phase.IDLE:
             return []
         if now >= self._heard_at + self.GIVE_UP_S:
-            self._phase = Phase.IDLE  # without a word; the old list stays
+            self._phase = Phase.IDLE  # no message is sent; the old list stays
             return []
         asks = self._phase is Phase.RECEIVING and now >= self._sent_at + self.ASK_AGAIN_S
         return self._ask(now) if asks else []
@@ -112,7 +112,7 @@ class Px4Server:
     def _begin(self, message: Count, sender: Address, now: float) -> Out:
         self._heard_at, self._partner, self._type = now, sender, message.mission_type
         if self._type not in self._board.lists:
-            # No room is known for such a list.
+            # PX4 has no storage for this mission type.
             return self._answer(NO_SPACE if message.count else ACCEPTED, sender)
         if message.count > storage.most_items(self._type) or (self._faults.no_space and message.count):
             return self._answer(NO_SPACE, sender)
@@ -126,8 +126,8 @@ class Px4Server:
     def _count_again(self, message: Count, sender: Address, now: float) -> Out:
         self._heard_at = now
         if sender != self._partner or self._next > 0:
-            return self._answer(ERROR, sender)  # and the upload goes on
-        return self._ask(now)  # our first request was lost; the first count stands
+            return self._answer(ERROR, sender)  # the upload goes on nevertheless
+        return self._ask(now)  # the first request was lost; the number in the first COUNT stays valid
 
     def _take(self, message: Item, sender: Address, now: float) -> Out:
         if sender != self._partner:
@@ -156,7 +156,7 @@ class Px4Server:
     def _late_item(self, message: Item, sender: Address, now: float) -> Out:
         if sender != self._partner:
             return []
-        # "Assume this is a duplicate" of the last item whose ACK was lost: also true of a transfer that timed out.
+        # "Assume this is a duplicate" of the last item whose ACK was lost; PX4 also does so after a timeout.
         again = message.mission_type == self._type and message.seq + 1 == self._next
         return self._answer(ACCEPTED, sender, self._crc) if again else self._answer(ERROR, sender)
 
@@ -205,7 +205,7 @@ class Px4Server:
         if message.seq == self._next and self._next < self._count:
             self._next += 1
         elif message.seq != self._next - 1:
-            self._phase = Phase.IDLE  # out of order: the download ends here
+            self._phase = Phase.IDLE  # a request out of order ends the download
             return self._answer(ERROR, sender)
         if message.seq >= len(stored):
             self._phase = Phase.IDLE

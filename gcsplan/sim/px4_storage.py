@@ -1,4 +1,4 @@
-"""What PX4 keeps of an item: floats as they are, but only the params that a command uses.
+"""What PX4 stores of an item: floats unchanged, but only the params that a command uses.
 
 Source: PX4 ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavlink_mission_item`) and ``navigation.h``.
 """
@@ -36,7 +36,7 @@ def _i16(value: float) -> float:
 
 
 def _heading(degrees: float) -> float:
-    """Degrees through radians in float32, wrapped to 0 … 2π: −90 comes back as 270, and 10 as 10.0 or its neighbour."""
+    """Convert degrees to float32 radians in 0 … 2π and back: −90 becomes 270; 10 stays 10 or a float32 next to it."""
     radians = float32(degrees * float32(float32(math.pi) / 180.0))
     if not math.isfinite(radians):
         return math.nan
@@ -53,7 +53,7 @@ def _vertices(value: float) -> float:
 _NOTHING = (_zero, _zero, _zero, _zero)
 _HEADING_ONLY = (_zero, _zero, _zero, _heading)
 
-# Commands with a place, in frames 0, 3, 5, 6: the params that come back.
+# Commands with a location, in frames 0, 3, 5, 6: how each param reads back.
 _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
     cmd.WAYPOINT: (_same, _same, _zero, _heading),  # waypoint: hold, acceptance radius
     cmd.LOITER_UNLIM: (_zero, _zero, _same, _heading),  # loiter unlimited
@@ -73,7 +73,7 @@ _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
     cmd.RALLY_POINT: _NOTHING,
 }
 
-# Commands that PX4 takes in frame 2 alone.
+# Commands that PX4 accepts only in frame 2.
 _PLACELESS = frozenset({
         cmd.RTL, cmd.DELAY, cmd.CONDITION_DELAY, cmd.CONDITION_DISTANCE, cmd.DO_JUMP, cmd.DO_CHANGE_SPEED,
         cmd.DO_SET_HOME, cmd.DO_SET_SERVO, cmd.DO_SET_ACTUATOR, cmd.DO_LAND_START, cmd.DO_SET_ROI_NONE,
@@ -91,7 +91,7 @@ _IN_INT_MODE = {0: 5, 5: 5, 3: 6, 6: 6}
 
 
 def keep_item(item: MissionItem, mission_type: int) -> MissionItem:
-    """``item`` as it will read back in ITEM_INT: frames 0 and 3 come back as 5 and 6. Raises `Refused`."""
+    """Return ``item`` as it reads back in MISSION_ITEM_INT: frames 0 and 3 become 5 and 6. Raises `Refused`."""
     kept = _kept(item)
     if mission_type == MISSION and item.command in _FENCE_AND_RALLY:
         raise Refused(ERROR)
@@ -99,7 +99,7 @@ def keep_item(item: MissionItem, mission_type: int) -> MissionItem:
         if item.command in (cmd.POLYGON_IN, cmd.POLYGON_OUT) and kept.params[0] < 3:
             raise Refused(ERROR)
         if kept.frame != NO_POSITION:
-            # A fence point has no room for "relative to home", nor for autocontinue.
+            # PX4 stores neither "relative to home" nor autocontinue with a fence point.
             return MissionItem(kept.command, 5, kept.params, kept.x, kept.y, kept.z, autocontinue=False)
     return kept
 
@@ -113,7 +113,7 @@ def _kept(item: MissionItem) -> MissionItem:
         params = item.params
         if item.command == cmd.DO_JUMP:
             params = (_i16(params[0]), _u16(params[1]), params[2], params[3])
-        # x and y pass through float32 here.
+        # PX4 stores x and y as float32 in this frame.
         return MissionItem(
             item.command, NO_POSITION, params, _through_float(item.x), _through_float(item.y), item.z, item.autocontinue
         )
@@ -133,5 +133,5 @@ def _through_float(value: int) -> int:
 
 
 def most_items(mission_type: int) -> int:
-    """The longest list that COUNT may announce."""
+    """Return the most items that COUNT may announce."""
     return {MISSION: 2000, FENCE: 64, RALLY: 32}[mission_type]

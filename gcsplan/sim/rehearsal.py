@@ -1,8 +1,8 @@
-"""The rehearsal: missions go up to simulated vehicles, are read from their boards, flown in simulated time, and judged.
+"""The rehearsal: missions are uploaded to simulated vehicles, flown as stored in simulated time, and judged.
 
-The upload is the real one, over 127.0.0.1: what is flown is what the vehicle stored, not what was meant. Every vehicle
-leaves at its departure offset. Times come out of how a vehicle moves (`kinematics`, `mission_flight`) and share nothing
-with what planned them; distances are judged on the flown tracks, limits by the exact check over them.
+The upload is the real one, over 127.0.0.1, so the vehicles fly what they stored, not what was intended. Every vehicle
+departs at its departure offset. Times result from the simulated motion (`kinematics`, `mission_flight`), which shares
+no code with their planning. Separation is judged on the flown paths, limits by the exact check of those paths.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from gcsplan.world.world import World
 __all__ = ["Part", "Rehearsal", "Terms", "rehearse"]
 
 MOST_LANES = 240
-"""So many vehicles fly at once, over all runs: it bounds the memory."""
+"""Most vehicles, over all runs, that are simulated at once; this bounds the memory."""
 
 
 def rehearse(
@@ -39,11 +39,11 @@ def rehearse(
     airspeed_m_s: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Rehearsal:
-    """Upload, fly, judge. ``progress(done, runs)`` is called now and then. ``airspeed_m_s``: the most that
-    every vehicle can do through the air, None: a little more than its own fastest cruise (`kinematics`).
+    """Upload, fly and judge. ``progress(done, runs)`` is called after each run.
 
-    In still air every run is the same, and one is flown. Raises what an upload raises, InputError for two vehicles of
-    one name or system id, or for a mission that flies nowhere.
+    ``airspeed_m_s``: highest airspeed of every vehicle, None: a little more than its own fastest cruise (`kinematics`).
+    In still air all runs are the same, so only one is flown. Raises what an upload raises, and InputError for two
+    vehicles with the same name or system id, or a mission that flies nowhere.
     """
     weather = weather or Weather()
     if runs < 1:
@@ -71,7 +71,7 @@ def rehearse(
 
 
 def on_board(parts: Sequence[Part]) -> list[Mission]:
-    """Each part's mission as a simulated vehicle stores it, after a real upload over this machine's loopback."""
+    """Return each part's mission as a simulated vehicle stores it, after a real upload over this machine's loopback."""
     vehicles = [
         LoopbackVehicle(
             p.mission.sysid, p.mission.autopilot, lat_deg=p.mission.home.lat_e7 / 1e7,

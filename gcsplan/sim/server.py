@@ -3,8 +3,8 @@
     with SimServer([vehicle], "udpin:127.0.0.1:0") as server:
         connect(server.url_for_gcs)
 
-The vehicles live in the server's thread, or with ``process=True`` in a process of their own (then they are copies:
-what happens to them is not seen in the objects that were given).
+The vehicles run in the server's thread, or with ``process=True`` in a separate process. There they are copies: changes
+to them do not show in the objects that were passed in.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from gcsplan.sim.hub import Hub
 from gcsplan.sim.sockets import TcpTransport, Transport, UdpTransport
 from gcsplan.sim.vehicle import LoopbackVehicle
 
-_START_WAIT_S = 30.0  # for a process: it has to import everything first
+_START_WAIT_S = 30.0  # for a process, which must import everything first
 
 
 class SimServer:
     """One or many vehicles behind one URL.
 
-    ``url``: ``udpin:HOST:PORT`` listens (port 0: any free one), ``udpout:HOST:PORT`` speaks first, ``tcpin:HOST:PORT``
-    (or ``tcp:``) listens for connections. ``speedup``: how much faster than ours the vehicles' clock runs, their
-    timers with it. Raises UsageError for another URL, LinkError where the port cannot be had.
+    ``url``: ``udpin:HOST:PORT`` listens (port 0: any free one), ``udpout:HOST:PORT`` sends first, ``tcpin:HOST:PORT``
+    (or ``tcp:``) listens for connections. ``speedup``: factor by which the vehicles' clock and timers run faster than
+    real time. Raises UsageError for another URL, LinkError if the port is not available.
     """
 
     def __init__(
@@ -60,18 +60,18 @@ class SimServer:
 
     @property
     def url_for_gcs(self) -> str:
-        """What a ground station on this machine connects to."""
+        """The URL for a ground station on this machine."""
         host, port = self._place if self._kind == "udpout" else self.address
         host = "127.0.0.1" if host in ("0.0.0.0", "::") else host
         return f"{ {'udpin': 'udpout', 'udpout': 'udpin', 'tcpin': 'tcp'}[self._kind] }:{host}:{port}"
 
     @property
     def mishandled(self) -> int:
-        """Messages that brought a bug of the simulator to light."""
+        """Number of messages that raised an error because of a bug in the simulator."""
         return self._hub.mishandled
 
     def start(self) -> SimServer:
-        """Open the socket and serve until `stop`."""
+        """Open the socket and serve until `stop`; return this server."""
         if self._address is not None:
             raise RuntimeError("the simulator is already running")
         if self._in_process:
@@ -102,7 +102,7 @@ class SimServer:
         self._address = answer
 
     def stop(self) -> None:
-        """Close the socket; at most some seconds. May be called twice."""
+        """Close the socket; takes at most some seconds. May be called twice."""
         if self._loop is not None:
             self._loop.stop()
         if self._thread is not None:
@@ -143,12 +143,12 @@ def _serve_in_child(vehicles: Sequence[LoopbackVehicle], url: str, speedup: floa
         return
     pipe.send(server.address)
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
-        pipe.recv()  # nothing ever comes: this waits for the other end to close
+        pipe.recv()  # nothing is ever sent: wait until the other end closes
     server.stop()
 
 
 def _parsed(url: str) -> tuple[str, tuple[str, int]]:
-    """``udpin``, ``udpout`` or ``tcpin``, and the place; with TCP a vehicle always listens."""
+    """Return ``udpin``, ``udpout`` or ``tcpin``, and the address; with TCP a vehicle always listens."""
     endpoint = parse_url(url)
     if endpoint.kind == "serial" or ":" in endpoint.host:
         raise UsageError(
@@ -156,7 +156,7 @@ def _parsed(url: str) -> tuple[str, tuple[str, int]]:
         )
     kind = "tcpin" if endpoint.kind == "tcp" else "udpin" if endpoint.listens else "udpout"
     try:
-        return kind, (socket.gethostbyname(endpoint.host), endpoint.port)  # as datagrams name their sender
+        return kind, (socket.gethostbyname(endpoint.host), endpoint.port)  # numeric, as in a datagram's source address
     except OSError as error:
         raise LinkError(f"there is no host {endpoint.host!r}: {error.strerror or error}", where=url) from error
 
@@ -177,7 +177,7 @@ def _opened(kind: str, place: tuple[str, int]) -> Transport:
 
 
 class _Loop:
-    """Waits for bytes and for the clock, and hands both to the hub."""
+    """Waits for bytes and timers, and passes both to the hub."""
 
     def __init__(self, hub: Hub, transport: Transport, speedup: float) -> None:
         self._hub, self.transport, self._speedup = hub, transport, speedup

@@ -1,11 +1,12 @@
-"""The rehearsal with real autopilots: SITL instances take the missions, arm, start them, and are watched as they fly.
+"""The rehearsal with real autopilots: SITL instances get the missions, are armed and started, and are observed.
 
-Each vehicle flies in its own simulated time (``time_boot_ms``): a machine that is too slow for all of them at once
-changes nothing. Zero of that time is set so that the moment its MISSION_START was accepted is its departure offset
-(less `LIFT_S`); they need not be in step, for nothing passes between them. Arrivals are read off the positions.
+Each vehicle flies in its own simulated time (``time_boot_ms``), so a machine that is too slow for all of them at once
+does not change the result. Each time is shifted so that the acceptance of MISSION_START falls on the vehicle's
+departure offset less `LIFT_S`; the instances need not be synchronous, because they do not interact. Arrival times are
+taken from the reported positions.
 
-What answers must say that it is simulated (it has the parameter SIM_SPEEDUP) and must be on this machine, unless the
-user insists: this arms and starts vehicles.
+Because this arms and starts vehicles, the peer must be a simulator (it has the parameter SIM_SPEEDUP) and must be on
+this machine, unless the user insists.
 """
 
 from __future__ import annotations
@@ -36,17 +37,17 @@ from gcsplan.world.world import World
 
 __all__ = ["Seat", "rehearse_sitl", "require_here"]
 
-_GUIDED = 4  # ArduCopter's custom mode: it may be armed in it, and MISSION_START leads from it to AUTO
+_GUIDED = 4  # ArduCopter's custom mode in which it can be armed and MISSION_START switches to AUTO
 _READY_S, _SILENT_S, _ARM_S, _ANSWER_S = 180.0, 30.0, 120.0, 3.0
 _RATE_US = 100_000.0
 _ARMED_MS = 3000
-"""It is armed so long before it is released: ArduCopter's motors do not turn for 2 s (ARMING_DELAY_SEC)."""
+"""Milliseconds from arming to MISSION_START: ArduCopter's motors do not turn for 2 s (ARMING_DELAY_SEC)."""
 _NEAR_M, _STILL_M_S = 3.0, 0.4
-"""The goal is reached where the vehicle is this near and this slow."""
+"""The goal is reached when the vehicle is this near (m) and this slow (m/s)."""
 _SLACK_M = 0.3
-"""What its position may be off, and where it may be between two messages."""
+"""Metres: error of a reported position, and deviation from uniform motion between two messages."""
 LIFT_S = 1.6
-"""From MISSION_START to leaving the ground: measured on ArduCopter, whose motors spin up first."""
+"""Seconds from MISSION_START to leaving the ground, measured on ArduCopter, whose motors spin up first."""
 _ODD_LIFT_S = 0.7
 _LATE = 1.5
 _SPARE_S = 300.0
@@ -54,7 +55,7 @@ _SPARE_S = 300.0
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """Where the autopilot of one vehicle answers; ``ours``: it was started for this, and may be left in the air."""
+    """The URL of one vehicle's autopilot; ``ours``: it was started for this rehearsal and may be left in the air."""
 
     name: str
     url: str
@@ -63,7 +64,7 @@ class Seat:
 
 @dataclass(slots=True)
 class _Log:
-    """What one vehicle said on its way; ``released_ms`` of its boot time is its departure."""
+    """What one vehicle reported in flight; ``released_ms``: its boot time at the acceptance of MISSION_START."""
 
     released_ms: int = 0
     boot_ms: list[int] = field(default_factory=list)
@@ -74,7 +75,7 @@ class _Log:
 
 
 def require_here(urls: Sequence[str]) -> None:
-    """Raise UsageError for a link that leads off this machine."""
+    """Raise UsageError for a link to another machine or a serial port."""
     for url in urls:
         end = parse_url(url)
         if end.kind == "serial" or not (end.host.startswith("127.") or end.host in ("localhost", "::1")):
@@ -93,11 +94,11 @@ def rehearse_sitl(
     i_know: bool = False,
     report: Callable[[str, str], None] | None = None,
 ) -> Rehearsal:
-    """Upload, arm, start, watch, judge: one run. ``seats`` by the vehicles' names; ``report(vehicle, what)``.
+    """Upload, arm, start, observe and judge one run. ``seats``: by vehicle name; ``report(vehicle, what)``: progress.
 
-    Raises UsageError for a vehicle without a seat, an autopilot that is not ArduCopter, and (unless ``i_know``) a
-    link off this machine; VehicleRefused for what is no simulator, will not arm, or does not take its mission;
-    LinkError where nobody answers.
+    Raises UsageError for a vehicle without a seat, an autopilot that is not ArduCopter, and (unless ``i_know``) a link
+    to another machine; VehicleRefused if a peer is no simulator, does not arm, or refuses its mission; LinkError if
+    nobody answers.
     """
     for part in parts:
         if part.vehicle.name not in seats:
@@ -146,7 +147,7 @@ def rehearse_sitl(
 
 
 def _all(jobs: list[PumpJob[Any]]) -> list[Any]:
-    """Run all to their ends; raises the first error."""
+    """Run all jobs to their ends and return their results; raise the first error."""
     pump(jobs)
     for job in jobs:
         if job.error is not None:
@@ -158,7 +159,7 @@ def _all(jobs: list[PumpJob[Any]]) -> list[Any]:
 
 
 def _ready(channel: Channel, part: Part, report: Callable[[str, str], None], *, i_know: bool) -> Steps[VehicleState]:
-    """Wait until it knows where it is, and make sure that it is a simulator and stands still."""
+    """Wait until the vehicle has a position and a home, and make sure that it is a simulator and not armed."""
     clock, name = channel.link.clock, part.vehicle.name
     end = clock() + _READY_S
     report(name, "waits for its position")
@@ -183,7 +184,7 @@ def _ready(channel: Channel, part: Part, report: Callable[[str, str], None], *, 
 def _fly(
     channel: Channel, part: Part, state: VehicleState, seat: Seat, world: World, report: Callable[[str, str], None]
 ) -> Steps[_Log]:
-    """Arm, start, and listen until it is down (or there, where it stays in the air)."""
+    """Arm, start, and record until the vehicle is down, or at its goal if it stays in the air."""
     to, name, log = state.address, part.vehicle.name, _Log()
     pilot = _Pilot(channel, to, log)
     for message, every_us in (
@@ -215,7 +216,7 @@ def _fly(
         if not log.places:
             continue
         if last == cmd.LAND and item == landing and log.places[-1][2] <= ground + 0.3:
-            log.down = True  # SITL's ground is level at the height of home: it would sink on through a higher one
+            log.down = True  # SITL's ground is flat at the altitude of home: it would sink through higher terrain
             return log
         if (
             last not in (cmd.LAND, cmd.RTL)
@@ -226,7 +227,7 @@ def _fly(
 
 
 class _Pilot:
-    """Says commands to one vehicle and writes down what it says; generators of `link.Steps`."""
+    """Sends commands to one vehicle and records its messages; its methods are generators of `link.Steps`."""
 
     def __init__(self, channel: Channel, to: Address, log: _Log) -> None:
         self._channel, self._to, self._log = channel, to, log
@@ -237,7 +238,7 @@ class _Pilot:
         self.boot_ms, self.item = 0, 0
 
     def listen(self, within_s: float) -> Steps[None]:
-        """Take in what comes; returns as soon as something came. Raises LinkError after a long silence."""
+        """Record messages; return as soon as one came, or after ``within_s``. Raises LinkError after `_SILENT_S`."""
         clock = self._channel.link.clock
         if not self._channel.waits:
             yield clock() + within_s
@@ -270,12 +271,12 @@ class _Pilot:
             self._results[message.command] = message.result
             started = message.command == dialect.MAV_CMD_MISSION_START
             if started and message.result == dialect.MAV_RESULT_ACCEPTED and not log.released_ms:
-                log.released_ms = self.boot_ms  # as they come down the line, not as they are looked at
+                log.released_ms = self.boot_ms  # at the message's place in the stream, not when the task reads it
         elif kind == "STATUSTEXT":
             self._texts.append(str(message.text))
 
     def command(self, command: int, *params: float) -> Steps[int | None]:
-        """Say a command once; its MAV_RESULT, None where no answer comes."""
+        """Send a command once; return its MAV_RESULT, None without an answer."""
         clock = self._channel.link.clock
         self._results.pop(command, None)
         p = (*params, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)[:7]
@@ -286,7 +287,10 @@ class _Pilot:
         return self._results.get(command)
 
     def insist(self, command: int, *params: float) -> Steps[None]:
-        """Say a command until it is accepted; an autopilot that has just got its position will not arm at once."""
+        """Send a command until it is accepted; an autopilot that has just got its position does not arm at once.
+
+        Raises VehicleRefused after `_ARM_S`.
+        """
         clock = self._channel.link.clock
         end = clock() + _ARM_S
         while True:
@@ -309,7 +313,7 @@ class _Pilot:
 
 
 def _goal(part: Part) -> tuple[float, float, float]:
-    """Where the path ends: latitude, longitude, amsl_m."""
+    """Return the end of the path: latitude, longitude, amsl_m."""
     legs = part.verdict.path_legs or part.verdict.legs
     return legs[-1].end
 
@@ -319,7 +323,7 @@ def _apart_m(a: tuple[float, float, float], b: tuple[float, float, float]) -> fl
 
 
 def _trace(log: _Log, part: Part, world: World) -> Trace:
-    """The positions as a trace in the fleet's time, from leaving the ground to the end."""
+    """Return the positions as a trace in the fleet's time, from leaving the ground to the end."""
     name = part.vehicle.name
     if len(log.places) < 2:
         raise LinkError(f"{name}: no positions came after its mission was started")
@@ -332,14 +336,14 @@ def _trace(log: _Log, part: Part, world: World) -> Trace:
     apart = np.linalg.norm(points - aim, axis=1)
     there = (apart <= _NEAR_M) & (np.array(log.speeds)[first] <= _STILL_M_S)
     arrive_s = float(times[int(there.argmax())]) if there.any() else math.nan
-    if not there.any() and float(apart.min()) <= _NEAR_M:  # it went on at once
+    if not there.any() and float(apart.min()) <= _NEAR_M:  # it passed the goal without stopping
         arrive_s = float(times[int(apart.argmin())])
     up = int((points[:, 2] > points[0, 2] + 0.3).argmax())
     begin = max(0, up - 1)
     command = {part.mission.first_seq + i: item.command for i, item in enumerate(part.mission.items)}
     moved = np.hypot(*np.diff(points[:, :2], axis=0).T) < np.abs(np.diff(points[:, 2])) + 0.05
     vertical = np.array([command.get(int(i)) in (cmd.TAKEOFF, cmd.LAND, cmd.RTL) for i in items[:-1]])
-    before = items[:-1] < part.mission.first_seq  # not yet said: it is taking off
+    before = items[:-1] < part.mission.first_seq  # no current item reported yet: it is taking off
     last = part.mission.items[-1].command
     return Trace(
         name, times[begin:], points[begin:], ((vertical & moved) | before)[begin:], items[:-1][begin:].astype(np.intp),

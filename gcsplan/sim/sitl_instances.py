@@ -1,4 +1,4 @@
-"""One ArduCopter SITL for each vehicle of a mission: started where it starts, with its speeds, and ended again."""
+"""One ArduCopter SITL for each vehicle of a mission: started at its start, with its speeds, and stopped afterwards."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _BASE_PORT = 5760
 _FIRST_INSTANCE, _LAST_INSTANCE = 20, 900
 _START_S, _STOP_S = 30.0, 10.0
 SPEEDUP = 5.0
-"""How much faster than ours their clock runs, if the machine can."""
+"""Factor by which the instances' clocks run faster than real time, if the machine is fast enough."""
 
 FRAME = {
     "FRAME_CLASS": 1, "FRAME_TYPE": 0, "ARMING_CHECK": 0, "FS_THR_ENABLE": 0, "DISARM_DELAY": 0, "TERRAIN_ENABLE": 0,
@@ -28,14 +28,15 @@ FRAME = {
     "INS_ACCSCAL_Z": 1.001, "MOT_THST_EXPO": 0.65, "MOT_THST_HOVER": 0.39, "MOT_BAT_VOLT_MIN": 9.6,
     "MOT_BAT_VOLT_MAX": 12.8, "ATC_RAT_YAW_P": 0.3, "FENCE_ENABLE": 0,
 }  # fmt: skip
-"""A quadrotor that arms without pilot, calibration or terrain data (after ArduPilot's own defaults for SITL)."""
+"""Parameters of a quadrotor that arms without pilot, calibration or terrain data (from ArduPilot's SITL defaults)."""
 
 FAST_M_S, FAST_ANGLE_CD = 9.0, 4500
-"""Above this cruise speed ANGLE_MAX 3000 is not enough: it was measured to cap the speed near 10 m/s."""
+"""Cruise speed (m/s) above which ANGLE_MAX is raised to this (0.01°): ANGLE_MAX 3000 was measured to limit the speed
+to about 10 m/s."""
 
 
 def parameters_of(part: Part) -> dict[str, float]:
-    """What an instance is given: the vehicle's own speeds and rates, so that it can do what was planned of it."""
+    """Return an instance's parameters: `FRAME` and the vehicle's own speeds and rates, so that it can fly the plan."""
     v = part.vehicle
     given = FRAME | {
         "WPNAV_SPEED": 100.0 * v.speed_max_m_s, "WPNAV_SPEED_UP": 100.0 * v.climb_m_s,
@@ -50,9 +51,9 @@ def parameters_of(part: Part) -> dict[str, float]:
 
 @contextmanager
 def sitl_instances(binary: Path, parts: Sequence[Part], *, speedup: float = SPEEDUP) -> Iterator[dict[str, Seat]]:
-    """One instance for each part, each in a directory of its own; gives the seats by vehicle. All end with the block.
+    """Start one instance for each part, each in its own directory; yield the seats by vehicle; stop all at the end.
 
-    Raises UsageError for a file that cannot be run, LinkError where an instance does not start.
+    Raises UsageError for a file that cannot be executed, LinkError if an instance does not start.
     """
     if not binary.is_file() or not os.access(binary, os.X_OK):
         raise UsageError(f"--sitl-binary {binary}: a program that can be run is wanted, an arducopter built for SITL")
@@ -70,7 +71,7 @@ def sitl_instances(binary: Path, parts: Sequence[Part], *, speedup: float = SPEE
 
 
 def _free(number: int) -> int:
-    """The next instance number on whose port nobody answers."""
+    """Return the next instance number on whose port nobody answers."""
     while number <= _LAST_INSTANCE:
         try:
             Link(_url(number)).close()
@@ -111,7 +112,7 @@ def _instance(binary: Path, part: Part, number: int, speedup: float, directory: 
 
 
 def _await(process: subprocess.Popen[bytes], said: Path, name: str) -> None:
-    """Wait until it listens, by its own words: a connection that is made and closed would end it."""
+    """Wait until its output says that it listens; a trial connection would end it when closed."""
     end = time.monotonic() + _START_S
     while time.monotonic() < end:
         words = said.read_text(encoding="utf-8", errors="replace")

@@ -1,4 +1,4 @@
-"""The simulator's sockets: one that listens for datagrams, one that listens for connections. Neither blocks."""
+"""The simulator's transports, both non-blocking: one for UDP datagrams, one for TCP connections."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ from typing import Protocol
 from gcsplan.sim.hub import Client
 
 _BUFFER = 65536
-_MOST_AT_ONCE = 64  # datagrams taken before the clock is looked at again
+_MOST_AT_ONCE = 64  # datagrams read before timers are checked again
 _MOST_CONNECTIONS = 16
 _UNSENT_LIMIT = 1 << 20  # bytes that a slow TCP client may leave unread before it is dropped
 
 
 class Transport(Protocol):
-    """What a server needs of a socket."""
+    """The interface of a socket that a server needs."""
 
     address: tuple[str, int]
-    datagrams: bool  # whether what comes in is whole
+    datagrams: bool  # whether one read gives whole frames
 
     def wait(self, waker: socket.socket, timeout_s: float) -> list[tuple[Client, bytes]]:
-        """What came in, after at most ``timeout_s``, or earlier when ``waker`` has something to read."""
+        """Return what was received; waits at most ``timeout_s``, or until ``waker`` is readable."""
         ...
 
     def send(self, client: Client, data: bytes) -> None:
-        """Send, or drop what cannot be sent."""
+        """Send ``data``, or drop what cannot be sent."""
         ...
 
     def newcomers(self) -> list[Client]:
-        """Clients that have connected since the last call."""
+        """Return the clients that have connected since the last call."""
         ...
 
     def gone(self) -> list[Client]:
-        """Clients that have left since the last call."""
+        """Return the clients that have disconnected since the last call."""
         ...
 
     def close(self) -> None:
@@ -43,7 +43,7 @@ class Transport(Protocol):
 
 
 class UdpTransport:
-    """One UDP socket; a client is the address it sends from."""
+    """One UDP socket; a client is identified by its source address."""
 
     datagrams = True
 
@@ -59,7 +59,7 @@ class UdpTransport:
         self.address: tuple[str, int] = self._socket.getsockname()
 
     def wait(self, waker: socket.socket, timeout_s: float) -> list[tuple[Client, bytes]]:
-        """Datagrams with their senders."""
+        """Return the received datagrams with their senders."""
         ready, _, _ = select.select([self._socket, waker], [], [], timeout_s)
         came: list[tuple[Client, bytes]] = []
         if self._socket in ready:
@@ -70,17 +70,17 @@ class UdpTransport:
         return came
 
     def send(self, client: Client, data: bytes) -> None:
-        """A datagram that cannot go is lost, as datagrams are."""
+        """Send a datagram; one that cannot be sent is lost."""
         if isinstance(client, tuple):
             with contextlib.suppress(OSError):
                 self._socket.sendto(data, client)
 
     def newcomers(self) -> list[Client]:
-        """Nobody comes to a UDP socket before he speaks."""
+        """Return none: a UDP client is unknown before its first datagram."""
         return []
 
     def gone(self) -> list[Client]:
-        """Nobody leaves a UDP socket."""
+        """Return none: UDP clients do not disconnect."""
         return []
 
     def close(self) -> None:
@@ -89,7 +89,7 @@ class UdpTransport:
 
 
 class TcpTransport:
-    """One listening socket; a client is a connection's number."""
+    """One listening TCP socket; a client is identified by its connection's number."""
 
     datagrams = False
 
@@ -111,7 +111,7 @@ class TcpTransport:
         self._accepted = 0
 
     def wait(self, waker: socket.socket, timeout_s: float) -> list[tuple[Client, bytes]]:
-        """Bytes of each connection; new connections are taken in, closed ones dropped."""
+        """Return the bytes received from each connection; accept new connections, drop closed ones."""
         by_socket = {connection: number for number, connection in self._connections.items()}
         blocked = [self._connections[number] for number, unsent in self._unsent.items() if unsent]
         ready, writable, _ = select.select([self._listening, waker, *by_socket], blocked, [], timeout_s)
@@ -148,7 +148,7 @@ class TcpTransport:
             self._came.append(self._accepted)
 
     def send(self, client: Client, data: bytes) -> None:
-        """Append to what waits for this client; one that reads too slowly is dropped."""
+        """Append ``data`` to the client's send buffer; drop a client that reads too slowly."""
         if not isinstance(client, int) or client not in self._connections:
             return
         self._unsent[client] += data
@@ -171,12 +171,12 @@ class TcpTransport:
         self._left.append(number)
 
     def newcomers(self) -> list[Client]:
-        """Connections that were opened since the last call."""
+        """Return the connections that were opened since the last call."""
         came, self._came = self._came, []
         return came
 
     def gone(self) -> list[Client]:
-        """Connections that were closed since the last call."""
+        """Return the connections that were closed since the last call."""
         left, self._left = self._left, []
         return left
 

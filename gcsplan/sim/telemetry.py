@@ -1,6 +1,7 @@
-"""What a vehicle says besides its mission: heartbeats, position, parameters, and answers to commands.
+"""A vehicle's messages outside the mission protocol: heartbeats, position, parameters, and answers to commands.
 
-Enough that ground stations take it for a vehicle. Messages in, messages out; time is handed in, nothing is sent here.
+They suffice for ground stations to treat it as a vehicle. Messages in, messages out; time is an argument, and nothing
+is sent here.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ Message: TypeAlias = Any  # a MAVLink_message; pymavlink carries no types
 
 _ACCEPTED, _TEMPORARILY_REJECTED, _DENIED, _UNSUPPORTED = 0, 1, 2, 3  # MAV_RESULT
 _BOOT, _STANDBY, _ACTIVE = 1, 3, 4  # MAV_STATE
-_MAGIC_FORCE = 21196  # param2 of arm/disarm: whatever the checks say
+_MAGIC_FORCE = 21196  # param2 of arm/disarm: override the arming checks
 
 # Custom modes in which the mission is flown: ArduCopter and ArduPlane AUTO, PX4 AUTO.MISSION.
 _MISSION_MODE = {Autopilot.ARDUCOPTER: 3, Autopilot.ARDUPLANE: 10, Autopilot.PX4: (4 << 16) | (4 << 24)}
@@ -35,7 +36,7 @@ _COMMON_CAPABILITIES = (
 
 
 class Telemetry:
-    """One vehicle's small talk. ``now`` is the clock of `LoopbackVehicle`, seconds."""
+    """One vehicle's telemetry. ``now`` is the time of `LoopbackVehicle`'s clock, seconds."""
 
     def __init__(self, vehicle: LoopbackVehicle) -> None:
         self._vehicle = vehicle
@@ -59,10 +60,10 @@ class Telemetry:
             self._began = now
         return int((now - self._began) * 1000) % 2**32
 
-    # what is sent unasked
+    # sent without a request
 
     def each_second(self, now: float) -> list[Message]:
-        """Sent once a second; while booting the heartbeat alone, and nothing while it is dead."""
+        """Return the messages sent once a second: only the heartbeat while booting, none while it is unreachable."""
         if not self._vehicle.reachable(now):
             return []
         if self._vehicle.booting(now):
@@ -79,7 +80,7 @@ class Telemetry:
         ]
 
     def heartbeat(self, now: float) -> Message:
-        """HEARTBEAT with the right kind of vehicle, autopilot, mode and state."""
+        """Return HEARTBEAT with the vehicle's type, autopilot, mode and state."""
         vehicle = self._vehicle
         plane = vehicle.autopilot is Autopilot.ARDUPLANE
         base_mode = (
@@ -107,7 +108,7 @@ class Telemetry:
             | mav.MAV_SYS_STATUS_SENSOR_GPS
             | mav.MAV_SYS_STATUS_PREARM_CHECK
         )
-        fence = mav.MAV_SYS_STATUS_GEOFENCE  # there and whole, not enabled
+        fence = mav.MAV_SYS_STATUS_GEOFENCE  # present and healthy, not enabled
         return mav.MAVLink_sys_status_message(
             sensors | fence, sensors, sensors | fence, 100, 12600, 50, 98, 0, 0, 0, 0, 0, 0
         )
@@ -158,10 +159,10 @@ class Telemetry:
             capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, self._vehicle.sysid
         )
 
-    # what is asked for
+    # sent on request
 
     def answer(self, message: Message, now: float) -> list[Message]:
-        """Answers to anything that is not the mission protocol; nothing to what is not understood."""
+        """Return the answers to a message outside the mission protocol; none if it is not understood."""
         if not self._vehicle.reachable(now) or not self._is_for_us(message):
             return []
         handlers: dict[str, Callable[[Message, float], list[Message]]] = {
@@ -216,7 +217,7 @@ class Telemetry:
             return _ACCEPTED, [self._autopilot_version(now)]
         if command == mav.MAV_CMD_GET_HOME_POSITION:
             return _ACCEPTED, [self._home_position(now)]
-        if command == mav.MAV_CMD_SET_MESSAGE_INTERVAL:  # accepted, and everything still comes once a second
+        if command == mav.MAV_CMD_SET_MESSAGE_INTERVAL:  # accepted, but everything is still sent once a second
             return (_ACCEPTED if _whole(message.param1) in self._by_id else _DENIED), []
         return _UNSUPPORTED, []
 
@@ -270,7 +271,7 @@ class Telemetry:
 
 
 def _whole(value: float) -> int:
-    """A command's param as a number of something; −1 where it is none."""
+    """Return a command's param as a whole number; −1 if it is negative, not finite or too large."""
     return int(value) if math.isfinite(value) and 0 <= value < 2**32 else -1
 
 

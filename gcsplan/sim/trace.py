@@ -1,9 +1,9 @@
-"""What was really flown, by a simulated vehicle or an autopilot, and how it is judged.
+"""The path actually flown, by a simulated vehicle or an autopilot, and its check against limits and other aircraft.
 
-A trace is where an aircraft *was*: corners, wind, noise and the autopilot's own errors are in it. So none of the
-limits' errors is added to it again (``track_error_m`` and ``altitude_error_m`` stand for just these), only what lies
-between two samples. Climb angles are not judged: they bound the mission's legs, which the check has judged, and a noisy
-trace has any angle.
+A trace contains the effects of corners, wind, noise and the autopilot's own errors. ``track_error_m`` and
+``altitude_error_m`` stand for just these errors, so they are not added again; only the uncertainty between two samples
+is. Climb angles are not judged: they limit the mission's legs, which the check has judged, and a noisy trace can have
+any angle.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.world import World
 
 CHORD = 16
-"""Samples that are looked at as one straight leg, where they lie on one."""
+"""Sample intervals that are checked as one straight leg if the samples between lie near it."""
 TRACK_M, HEIGHT_M = 0.25, 0.05
-"""How far they may lie off it; it widens the leg."""
+"""Metres, across and in altitude, by which those samples may lie off the leg; the leg is widened by their offset."""
 BLOCK = 16
-"""Intervals whose distance from another aircraft is bounded at once."""
+"""Time steps for which the distance between two aircraft is bounded at once."""
 
 WORDS = {
     "min_agl": "came too low above ground",
@@ -41,13 +41,13 @@ WORDS = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trace:
-    """One aircraft's way through the air.
+    """One aircraft's flown path over time.
 
-    ``times_s`` (M,) rising, ``points`` (M, 3) east_m, north_m, amsl_m, from leaving the ground to the end. Its line is
-    within ``off_m`` of the straight ones between them; at every moment it is within ``slack_m`` (M - 1,) of where an
-    even motion between them puts it. ``column`` and ``seq`` (M - 1,): whether a piece belongs to a take-off or landing,
-    and the wire item it was flown for. ``arrive_s``: the goal reached; NaN where it never was. ``stays``: it hangs in
-    the air at the end; ``leaves``: it is gone after the end.
+    ``times_s`` (M,), increasing, and ``points`` (M, 3) east_m, north_m, amsl_m, from leaving the ground to the end. The
+    true path is within ``off_m`` of the straight pieces between the points; at every time the aircraft is within
+    ``slack_m`` (M - 1,) of its place in uniform motion between them. ``column`` and ``seq`` (M - 1,): whether a piece
+    belongs to a take-off or landing, and its wire item. ``arrive_s``: time of reaching the goal, NaN if never.
+    ``stays``: it stays in the air at the end; ``leaves``: it is gone after the end.
     """
 
     name: str
@@ -63,22 +63,22 @@ class Trace:
 
     @property
     def begin_s(self) -> float:
-        """When it left the ground."""
+        """Time of leaving the ground."""
         return float(self.times_s[0])
 
     @property
     def end_s(self) -> float:
-        """When it was down, or at its last point."""
+        """Time of touch-down, or of reaching the last point."""
         return float(self.times_s[-1])
 
     def at(self, times_s: Floats) -> Floats:
-        """(K, 3) places at ``times_s`` (K,); before the first and after the last it stands there."""
+        """(K, 3) positions at ``times_s`` (K,); before the first and after the last time, the end points."""
         return np.column_stack([np.interp(times_s, self.times_s, self.points[:, k]) for k in range(3)])
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """``min_agl_m``: least height above ground and what stands on it, columns aside; NaN where there is none."""
+    """``min_agl_m``: least height above ground and obstacles outside columns, NaN if none is known; and its place."""
 
     min_agl_m: float
     min_agl_at: tuple[float, float]
@@ -86,7 +86,7 @@ class Judged:
 
 
 def examine(trace: Trace, vehicle: Vehicle, world: World) -> Judged:
-    """Hold a trace against the limits by the exact check, between its samples too."""
+    """Check a trace against the limits with the exact check, also between its samples."""
     legs, owner = _legs(trace)
     limits = replace(vehicle.limits, max_climb_deg=90.0, max_descent_deg=90.0)
     report = world.airspace.examine(legs, limits)
@@ -107,7 +107,7 @@ def examine(trace: Trace, vehicle: Vehicle, world: World) -> Judged:
 
 
 def _legs(trace: Trace) -> tuple[Legs, NDArray[np.intp]]:
-    """The trace as few straight legs, each widened by how far the samples lie off it, and each one's first sample."""
+    """Return the trace as few straight legs, each widened by the offset of its samples, and each leg's first sample."""
     points = trace.points
     firsts: list[NDArray[np.intp]] = []
     lasts: list[NDArray[np.intp]] = []
@@ -134,7 +134,7 @@ def _legs(trace: Trace) -> tuple[Legs, NDArray[np.intp]]:
 
 
 def _off(a: Floats, b: Floats, inner: Floats) -> tuple[Floats, Floats]:
-    """How far, across and in height, ``inner`` (N, K, 3) lie off the lines ``a``-``b`` (N, 3) at most."""
+    """(N,) largest horizontal and largest vertical offset of ``inner`` (N, K, 3) from the lines ``a``-``b`` (N, 3)."""
     along = b - a
     square = np.maximum((along**2).sum(axis=1), 1e-12)
     f = np.clip(((inner - a[:, None]) * along[:, None]).sum(axis=2) / square[:, None], 0.0, 1.0)
@@ -159,13 +159,14 @@ def _degrees(world: World, place: Floats) -> tuple[float, float]:
     return lat, lon
 
 
-# -- each other ---------------------------------------------------------------------------------------------------
+# -- separation ---------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """Two aircraft at their nearest: ``distance_m`` is less what may lie between samples. ``kind``: ``air``, or
-    ``landing`` where the first comes down beside the second, which stands on the ground."""
+    """Two aircraft at their least distance; the uncertainty between samples is subtracted from ``distance_m``.
+
+    ``kind``: ``air``, or ``landing`` if the first lands beside the second, which stands on the ground."""
 
     names: tuple[str, str]
     distance_m: float
@@ -173,7 +174,7 @@ class Meeting:
     kind: str = "air"
 
     def describe(self, needed_m: float) -> str:
-        """One sentence."""
+        """Return one sentence; ``needed_m`` is the required separation."""
         a, b = self.names
         near = f"{self.distance_m:.1f} m, needed are {needed_m:g} m, at {self.time_s:.1f} s"
         if self.kind == "air":
@@ -184,11 +185,11 @@ class Meeting:
 def meetings(
     traces: Sequence[Trace], needed_m: float, step_s: float, *, pad_clear_s: float = math.inf
 ) -> list[Meeting]:
-    """The least distance of each pair nearer than ``needed_m`` while both are in the air, and of the nearest pair.
+    """Return the least distance of each pair nearer than ``needed_m`` while both are in the air, and of the nearest.
 
-    Looked for in steps of ``step_s``, then at the traces' own times, and less by how uneven the motion between those
-    may be: never optimistic. The nearest stands first. Then those that land within ``needed_m`` of one that has landed
-    up to ``pad_clear_s`` before.
+    The search runs in steps of ``step_s``, then at the traces' own times. The possible deviation from uniform motion
+    between those is subtracted, so the distances are never optimistic. The nearest pair is first. Landings within
+    ``needed_m`` of an aircraft that landed up to ``pad_clear_s`` before follow.
     """
     found: list[Meeting] = []
     if len(traces) > 1:
@@ -235,14 +236,17 @@ def _in_the_air(traces: Sequence[Trace], times: Floats, needed_m: float) -> list
 
 
 def _reach(trace: Trace, begin_s: Floats, end_s: Floats) -> Floats:
-    """No farther than this from where it is at ``begin_s`` is it until ``end_s``."""
+    """Upper bound of its distance, between ``begin_s`` and ``end_s``, from its position at ``begin_s``."""
     flown = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(trace.points, axis=0), axis=1)))
     along = np.interp(end_s, trace.times_s, flown) - np.interp(begin_s, trace.times_s, flown)
     return np.asarray(along + 2.0 * trace.slack_m.max(initial=0.0))
 
 
 def _nearest(a: Trace, b: Trace, times: Floats, rows: NDArray[np.intp]) -> tuple[float, float]:
-    """The least distance while both fly within the intervals ``rows`` of ``times``, less what is uneven, and when."""
+    """Return the least distance, and its time, while both fly within the intervals ``rows`` of ``times``.
+
+    The possible deviations from uniform motion are subtracted.
+    """
     begin = max(a.begin_s, b.begin_s)
     end = min(math.inf if t.stays else t.end_s for t in (a, b))
     knots = np.unique(np.concatenate([times[rows], times[rows + 1], a.times_s, b.times_s]))
@@ -263,7 +267,7 @@ def _nearest(a: Trace, b: Trace, times: Floats, rows: NDArray[np.intp]) -> tuple
 
 
 def _uneven(trace: Trace, times_s: Floats) -> Floats:
-    """How far it may be from where an even motion puts it, at ``times_s``."""
+    """Metres by which the aircraft may be off uniform motion at ``times_s``."""
     at = np.searchsorted(trace.times_s, times_s, side="right") - 1
     inside = (at >= 0) & (at < len(trace.slack_m))
     return np.where(inside, trace.slack_m[np.where(inside, at, 0)], 0.0)

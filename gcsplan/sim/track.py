@@ -1,7 +1,7 @@
-"""The way of one simulated vehicle: its stored mission as a line in space, with what limits its speed on each piece.
+"""The path of one simulated vehicle: its stored mission as a line in space, with the speed limits of each piece.
 
-The items are read as the check reads them (`check.flight.follow`); how long they take is worked out here and in
-`mission_flight`, and nowhere else: nothing of it is shared with what planned the times.
+The items are interpreted as in the check (`check.flight.follow`). How long they take is computed only here and in
+`mission_flight`, which share no code with the planning of the times.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
 SAG_M = 0.02
-"""How far the chords of a rounded corner may lie from its arc."""
+"""Metres by which the chords of a rounded corner may lie off its arc."""
 TERRAIN_PART_M = 10.0
-"""Longest piece of a leg that follows the ground."""
+"""Longest piece of a leg that follows the terrain, in metres."""
 FAST_M_S = 60.0
-"""A corner that allows more, and is cut by next to nothing, is none."""
+"""m/s: a corner that allows more than this, and is cut by at most half of `SAG_M`, is not rounded."""
 SAME_M = 0.01
-"""Places nearer than this are one place."""
+"""Metres: positions nearer than this are the same."""
 METRES_PER_DEGREE = 0.011131884502145034 * 1e7
-"""ArduPilot's, of latitude (`LOCATION_SCALING_FACTOR`)."""
+"""Metres per degree of latitude in ArduPilot (`LOCATION_SCALING_FACTOR`)."""
 PASSED = -1.0
-"""In `Track.hold_s`: a node that is passed without a stop."""
+"""Value in `Track.hold_s` of a node that is passed without a stop."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Track:
     """N nodes and the N - 1 straight pieces between them.
 
-    ``points`` (N, 3): east_m, north_m, amsl_m. ``hold_s`` (N,): how long the vehicle stands at a node, `PASSED` where
-    it does not stop; infinite for good. Of the pieces (N - 1,): ``cap_m_s`` the most that climb, descent and corners
-    allow along it; ``command_m_s`` the speed over ground that the command means; ``level`` the horizontal part of a
-    metre; ``accel_m_s2``; ``column`` (take-off or landing); ``seq`` the wire item. ``goal`` is the node where the path
-    ends.
+    ``points`` (N, 3): east_m, north_m, amsl_m. ``hold_s`` (N,): seconds that the vehicle stands at a node, `PASSED` if
+    it does not stop, infinite if it stays. Of the pieces (N - 1,): ``cap_m_s``, the highest speed along it that climb,
+    descent and corners allow; ``command_m_s``, the commanded speed over ground; ``level``, the horizontal fraction of
+    its length; ``accel_m_s2``; ``column`` (take-off or landing); ``seq``, the wire item. ``goal``: the node at which
+    the planned path ends.
     """
 
     name: str
@@ -65,15 +65,15 @@ class Track:
 
     @property
     def length_m(self) -> Floats:
-        """(N - 1,) of each piece, in space."""
+        """(N - 1,) length of each piece in space."""
         return np.asarray(np.linalg.norm(np.diff(self.points, axis=0), axis=1))
 
     def slack_m(self, times_s: Floats, along_m: Floats) -> Floats:
-        """(M - 1,) how far along the track the motion may be from an even one between two of its samples.
+        """(M - 1,) metres along the path by which the motion between two samples may deviate from uniform motion.
 
-        ``times_s``, ``along_m`` (M,): samples, every stop among them. Between two of them the speed changes no faster
-        than their pieces allow. It is also between none and the fastest that they allow, so that what is flown at that
-        speed from sample to sample is even.
+        ``times_s``, ``along_m`` (M,): samples, including every stop. Between two of them, the speed changes no faster
+        than their pieces allow, and lies between 0 and the highest speed that they allow. So the slack is 0 between
+        samples that are flown at that highest speed.
         """
         seconds, flown = np.diff(times_s), np.diff(along_m)
         speed = flown / seconds
@@ -83,14 +83,14 @@ class Track:
         allowed = np.minimum(self.cap_m_s, self.command_m_s / np.maximum(self.level, 0.05))
         fastest = np.maximum.reduceat(np.append(allowed, 0.0), ranges)[::2]
         accel = np.maximum.reduceat(np.append(self.accel_m_s2, 0.0), ranges)[::2]
-        # A lower command takes hold slowly: until then the speed of before counts.
+        # A lower commanded speed takes effect slowly; until then the speed before it counts.
         fastest = np.maximum.reduce([fastest, speed, np.append(0.0, speed[:-1]), np.full_like(speed, 1e-9)])
         return np.asarray(np.minimum(accel * seconds**2 / 8.0, flown * (1.0 - speed / fastest)))
 
     def braking(self) -> Floats:
-        """(N,) the largest v² at each node from which every later cap and stop can still be met.
+        """(N,) the largest v² at each node from which every later speed cap and stop can still be met.
 
-        A lower speed that is commanded on the way is not looked ahead to: it is heard of when it is commanded.
+        The vehicle does not brake ahead for a lower commanded speed, because it learns of it only at that item.
         """
         heard = self.command_m_s.copy()
         for i in range(1, len(heard)):
@@ -106,7 +106,7 @@ class Track:
 
 
 class _Line:
-    """Nodes and pieces, one after the other. ``leg_m_s``: what the leg that is being laid allows for its length."""
+    """Collects nodes and pieces in order. ``leg_m_s``: the highest speed that the current leg's length allows."""
 
     def __init__(self, start: Floats) -> None:
         self.leg_m_s = math.inf
@@ -117,7 +117,7 @@ class _Line:
     def add(
         self, to: Floats, stretch: Stretch, kinematics: Kinematics, *, corner_m_s: float = math.inf, cap_m_s: float = 0
     ) -> None:
-        """A piece to ``to``; ``cap_m_s`` > 0 in a column."""
+        """Add a piece to ``to``; ``cap_m_s`` > 0 sets its speed in a column."""
         delta = to - self.points[-1]
         length = float(np.linalg.norm(delta))
         if length <= 1e-9:
@@ -128,7 +128,7 @@ class _Line:
         if not cap_m_s:
             rate = vertical / abs(rise) if abs(rise) > 1e-9 else math.inf
             cap_m_s = min(rate, self.leg_m_s, corner_m_s / level if level else math.inf)
-        if rise != 0.0 and math.isinf(vertical):  # the ideal vehicle: its speed is one in space
+        if rise != 0.0 and math.isinf(vertical):  # the ideal vehicle holds the commanded speed in space
             level = 1.0
         accel = kinematics.vertical_accel_m_s2 if stretch.column else kinematics.accel_m_s2
         self.pieces.append((cap_m_s, stretch.speed_m_s, level, accel, stretch.column, stretch.seq))
@@ -136,7 +136,7 @@ class _Line:
         self.hold_s.append(PASSED)
 
     def stop(self, hold_s: float) -> None:
-        """Stand at the last node, ``hold_s`` longer if it stands there already."""
+        """Stop at the last node for ``hold_s``, in addition to an earlier stop there."""
         self.hold_s[-1] = max(self.hold_s[-1], 0.0) + hold_s
 
 
@@ -149,12 +149,12 @@ def make_track(
     rtl_rel_home_m: float | None = None,
     airborne: bool = False,
 ) -> Track:
-    """The way that ``mission`` (as stored on board) asks of ``vehicle``.
+    """Return the path that ``mission`` (as stored on board) commands ``vehicle`` to fly.
 
     ``airborne``: it begins at the top of its take-off.
 
-    What of it is not understood, or cannot be simulated, is named in ``not_flown``. Raises ValueError where the
-    mission does not fly at all.
+    ``not_flown`` lists the parts that are not understood or cannot be simulated. Raises ValueError if the mission does
+    not fly at all.
     """
     flight = follow(mission, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
     if not flight.stretches:
@@ -171,7 +171,7 @@ def make_track(
     if airborne:
         first = next((k for k, s in enumerate(flight.stretches) if not s.column), 0)
         flight.stretches, ends = flight.stretches[first:], ends[first:]
-    # A leg begins where the last one ended: what lies between was not understood, and is said in `not_flown`.
+    # A leg begins where the last one ended: a gap between them was not understood and is listed in `not_flown`.
     line, goal, i = _Line(ends[0, 0]), 0, 0
     stretches = flight.stretches
     while i < len(stretches):
@@ -197,10 +197,10 @@ def make_track(
 
 
 def _as_measured(s: Stretch, mission: Mission, world: World) -> Stretch:
-    """A leg with the speed over ground that comes of the commanded one: ArduPilot counts in metres of its own.
+    """Return a leg with its true speed over ground, because ArduPilot flies the commanded speed in its own metres.
 
-    They are of a sphere, from home; longitudes shrink with the cosine of the latitude midway between home and the way
-    point (`Location::get_vector_xy_from_origin_NE`).
+    Those are measured on a sphere, from home; longitudes are scaled by the cosine of the latitude midway between home
+    and the way point (`Location::get_vector_xy_from_origin_NE`).
     """
     if s.column:
         return s
@@ -233,7 +233,7 @@ def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics:
 
 
 def _left_out(flight: Flight) -> list[str]:
-    """What is flown more simply than by an autopilot."""
+    """Return in words what is flown more simply than an autopilot would."""
     circles = sorted({s.seq for s in flight.stretches if s.kind == "loiter" and s.reach_m > 0.0})
     again = sorted({s.seq for s in flight.stretches if s.times > 1})
     return [
@@ -247,10 +247,10 @@ def _stands(s: Stretch, ends: Floats) -> bool:
 
 
 def _end_of_run(stretches: Sequence[Stretch], ends: Floats, first: int) -> int:
-    """Index of the stretch at whose end the vehicle stops: way points without a wait are passed.
+    """Return the index of the stretch at whose end the vehicle stops; way points without a hold are passed.
 
-    It stops before a landing or a return and where the frame changes between terrain and another
-    (mode_auto.cpp, `set_next_wp`).
+    It stops before a landing or a return, and where the frame changes from terrain to another or back (mode_auto.cpp,
+    `set_next_wp`).
     """
     i = first
     while i + 1 < len(stretches):
@@ -264,7 +264,7 @@ def _end_of_run(stretches: Sequence[Stretch], ends: Floats, first: int) -> int:
 
 
 def _end_of_flight(stretches: Sequence[Stretch], first: int) -> int:
-    """Index of the last stretch of one kind that a fixed wing flies; to stop there takes it no time."""
+    """Return the index of the last stretch of the same kind that a fixed wing flies; its stop there takes no time."""
     i = first
     while i + 1 < len(stretches) and stretches[i + 1].kind == stretches[first].kind:
         i += 1
@@ -276,7 +276,7 @@ def _slants(ends: Floats) -> bool:
 
 
 def _column(line: _Line, ends: Floats, s: Stretch, kinematics: Kinematics) -> None:
-    """Straight up, or straight down and slowly at the end."""
+    """Add a vertical piece: straight up, or straight down, with slow descent at the end."""
     start, end = line.points[-1], ends[1]
     climb, descent = s.rates_m_s or (kinematics.climb_m_s, kinematics.descent_m_s)
     if end[2] >= start[2]:
@@ -289,17 +289,17 @@ def _column(line: _Line, ends: Floats, s: Stretch, kinematics: Kinematics) -> No
 
 
 def _run(line: _Line, stretches: Sequence[Stretch], ends: Floats, kinematics: Kinematics, world: World) -> None:
-    """Legs that are flown without a stop, their corners rounded."""
+    """Add legs that are flown without a stop, with rounded corners."""
     terrain = stretches[0].terrain
     legs = [i for i, s in enumerate(stretches) if not _stands(s, ends[i])]
     if not legs:
         return
     corners = np.array([line.points[-1], *(ends[i, 1] for i in legs)])
-    if terrain:  # heights above ground are what changes evenly along the leg
+    if terrain:  # the height above ground changes linearly along the leg
         corners[:, 2] -= world.airspace.surface.ground_at(corners[:, 0], corners[:, 1])
     arcs = [_arc(corners[k : k + 3], kinematics) for k in range(len(legs) - 1)]
     sharp_end = corners[-1][None, :], math.inf
-    for k, i in enumerate(legs):  # the second half of the corner behind, the straight, the first half of the one ahead
+    for k, i in enumerate(legs):  # second half of the previous corner, straight piece, first half of the next corner
         way: list[tuple[Floats, float]] = []
         if k > 0:
             nodes, corner_m_s = arcs[k - 1]
@@ -316,7 +316,7 @@ def _run(line: _Line, stretches: Sequence[Stretch], ends: Floats, kinematics: Ki
 
 
 def _over_ground(line: _Line, to: Floats, s: Stretch, kinematics: Kinematics, corner_m_s: float, world: World) -> None:
-    """A piece whose height is given above ground, in parts that follow it."""
+    """Add a piece whose height is above ground, in parts that follow the terrain."""
     surface = world.airspace.surface
     here = line.points[-1]
     agl = here[2] - float(surface.ground_at(here[0], here[1]))
@@ -328,9 +328,9 @@ def _over_ground(line: _Line, to: Floats, s: Stretch, kinematics: Kinematics, co
 
 
 def _arc(corner: Floats, kinematics: Kinematics) -> tuple[Floats, float]:
-    """The nodes of a rounded corner, an odd number of them, and the speed that it allows.
+    """Return the nodes of a rounded corner, an odd number, and the speed that it allows.
 
-    ``corner`` (3, 3): the way point between its neighbours. One node, the way point, where there is no turn.
+    ``corner`` (3, 3): the way point between its neighbours. If there is no turn, the way point is the only node.
     """
     before, here, after = corner
     into, out = here - before, after - here
@@ -357,5 +357,5 @@ def _arc(corner: Floats, kinematics: Kinematics) -> tuple[Floats, float]:
     turned = np.column_stack(
         [spoke[0] * np.cos(angle) - spoke[1] * np.sin(angle), spoke[0] * np.sin(angle) + spoke[1] * np.cos(angle)]
     )
-    height = np.interp(u, [0.0, 0.5, 1.0], [begin[2], here[2], end[2]])  # a change of pitch is not rounded
+    height = np.interp(u, [0.0, 0.5, 1.0], [begin[2], here[2], end[2]])  # a change of slope is not rounded
     return np.column_stack([centre + turned, height]), corner_m_s

@@ -1,13 +1,13 @@
-"""A loopback vehicle: a mission server that answers as an autopilot does, without sockets and with time handed in.
+"""A loopback vehicle: a mission server that answers like an autopilot; no sockets, time is an argument.
 
     vehicle = LoopbackVehicle(1, Autopilot.ARDUCOPTER, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.0)
     answers = vehicle.receive(packet, now)
     if vehicle.deadline is not None and now >= vehicle.deadline:
         answers += vehicle.on_timer(now)
 
-``now`` is any clock in seconds that does not run backwards; the vehicle is switched on at the first ``now`` it sees.
-What it answers is decided in `ardupilot_protocol` and `px4_protocol`, what it keeps in `ardupilot_storage` and
-`px4_storage`, what goes wrong in `misbehaviour`.
+``now`` is the time in seconds of any clock that does not run backwards; the vehicle is switched on at the first ``now``
+that it gets. `ardupilot_protocol` and `px4_protocol` decide what it answers, `ardupilot_storage` and `px4_storage` what
+it stores, `misbehaviour` what goes wrong.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ _MISSION_PLANNER = 190  # a component id that PX4 also answers to
 
 
 class LoopbackVehicle:
-    """One vehicle that stands at a place and keeps a mission, a fence and rally points.
+    """One vehicle that stands on the ground and stores a mission, a fence and rally points.
 
-    ``lat_deg``, ``lon_deg`` in degrees, ``amsl_m`` above mean sea level: where it stands, which is its home.
-    ``boot_s``: it answers NO_SPACE (ArduPilot) or nothing (PX4) for so long after being switched on.
+    ``lat_deg``, ``lon_deg``, ``amsl_m``: its position, which is also its home. ``boot_s``: seconds after being switched
+    on for which it answers NO_SPACE (ArduPilot) or nothing (PX4).
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class LoopbackVehicle:
         self._rebooted = False
         self._edit_due_after: int | None = 0 if self.misbehave.edit is not None else None
 
-    # what a test or a server may look at
+    # state for tests and servers
 
     @property
     def sysid(self) -> int:
@@ -83,16 +83,16 @@ class LoopbackVehicle:
 
     @property
     def home(self) -> Home:
-        """Where it stands."""
+        """The vehicle's position, which is its home."""
         return self._board.home
 
     def carry_to(self, home: Home) -> None:
-        """Put it somewhere else; its home goes along."""
+        """Move the vehicle, and its home, to another place."""
         self._board.home = home
 
     @property
     def armed(self) -> bool:
-        """Whether its motors may turn."""
+        """Whether it is armed."""
         return self._board.armed
 
     @armed.setter
@@ -115,31 +115,31 @@ class LoopbackVehicle:
         return limit is not None and self._received >= limit
 
     def booting(self, now: float) -> bool:
-        """Whether it is up but not ready (system_status below standby)."""
+        """Whether it is running but not ready (system_status below standby)."""
         self._switch_on(now)
         return self.reachable(now) and now < self._ready_at
 
     def reachable(self, now: float) -> bool:
-        """Whether it says anything at all at ``now``."""
+        """Whether it sends anything at all at ``now``."""
         self._switch_on(now)
         assert self._dead_until is not None
         return not self.silent and now >= self._dead_until
 
     def items(self, mission_type: int = MISSION) -> tuple[MissionItem, ...]:
-        """What is on board, as it would be read back: on ArduPilot a mission starts with the vehicle's home."""
+        """Return the list on board as it would be read back: on ArduPilot, a mission starts with the vehicle's home."""
         stored = self._board.lists[mission_type]
         if mission_type == MISSION and self.autopilot.is_ardupilot and stored:
             return (home_item(self._board.home), *stored[1:])
         return tuple(stored)
 
     def load(self, items: Sequence[MissionItem], mission_type: int = MISSION) -> None:
-        """Put ``items`` (in wire order) on board as they are, as a former flight left them."""
+        """Store ``items`` (in wire order) unchanged, as if from an earlier flight."""
         self._board.lists[mission_type] = list(items)
 
     # the protocol
 
     def receive(self, packet: Packet, now: float) -> list[Packet]:
-        """Take one packet in and return what goes out at once."""
+        """Process one packet and return the packets that are sent at once."""
         out = self.on_timer(now)
         if not self._is_for_us(packet.target):
             return out
@@ -151,14 +151,14 @@ class LoopbackVehicle:
 
     @property
     def deadline(self) -> float | None:
-        """When `on_timer` wants to be called, or None."""
+        """The next time to call `on_timer`, or None."""
         if self.silent:
             return None
         due = (self._server.deadline, self._inbound.deadline, self._outbound.deadline)
         return min((at for at in due if at is not None), default=None)
 
     def on_timer(self, now: float) -> list[Packet]:
-        """What is due at ``now``: requests sent again, transfers given up, packets that were held back."""
+        """Return the packets due at ``now``: repeated requests, ACKs of transfers given up, delayed packets."""
         self._switch_on(now)
         if not self.reachable(now):
             return []
@@ -167,7 +167,7 @@ class LoopbackVehicle:
         return self._run(now)
 
     def reboot(self, now: float) -> None:
-        """Fall silent for half of ``reboot_s``, boot for the other half, and forget every transfer."""
+        """Reboot: silent for half of ``reboot_s``, booting for the other half; every transfer is lost."""
         self._server.reset()
         self._inbound.clear()
         self._outbound.clear()
@@ -193,7 +193,7 @@ class LoopbackVehicle:
 
     def _is_for_us(self, target: Address) -> bool:
         if self.autopilot.is_ardupilot:
-            # A component it has never heard of is taken for itself (MAVLink_routing.cpp).
+            # ArduPilot accepts packets to a component that it has never heard of (MAVLink_routing.cpp).
             return target.sysid in (0, self.sysid)
         return target.sysid == self.sysid and target.compid in (0, self.compid, _MISSION_PLANNER)
 
@@ -219,7 +219,7 @@ class LoopbackVehicle:
         return True
 
     def _edit_before(self, message: MissionMessage) -> None:
-        """The second ground station: changes one item once, after an upload and before it is read back."""
+        """Act as a second ground station: change one item once, after an upload and before it is read back."""
         due = self._edit_due_after
         if due is None or not isinstance(message, RequestList) or self._board.uploads <= due:
             return
@@ -231,7 +231,7 @@ class LoopbackVehicle:
 
 
 def _lies(truth: MissionMessage, mission_type: int) -> list[MissionMessage]:
-    """What a careless ground station could take for ``truth``, of ``mission_type``."""
+    """Return messages of ``mission_type`` that a careless ground station could mistake for ``truth``."""
     lies: dict[type[MissionMessage], Callable[[], list[MissionMessage]]] = {
         Request: lambda: [Ack(0, mission_type), Request(65535, mission_type)],
         Count: lambda: [Count(1, mission_type), Ack(0, mission_type)],

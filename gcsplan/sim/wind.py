@@ -1,6 +1,7 @@
 """Wind, gusts and position error of a simulated flight, all drawn from one seed.
 
-Both are processes that forget exponentially (Ornstein-Uhlenbeck), one for each lane: a vehicle in one run.
+Gusts and position error are exponentially correlated processes (Ornstein-Uhlenbeck), one for each lane; a lane is one
+vehicle in one run.
 """
 
 from __future__ import annotations
@@ -14,19 +15,20 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 
 GUST_MEMORY_S = 4.0
-"""Near the ground a turbulence of some tens of metres is carried past at about 10 m/s."""
+"""Correlation time of gusts, s: near the ground, turbulence of some tens of metres drifts past at about 10 m/s."""
 NOISE_MEMORY_S = 20.0
-"""A position fix wanders; it does not jump from one message to the next."""
+"""Correlation time of the position error, s: a position fix drifts, it does not jump between messages."""
 PUSH_S = 0.1
-"""Metres a gust of 1 m/s pushes a multicopter off its track, before its position control has it back."""
+"""Metres per m/s by which a gust pushes a multicopter off its track before its position control corrects it."""
 PUSH_LAG_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """``wind_m_s`` blows from ``from_deg`` (None: another direction in each run); ``gusts_m_s`` and ``noise_m`` are
-    standard deviations of each component of the gusts and of the position error. Raises InputError for a number that
-    is negative or not finite."""
+    """Mean wind ``wind_m_s`` from ``from_deg`` (None: a random direction in each run), gusts and position error.
+
+    ``gusts_m_s``, ``noise_m``: standard deviation of each component of the gusts and of the position error. Raises
+    InputError for a number that is negative or not finite."""
 
     wind_m_s: float = 0.0
     from_deg: float | None = None
@@ -43,26 +45,26 @@ class Weather:
 
     @property
     def calm(self) -> bool:
-        """No air moves, and the vehicle knows where it is."""
+        """Whether there is no wind, no gust and no position error."""
         return not (self.wind_m_s or self.gusts_m_s or self.noise_m)
 
     def as_dict(self) -> dict[str, float | None]:
-        """For JSON."""
+        """Return a dict for JSON."""
         return {
             "wind_m_s": self.wind_m_s, "from_deg": self.from_deg, "gusts_m_s": self.gusts_m_s, "noise_m": self.noise_m
         }  # fmt: skip
 
 
 class Air:
-    """What the weather does to each lane. ``lanes`` = runs × ``vehicles``: lane ``r · vehicles + v``.
+    """The effect of the weather on each lane. ``lanes`` = runs × ``vehicles``: lane ``r · vehicles + v``.
 
-    After `step`, ``wind`` (lanes, 2) is where the air moves to, east and north, m/s; ``offset`` (lanes, 3) how far
-    the vehicle is from where it thinks it is on its track, metres.
+    After `step`, ``wind`` (lanes, 2) is the velocity of the air, east and north, m/s; ``offset`` (lanes, 3) is the
+    vehicle's true position minus its position on the track, metres.
     """
 
     def __init__(self, weather: Weather, vehicles: int, runs: int, seed: int, first_run: int = 0) -> None:
         self._weather = weather
-        # One stream for each run: a run is the same whether it is flown alone or among others.
+        # One random stream for each run, so that a run does not depend on the other runs.
         self._streams = [np.random.default_rng((seed, first_run + r)) for r in range(runs)]
         self._vehicles = vehicles
         lanes = runs * vehicles
@@ -84,7 +86,7 @@ class Air:
         return np.concatenate([stream.standard_normal((self._vehicles, columns)) for stream in self._streams])
 
     def step(self, step_s: float) -> None:
-        """Let ``step_s`` seconds pass."""
+        """Advance by ``step_s`` seconds."""
         weather = self._weather
         if weather.calm or not (weather.gusts_m_s or weather.noise_m):
             return
