@@ -30,9 +30,9 @@ class Kinematics:
     speed* (measured: from 10 m/s, with 3 m/s commanded, 7.0 was reached after 60 m and 4.0 after 100 m).
     ``corner_accel_m_s2``: lateral, on the arc that rounds a corner and passes its way point at ``cut_m``. With an
     infinite acceleration speeds change instantly; with an infinite corner acceleration corners are not rounded. With an
-    infinite climb or descent rate the commanded speed is the speed in space on any slope. ``land_m_s``: descent rate
-    lower than ``land_below_m`` above the landing place. ``airspeed_m_s``: highest airspeed, which a headwind reduces.
-    ``leg_jerk_m_s3``, ``leg_accel_m_s2``: of ArduPilot's S-curves, see `leg_m_s`; an infinite jerk disables them.
+    infinite climb or descent rate the commanded speed is the speed in space on any slope. ``land_m_s``: descent rate in
+    the last ``land_below_m`` above the landing place. ``airspeed_m_s``: highest airspeed; a headwind is subtracted from
+    it. ``leg_jerk_m_s3``, ``leg_accel_m_s2``: of ArduPilot's S-curves, see `leg_m_s`; an infinite jerk disables them.
     """
 
     climb_m_s: float

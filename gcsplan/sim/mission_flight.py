@@ -32,7 +32,7 @@ CRAWL_M_S = 0.05
 HEADWAY_M_S = 0.3
 """Lowest speed over ground, m/s, against a wind that is too strong for the vehicle."""
 PATIENCE = 4.0
-"""All lanes are given up this many times the longest flight in still air, plus `SPARE_S`, after the last departure."""
+"""Lanes are given up this many durations of the longest flight in still air, plus `SPARE_S`, after the last start."""
 SPARE_S = 300.0
 
 
@@ -124,7 +124,7 @@ class _Ways:
         self.last = np.concatenate([_next_stop(t) == len(t.points) - 1 for t in tracks])
 
     def calm_s(self) -> float:
-        """Return about the seconds of the longest flight in still air, without acceleration."""
+        """Return the approximate duration of the longest flight in still air, seconds; acceleration is ignored."""
         slow = np.maximum(np.minimum(self.cap, self.command), CRAWL_M_S)
         holds = np.where(self.stops_after & np.isfinite(self.hold), self.hold, 0.0)
         return float(np.add.reduceat((self.end - self.begin) / slow + holds, self.first).max())

@@ -66,7 +66,7 @@ class Breach:
         return self.message if of_runs == 1 else f"{self.message} (in {self.runs} of {of_runs} runs)"
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return a dict for JSON."""
         return {
             "kind": self.kind, "vehicles": list(self.vehicles), "message": self.message, "by": _number(self.by),
             "runs": self.runs,
@@ -117,7 +117,7 @@ class Performance:
 class Rehearsal:
     """The result of a rehearsal.
 
-    ``closest``: the least distance of any two vehicles in any run, None if no two flew at the same time.
+    ``closest``: the nearest approach of any two vehicles in any run, None if no two flew at the same time.
     ``simulator``: ``gcsplan`` or ``sitl``. ``weather``: the simulated weather, for output.
     """
 
@@ -164,7 +164,7 @@ class Rehearsal:
         return None
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return a dict for JSON."""
         closest = None
         if self.closest is not None:
             closest = {"vehicles": list(self.closest.names), "time_s": _number(self.closest.time_s)}

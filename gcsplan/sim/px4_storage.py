@@ -36,7 +36,7 @@ def _i16(value: float) -> float:
 
 
 def _heading(degrees: float) -> float:
-    """Convert degrees to float32 radians in 0 … 2π and back: −90 becomes 270; 10 stays 10 or a float32 next to it."""
+    """Convert degrees to float32 radians in 0 … 2π and back: −90 becomes 270; 10 becomes 10 or an adjacent float32."""
     radians = float32(degrees * float32(float32(math.pi) / 180.0))
     if not math.isfinite(radians):
         return math.nan

@@ -19,7 +19,7 @@ class Transport(Protocol):
     """The interface of a socket that a server needs."""
 
     address: tuple[str, int]
-    datagrams: bool  # whether one read gives whole frames
+    datagrams: bool  # whether it reads whole datagrams
 
     def wait(self, waker: socket.socket, timeout_s: float) -> list[tuple[Client, bytes]]:
         """Return what was received; waits at most ``timeout_s``, or until ``waker`` is readable."""

@@ -90,7 +90,7 @@ class Track:
     def braking(self) -> Floats:
         """(N,) the largest v² at each node from which every later speed cap and stop can still be met.
 
-        The vehicle does not brake ahead for a lower commanded speed, because it learns of it only at that item.
+        The vehicle does not brake ahead of a lower commanded speed, because the command comes only at its item.
         """
         heard = self.command_m_s.copy()
         for i in range(1, len(heard)):

@@ -1,1 +1,1 @@
-"""From a path to mission items, and from zones to a fence."""
+"""Builders: from a path to mission items, and from zones to a fence."""

@@ -81,7 +81,7 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
         item(cmd.VTOL_TAKEOFF if plane else cmd.TAKEOFF, 0, m.RELATIVE, top_cm),
         MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (speed_kind, speed, -1.0, 0.0)),
     ]
-    if order.hold_s > 0 or order.gate_utc is not None:  # before the speed change: a gate is exact from a standstill
+    if order.hold_s > 0 or order.gate_utc is not None:  # right after take-off: a gate is exact from a standstill
         items.insert(1, _gate(order, vehicle))
     last = len(points) - 1
     items += [item(cmd.WAYPOINT, i, frame, int(cm[i]), radius_m=radius) for i in range(1, last)]

@@ -103,7 +103,7 @@ def _shape(request: bytes) -> bytes:
 
 
 def _tail(message: Item, target: Address, us: Address) -> bytes:
-    """Return a MISSION_ITEM_INT frame after its sequence number; the checksum is replaced by its extra byte."""
+    """Return a MISSION_ITEM_INT frame from after its sequence number, with the CRC extra byte instead of a checksum."""
     item = message.item
     payload = _PAYLOAD.pack(
         *item.params, item.x, item.y, item.z, message.seq, item.command, *target, item.frame, message.current,

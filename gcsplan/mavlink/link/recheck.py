@@ -9,7 +9,8 @@ addresses under its system id are ignored, and preflight is repeated
 - after a silence, before another item is sent: the vehicle that is heard then may be another one;
 - after the read-back (`last_look`).
 
-Such a look is valid only with a heartbeat and a position received since it began; both are requested.
+A look needs a recent heartbeat, and a recent position if the vehicle reports any: received at most 1.5 s (`_RECENT_S`)
+before the look began, or after it began for `last_look`. Both are requested.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ _AGAIN_S = 0.1
 _REQUEST_MESSAGE, _HEARTBEAT, _GLOBAL_POSITION_INT = 512, 0, 33
 _MOVED = frozenset({"wrong_place", "wrong_height"})
 _AT_ONCE = frozenset({"wrong_place", "wrong_autopilot"})
-"""Reasons that end a running transfer, because it may be another vehicle. If it was armed, the transfer completes."""
+"""Reasons that end a running transfer: it may be another vehicle. One that was only armed still gets its whole list."""
 
 
 class Recheck:

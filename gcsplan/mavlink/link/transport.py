@@ -1,7 +1,7 @@
 """Sockets and serial ports behind one small interface: received bytes with their peer, and bytes sent to a peer.
 
-Only opening a connection may block. An open transport is read when one of its ``handles`` is readable; one without
-handles (serial ports on Windows) is polled.
+No read or write blocks longer than opening a connection does. An open transport is read when one of its ``handles`` is
+readable; one without handles (serial ports on Windows) is polled.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _MOST_CLIENTS = 32
 
 
 class Transport(Protocol):
-    """A socket or port. ``datagrams``: one read gives whole frames. ``default``: peer for addresses not yet heard."""
+    """A socket or port. ``datagrams``: it reads whole datagrams. ``default``: peer for ids not heard yet, or None."""
 
     datagrams: bool
     default: Peer | None
@@ -97,7 +97,7 @@ def _resolve(endpoint: Endpoint, kind: socket.SocketKind) -> tuple[socket.Addres
 
 
 def _patience_s(sock: socket.socket) -> float | None:
-    """Return the timeout for `_SILENCE_S` on ``sock``; None (blocking) if the kernel accepted it as a socket option."""
+    """Return the timeout that ends a wait on ``sock`` after `_SILENCE_S`; None (blocking) if the kernel enforces it."""
     try:
         silence = struct.pack("@ll", 0, round(_SILENCE_S * 1e6))  # struct timeval
         for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):

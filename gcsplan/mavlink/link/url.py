@@ -9,7 +9,7 @@
 ``serial:DEVICE:BAUD``                    serial port
 ========================================  =====================================================
 
-All but the bare device names may be written with ``://``. IPv6 addresses stand in brackets.
+All forms but the bare device names may be written with ``://``. IPv6 addresses are written in brackets.
 """
 
 from __future__ import annotations

@@ -147,7 +147,7 @@ class _Told:
 
 
 _Voice = tuple[int, Peer]  # component id and address
-_Key = tuple[int, Peer, int, int]  # and the kinds of autopilot and vehicle
+_Key = tuple[int, Peer, int, int]  # the same, and MAV_AUTOPILOT and MAV_TYPE
 
 
 class Watch:

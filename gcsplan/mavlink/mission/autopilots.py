@@ -89,7 +89,7 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
         PX4,
         _COPTERS | _PLANES,
         # navigation.h: NUM_MISSIONS_SUPPORTED 2000 on boards with an SD card, 65534 in simulation, 500 with missions
-        # in RAM and 50 on the smallest boards; those answer NO_SPACE.
+        # in RAM and 50 on the smallest boards; a board that holds fewer answers NO_SPACE.
         max_items=2000,
         atomic=True,  # mavlink_mission.cpp: written to the inactive bank, swapped after the last item
         holds_s=5.0,  # mavlink_mission.h: MAVLINK_MISSION_PROTOCOL_TIMEOUT_DEFAULT

@@ -19,7 +19,7 @@ from gcsplan.vehicle import Autopilot
 GLOBAL, NO_POSITION, RELATIVE, TERRAIN = 0, 2, 3, 10
 FRAME_SYNONYMS = {5: GLOBAL, 6: RELATIVE, 11: TERRAIN}
 
-# Kinds of list (MAV_MISSION_TYPE).
+# Types of lists (MAV_MISSION_TYPE).
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
 
 
@@ -116,7 +116,7 @@ class Mission:
         return 1 if self.autopilot.is_ardupilot else 0
 
     def wire_items(self) -> tuple[MissionItem, ...]:
-        """All items in wire order: seq is the index."""
+        """Return all items in wire order: seq is the index."""
         return (self.home.as_item(), *self.items) if self.autopilot.is_ardupilot else self.items
 
     @classmethod

@@ -26,8 +26,8 @@ class Timers:
 
     ``response_s``: wait for an answer before the message is repeated, at most ``retries`` times. ``item_s``: the same
     for an item of a download, repeated as long as the vehicle answers at all. ``silence_s``: wait of an upload for the
-    next request of a vehicle that has requested items (ArduPilot itself gives up after 8 s). ``stall_s``: the longest
-    time in which an upload accepts only requests for items that were requested before.
+    next request of a vehicle that has requested items (ArduPilot itself gives up after 8 s). ``stall_s``: longest time
+    of an upload without a request for a new item.
     """
 
     response_s: float = 1.5

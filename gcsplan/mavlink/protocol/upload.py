@@ -136,7 +136,7 @@ class Upload(Machine):
             raise InputError(f"a list holds at most {_MOST_ITEMS} items, given {len(self.items)}")
         self._asked: set[int] = set()
         self._last_asked: int | None = None
-        self._highest = -1  # seq requested in this round; a request for item 0 begins a new round
+        self._highest = -1  # highest seq requested in this round; a repeated request for item 0 begins a new round
         self._rounds = 0
         self._gives_up_at = 0.0  # a stall if no new item is requested by this time
         self._doubt: Outcome | None = None

@@ -31,7 +31,7 @@ from gcsplan.mavlink.protocol.messages import (
 dialect.MAVLINK_IGNORE_CRC = 0
 
 _COUNT_ID_AT, _ACK_ID_AT = 5, 4  # byte offset of opaque_id in the payloads
-_UNPLACED = 1e7  # MISSION_ITEM carries degrees
+_UNPLACED = 1e7  # MISSION_ITEM holds degrees, a `MissionItem` degrees times this
 
 
 class _CountWithId(dialect.MAVLink_mission_count_message):  # type: ignore[misc]
