@@ -10,7 +10,7 @@
     for result in upload(planned, to="sim"):
         print(result.vehicle, result.outcome, result.verified)
 
-Every function blocks until it is done; errors are those of `gcsplan.errors`.
+Every function blocks until it is done. Errors are those of `gcsplan.errors`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _MODULE_OF = {
     "upload": "gcsplan.app.scripting",
     "write": "gcsplan.app.scripting",
 }
-"""Each function is imported at its first use, so that the command line starts fast."""
+"""The module of each function, which is imported at its first use, so that the command line starts fast."""
 
 
 def __getattr__(name: str) -> object:
@@ -50,11 +50,11 @@ def __dir__() -> list[str]:
 
 
 class _Package(ModuleType):
-    """This package, where `check` and `report` always mean the functions.
+    """The type of this package: it keeps `check` and `report` bound to the functions.
 
-    The packages `gcsplan.check` and `gcsplan.report` have the same names, and Python would put them in the place of
-    the functions as soon as one of their modules is imported. They are reached by import alone: ``from gcsplan.check
-    import judge``, ``from gcsplan.check.verdict import Verdict``.
+    The packages `gcsplan.check` and `gcsplan.report` have the same names, and Python would bind the names to those
+    packages as soon as one of their modules is imported. Import from the packages by their full name: ``from
+    gcsplan.check import judge``, ``from gcsplan.check.verdict import Verdict``.
     """
 
     def __setattr__(self, name: str, value: object) -> None:

@@ -1,4 +1,4 @@
-"""``python -m gcsplan``: the same as the command ``gcsplan``, for where scripts are not on the PATH."""
+"""``python -m gcsplan`` does the same as the command ``gcsplan``; use it where scripts are not on the PATH."""
 
 from gcsplan.cli.main import main
 

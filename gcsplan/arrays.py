@@ -1,4 +1,4 @@
-"""Names of the arrays that pass from module to module."""
+"""Names of the array types that are passed between modules."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every error that gcsplan raises on purpose, and the exit code that it ends in.
+"""Every error that gcsplan raises on purpose, and the exit code that it leads to.
 
     GcsplanError                    70  our bug, if nothing below fits
     ├── InputError     (ValueError)       2  bad input; carries every problem found, each with its place
@@ -9,7 +9,7 @@
     ├── LinkError      (ConnectionError)  6  the link is dead, or the outcome is unknown
     └── ReadBackDiffers (RuntimeError)    7  what is on board is not what was sent
 
-A message says what was wanted, what was given, where, and what to do about it.
+A message states what was required, what was given, where, and what to do about it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ NoMissionReason = Literal["infeasible", "not_found", "time", "separation", "batt
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One mistake in the input: where it stands (``file: key.path``) and what to do about it."""
+    """One mistake in the input: its place (``file: key.path``) and what to do about it."""
 
     where: str
     message: str
@@ -33,7 +33,7 @@ class Problem:
 
 
 class GcsplanError(Exception):
-    """Root of the tree. ``reason`` is a word for scripts, ``where`` the place, both may be empty."""
+    """Root of the error tree. ``reason`` is a word for scripts and ``where`` is the place; both may be empty."""
 
     exit_code: ClassVar[int] = 70
     default_reason: ClassVar[str] = "internal"
@@ -48,12 +48,12 @@ class GcsplanError(Exception):
         return f"{self.where}: {self.message}" if self.where else self.message
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Python's own way calls the class with the message alone, and drops or misses the keywords.
+        # Python's default calls the class with the message alone, and drops or misses the keyword arguments.
         return _revived, (type(self), self.args, self.__dict__)
 
 
 def _revived(kind: type[GcsplanError], args: tuple[object, ...], state: dict[str, object]) -> GcsplanError:
-    """An error that came from another process, as it was there."""
+    """Rebuild an error that came from another process, with the same data."""
     error = kind.__new__(kind, *args)
     error.__dict__.update(state)
     return error
@@ -71,7 +71,7 @@ class InputError(GcsplanError, ValueError):
 
     @classmethod
     def of(cls, problems: Iterable[Problem], *, headline: str = "") -> InputError:
-        """Make one error of all ``problems`` (at least one), one a line."""
+        """Make one error of all ``problems`` (at least one), one per line."""
         found = tuple(problems)
         if len(found) == 1 and not headline:
             return cls(found[0].message, where=found[0].where, problems=found)
@@ -80,13 +80,13 @@ class InputError(GcsplanError, ValueError):
 
 
 class UsageError(InputError):
-    """The command line's own words are off."""
+    """The arguments on the command line are wrong."""
 
     default_reason = "usage"
 
 
 class NoMission(GcsplanError, RuntimeError):
-    """No path is better than a wrong one: names the binding constraint in words."""
+    """There is no mission, because no path is better than a wrong one. The message names the binding constraint."""
 
     exit_code = 3
     default_reason = "not_found"
@@ -103,14 +103,14 @@ class CheckFailed(GcsplanError, RuntimeError):
 
 
 class VehicleRefused(GcsplanError, ConnectionError):
-    """The vehicle said no, or we would not send to it (armed, wrong autopilot, wrong place)."""
+    """The vehicle refused, or gcsplan refused to send to it (armed, wrong autopilot, wrong place)."""
 
     exit_code = 5
     default_reason = "refused"
 
 
 class LinkError(GcsplanError, ConnectionError):
-    """Nobody answers, or the link died and the outcome of a transfer is unknown."""
+    """Nobody answers, or the link failed and the outcome of a transfer is unknown."""
 
     exit_code = 6
     default_reason = "unknown"
@@ -124,7 +124,7 @@ class ReadBackDiffers(GcsplanError, RuntimeError):
 
 
 def unknown_name(sentence: str, name: str, known: Iterable[str]) -> InputError:
-    """What to raise where ``name`` is none of the ``known``: the sentence that says so, the nearest one, and all."""
+    """The error for a ``name`` that is not in ``known``: ``sentence``, the nearest known name, all known names."""
     from difflib import get_close_matches
 
     names = list(known)

@@ -24,10 +24,10 @@ class Autopilot(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Energy:
-    """Energy model of the krill paper, Table 1: R1 for every vertical metre, up or down, R2 for every horizontal one.
+    """Energy model of the krill paper, Table 1: R1 joules per vertical metre, up or down, R2 per horizontal metre.
 
-    ``hover_w`` is the power of standing still; ``battery_j`` None: capacity is not judged; ``reserve`` is the
-    part of the battery that must be left at the end.
+    ``hover_w`` is the power for hovering. With ``battery_j`` None, the capacity is not judged. ``reserve`` is the part
+    of the battery that must be left at the end.
     """
 
     vertical_j_per_m: float = 120.0
@@ -39,13 +39,14 @@ class Energy:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """An airframe with its limits; speeds in m/s over ground (cruise) and vertically (climb, descent).
+    """An airframe with its limits. Speeds are in m/s: over ground (cruise) and vertical (climb, descent).
 
-    ``accel_m_s2`` speeds up and brakes along the path, ``corner_accel_m_s2`` bounds the speed in a rounded corner,
-    ``vertical_accel_m_s2`` holds in the columns of take-off and landing, ``land_m_s`` is the descent just above ground.
-    ``leg_jerk_m_s3``: of the S-curves that ArduPilot lays its legs out with, which bound the speed on a short leg.
-    An accel of ``inf`` is instant speed, a corner accel of ``inf`` a sharp corner at full speed; a climb or descent of
-    ``inf`` means that the cruise speed counts in space, whatever the slope: the ideal vehicle of the papers.
+    ``accel_m_s2`` is the acceleration and braking along the path, ``corner_accel_m_s2`` bounds the speed in a rounded
+    corner, ``vertical_accel_m_s2`` applies in the columns of take-off and landing, ``land_m_s`` is the descent rate
+    just above the ground. ``leg_jerk_m_s3`` is the jerk of the S-curves that ArduPilot flies its legs with; it bounds
+    the speed on a short leg. An acceleration of ``inf`` is an instant change of speed, a corner acceleration of ``inf``
+    a sharp corner at full speed. A climb or descent rate of ``inf`` means that the cruise speed is the speed in space,
+    whatever the slope: the ideal vehicle of the papers.
     """
 
     name: str
@@ -67,20 +68,21 @@ class Vehicle:
 
     @property
     def lays_curves(self) -> bool:
-        """Whether it flies legs as ArduPilot lays them out: each an S-curve of its own, in ArduPilot's own metres."""
+        """Whether it flies legs as ArduPilot does: each leg is its own S-curve, measured in ArduPilot's own metres."""
         return self.autopilot.is_ardupilot and math.isfinite(self.leg_jerk_m_s3) and math.isfinite(self.accel_m_s2)
 
     @property
     def can_hold(self) -> bool:
         """Whether its mission can make it wait in the air for a set time.
 
-        A multicopter's can. ArduPlane, a VTOL too, goes on at once while it is armed (``ModeAuto::verify_nav_delay``)
-        and ignores a way point's hold; what turns with a radius circles instead.
+        A multicopter can. ArduPlane, also as a VTOL, continues at once while it is armed
+        (``ModeAuto::verify_nav_delay``) and ignores the hold of a way point. A vehicle with a turn radius circles
+        instead.
         """
         return self.autopilot is not Autopilot.ARDUPLANE and self.turn_radius_m <= 0.0
 
     def leg_time_s(self, horizontal_m: float, rise_m: float, speed_m_s: float) -> float:
-        """Seconds for a straight leg: cruise speed, or slower where the climb or descent rate is the tight one."""
+        """Seconds for a straight leg: at cruise speed, or slower where the climb or descent rate limits the speed."""
         rate_m_s = self.climb_m_s if rise_m >= 0 else self.descent_m_s
         if math.isinf(rate_m_s):
             return math.hypot(horizontal_m, rise_m) / speed_m_s

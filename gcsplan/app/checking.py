@@ -1,4 +1,4 @@
-"""Anybody's `.waypoints` and `.plan` files, each held against the world of a mission file, or one made of options."""
+"""Check any `.waypoints` and `.plan` files in the world of a mission file, or in a world made from options."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ from gcsplan.world.frame import FARTHEST_M
 from gcsplan.world.world import World
 
 SAME_PLACE_M = 1.0
-"""A home row within this of the vehicle's start is the start."""
+"""A home row within this distance of the vehicle's start, m, counts as the start."""
 
 
 CIRCLES = frozenset({LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALT})
 DEFAULT_CIRCLE_M = 150.0
-"""More than a plane's own circle takes at any altitude."""
+"""Radius of a circle, m, whose own radius is not stated: more than a plane's own circle needs at any altitude."""
 
 SPLINE_BULGE = 0.6
-"""A spline's tangents together are four times its length at most, so it bulges by 16/27 of it."""
+"""A spline's two tangents together are at most four times its length, so it bulges by at most 16/27 of its length."""
 
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """One file, the vehicle that it is for, and the verdict in ``world``.
+    """One file, its vehicle, and the verdict in ``world``.
 
-    ``fence``, ``rally``: the file's own. ``terrain_error_m`` is what terrain-frame legs were judged with. ``way_home``
-    where that is requested.
+    ``fence`` and ``rally`` are the file's own. ``terrain_error_m`` is the error that terrain-frame legs were judged
+    with. ``way_home`` is None unless it was requested.
     """
 
     file: Path
@@ -61,7 +61,7 @@ class Checked:
 
 @dataclass(frozen=True)
 class Batch:
-    """Several files: those that were judged, and what is wrong with the others. ``inputs``: of the world."""
+    """Several files: those that were judged, and the errors of the others. ``inputs`` describes the world."""
 
     name: str
     checked: tuple[Checked, ...]
@@ -71,7 +71,7 @@ class Batch:
 
 
 def split_name(argument: str) -> tuple[str | None, Path]:
-    """``uav1=FILE`` or ``FILE``: the vehicle's name if given, and the file."""
+    """Split ``uav1=FILE`` or ``FILE`` into the vehicle's name (None without one) and the file."""
     name, equals, file = argument.partition("=")
     if equals and re.fullmatch(r"[A-Za-z0-9_-]+", name) and not os.path.exists(argument):
         return name, Path(file)
@@ -79,7 +79,7 @@ def split_name(argument: str) -> tuple[str | None, Path]:
 
 
 def match(source: MissionFile, argument: str) -> tuple[VehicleRequest, Path]:
-    """The vehicle that a file is for: named, or of the file's stem, or the only one. Raises UsageError if unclear."""
+    """The vehicle that a file is for: by name, by the file's stem, or the only one. Raises UsageError if unclear."""
     name, file = split_name(argument)
     by_name = {r.vehicle.name: r for r in source.vehicles}
     if name is not None:
@@ -94,7 +94,7 @@ def match(source: MissionFile, argument: str) -> tuple[VehicleRequest, Path]:
 
 
 def check_files(source: MissionFile, arguments: Sequence[str]) -> list[Checked]:
-    """Judge each FILE or NAME=FILE in the world of ``source``; InputError and UsageError for what is not readable."""
+    """Judge each FILE or NAME=FILE in the world of ``source``. Raises InputError or UsageError for unreadable files."""
     batch = check_batch(source, arguments)
     if batch.unreadable:
         if len(batch.unreadable) == 1:
@@ -104,10 +104,10 @@ def check_files(source: MissionFile, arguments: Sequence[str]) -> list[Checked]:
 
 
 def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: bool = False) -> Batch:
-    """Judge each FILE or NAME=FILE in the world of ``source``; a file that cannot be read leaves the others standing.
+    """Judge each FILE or NAME=FILE in the world of ``source``; a file that cannot be read does not stop the others.
 
-    ``returns``: judge the way home from everywhere too. Where a file goes beyond the terrain that was loaded for the
-    mission, more of it is loaded. Raises UsageError where it is not clear for which vehicle a file is.
+    ``returns``: also judge the way home from every point. If a file reaches beyond the terrain that was loaded for the
+    mission, more terrain is loaded. Raises UsageError if it is not clear which vehicle a file is for.
     """
     requests = [match(source, argument) for argument in arguments]
     read: list[tuple[VehicleRequest, Path, MissionFileRead]] = []
@@ -127,9 +127,9 @@ def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: bool 
 
 
 def check_mission(source: MissionFile, mission: Mission, vehicle: str | None = None) -> Checked:
-    """Judge mission items in the world of ``source``, for the vehicle of that name, else of the mission's own.
+    """Judge mission items in the world of ``source``, for the named vehicle or else the one that the mission names.
 
-    Raises UsageError where that is none of the file's vehicles.
+    Raises UsageError if the mission file has no such vehicle.
     """
     request, file = match(source, mission.name if vehicle is None else f"{vehicle}={mission.name}")
     start = Home.at(*request.start_deg, request.start[2])
@@ -141,7 +141,7 @@ def check_mission(source: MissionFile, mission: Mission, vehicle: str | None = N
 
 def _at_start(read: MissionFileRead, start: Home, vehicle: Vehicle) -> MissionFileRead:
     """The mission as ``vehicle`` flies it from its start: no autopilot flies from a file's home row."""
-    from gcsplan.mavlink.link.preflight import distance_m  # with the dialect behind it, which planning can do without
+    from gcsplan.mavlink.link.preflight import distance_m  # loads the MAVLink dialect, which planning does not need
 
     mission, notes = replace(read.mission, name=vehicle.name, sysid=vehicle.sysid), list(read.notes)
     home, place = mission.home, (start.lat_e7 / 1e7, start.lon_e7 / 1e7)
@@ -162,18 +162,18 @@ def places_of(mission: Mission) -> list[tuple[float, float]]:
 
 
 def beyond_m(mission: Mission) -> float:
-    """How far from its places a mission may fly: its widest circle, and the bulge of its splines."""
+    """How far from its places a mission may fly, m: the radius of its widest circle plus the bulge of its splines."""
     circles = [p for i in mission.items if i.command in CIRCLES for p in i.params[1:3]]
     widest = max((min(abs(p), 3000.0) for p in circles if math.isfinite(p)), default=0.0)
     if any(i.command == SPLINE_WAYPOINT for i in mission.items):
         extent_m = _extent_m(places_of(mission))
-        # What is wider than any plane is found to be too far, and wants no terrain.
+        # A mission wider than any plane is refused as too far apart later, so it needs no terrain here.
         widest += SPLINE_BULGE * extent_m if extent_m <= 2.0 * FARTHEST_M else 0.0
     return float(widest) + DEFAULT_CIRCLE_M
 
 
 def _extent_m(places: Sequence[tuple[float, float]]) -> float:
-    """The diagonal of the box around places, no less than it is; the antimeridian is no edge."""
+    """Upper bound of the diagonal of the box around ``places``, m. The box may cross the antimeridian."""
     lat, lon = zip(*places, strict=True)
     turned = [(x - lon[0] + 180.0) % 360.0 - 180.0 for x in lon]
     nearest = 0.0 if min(lat) < 0.0 < max(lat) else min(map(abs, lat))  # to the equator, where a degree is longest
@@ -182,7 +182,7 @@ def _extent_m(places: Sequence[tuple[float, float]]) -> float:
 
 
 def _reaching(source: MissionFile, places: Sequence[tuple[float, float]]) -> MissionFile:
-    """``source``, with terrain loaded as far as ``places`` go; the same where it holds them, or was not read here."""
+    """``source`` with terrain loaded as far as ``places``; ``source`` itself if it covers them or cannot load more."""
     world = world_of(source)
     on_earth = [p for p in places if abs(p[0]) <= 90.0 and abs(p[1]) <= 180.0]
     unknown = [p for p in on_earth if math.isnan(world.ground_amsl(*p))]
@@ -192,11 +192,11 @@ def _reaching(source: MissionFile, places: Sequence[tuple[float, float]]) -> Mis
 def check_with_options(
     options: WorldOptions, autopilot: Autopilot | None, arguments: Sequence[str], *, returns: bool = False
 ) -> Batch:
-    """Judge each FILE in the world that ``options`` make.
+    """Judge each FILE in the world that ``options`` describe.
 
-    ``autopilot`` None takes a `.plan`'s own, and ArduCopter for a `.waypoints` file, which names none. Files that lie
-    too far apart for one plane get one each. ``returns``: judge the way home from everywhere too. Raises InputError
-    where the options are off.
+    With ``autopilot`` None, a `.plan` file names its own; a `.waypoints` file names none and is judged for ArduCopter.
+    Files that lie too far apart for one plane get a plane each. ``returns``: also judge the way home from every point.
+    Raises InputError if the options are wrong.
     """
     opened = OpenWorld(options)
     hint = None if options.home is None else Home.at(*options.home, 0.0)
@@ -234,7 +234,7 @@ def check_with_options(
 
 
 def _with_home(read: MissionFileRead, given: Home | None, argument: str) -> MissionFileRead:
-    """The mission with the home that the options give, if any. Raises InputError where none is known."""
+    """The mission with the home of the options, if they have one. Raises InputError if no home is known."""
     home = read.mission.home
     if given is not None:
         note = () if home == given else ("--home was taken for the file's home",)
@@ -284,13 +284,13 @@ def _judged(
 
 
 def passes(c: Checked, *, allow_unjudged: bool) -> bool:
-    """Whether a checked mission may fly: no limit is broken, on the way home neither if that is requested."""
+    """Whether a checked mission may fly: it breaks no limit, and neither does the way home if that was requested."""
     judged = [c.verdict.safe, *([c.way_home.safe] if c.way_home is not None else [])]
     return False not in judged and (allow_unjudged or None not in judged)
 
 
 def finding_lines(c: Checked, *, allow_unjudged: bool = False) -> list[str]:
-    """One line for each finding, ``file:item: kind: message``, as compilers and linters write theirs."""
+    """One line per finding, ``file:item: kind: message``, in the format of compilers and linters."""
     lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(f.message)}" for f in c.verdict.findings]
     unjudged = list(c.verdict.not_judged)
     if c.way_home is not None:
@@ -316,9 +316,9 @@ def _without_item(words: str) -> str:
 def failure(
     checked: Iterable[Checked], *, allow_unjudged: bool, unreadable: Sequence[tuple[str, InputError]] = ()
 ) -> dict[str, Any] | None:
-    """The ``error`` of ``check --json``: what cannot be read, which limits are broken, or what could not be judged.
+    """The ``error`` of ``check --json``: unreadable files, broken limits, or what could not be judged.
 
-    None if all may fly.
+    None if every mission may fly.
     """
     bad = [c for c in checked if not passes(c, allow_unjudged=allow_unjudged)]
     if not bad and not unreadable:
@@ -341,7 +341,7 @@ def failure(
 
 
 def more_of(c: Checked) -> dict[str, Any]:
-    """What ``check --json`` says of one file beside its verdict: the nearest misses, every leg, its own lists."""
+    """The part of ``check --json`` for one file beside its verdict: nearest misses, all legs, the file's own lists."""
     return {
         "nearest_misses": [asdict(miss) for miss in c.verdict.misses],
         "time_s": c.verdict.time_s,

@@ -1,4 +1,4 @@
-"""Of a fixed wing's plan, what a time table needs besides the path: climb-out, glide, and the circle at the end."""
+"""The parts of a fixed wing's flight that a time table needs besides the path: climb-out, glide and final circle."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["circling_m", "climb_out_and_glide"]
 
 
 def climb_out_and_glide(v: VehiclePlan, world: World) -> tuple[Floats | None, Floats | None]:
-    """The climb-out and the glide of a fixed wing, (K, 3) metres each; None for what stands in the air, or is not."""
+    """The climb-out and the glide of a fixed wing, (K, 3) metres each; None where the flight has no such part."""
     if v.order.wing is None:
         return None, None
     legs = v.verdict.legs
@@ -27,10 +27,10 @@ def climb_out_and_glide(v: VehiclePlan, world: World) -> tuple[Floats | None, Fl
 
 
 def circling_m(v: VehiclePlan) -> float:
-    """How far from its last point a vehicle may be that circles there for good; 0 for any other."""
+    """Distance from its last point, m, that a vehicle may have while it circles there for good; 0 for any other end."""
     wing = v.order.wing
     if wing is None or v.request.end not in ("loiter", "rtl"):
-        return 0.0  # a climb in circles is in the motion
+        return 0.0  # circles for climbing are part of the motion
     highest = max(leg.end[2] for leg in v.verdict.legs)
     radius = wing.circle_m if v.request.end == "loiter" else PLANE_LOITER_RADIUS_M
     return max(radius, math.ceil(v.request.vehicle.turn_radius_m)) * circle_growth(highest)

@@ -1,7 +1,7 @@
-"""Other paths for a vehicle: higher above ground or round the places where it meets another, or longer, to come later.
+"""Other paths for a vehicle: higher above ground, around the places of conflicts, or longer for a later arrival.
 
-The planner is asked again with tighter limits or with no-fly discs that only it sees; the mission that comes of it is
-judged in the mission file's own world, like any other.
+The planner runs again, with tighter limits or with no-fly discs that only it sees. The resulting mission is judged in
+the mission file's own world, like any other.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
 
 RADII = (1.0, 3.0, 8.0)
-"""Of the discs round places of conflict, in needed distances; each attempt is wider than the one before."""
+"""Radii of the discs around places of conflict, in needed distances; each attempt is wider than the one before."""
 
 TEETH = (1, 2, 4, 8)
-"""Of the zigzag of a longer path."""
+"""Numbers of teeth to try for the zigzag of a longer path."""
 
 LONGER_BY = 1e-3
-"""Of a longer path, beyond the requested length."""
+"""Part by which a longer path is made longer than requested."""
 
 SPARE_M = 2.0
-"""By which a path is raised, or a disc widened, beyond what is needed: way points are rounded, corners cut."""
+"""Metres by which a path is raised, or a disc widened, beyond the need: way points are rounded, corners are cut."""
 
 
 class Detours:
-    """``detours(name, avoid, attempt)`` is the ``replan`` of `fleet.resolve`, `longer` that of `fleet.arrival`.
+    """Plan other paths: calling it is the ``replan`` of `fleet.resolve`, `longer` is that of `fleet.arrival`.
 
-    `plan_of` gives the plan of a route that either has made.
+    `plan_of` returns the plan of a route that either of them made.
     """
 
     def __init__(
@@ -51,11 +51,11 @@ class Detours:
         self._known: dict[object, Route | None] = {}
 
     def plan_of(self, name: str, route: Route) -> VehiclePlan:
-        """The plan that a route was made of: one of ours, or the vehicle's first."""
+        """The plan that a route was made from: one of these detours, or the vehicle's first plan."""
         return next((plan for known, plan in self._found if known is route), self._plans[name])
 
     def __call__(self, name: str, avoid: Sequence[Conflict], attempt: int) -> Route | None:
-        """The first route of the ideas from number ``attempt`` on for which there is a mission; None without any."""
+        """The first route that has a mission, of the ideas from number ``attempt`` on; None if no idea has one."""
         ideas = [self._higher, *(lambda n, a, r=r: self._round(n, a, r) for r in RADII)]
         for number, idea in enumerate(ideas[attempt - 1 :], start=attempt):
             key = (name, number, () if number == 1 else tuple(c.worst.middle for c in avoid))
@@ -67,18 +67,18 @@ class Detours:
         return None
 
     def longer(self, name: str, length_m: float) -> Route | None:
-        """A route of about that length: a zigzag over the way as it is, as wide as there is room; None where none."""
+        """A route of about ``length_m``: a zigzag over the present path, the widest that fits; None if none does."""
         plan = self._plans[name]
         request, points = plan.request, plan.solution.path.points
         legs_m = np.linalg.norm(np.diff(points, axis=0), axis=1)
         now_m = float(legs_m.sum())
-        length_m *= 1.0 + LONGER_BY  # a little too long is flown a little faster; too short does not do
+        length_m *= 1.0 + LONGER_BY  # a slightly longer path is flown slightly faster; a shorter one cannot be used
         along_m = np.concatenate([[0.0], np.cumsum(legs_m)])
         way = points[-1, :2] - points[0, :2]
         if request.via or not np.hypot(*way) > 0.0:
-            return None  # the points that it must pass have an order of their own
+            return None  # the order of the via points is fixed, so none can be added
         aside = np.array([-way[1], way[0]]) / np.hypot(*way)
-        for teeth in TEETH:  # each tooth is two equal sides of a triangle over its part of the way
+        for teeth in TEETH:  # each tooth is two equal sides of a triangle over its part of the track
             off_m = math.sqrt(max(0.0, length_m**2 - now_m**2)) / (2.0 * teeth)
             at_m = now_m * (np.arange(teeth) + 0.5) / teeth
             middle = np.column_stack([np.interp(at_m, along_m, points[:, k]) for k in (0, 1)])
@@ -109,7 +109,7 @@ class Detours:
             east, north, amsl = conflict.worst.middle
             ends = (request.start, request.goal)
             if conflict.kind != "air" or any(math.hypot(e[0] - east, e[1] - north) <= reach_m for e in ends):
-                continue  # it starts or ends there: no way round
+                continue  # it starts or ends there, so no path leads around it
             levels = Level(amsl - half_m, "amsl"), Level(amsl + half_m, "amsl")
             discs.append(Zone(f"conflict {i + 1}", Circle(east, north, radius_m), *levels))
         if not discs:
@@ -123,7 +123,7 @@ class Detours:
     def _planned(
         self, name: str, request: VehicleRequest, *, limits: Limits | None = None, searched: World | None = None
     ) -> Route | None:
-        if limits is not None:  # a take-off height of the file's may lie below the raised limit
+        if limits is not None:  # the mission file's take-off height may be below the raised limit
             request = replace(request, takeoff_agl_m=None, approach_agl_m=None)
         try:
             plan = plan_vehicle(self._brief, request, limits=limits, searched=searched)

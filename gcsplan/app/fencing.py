@@ -1,8 +1,8 @@
-"""Fences of missions: made of a world's zones, held against the mission itself, uploaded before it, read back.
+"""Fences of missions: made from a world's zones, checked against the mission, uploaded before it, and read back.
 
-A fence that the mission would breach turns it round in the air. So a fence is only made after the whole of the flight
-as the autopilot flies it, from the ground at the start to the ground at the goal, was found to stay outside every
-area of it by the track error and the clearance.
+A fence that the mission would breach makes the vehicle turn round in the air. So a fence is made only after the whole
+flight as the autopilot flies it, from the ground at the start to the ground at the goal, was found to keep the track
+error and the clearance from every area of the fence.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ def fence_for(
 ) -> Fence:
     """The fence that the world's zones make for ``mission``; see `fence_of` for ``infinite`` and for its notes.
 
-    Raises CheckFailed where the mission itself would breach it, naming zone and item; InputError where the autopilot
-    cannot keep it.
+    Raises CheckFailed if the mission itself would breach it, with zone and item; InputError if the autopilot cannot
+    store or keep it.
     """
     fence = fence_of(world.airspace.zones, world.frame, mission.autopilot, infinite=infinite)
     try:
         areas = areas_of([profile_of(mission.autopilot).stored(item) for item in fence.items], world.frame)
-    except InputError as error:  # as it is stored, to centimetres
+    except InputError as error:  # areas_of reads the items as stored, rounded to centimetres
         raise InputError(
             f"the fence would not be stored as it was made ({error.message}): a zone is too thin for it; widen the "
             "zone, or send no fence",
@@ -75,16 +75,16 @@ def fence_for(
 def breaches(
     areas: Sequence[Area], mission: Mission, vehicle: Vehicle, world: World, *, rtl_rel_home_m: float | None = None
 ) -> list[Finding]:
-    """Where the flight of ``mission`` comes into an exclusion area, or out of an inclusion area, of a fence.
+    """Findings where the flight of ``mission`` enters an exclusion area, or leaves an inclusion area, of a fence.
 
-    The flight is widened by its track error and keeps the horizontal clearance, as from zones. An aircraft must be
-    inside each inclusion area.
+    The flight is widened by its track error and keeps the horizontal clearance from exclusion areas, as from zones. An
+    aircraft must be inside every inclusion area.
     """
     out = [Zone(a.name, shape) for a in areas if not a.inclusion for shape in a.shapes]
     found: list[Finding] = []
     if out:
         fenced = World(world.frame, Airspace(world.airspace.surface, out, scale=world.airspace.scale))
-        # A fence is a zone rounded to what its items can say; that much may be taken from the clearance.
+        # A fence is a zone rounded to the precision of its items, so that much is taken off the clearance.
         clearance_m = max(0.0, vehicle.limits.horizontal_clearance_m - ROUNDING_M)
         craft = replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=clearance_m))
         verdict = judge(mission, craft, fenced, rtl_rel_home_m=rtl_rel_home_m)
@@ -100,7 +100,7 @@ def breaches(
 def _outside(
     areas: Sequence[Area], mission: Mission, vehicle: Vehicle, world: World, rtl_rel_home_m: float | None
 ) -> list[Finding]:
-    """For each of the inclusion areas where the flight, as `judge` follows it, first comes out of it."""
+    """One finding for each inclusion area that the flight, as `judge` follows it, leaves: the first leg that does."""
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(i) for i in mission.items))
     flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
     round_corners(flight, stored, vehicle, world.frame)
@@ -123,9 +123,9 @@ def _outside(
 
 
 def _beyond_m(area: Area, legs: Legs, scale: float) -> Floats:
-    """How far each leg, widened by its track error, goes beyond an area's border; 0 where it stays inside.
+    """How far each leg, widened by its track error, goes beyond an area's border, m; 0 where it stays inside.
 
-    The parts of an area that is near in several lie apart: a leg inside the area is inside one of them.
+    The shapes of an area with several are apart, so a leg inside the area is inside one of them.
     """
     beyond_m = np.full(len(legs.start), math.inf)
     for shape in area.shapes:
@@ -136,13 +136,13 @@ def _beyond_m(area: Area, legs: Legs, scale: float) -> Floats:
 def _beyond_shape_m(shape: Circle | Polygon, legs: Legs, scale: float) -> Floats:
     reach_m = legs.track_error_m * scale
     ends = np.stack([legs.start[:, :2], legs.end[:, :2]], axis=1)
-    if isinstance(shape, Circle):  # a disc is convex: the ends decide
+    if isinstance(shape, Circle):  # a disc is convex, so the ends decide
         away = np.hypot(ends[..., 0] - shape.east_m, ends[..., 1] - shape.north_m).max(axis=1)
         return np.asarray(np.maximum(0.0, away + reach_m - shape.radius_m))
     import shapely
 
     polygon, lines = shapely.Polygon(shape.vertices), shapely.linestrings(ends)
-    # A vertical leg is a line without length, of which no part is left to be outside: its ends are tested too.
+    # A vertical leg is a line of length zero, and its difference with the polygon is empty: test its ends too.
     out = shapely.distance(polygon, shapely.points(ends)).max(axis=1)
     rest = shapely.difference(lines, polygon)
     points, owner = shapely.get_coordinates(rest, return_index=True)
@@ -155,7 +155,7 @@ def _beyond_shape_m(shape: Circle | Polygon, legs: Legs, scale: float) -> Floats
 def own_fence(
     items: Sequence[MissionItem], verdict: Verdict, vehicle: Vehicle, world: World
 ) -> tuple[Verdict, tuple[str, ...]]:
-    """``verdict`` with what a file's own fence has against the mission, and what is to be said of that fence."""
+    """``verdict`` plus the breaches of the file's own fence, and notes on that fence."""
     if not items:
         return verdict, ()
     try:
@@ -164,16 +164,16 @@ def own_fence(
         return replace(verdict, not_judged=(*verdict.not_judged, f"the file's fence: {error.message}")), ()
     out = sum(not a.inclusion for a in areas)
     words = f"the file brings a fence of its own: {out} area(s) to stay out of, {len(areas) - out} to stay inside of"
-    # A fence acts where it is: it is the errors that may carry the aircraft into it, not the clearance from zones.
+    # A fence acts at its border. Only errors can carry the aircraft across, so the clearance from zones is left out.
     plain = replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=0.0))
     found = breaches(areas, verdict.mission, plain, world) if verdict.legs else []
     return replace(verdict, findings=(*verdict.findings, *found)), (words,)
 
 
 def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[list[UploadJob], list[tuple[str, str]]]:
-    """``jobs``, each with the fence that its world's zones make for its mission; and notes, (name, words) each.
+    """``jobs``, each with the fence that its world's zones make for its mission, and notes as (name, words).
 
-    Raises what `fence_for` raises, and InputError for a mission that was not checked: nobody knows what it would
+    Raises what `fence_for` raises, and InputError for a mission that was not checked, since nobody knows what it would
     breach.
     """
     fenced: list[UploadJob] = []
@@ -197,11 +197,11 @@ def _notes(name: str, fence: Fence) -> list[tuple[str, str]]:
 def upload_fences(
     jobs: Sequence[UploadJob], links: Mapping[str, Link], options: session.SessionOptions
 ) -> dict[str, UploadResult | GcsplanError]:
-    """Send each job's fence over the link of its URL, all at once, read them back, compare; results by job's name.
+    """Send each job's fence over the link of its URL, all at once, read back and compare; results by job name.
 
-    To be done before the missions go out: an autopilot may refuse a mission for an old fence. Vehicles without a
-    fence, or with an empty one, are left as they are and are not in the result; one vehicle's failure leaves the
-    others standing.
+    Call this before the missions are sent: an autopilot may refuse a mission because of an old fence. Vehicles without
+    a fence, or with an empty one, are left as they are and are not in the result. A failure of one vehicle does not
+    affect the others.
     """
     from gcsplan.mavlink.link import session
 
@@ -216,7 +216,7 @@ def upload_fences(
 
 
 def not_fenced(ended: Mapping[str, UploadResult | GcsplanError]) -> dict[str, GcsplanError]:
-    """Those whose fence is not proved to be on board, and why: their missions are not to be sent."""
+    """Vehicles whose fence is not proved to be on board, with the reason: their missions must not be sent."""
     errors = {name: r if isinstance(r, GcsplanError) else r.error() for name, r in ended.items()}
     return {
         name: type(e)(f"the mission was not sent, for its fence is not on board: {e.message}", where=e.where,

@@ -1,8 +1,8 @@
-"""All vehicles together: when each leaves and how fast it flies, so that they arrive as requested and keep apart.
+"""Plan all vehicles together: departures and speeds, so that they arrive as requested and keep apart.
 
-The routes are those of the missions as the autopilots store them. A schedule gives departures, holds and speeds; each
-mission is built anew with its own and judged again; then every pair is held against the separation, and what conflicts
-is resolved or refused.
+The routes are those of the missions as the autopilots store them. A schedule sets departures, holds and speeds. Each
+mission is rebuilt with its own and judged again. Then the separation of every pair is judged, and conflicts are
+resolved or refused.
 """
 
 from __future__ import annotations
@@ -32,11 +32,12 @@ Ints = NDArray[np.intp]
 
 TERRAIN_STEP_M = 25.0
 LATER_S = 600.0
-"""By which all arrivals may move, where the mission file sets no time, to keep a fleet apart."""
+"""Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
 ARDUPILOT_DEGREE_M = 111318.84502145034
-"""Location.h, `LOCATION_SCALING_FACTOR`. An ArduCopter flew east and west 0.2 % faster than commanded, at 37° N."""
+"""Metres per degree, Location.h, `LOCATION_SCALING_FACTOR`. An ArduCopter flew 0.2 % faster than commanded east and
+west at 37° N."""
 SEPARATION_M = 30.0
-"""Judged where the file has no `arrival`."""
+"""Separation that is judged if the file has no `arrival`, m."""
 
 __all__ = ["crew_of", "fleet_of", "route_of"]
 
@@ -46,8 +47,8 @@ def fleet_of(
 ) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
     """The vehicles' missions with their speeds and gates, and the fleet's time table.
 
-    With ``gate`` everybody waits in the air until its own second of the day. Raises NoMission: ``time`` where they
-    cannot arrive as requested, ``separation`` where they cannot keep apart.
+    With ``gate`` every vehicle waits in the air until its own second of the day. Raises NoMission: ``time`` if they
+    cannot arrive as requested, ``separation`` if they cannot keep apart.
     """
     world, arrival = brief.world, brief.source.arrival
     crews = [crew_of(v, world) for v in vehicles]
@@ -77,7 +78,7 @@ def fleet_of(
     found = separation(motions, rules_of(arrival, flown)) if len(flown) > 1 else None
     if found is not None:
         notes += found.notes
-        if not found.safe and arrival is not None:  # the missions as built are what flies: the last word
+        if not found.safe and arrival is not None:  # the missions as built are what is flown, so this check decides
             raise NoMission(_conflict_text(found.conflicts, world), reason="separation")
         if not found.safe:
             notes.append(
@@ -93,15 +94,15 @@ def fleet_of(
 
 
 def crew_of(v: VehiclePlan, world: World) -> Crew:
-    """A vehicle and its route, as the fleet package takes them."""
+    """A vehicle and its route, in the form that the fleet package takes."""
     return Crew(v.request.vehicle, route_of(v, world))
 
 
 def route_of(v: VehiclePlan, world: World) -> Route:
-    """What the mission flies, as judged, in metres: from the top of take-off to the approach, and how it ends.
+    """The judged flight of the mission in metres, from the top of take-off to the approach, and how it ends.
 
-    Where a mission of a paper begins in the air and ends at its goal, there are no columns. Legs of the terrain frame
-    are cut every `TERRAIN_STEP_M`: between way points they rise and sink with the ground.
+    A mission of a paper that begins in the air and ends at its goal has no columns. Terrain-frame legs are cut every
+    `TERRAIN_STEP_M`: between way points they rise and sink with the ground.
     """
     request, legs = v.request, v.verdict.legs
     flown = [leg for leg in legs if leg.on_path]
@@ -135,10 +136,10 @@ def route_of(v: VehiclePlan, world: World) -> Route:
 
 
 def _pace(points: Floats, home_deg: tuple[float, float], world: World) -> Floats:
-    """(N,) metres over ground in one of ArduPilot's, along each leg and last on the way straight home.
+    """(N,) metres over ground per ArduPilot metre, for each leg, and last for the straight line home.
 
-    It takes a degree of latitude for equally long everywhere, and one of longitude for that times the cosine of the
-    latitude halfway between home and the way point (Location.cpp, `get_vector_xy_from_origin_NE`).
+    ArduPilot takes a degree of latitude as equally long everywhere, and a degree of longitude as that times the cosine
+    of the latitude halfway between home and the way point (Location.cpp, `get_vector_xy_from_origin_NE`).
     """
     lat, lon = world.frame.to_degrees(points[:, 0], points[:, 1]).T
     north = (lat - home_deg[0]) * ARDUPILOT_DEGREE_M
@@ -150,7 +151,7 @@ def _pace(points: Floats, home_deg: tuple[float, float], world: World) -> Floats
 
 
 def _over_ground(points: Floats, holds: Floats, numbers: Ints, world: World) -> tuple[Floats, Floats, Ints]:
-    """Points cut in such a way that each leg keeps its height above ground, interpolated between its ends."""
+    """Cut the legs so that each keeps its height above ground, interpolated between the leg's ends."""
     ground_at = world.airspace.surface.ground_at
     agl = points[:, 2] - ground_at(points[:, 0], points[:, 1])
     out, waits, owners = [points[:1]], [holds[:1]], []
@@ -167,7 +168,7 @@ def _over_ground(points: Floats, holds: Floats, numbers: Ints, world: World) -> 
 
 
 def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) -> Rules:
-    """The requested separation, with how far the motions may be from the true ones."""
+    """The requested separation, with the error of the modelled motions."""
     error_m = max(motion_error_m(v.request.vehicle) + circling_m(v) for v in vehicles)
     leaving = frozenset(v.name for v in vehicles if v.request.end == "none")
     if arrival is None:
@@ -184,7 +185,7 @@ def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) ->
 def _scheduled(crews: Sequence[Crew], arrival: ArrivalRequest, detours: Detours) -> tuple[Schedule, list[str]]:
     """The requested schedule, and notes on it.
 
-    Where the file does not say whose clock counts, it is the first one's, else that of the whole fleet.
+    If the file does not set `clock`, the first vehicle's clock is tried, then that of the whole fleet.
     """
 
     def by_clock(clock: Literal["first", "fleet"]) -> Schedule:
@@ -217,8 +218,8 @@ def _kept_apart(
     arrival: ArrivalRequest,
     detours: Detours,
 ) -> Schedule:
-    """The schedule with its conflicts resolved: departures, speeds, holds, other paths."""
-    from gcsplan.fleet.resolve import resolve  # most plans are of one vehicle
+    """The schedule with its conflicts resolved by departures, speeds, holds or other paths."""
+    from gcsplan.fleet.resolve import resolve  # imported here because most plans have one vehicle
 
     settled = resolve(
         plan, crews, rules_of(arrival, vehicles),
@@ -232,13 +233,13 @@ def _kept_apart(
 
 
 def _motion(v: VehiclePlan, slot: Slot, world: World) -> TimedPath:
-    """The motion of the mission as built: its hold stands in it already, unless a time of day ends it."""
+    """The motion of the mission as built. Its items contain the hold already, unless a time of day ends it."""
     course = Course(route_of(v, world), v.request.vehicle)
     return course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s if v.order.gate_utc else 0.0)
 
 
 def words_of(world: World, place: Place) -> str:
-    """A place as a person finds it on a map."""
+    """A place in words that a person can find on a map."""
     lat, lon = (float(x) for x in world.frame.to_degrees(place[0], place[1]))
     return f"{lat:.6f}, {lon:.6f}, {place[2]:.0f} m AMSL"
 

@@ -1,8 +1,8 @@
-"""A gate that opens at a time of day: NAV_DELAY with hour, minute and second UTC, which ArduCopter alone obeys.
+"""A gate that opens at a time of day: NAV_DELAY with hour, minute and second UTC, which only ArduCopter obeys.
 
-The vehicle waits in the air above its start until then. The command holds no date: a vehicle that comes to the gate a
-moment too late waits for nearly a day (seen on a real ArduCopter). So everybody is to be there `SLACK_S` early, and a
-time that is near or past is refused.
+The vehicle waits in the air above its start until then. The command holds no date: a vehicle that reaches the gate a
+moment too late waits for nearly a day (seen on a real ArduCopter). So every vehicle must be there `SLACK_S` early, and
+a start time that is near or past is refused.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from gcsplan.fleet.timing import Course
 from gcsplan.vehicle import Autopilot
 
 NEAREST_S = 60.0
-"""So far ahead the common start must be at least, when it is requested and when it is sent."""
+"""Seconds by which the common start must be ahead at least, when it is requested and when it is sent."""
 FARTHEST_S = 20.0 * 3600.0
 SLACK_S = 30.0
-"""How early everybody is to be at the gate."""
+"""Seconds before the opening by which every vehicle must be at its gate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,10 @@ class GateTime:
 
     @classmethod
     def parse(cls, text: str, now: datetime) -> GateTime:
-        """From ``18:30:00`` (today, UTC) or ``2026-11-21T18:30:00Z``. Raises UsageError for others, near or past."""
+        """Parse ``18:30:00`` (today, UTC) or ``2026-11-21T18:30:00Z``.
+
+        Raises UsageError for other text, and for a start that is near, past or too far ahead.
+        """
         try:
             if re.fullmatch(r"\d{1,2}:\d{2}(:\d{2})?", text):
                 hour, minute, second = (int(x) for x in (text if text.count(":") == 2 else f"{text}:00").split(":"))
@@ -51,7 +54,7 @@ class GateTime:
         return gate
 
     def require_ahead(self, now: datetime) -> None:
-        """Raise UsageError where the common start is near, past or a day away."""
+        """Raise UsageError if the common start is too near, past, or more than `FARTHEST_S` away."""
         ahead_s = (self.start - now).total_seconds()
         at = f"{self.start:%Y-%m-%d %H:%M:%S} UTC, and it is {now.astimezone(UTC):%H:%M:%S} now"
         if ahead_s < NEAREST_S:
@@ -75,10 +78,10 @@ class GateTime:
 
 
 def gated(crews: Sequence[Crew], slots: Sequence[Slot]) -> list[tuple[Slot, int]]:
-    """Each slot with its hold drawn out to a whole second, `SLACK_S` after it is at its gate, and when that is (T+ s).
+    """Each slot, its hold extended to a whole second `SLACK_S` or more after reaching its gate, and that second (T+ s).
 
-    Slots and crews in the same order. Everybody arrives later by about as much. Raises InputError for a vehicle
-    whose autopilot has no such gate.
+    Slots and crews are in the same order. Every vehicle arrives later by the extension of its hold. Raises InputError
+    for a vehicle whose autopilot has no such gate.
     """
     out = []
     for crew, slot in zip(crews, slots, strict=True):

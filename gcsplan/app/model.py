@@ -1,4 +1,4 @@
-"""What planning gives: a `Plan` of a whole mission file, with a `VehiclePlan` for each vehicle and the `FleetPlan`."""
+"""The result of planning: a `Plan` of a mission file, with a `VehiclePlan` per vehicle and the `FleetPlan`."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from gcsplan.world.world import World
 
 @dataclass(frozen=True, eq=False)
 class Brief:
-    """How all vehicles of a mission file are planned: ``run`` is the planner, ``options`` what only it knows.
+    """How all vehicles of a mission file are planned: ``run`` is the planner, ``options`` are those that only it knows.
 
-    ``by_priority``: each vehicle is planned with those before it in view, and gives way to them.
+    ``by_priority``: each vehicle is planned with knowledge of those before it, and gives way to them.
     """
 
     source: MissionFile
@@ -34,7 +34,7 @@ class Brief:
 
 @dataclass(frozen=True, eq=False)
 class VehiclePlan:
-    """One vehicle's request and everything that became of it; ``brief``: over which terrain it was planned."""
+    """One vehicle's request and all results for it. ``brief`` holds the terrain that it was planned over."""
 
     request: VehicleRequest
     problem: Problem
@@ -53,21 +53,21 @@ class VehiclePlan:
 
     @property
     def cost(self) -> float:
-        """Metres or joules of the path as it is flown, by the objective."""
+        """Cost of the path as it is flown: metres, or joules if the objective is energy."""
         return self.verdict.path_energy_j if self.problem.objective == "energy" else self.verdict.length_m
 
     @property
     def gap_percent(self) -> float | None:
-        """How far the flown path may be above the best, percent of the bound; None without a bound."""
+        """How far the flown path may be above the best one, in percent of the lower bound; None without a bound."""
         bound = self.solution.lower_bound
         return None if not bound else max(0.0, 100.0 * (self.cost / bound - 1.0))
 
 
 @dataclass(frozen=True, eq=False)
 class FleetPlan:
-    """When each vehicle is where. ``slots`` and ``motions`` stand in the order of the plan's vehicles.
+    """The time table of all vehicles. ``slots`` and ``motions`` are in the order of the plan's vehicles.
 
-    ``order`` is that of arrival. ``separation`` is None for a single vehicle.
+    ``order`` is the order of arrival. ``separation`` is None for a single vehicle.
     """
 
     mode: str
@@ -88,13 +88,13 @@ class FleetPlan:
 
     @property
     def closest(self) -> Encounter | None:
-        """The pair that comes nearest to each other in the air; None where no two ever fly at a time."""
+        """The pair that comes nearest to each other in the air; None if no two ever fly at the same time."""
         return None if self.separation is None else self.separation.least
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A whole mission file, planned; ``planner`` is the one that was used."""
+    """A planned mission file. ``planner`` is the one that was used."""
 
     source: MissionFile
     world: World

@@ -1,4 +1,4 @@
-"""What `plan` writes: every file of a plan as text, from one plan alone, the same bytes for the same plan."""
+"""The files that `plan` writes, as text made from the plan alone: the same plan gives the same bytes."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def outputs_of(
     *,
     rally: bool = False,
 ) -> dict[str, str]:
-    """File name to text, of all that docs/reference/contract.md names but the report and the upload.
+    """File name to text of every file in docs/reference/contract.md except the report and the upload.
 
-    ``homes``: vehicle to its way home, where that was judged; it stands in the summary then. ``fences``: vehicle to
-    the items of its fence, for the `.plan`; with ``rally`` the rally points that were proposed stand there too.
+    ``homes``: vehicle name to its way home if that was judged; the summary then contains it. ``fences``: vehicle name
+    to its fence items, for the `.plan`. With ``rally``, the `.plan` also contains the proposed rally points.
     """
     tracks = [_track(v) for v in plan.vehicles]
     frame, zones = plan.world.frame, plan.world.airspace.zones
@@ -69,7 +69,7 @@ def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
 
 
 def homes_of(plan: Plan) -> dict[str, WayHome]:
-    """The way home of every vehicle, from everywhere on its mission: about a second for 20 km."""
+    """The way home of every vehicle, from every point of its mission; takes about a second for 20 km."""
     from gcsplan.check.rtl.way_home import way_home
 
     return {
@@ -89,7 +89,7 @@ def report_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = Mapp
 
 
 def figures_of(plan: Plan) -> dict[str, bytes]:
-    """File name to PNG of each figure alone: map, profiles, and a fleet's time and separation."""
+    """File name to PNG of each separate figure: map, profiles, and a fleet's time and separation."""
     from gcsplan.app.report_page import page_of_plan
     from gcsplan.report import picture
 
@@ -97,7 +97,7 @@ def figures_of(plan: Plan) -> dict[str, bytes]:
 
 
 def picture_of(plan: Plan) -> bytes:
-    """Map and profiles as PNG."""
+    """Map and profiles in one PNG."""
     from gcsplan.app.report_page import page_of_plan
     from gcsplan.report import picture
 
@@ -112,7 +112,7 @@ def upload_text(plan: Plan, results: Sequence[JobResult], homes: Homes = Mapping
 
 
 def summary_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = MappingProxyType({})) -> dict[str, Any]:
-    """The summary of docs/reference/contract.md as plain values, clock readings included."""
+    """The summary of docs/reference/contract.md as plain values, with the clock readings."""
     uploads = {d.vehicle: d for d in results}
     return {
         "name": plan.source.name,
@@ -182,7 +182,7 @@ def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, result: JobResult | None) 
 
 
 def _of_search(v: VehiclePlan) -> dict[str, Any]:
-    """What a search by samples made, before it was mended; nothing of other planners."""
+    """The result of a sampling search before its repair; empty for other planners."""
     if v.solution.raw_violations is None:
         return {}
     return {"raw_violations": v.solution.raw_violations, "repaired": v.solution.repaired}
@@ -210,13 +210,13 @@ def verdict_of(name: str, verdict: Verdict) -> dict[str, Any]:
 
 
 def item_rows(vehicle: str, verdict: Verdict, motion: TimedPath | None = None) -> list[ItemRow]:
-    """A row for each wire item; the figures of all stretches that are flown for it.
+    """One row per wire item, with the figures of all stretches that are flown for it.
 
-    Times count from the fleet's common start, by ``motion``; without one from leaving the ground, by the verdict.
+    Times count from the fleet's common start if ``motion`` is there; otherwise from leaving the ground, by the verdict.
     """
     until: dict[int, float] = {}
     if motion is not None and motion.pieces is not None:
-        until = dict(zip(motion.pieces.tolist(), motion.times_s[1:].tolist(), strict=True))  # the last one of each
+        until = dict(zip(motion.pieces.tolist(), motion.times_s[1:].tolist(), strict=True))  # the last of each item
     flown: dict[int, list[LegFigures]] = {}
     for leg in verdict.legs:
         flown.setdefault(leg.seq, []).append(leg)
@@ -232,7 +232,7 @@ def item_rows(vehicle: str, verdict: Verdict, motion: TimedPath | None = None) -
             continue
         energy_j = math.fsum(leg.energy_j for leg in legs)
         spent_j += energy_j
-        # A hold at the gate has no piece of its own: its seconds stand with the take-off.
+        # A hold at the gate has no piece of its own: its seconds count in the row of the take-off.
         clock_s = until.get(seq, clock_s) if until else clock_s + math.fsum(leg.time_s for leg in legs)
         low = [leg.min_agl_m for leg in legs if not leg.column and not math.isnan(leg.min_agl_m)]
         steep = max((leg.climb_deg for leg in legs), key=abs)

@@ -1,6 +1,7 @@
-"""The way of the data: mission file → world → path → mission → verdict → outputs → vehicles.
+"""The flow of the data: mission file → world → path → mission → verdict → outputs → vehicles.
 
-Each step is one function that takes what the step before it gave. `plan` is what `from gcsplan import plan` gives.
+Each step is one function that takes the result of the step before it. `plan` is the function of `from gcsplan import
+plan`.
 """
 
 from __future__ import annotations
@@ -44,16 +45,16 @@ def plan(
 ) -> Plan:
     """Plan every vehicle of a mission; nothing is written or sent.
 
-    ``source`` is what `load_mission` gives, or what it takes. ``planner``, ``objective`` (``length`` in metres or
-    ``energy`` in joules), ``seed`` and ``options`` (what only some planners know, such as a swarm's ``encoding``)
-    override the file's. ``gate_utc``: the common start as a time of day; every ArduCopter then waits in the air until
-    its own second. ``progress(vehicle, what)`` is called now and then.
+    ``source`` is a mission of `load_mission`, or anything that `load_mission` accepts. ``planner``, ``objective``
+    (``length`` in metres or ``energy`` in joules), ``seed`` and ``options`` (keys of single planners, such as a swarm's
+    ``encoding``) override the file's. ``gate_utc`` is the common start as a time of day; every ArduCopter then waits in
+    the air until its own second. ``progress(vehicle, progress)`` is called from time to time.
 
-    Gives a `Plan`, whose ``vehicles`` stand in the mission's order. Of each, ``solution.path.points`` is the path,
-    (N, 3) float64: east_m, north_m in the mission's plane and amsl_m; ``mission`` holds the items as they go over the
-    wire, and ``verdict`` is the exact check of those items.
+    Returns a `Plan`, whose ``vehicles`` are in the mission's order. In each of them, ``solution.path.points`` is the
+    path, (N, 3) float64: east_m and north_m in the mission's plane, and amsl_m. ``mission`` holds the items as they are
+    sent, and ``verdict`` is the exact check of those items.
 
-    Raises InputError for a bad mission, NoMission where no safe one exists or none was found (``reason`` says which).
+    Raises InputError for a bad mission, NoMission if no safe path exists or none was found (``reason`` states which).
 
     Examples:
         >>> planned = plan({
@@ -90,7 +91,7 @@ def plan(
 
 
 def _one_by_one(brief: Brief, progress: Callable[[str, Progress], None] | None) -> list[VehiclePlan]:
-    """Every vehicle's own plan, in the file's order; by priority, each has those before it in view (MSFOA)."""
+    """Every vehicle's own plan, in the file's order. By priority (MSFOA), each knows the paths before it."""
     requests = {r.vehicle.name: r for r in brief.source.vehicles}
     arrival = brief.source.arrival
     plans: dict[str, VehiclePlan] = {}
@@ -106,7 +107,7 @@ def _one_by_one(brief: Brief, progress: Callable[[str, Progress], None] | None) 
 
 
 def _options(source: MissionFile, planner: str) -> dict[str, object]:
-    """The file's own options for a planner; of another one than it names, only what suits any."""
+    """The file's options for ``planner``; if the file names another planner, only parameters in `VOLUME_KEYS` stay."""
     extras = dict(source.planner.extras)
     own = extras.get("parameters")
     if planner != source.planner.name and isinstance(own, Mapping):
@@ -115,7 +116,7 @@ def _options(source: MissionFile, planner: str) -> dict[str, object]:
 
 
 def require_passing(verdicts: Mapping[str, Verdict], *, allow_unjudged: bool = False) -> None:
-    """Raise CheckFailed unless every verdict is safe (or merely unjudged, where that is allowed)."""
+    """Raise CheckFailed unless every verdict is safe (or not judged, if that is allowed)."""
     bad = {name: v for name, v in verdicts.items() if v.safe is False or (v.safe is None and not allow_unjudged)}
     if bad:
         broken = any(v.safe is False for v in bad.values())

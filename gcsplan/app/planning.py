@@ -1,4 +1,4 @@
-"""One vehicle: from its request to a path, to a mission, to a verdict on it as the autopilot stores it."""
+"""Planning of one vehicle: request to path, path to mission, and the verdict on the mission as it is stored."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gcsplan.world.world import World
 __all__ = ["over_one_terrain", "plan_vehicle", "rebuilt"]
 
 ATTEMPTS = 4
-"""Plans for one vehicle, each with larger margins than the one before, until the decoded mission passes."""
+"""Most plans for one vehicle, each with larger margins than the one before, until the decoded mission passes."""
 
 
 def plan_vehicle(
@@ -33,8 +33,8 @@ def plan_vehicle(
 ) -> VehiclePlan:
     """One vehicle's path, mission and verdict. Raises InputError, NoMission.
 
-    ``searched`` and ``limits``: a world with more zones, and tighter limits, to look for another path in; the verdict
-    is on the mission file's own. ``options`` are for the planner, on top of the brief's.
+    ``searched`` is a world with more zones, ``limits`` are tighter limits: another path is searched under them, and
+    judged in the mission file's own world and limits. ``options`` are for the planner, on top of the brief's.
     """
     source, vehicle = brief.source, request.vehicle
     limited = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))
@@ -47,7 +47,7 @@ def plan_vehicle(
         problem, notes = make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, merged)
         solution = run_planner(brief.run, problem, vehicle, world)
         over = looked_over(brief, solution)
-        for spaced in (True, False):  # way points nearer than the acceptance radii are dropped where that is legal
+        for spaced in (True, False):  # first without way points nearer than the acceptance radii, where that is legal
             order = Order(request.end, source.altitude_frame, spaced=spaced)
             mission, verdict = built(over, request, solution, order)
             if not verdict.findings:
@@ -56,7 +56,7 @@ def plan_vehicle(
                 )
         failed = verdict
         if not any(f.seq > mission.first_seq for f in verdict.findings if f.kind != "battery"):
-            break  # no margin mends a battery or a take-off column
+            break  # larger margins cannot cure a battery or a take-off column
         all_along = source.altitude_frame == "terrain" or vehicle.autopilot is Autopilot.ARDUPLANE
         margins = _larger(margins, verdict, all_along=all_along)
     assert failed is not None
@@ -66,7 +66,7 @@ def plan_vehicle(
 def over_one_terrain(
     brief: Brief, vehicles: Sequence[VehiclePlan], progress: Callable[[str, Progress], None] | None = None
 ) -> tuple[Brief, list[VehiclePlan]]:
-    """All vehicles over the widest terrain that any of them needed, each judged there; planned anew where it fails."""
+    """Judge all vehicles over the widest terrain that any of them needed; replan those that fail there."""
     wide = widest(brief, vehicles)
     out = []
     for v in vehicles:
@@ -90,9 +90,9 @@ def rebuilt(
     hold_s: float = 0.0,
     gate_utc: tuple[int, int, int] | None = None,
 ) -> VehiclePlan:
-    """The same path flown at another speed, after ``hold_s`` (whole seconds) at the gate: its mission, judged anew.
+    """The same path at another speed, after ``hold_s`` (whole seconds) at the gate: the mission is rebuilt and judged.
 
-    Raises NoMission where that one breaks a limit: a hold costs energy, and an item.
+    Raises NoMission if the mission then breaks a limit: a hold costs energy and an item.
     """
     order = replace(v.order, speed_m_s=speed_m_s, hold_s=0 if gate_utc else round(hold_s), gate_utc=gate_utc)
     if order == v.order:
@@ -104,15 +104,15 @@ def rebuilt(
 
 
 def widest(brief: Brief, plans: Sequence[VehiclePlan]) -> Brief:
-    """Of ``brief`` and those that vehicles were planned under the one that looks over the most terrain."""
+    """The brief with the most terrain, of ``brief`` and those that the vehicles were planned under."""
     return max([brief, *(v.brief for v in plans if v.brief is not None)], key=lambda b: b.source.level)
 
 
 def _larger(margins: Margins, verdict: Verdict, *, all_along: bool) -> Margins:
-    """Margins for another attempt.
+    """Margins for the next attempt.
 
-    ``all_along``: what is off is off on many legs, not at one hilltop: a terrain-frame leg over sloping ground, and
-    ArduPlane's, which changes height by less than GLIDE_SLOPE_MIN at once.
+    ``all_along``: the shortage occurs on many legs, not at one hilltop. That is so for terrain-frame legs over sloping
+    ground, and for ArduPlane, which makes changes of height below GLIDE_SLOPE_MIN at once.
     """
     heights = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
     low_m = max((f.by for f in verdict.findings if f.kind in heights), default=0.0) if all_along else 0.0

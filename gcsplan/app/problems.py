@@ -1,4 +1,4 @@
-"""From a vehicle's request to the planner's `Problem`, and from its solution to a mission that was judged."""
+"""Build the planner's `Problem` from a vehicle's request, and the judged mission from the planner's solution."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from gcsplan.world.world import World
 from gcsplan.world.zones import Zone
 
 BYTES_PER_NODE = 64.0
-"""What a wider window takes in memory for each of its nodes, terrain included: 58 bytes were measured."""
+"""Memory that a wider window takes for each of its nodes, terrain included: 58 bytes were measured."""
 
 
 @dataclass(frozen=True, eq=False)
 class Wider:
-    """A problem's ``widen``: the same question over more terrain of its mission file.
+    """The ``widen`` of a problem: the same problem over more terrain of its mission file.
 
-    ``source`` and ``world`` are those that the problem is of; ``zones``: those of the search alone.
+    ``source`` and ``world`` are those of the problem; ``zones`` are those that only the search sees.
     """
 
     source: MissionFile
@@ -56,16 +56,16 @@ class Wider:
         try:
             return make_problem(wide, request, world, self.objective, self.seed, self.margins)[0]
         except (InputError, NoMission):
-            return None  # an end that is legal by a hair here is not there
+            return None  # a terminal that is just legal here is illegal over the wider terrain
 
 
 def looked_over(brief: Brief, solution: Solution) -> Brief:
-    """``brief`` over the terrain that a solution was found in: more than was requested, where that was needed."""
+    """``brief`` over the terrain that the solution was found in, which may be wider than the requested terrain."""
     over = None if solution.problem is None else solution.problem.widen
     if not isinstance(over, Wider):
         return brief
     world = over.world
-    if over.zones:  # a search's own zones are nobody else's
+    if over.zones:  # zones that only the search sees do not count in the check
         air = Airspace(world.airspace.surface, over.source.zones, scale=over.source.airspace_scale)
         world = World(world.frame, air)
     return replace(brief, source=over.source, world=world)
@@ -91,7 +91,7 @@ def _require_room(mission: Mission, vehicle: Vehicle) -> None:
 
 
 def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
-    """No mission: the one that was found does not pass as the autopilot would fly it."""
+    """The NoMission for a verdict with findings: a path was found, but its mission breaks limits as it is flown."""
     words = "\n".join(f"  {f.message}" for f in verdict.findings[:8])
     if all(f.kind == "battery" for f in verdict.findings):
         return NoMission(f"{vehicle.name}: {verdict.findings[0].message}", reason="battery")
@@ -111,10 +111,10 @@ def make_problem(
     progress: Callable[[Progress], None] | None = None,
     options: Mapping[str, object] | None = None,
 ) -> tuple[Problem, tuple[str, ...]]:
-    """The planner's question for one vehicle, with the wire's margins in its limits, and notes for the user.
+    """The planner's problem for one vehicle, with the wire's margins in its limits, and notes for the user.
 
-    The ends are in whole centimetres above home. A ``takeoff_agl_m`` that meets min AGL and the altitude error but
-    not the slope of the ground within the track error is raised, and a note says so; a lower one is bad input.
+    The altitudes of start and goal are whole centimetres above home. If ``takeoff_agl_m`` meets min AGL plus altitude
+    error but not the ground's slope within the track error, it is raised, with a note; a lower value is bad input.
     """
     vehicle = request.vehicle
     given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
@@ -184,16 +184,16 @@ def make_problem(
 
 
 def _wanted_agl_m(agl_m: float | None, amsl_m: float | None, ground_m: float) -> float | None:
-    """The height above ground that the file asks for at an end, as such or by an altitude above the ground there."""
+    """The height above ground that the file requests at an end: stated as AGL, or by an altitude above the ground."""
     if agl_m is None and amsl_m is not None and amsl_m > ground_m:
         return amsl_m - ground_m
     return agl_m
 
 
 def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) -> float:
-    """The lowest altitude that a path may begin or end with, in whichever direction it leaves; inf over unknown ground.
+    """The lowest altitude that a path may begin or end with, for any direction; inf over unknown ground.
 
-    A path's room is bounded piece by piece (`Airspace.tube`), a little above what hovering at the point would need.
+    A path's altitudes are bounded piece by piece (`Airspace.tube`), a little higher than hovering at the point needs.
     """
     low = float(air.floor_amsl(east_m, north_m, limits))
     for east, north in ((0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)):
@@ -203,7 +203,7 @@ def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) ->
 
 
 def _largest_bow_m(world: World) -> float:
-    """Bow of the longest leg that may be flown in this world (small in the papers' 100 m worlds)."""
+    """Bow of the longest leg that may be flown in this world, m (small in the papers' 100 m worlds)."""
     surface = world.airspace.surface
     rows, cols = surface.ground_m.shape
     corners = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
@@ -214,7 +214,7 @@ def _largest_bow_m(world: World) -> float:
 
 
 def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: MissionFile) -> Limits:
-    """The limits a planner is held to: the vehicle's, less what the wire's rounding and the bow may take."""
+    """The limits for the planner: the vehicle's, reduced by what the wire's rounding and the bow may take."""
 
     def less(angle_deg: float) -> float:
         return math.degrees(math.atan(math.tan(math.radians(angle_deg)) * (1.0 - margins.slope)))
@@ -238,7 +238,7 @@ def run_planner(run: Callable[[Problem], Solution], problem: Problem, vehicle: V
 
 
 def in_degrees(refusal: Refusal, vehicle: Vehicle, world: World) -> NoMission:
-    """A planner's refusal as the user reads it: whose it is, and its place in degrees."""
+    """A planner's refusal for the user: with the vehicle's name, and its place in degrees."""
     place = ""
     if refusal.east_m is not None and refusal.north_m is not None:
         lat, lon = (float(x) for x in world.frame.to_degrees(refusal.east_m, refusal.north_m))

@@ -1,7 +1,8 @@
-"""One vehicle's plan, or why there is none and what would help: a value that is reported gave a whole mission.
+"""One vehicle's plan, or the reason why there is none and what would help.
 
-What would help is tried with the limits and zones as the mission file has them, through the same steps as any plan:
-with the margins for the wire, the climb-out and glide of a fixed wing, and the verdict on the mission as stored.
+A change is reported as a help only if a whole mission was planned with it. It is tried with the limits and zones of the
+mission file, through the same steps as any plan: with the margins for the wire, the climb-out and glide of a fixed
+wing, and the verdict on the mission as stored.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def plan_or_explain(
     *,
     options: Mapping[str, object] | None = None,
 ) -> VehiclePlan:
-    """`plan_vehicle`; where there is no mission, the NoMission says what would help. Raises InputError, NoMission."""
+    """`plan_vehicle`, whose NoMission also says what would help. Raises InputError, NoMission."""
     try:
         return plan_vehicle(brief, request, progress, options=options)
     except NoMission as refused:
@@ -61,5 +62,5 @@ def _explained(
     problem, _ = make_problem(
         brief.source, request, brief.world, brief.objective, brief.seed, progress=progress, options=options
     )
-    # As the user wrote them: the margins for the wire come on top, when a change of them is planned.
+    # The limits as the user wrote them: planning a change of them adds the margins for the wire again.
     return with_cures(replace(problem, limits=vehicle.limits), bare, plan)

@@ -1,10 +1,12 @@
-"""From a plan to its rehearsal: who leaves when, and what the fleet is held to.
+"""Rehearsal of a plan: when each vehicle leaves, and what the fleet must keep.
 
-from gcsplan import load_mission, plan
-from gcsplan.app.rehearsing import rehearse
+    from gcsplan import load_mission, plan
+    from gcsplan.app.rehearsing import rehearse
 
-result = rehearse(plan(load_mission("fleet.yaml")))
-print(result.safe, result.p95_s, result.order_flown)
+    result = rehearse(plan(load_mission("fleet.yaml")))
+    print(result.safe, result.p95_s, result.order_flown)
+
+Errors are those of `gcsplan.errors`.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ __all__ = ["Part", "Rehearsal", "Terms", "parts_of", "rehearse", "rehearse_in_si
 
 
 def parts_of(planned: Plan) -> list[Part]:
-    """Every vehicle's part, with the departures and arrivals of the fleet's time table."""
+    """The part of each vehicle, with its departure and arrival in the fleet's time table."""
     return [_part(planned, v) for v in planned.vehicles]
 
 
@@ -44,7 +46,7 @@ def _part(planned: Plan, v: VehiclePlan) -> Part:
 
 
 def terms_of(planned: Plan) -> Terms:
-    """What the mission file asks of the fleet: its order if it is a sequence, and its separation."""
+    """The requirements of the mission file on the fleet: the order, if it is a sequence, and the separation."""
     arrival = planned.source.arrival
     if arrival is None or len(planned.vehicles) < 2:
         return Terms()
@@ -62,7 +64,7 @@ def rehearse(
     airspeed_m_s: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Rehearsal:
-    """Upload to a simulated vehicle for each UAV, fly all in simulated time, judge; see `sim.rehearsal`."""
+    """Upload to one simulated vehicle per UAV, fly all of them in simulated time, and judge; see `sim.rehearsal`."""
     from gcsplan.sim.rehearsal import rehearse as run
 
     return run(
@@ -80,9 +82,9 @@ def rehearse_in_sitl(
     i_know: bool = False,
     report: Callable[[str, str], None] | None = None,
 ) -> Rehearsal:
-    """The same with real ArduCopter SITL: one is started of ``binary`` for each vehicle without one of ``addresses``.
+    """Rehearse with real ArduCopter SITL; starts one of ``binary`` for each vehicle without one of ``addresses``.
 
-    Raises UsageError where a vehicle has neither; see `sim.sitl` for the rest.
+    Raises UsageError if a vehicle has neither. See `sim.sitl` for the other arguments.
     """
     from gcsplan.sim.sitl import Seat, rehearse_sitl, require_here
     from gcsplan.sim.sitl_instances import SPEEDUP, sitl_instances
@@ -99,7 +101,7 @@ def rehearse_in_sitl(
 
 
 def seats_of(words: Sequence[str], names: Sequence[str]) -> dict[str, str]:
-    """Vehicle to URL of ``--sitl`` words, NAME=URL each, or one URL alone for a single vehicle. Raises UsageError."""
+    """Vehicle to URL from the ``--sitl`` words: NAME=URL, or one URL alone for a single vehicle. Raises UsageError."""
     found: dict[str, str] = {}
     for word in words:
         name, equals, url = word.partition("=")

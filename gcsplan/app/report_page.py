@@ -1,4 +1,4 @@
-"""The report of a plan: its `Page`, with how its uploads ended, and that page as HTML and pictures."""
+"""The report of a plan as a `Page`, with the results of its uploads, and that page as HTML."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gcsplan.report.subject import Certificate, Page, Subject
 
 
 def render(plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None) -> str:
-    """The report of ``plan`` as HTML text, with how its uploads ended; ``homes``: vehicle to its way home."""
+    """The report of ``plan`` as HTML text, with the results of its uploads. ``homes``: vehicle name to its way home."""
     return render_page(page_of_plan(plan, results, homes))
 
 
 def page_of_plan(plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None) -> Page:
-    """The page of a plan, with how its uploads ended, and the way home of each vehicle named in ``homes``."""
+    """The page of a plan, with the results of its uploads and the way home of each vehicle named in ``homes``."""
     uploads = {d.vehicle: d.as_dict() for d in results}
     source, fleet = plan.source, plan.fleet
     facts = [("planner", plan.planner), ("objective", plan.objective), ("seed", str(plan.seed)),

@@ -1,4 +1,4 @@
-"""All or nothing: what a fleet's vehicles took is cleared again where one upload failed."""
+"""All or nothing (`--atomic`): if one upload failed, the missions that other vehicles took are cleared again."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ def rolled_back(
     orders: Mapping[str, session.UploadOrder],
     ended: Mapping[str, UploadResult | GcsplanError],
 ) -> list[JobResult]:
-    """All or nothing: where one is not verified, the missions that vehicles took are cleared and read back as gone.
+    """If one upload is not verified, clear the missions that the vehicles took, and read back that they are gone.
 
-    Cleared is what was accepted, or may have been: a vehicle that never took anything of ours keeps its own. To one
-    that is no longer as it was when it was checked nothing further is sent: it keeps what it has, and that is said.
+    A list is cleared if it was accepted or may have been; a vehicle that never took anything of this upload keeps its
+    own list. Nothing further is sent to a vehicle that has changed since it was checked: it keeps what it has, and the
+    result says so.
     """
     from gcsplan.mavlink.link import session
 
@@ -31,7 +32,7 @@ def rolled_back(
         return list(uploads)
     results = {name: result for name, result in ended.items() if not isinstance(result, GcsplanError)}
     taken = [name for name, r in results.items() if r.outcome in ("accepted", "unknown") and not r.changed]
-    again = [orders[name] for name in taken]  # listening for rivals too: the upload may have ended minutes ago
+    again = [orders[name] for name in taken]  # also listens for rivals: the upload may have ended minutes ago
     seen = {orders[name].mission.name: results[name].state for name in taken}
     cleared = dict(zip(taken, session.clear_fleet(again, seen), strict=True))
     why = f"not verified: {', '.join(failures)}"

@@ -1,4 +1,4 @@
-"""What scripts call beside `load_mission` and `plan`, without a command line or asyncio.
+"""The functions for scripts beside `load_mission` and `plan`, without a command line or asyncio.
 
     from gcsplan import check, load_mission, plan, rehearse, report, upload, write
 
@@ -11,7 +11,7 @@
     for result in upload(planned, to="link", atomic=True):
         print(result.vehicle, result.outcome, result.verified, result.message)
 
-Everything blocks until it is done; errors are those of `gcsplan.errors`.
+Every function blocks until it is done. Errors are those of `gcsplan.errors`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 __all__ = ["check", "rehearse", "report", "upload", "write"]
 
 Source = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
-"""A mission as `load_mission` gives it, or what it takes."""
+"""A mission of `load_mission`, or anything that `load_mission` accepts."""
 
 
 @overload
@@ -54,17 +54,17 @@ def check(
 ) -> Verdict | dict[str, Verdict]:
     """Judge mission items along every leg as the autopilot flies them; nothing is planned, written or sent.
 
-    ``what`` is a plan (every vehicle's items are judged anew; gives a verdict by vehicle's name), a `Mission` (such as
-    ``planned.vehicles[0].mission`` or what was downloaded) or the path of a `.waypoints` or `.plan` file, anybody's
-    (gives one verdict). The last two need ``within``: the plan or mission (or what `load_mission` takes) whose terrain,
-    zones and limits count; ``vehicle`` names the one in it that flies, where the file's stem, or the mission's name,
-    does not.
+    ``what`` is one of three. A plan: every vehicle's items are judged again, and the result is a verdict by vehicle
+    name. A `Mission` (such as ``planned.vehicles[0].mission`` or a downloaded one), or the path of any `.waypoints` or
+    `.plan` file: the result is one verdict. The last two need ``within``: a plan or a mission (or anything that
+    `load_mission` accepts) with the terrain, zones and limits. ``vehicle`` names the vehicle of ``within`` that flies,
+    if neither the file's stem nor the mission's name does.
 
-    Of a `Verdict`, ``safe`` is True, False or None (something could not be judged: ``not_judged``); ``findings`` say
-    which limit is broken on which item, ``legs`` hold heights in m, angles in degrees, times in s and energies in J.
-    Each vehicle is judged alone: a plan's separation in the air is ``planned.fleet.separation``.
+    In a `Verdict`, ``safe`` is True, False or None (something could not be judged: ``not_judged``). ``findings`` state
+    which limit is broken on which item. ``legs`` hold heights in m, angles in degrees, times in s and energies in J.
+    Each vehicle is judged alone; a plan's separation in the air is ``planned.fleet.separation``.
 
-    Raises InputError for a file that cannot be read, UsageError where it is not clear what is to be judged.
+    Raises InputError for a file that cannot be read, UsageError if it is not clear what is to be judged.
 
     Examples:
         >>> from gcsplan import check, load_mission, plan
@@ -113,16 +113,16 @@ def write(
     way_home: bool = False,
     allow_unjudged: bool = False,
 ) -> list[Path]:
-    """Write what ``gcsplan plan -o FOLDER`` writes, the same bytes, whole or not at all; gives the files' paths.
+    """Write what ``gcsplan plan -o FOLDER`` writes, the same bytes, whole or not at all; returns the files' paths.
 
-    These are for each vehicle `.waypoints` and `.plan`, and `mission.kml`, `mission.geojson`, `profile.csv` and
-    `summary.json`; with ``report`` `report.html`. ``way_home``: the summary says how each vehicle returns from
-    everywhere, as with ``report``; about a second for 20 km.
+    The files are `.waypoints` and `.plan` for each vehicle, `mission.kml`, `mission.geojson`, `profile.csv` and
+    `summary.json`; with ``report`` also `report.html`. ``way_home``, and ``report`` too, adds to the summary how each
+    vehicle returns from every point, which takes about a second for 20 km.
 
-    Outputs of an earlier plan in ``folder`` go; a file of somebody else's that stands in the way is moved to its
-    ``previous/``. Raises CheckFailed where a verdict does not pass (``allow_unjudged`` lets pass what could not be
-    judged); the earlier outputs are moved to ``previous/`` then, so that no old mission is flown by mistake. Raises
-    InputError where ``folder`` cannot be written; everything is as it was then.
+    Outputs of an earlier plan in ``folder`` are removed; any other file in the way is moved to its ``previous/``.
+    Raises CheckFailed if a verdict does not pass (with ``allow_unjudged``, what could not be judged passes). The
+    earlier outputs are moved to ``previous/`` then, so that no old mission is flown by mistake. Raises InputError if
+    ``folder`` cannot be written; nothing has changed then.
 
     Examples:
         >>> import tempfile
@@ -159,11 +159,11 @@ def report(
     results: Sequence[JobResult] = (),
     way_home: bool = True,
 ) -> str:
-    """The report of a plan as HTML text: map, profiles, tables; one page that needs no network.
+    """The report of a plan as HTML text: map, profiles and tables on one page that needs no network.
 
-    With ``file`` it is written there too, whole or not at all (UTF-8). ``results``, which `upload` gives, are told
-    on the page. ``way_home``: the return of each vehicle from everywhere is judged and shown; about a second for 20 km.
-    Raises InputError where ``file`` cannot be written.
+    With ``file`` the report is also written there, whole or not at all (UTF-8). ``results`` of `upload` are shown on
+    the page. ``way_home``: the return of each vehicle from every point is judged and shown, which takes about a second
+    for 20 km. Raises InputError if ``file`` cannot be written.
 
     Examples:
         >>> from gcsplan import plan, report
@@ -196,15 +196,15 @@ def upload(
 ) -> list[JobResult]:
     """Upload every mission of a plan, all at once, read each back, compare, and check what was read back.
 
-    ``to``: a URL for all vehicles (told apart by system id), ``"link"`` (the mission file's links), ``"sim"`` (a
-    simulated vehicle for each), ``"NAME=URL"``, several of these, or a mapping from name to URL. Vehicles that it
-    says nothing of get nothing. With ``atomic``, if one upload fails, what the others took is cleared again.
-    ``timeout_s`` is the longest time without progress. ``progress(name, told)`` is called on the way.
+    ``to`` is a URL for all vehicles (distinguished by system id), ``"link"`` (the mission file's links), ``"sim"`` (a
+    simulated vehicle for each), ``"NAME=URL"``, a list of these, or a mapping from name to URL. Vehicles without a
+    target are left out. With ``atomic``, if one upload fails, the missions that the others took are cleared again.
+    ``timeout_s`` is the longest time without progress. ``progress(name, progress)`` is called during the uploads.
 
-    One `JobResult` for each vehicle, in the plan's order: ``verified`` is True only where the mission was read back
-    and equals what was sent; ``message`` says what went wrong. One vehicle's failure leaves the others standing and
-    raises nothing; `gcsplan.app.uploads.exit_code` sums them up. Raises UsageError for targets that are none,
-    CheckFailed, before anything is sent, where a verdict does not pass.
+    Returns one `JobResult` per vehicle, in the plan's order: ``verified`` is True only if the mission was read back and
+    equals what was sent; ``message`` says what went wrong. A failure of one vehicle does not affect the others and
+    raises nothing; `gcsplan.app.uploads.exit_code` sums them up. Raises UsageError for bad targets, and, before
+    anything is sent, CheckFailed if a verdict does not pass.
     """
     if isinstance(to, Mapping):
         words = [f"{name}={url}" for name, url in to.items()]
@@ -231,12 +231,12 @@ def rehearse(
     seed: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Rehearsal:
-    """Upload a plan to simulated vehicles, fly what they store in simulated time, and judge it; nothing is sent out.
+    """Upload a plan to simulated vehicles, fly what they store in simulated time, and judge that; all on this machine.
 
-    Wind, gusts and position noise (`gcsplan.sim.wind.Weather`) are drawn from ``seed``, another draw for each of
-    ``runs``. ``progress(done, runs)`` is called now and then. The result's ``safe`` is True where arrivals came in
-    order, the separation and every limit were kept on the flown tracks; ``error()`` says what was not. Raises what an
-    upload raises, InputError for weather that is none.
+    Wind, gusts and position noise (`gcsplan.sim.wind.Weather`) are drawn from ``seed``, anew for each of ``runs``.
+    ``progress(done, runs)`` is called from time to time. The result's ``safe`` is True if the arrivals were in order,
+    and the separation and every limit were kept on the flown tracks; ``error()`` states what was not kept. Raises what
+    an upload raises, and InputError for invalid weather.
     """
     from gcsplan.app import rehearsing
     from gcsplan.sim.wind import Weather

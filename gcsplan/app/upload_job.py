@@ -1,4 +1,4 @@
-"""What is sent to a vehicle, what the user allows, and how it ended."""
+"""An upload job (what is sent to a vehicle), the user's options, and the result."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from gcsplan.world.world import World
 
 SIM, LINK = "sim", "link"
 ProgressCall = Callable[[str, Progress], None]
-"""Called with a vehicle's name and where its upload is; at the end the phase is the outcome in a word."""
+"""Called with a vehicle's name and the progress of its upload. In the last call, the phase is the outcome in a word."""
 
 
 @dataclass(frozen=True, slots=True)
 class UploadOptions:
-    """What the user allows. ``atomic``: if one upload fails, the missions that others took are cleared again.
+    """The user's permissions. ``atomic``: if one upload fails, the missions that others took are cleared again.
 
-    ``timeout_s``: the user's patience, of `gcsplan.mavlink.protocol.patience`.
+    ``timeout_s``: the longest time without progress, see `gcsplan.mavlink.protocol.patience`.
     """
 
     allow_armed: bool = False
@@ -49,7 +49,7 @@ class UploadJob:
 
 @dataclass(frozen=True, eq=False)
 class JobResult:
-    """How one upload or comparison ended. ``message`` is the error in words, empty if there is none."""
+    """The result of one upload or comparison. ``message`` is the error in words, empty if there is none."""
 
     vehicle: str
     url: str
@@ -66,7 +66,7 @@ class JobResult:
     details: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the fixed keys first."""
+        """The result for JSON, fixed keys first; of the others, those with a value."""
         fixed = {
             "url": self.url, "outcome": self.outcome, "verified": self.verified, "simulated": self.simulated,
             "items": self.items, "seconds": self.seconds, "retries": self.retries,

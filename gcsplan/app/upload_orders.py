@@ -1,4 +1,4 @@
-"""A job as the session wants it: its limits, the check of what is read back, and the call that reports how it ended."""
+"""Turn an upload job into a session's order: settings, check of the read-back, and the call that reports the end."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def report_end(progress: ProgressCall | None) -> session.EndCall | None:
-    """A call that reports to ``progress`` how each order ended, in a word."""
+    """A call that reports the outcome of each order, in a word, to ``progress``."""
     if progress is None:
         return None
     from gcsplan.mavlink.protocol.machine import Progress
@@ -47,7 +47,7 @@ def order_of(
     simulated: bool,
     listen_s: float,
 ) -> session.UploadOrder:
-    """``job`` as an order of the session over ``link``; ``listen_s``: how long to listen for rivals."""
+    """``job`` as an order of the session over ``link``. ``listen_s``: how long to listen for rivals, s."""
     from gcsplan.mavlink.link import session
 
     ground_m = None
@@ -69,13 +69,13 @@ def order_of(
 
 
 def _judge_again(job: UploadJob) -> session.Judge | None:
-    """The check on what was read back: what a vehicle holds is what it will fly."""
+    """The check of the mission that was read back, since the vehicle will fly what it holds."""
     if job.world is None or job.vehicle is None or job.verdict is None:
         return None
     world, vehicle, first = job.world, job.vehicle, job.verdict
 
     def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
-        # Home on board is where the vehicle stands now; altitudes count from where the mission was planned to start.
+        # Home on board is where the vehicle is now, but the altitudes count from the planned start.
         verdict = judge(
             replace(read_back, home=job.mission.home), vehicle, world, rtl_rel_home_m=job.rtl_rel_home_m,
             terrain_error_m=job.terrain_error_m, tuning=Tuning.of(values),

@@ -1,9 +1,10 @@
-"""Sending plans and files to vehicles: who gets what, over which link, and how it ended.
+"""Uploads of plans and files to vehicles: which vehicle gets what, over which link, and the results.
 
-One link for each URL; vehicles on one URL differ by system id. For ``sim`` the caller hands in what
-starts a loopback vehicle for each UAV where its mission starts; the results say *simulated*.
+There is one link per URL; vehicles on the same URL differ by system id. For ``sim`` the caller passes a function that
+starts one loopback vehicle per UAV, where its mission starts; the results then say *simulated*.
 
-Links and transfers are imported by what opens one: most plans are sent nowhere, and the dialect is slow to import.
+Links and transfers are imported only where a link is opened: most plans are not uploaded, and the MAVLink dialect is
+slow to import.
 """
 
 from __future__ import annotations
@@ -36,14 +37,14 @@ if TYPE_CHECKING:
     from gcsplan.mavlink.link.results import UploadResult
 
 LISTEN_S = 1.5
-"""How long to listen for a second source of a system id's heartbeats, which come once a second."""
+"""Seconds to listen for a second source of a system id's heartbeats, which come once a second."""
 KINDS = {"mission": MISSION, "fence": FENCE, "rally": RALLY}
 Simulator = Callable[[Sequence[Mission]], AbstractContextManager[str]]
-"""Starts a vehicle for each mission; the context is the URL where all of them answer."""
+"""Starts a vehicle for each mission; the context value is the URL where all of them answer."""
 
 
 def targets(where: Sequence[str], vehicles: Sequence[Vehicle]) -> dict[str, str]:
-    """Vehicle name to URL (or `SIM`) of all ``--upload`` words; empty without any. Raises UsageError."""
+    """Vehicle name to URL (or `SIM`) from all ``--upload`` words; empty without words. Raises UsageError."""
     by_name = {v.name: v for v in vehicles}
     chosen: dict[str, str] = {}
     single: dict[str, str] = {}
@@ -66,7 +67,7 @@ def targets(where: Sequence[str], vehicles: Sequence[Vehicle]) -> dict[str, str]
 
 
 def _url(text: str, word: str) -> str:
-    """``text`` as a URL in its one form; ``word`` is what the user wrote. Raises UsageError."""
+    """``text`` as a URL in normal form; ``word`` is what the user wrote, for the error. Raises UsageError."""
     try:
         return parse_url(text).url
     except InputError as error:
@@ -76,7 +77,7 @@ def _url(text: str, word: str) -> str:
 
 
 def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[UploadJob]:
-    """The uploads of a plan; vehicles without a target are left out."""
+    """The upload jobs of a plan; vehicles without a target are left out."""
     source = plan.source
     return [
         UploadJob(
@@ -88,7 +89,7 @@ def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[UploadJob]:
 
 
 def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) -> list[UploadJob]:
-    """The uploads of checked files; ``word`` as of ``--upload``. Raises UsageError for two files of one vehicle."""
+    """The upload jobs of checked files; ``word`` as in ``--upload``. Raises UsageError for two files of one vehicle."""
     seen: dict[str, Path] = {}
     for c in checked:
         if seen.setdefault(c.vehicle.name, c.file) is not c.file:
@@ -107,7 +108,7 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
 
 
 def unchecked_job(argument: str, url: str, sysid: int) -> UploadJob:
-    """A file for ``--unchecked``; the vehicle itself says which autopilot it is where the file does not."""
+    """The job of a file for ``--unchecked``; the vehicle is asked for its autopilot if the file does not name one."""
     name, file = split_name(argument)
     endpoint = parse_url(url)
     require_file(file)
@@ -120,7 +121,7 @@ def unchecked_job(argument: str, url: str, sysid: int) -> UploadJob:
 
 
 def _open(url: str) -> Link:
-    """The link at ``url``, signed where the environment holds a key."""
+    """The link at ``url``, signed if the environment holds a key."""
     from gcsplan.mavlink.link.frames import signing_key
     from gcsplan.mavlink.link.link import Link
 
@@ -148,7 +149,7 @@ def run_jobs(
     *,
     simulator: Simulator | None = None,
 ) -> list[JobResult]:
-    """Upload every job, all at once, read back, compare, and check what was read back; in the order given."""
+    """Upload all jobs at once, read back, compare, and check what was read back; results in the order of ``jobs``."""
     from gcsplan.mavlink.link import session
     from gcsplan.mavlink.link.link import Link
 
@@ -159,14 +160,14 @@ def run_jobs(
             if simulator is None:
                 raise UsageError("nothing here can simulate a vehicle")
             url = stack.enter_context(simulator([job.mission for job in simulated]))
-            links[SIM] = stack.enter_context(Link(url))  # unsigned: it never leaves this machine
+            links[SIM] = stack.enter_context(Link(url))  # unsigned: it stays on this machine
         failed: dict[str, LinkError] = {}
         for url in dict.fromkeys(job.url for job in jobs if job.url != SIM):
             try:
                 links[url] = stack.enter_context(_open(url))
-            except LinkError as error:  # the other vehicles' links may be well
+            except LinkError as error:  # the other vehicles' links may work
                 failed[url] = error
-        if failed and options.atomic:  # known before anything was sent: nobody's old mission need be lost
+        if failed and options.atomic:  # nothing has been sent yet, so every vehicle can keep its old mission
             where = ", ".join(failed)
             held = LinkError(f"nothing was sent, all or nothing: the link {where} did not open")
             return [_result(job, failed.get(job.url) or held) for job in jobs]
@@ -250,14 +251,14 @@ def _result(job: UploadJob, ended: UploadResult | GcsplanError) -> JobResult:
 
 
 def exit_code(results: Sequence[JobResult]) -> int:
-    """The worst of 70 (our bug), 7, 6, 5 (then 4): a fleet's exit code; 0 if all are verified."""
+    """The exit code of a fleet: the worst of 70 (our bug), 7, 6, 5 (then 4); 0 if all are verified."""
     codes = {d.code for d in results}
     order = (GcsplanError.exit_code, ReadBackDiffers.exit_code, LinkError.exit_code, VehicleRefused.exit_code)
     return next((c for c in order if c in codes), max(codes, default=0))
 
 
 def failure(results: Sequence[JobResult]) -> dict[str, Any] | None:
-    """The ``error`` of ``--json``: of those that failed the worst kind; None if all are verified."""
+    """The ``error`` of ``--json``, made of the results with the worst exit code; None if all are verified."""
     code = exit_code(results)
     if code == 0:
         return None
@@ -271,13 +272,13 @@ def failure(results: Sequence[JobResult]) -> dict[str, Any] | None:
 
 
 def require_file(file: Path) -> None:
-    """Raise InputError where there is no such file, before a vehicle is looked for."""
+    """Raise InputError if there is no such file, before a vehicle is searched for."""
     if not os.path.exists(file):
         raise InputError("there is no such file", where=str(file))
 
 
 def verify_file(file: Path, url: str, sysid: int, *, timeout_s: float = 60.0) -> JobResult:
-    """Compare a file with what is on board; nothing is written to the vehicle."""
+    """Compare a file with the mission on board; nothing is written to the vehicle."""
     from gcsplan.mavlink.link import session
 
     require_file(file)

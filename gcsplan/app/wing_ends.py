@@ -1,7 +1,7 @@
-"""The ends of a fixed wing's flight: climb-outs and approaches, straight or in circles, the natural ones first.
+"""The ends of a fixed wing's flight: climb-outs and approaches, straight or in circles, most natural ones first.
 
-An end is seen outwards from the ground: a slant as long as it must be, a piece straight on from which the first turn
-begins, and further turns where the heading is far off the way that is to be flown.
+An end is described outwards from the ground: a slant of the necessary length, a straight piece at whose end the first
+turn begins, and further turns where the heading is far off the direction of the path.
 """
 
 from __future__ import annotations
@@ -29,25 +29,26 @@ __all__ = ["FlightEnd", "circle_m", "goals", "starts"]
 
 
 SHARPEST = math.radians(60.0)
-"""The largest turn at a joint that the straight pieces there are long enough for; what is more takes several."""
+"""The largest turn at a joint that the straight pieces are long enough for; a larger turn is split into several."""
 
 STEP_DEG = 15.0
-"""Between headings that are tried, where none is requested."""
+"""Step between the headings that are tried if none is requested."""
 
 LONGER_M, LONGEST_M = 20.0, 6000.0
-"""Climb-outs are tried longer by the first until the second."""
+"""Climb-outs are lengthened in steps of the first, up to the second."""
 
 SAMPLE_M = 10.0
 
 CIRCLES_FROM_M, HIGHEST_CIRCLE_M = (20.0, 30.0, 45.0, 65.0, 90.0), 1000.0
-"""Heights above home at which a climb-out goes over to circles, and how far up those may lead."""
+"""Heights above home at which a climb-out goes over to circles, and the most that the circles may climb."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FlightEnd:
-    """One end: from ``ground`` (3,) on a slant to ``top`` (3,), then through ``chain`` (N, 3), level.
+    """One end: from ``ground`` (3,) on a slant to ``top`` (3,), then through the level way points ``chain`` (N, 3).
 
-    ``circle`` (3,): behind the slant, circles of ``circle_m`` (negative: anticlockwise) up to there.
+    ``circle`` (3,): after the slant, the vehicle circles up to this point with radius ``circle_m`` (negative:
+    anticlockwise).
     """
 
     ground: Floats
@@ -59,17 +60,17 @@ class FlightEnd:
 
     @property
     def leaves(self) -> Floats:
-        """Where the first level leg begins: at the end of the slant, or over the middle of the circle."""
+        """Start of the first level leg: the end of the slant, or the top of the circles over their middle."""
         return self.top if self.circle is None else self.circle
 
 
 def circle_m(problem: Problem) -> float:
-    """The radius of the circle that is requested at the goal: whole metres, not below the turn radius."""
+    """Radius of the requested circle at the goal: whole metres, at least the turn radius."""
     return float(math.ceil(problem.turn_radius_m))
 
 
 def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[FlightEnd]:
-    """Climb-outs, the wanted one or the most natural ones first. Raises NoMission where there is none."""
+    """Climb-outs, on the requested heading or the most natural ones first. Raises NoMission if there is none."""
     slope = math.tan(math.radians(pitch_deg(request.vehicle)))
     given = request.takeoff_heading_deg
     heading = None if given is None else math.radians(90.0 - given)
@@ -92,7 +93,7 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
 
 
 def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[FlightEnd | None]:
-    """Approaches, the most natural ones first; None where it does not land. Raises NoMission where there is none."""
+    """Approaches, the most natural ones first; one None if it does not land. Raises NoMission if there is none."""
     if request.end != "land":
         yield None
         return
@@ -120,9 +121,9 @@ def _ends(
     heading: float | None,
     lands_m_s: float,
 ) -> Iterator[FlightEnd]:
-    """The legal ends at ``place`` (on the ground), seen outwards from it; ``sharp`` (N, 3) is the way from there.
+    """The legal ends at ``place`` (on the ground), seen outwards from it; ``sharp`` (N, 3) is the path from there.
 
-    ``lands_m_s``: the speed of a landing; 0 for a take-off.
+    ``lands_m_s`` is the speed of a landing, 0 for a take-off.
     """
     ground, radius = np.array(place), problem.turn_radius_m
     run_m = radius * math.tan(0.5 * SHARPEST) + 20.0
@@ -134,7 +135,7 @@ def _ends(
 
 
 def _headings(ground: Floats, aim: Floats, given: float | None) -> list[float]:
-    """The requested one; else all, those nearest to the way to ``aim`` first."""
+    """The requested heading alone; otherwise all headings, those nearest to the direction of ``aim`` first."""
     if given is not None:
         return [given]
     natural = math.atan2(aim[1] - ground[1], aim[0] - ground[0])
@@ -153,7 +154,7 @@ def _end(
     run_m: float,
     lands_m_s: float,
 ) -> FlightEnd | None:
-    """The shortest legal end on a heading; None where there is none."""
+    """The shortest legal end on a heading; None if there is none."""
     air, limits = problem.airspace, problem.limits
     way = np.array([math.cos(heading), math.sin(heading)])
     wanted = ground[2] + max(agl_m or 0.0, limits.min_agl_m)
@@ -200,7 +201,7 @@ def _three(point: Floats) -> tuple[float, float, float]:
 def _column_clear(
     low: Floats, high: Floats, reach_m: float, limits: Limits, air: Airspace, band_m: float = 0.0
 ) -> bool:
-    """Whether zones and ceilings leave room from ``low`` to ``high``, ``reach_m`` around and ``band_m`` up and down."""
+    """Whether zones and ceilings are clear from ``low`` to ``high``, ``reach_m`` around and ``band_m`` up and down."""
     track, height = np.array([limits.track_error_m + reach_m]), np.array([limits.altitude_error_m + band_m])
     legs = Legs(low[None], high[None], np.ones(1, bool), track, height)
     return bool(air.clear(legs, _steep(limits)).all())
@@ -218,7 +219,7 @@ def _circles(
     sharp: Floats,
     heading: float | None,
 ) -> Iterator[FlightEnd]:
-    """Short climb-outs that go on in circles, up to where the first leg is legal in every way to leave them."""
+    """Short climb-outs that continue in circles, up to where the first leg is legal in any direction."""
     air, limits, radius = problem.airspace, problem.limits, circle_m(problem)
     ground, aim = np.array(place), _along(sharp, 6.0 * radius)
     wanted = place[2] + max(agl_m or 0.0, limits.min_agl_m)
@@ -228,19 +229,19 @@ def _circles(
             top = np.array([*(ground[:2] + low_m / slope * way), place[2] + low_m])
             if not _slant_clear(ground, top, limits, air, 0.0):
                 break
-            for side in (0.5 * math.pi, -0.5 * math.pi, 0.0):  # to the left and right, where it is on the circle; ahead
+            for side in (0.5 * math.pi, -0.5 * math.pi, 0.0):  # middle left, right (both on the circle) or ahead
                 towards = np.array([math.cos(one + side), math.sin(one + side)])
                 high = _circle(problem, top + np.array([*(radius * towards), 0.0]), wanted, aim)
                 if high is None:
                     continue
                 middle, half = 0.5 * (high[0, 2] + top[2]), 0.5 * (high[0, 2] - top[2])
-                line = np.array([[*ground[:2], middle], [*top[:2], middle]])  # it may climb there, and fly on higher
-                if _column_clear(line[0], line[1], 0.0, limits, air, half):  # anticlockwise with ArduPlane's sign
+                line = np.array([[*ground[:2], middle], [*top[:2], middle]])  # it may fly there above the slant
+                if _column_clear(line[0], line[1], 0.0, limits, air, half):  # ArduPlane: negative is anticlockwise
                     yield FlightEnd(ground, top, high[1:], one, high[0], -radius if side > 0.0 else radius)
 
 
 def _circle(problem: Problem, middle: Floats, wanted_m: float, aim: Floats) -> Floats | None:
-    """(2, 3) over the middle of a circle, as high as its first leg needs it, and the end of that leg."""
+    """(2, 3) the point over a circle's middle, at the altitude that its first leg needs, and the end of that leg."""
     air, limits, radius = problem.airspace, problem.limits, circle_m(problem)
     reach_m = radius * circle_growth(middle[2] + HIGHEST_CIRCLE_M)
     if circle_missing_m(middle, reach_m, limits, air) > 0.0:
@@ -252,14 +253,14 @@ def _circle(problem: Problem, middle: Floats, wanted_m: float, aim: Floats) -> F
     needed = max(_floor(air, np.array([[*middle[:2], 0.0], [*there, 0.0]]), wide), wanted_m)
     if not middle[2] < needed <= middle[2] + HIGHEST_CIRCLE_M:
         return None
-    z = middle[2] + math.ceil((needed - middle[2]) * 100.0 - 1e-6) / 100.0 + REACHED_M  # it may leave so much lower
+    z = middle[2] + math.ceil((needed - middle[2]) * 100.0 - 1e-6) / 100.0 + REACHED_M  # it may leave that much lower
     line = np.array([[*middle[:2], z], [*there, z]])
     clear = _column_clear(middle, line[0], reach_m, limits, air) and air.clear(Legs.of_path(line, wide), wide).all()
     return line if clear else None
 
 
 def _chain(top: Floats, heading: float, aim: Floats, run_m: float, radius: float) -> Floats:
-    """(N, 3) level corners from the end of the slant on, until the way to ``aim`` is a turn of `SHARPEST` at most."""
+    """(N, 3) level corners after the slant, until the direction to ``aim`` is a turn of at most `SHARPEST`."""
     z, here = float(top[2]), top[:2]
     points = []
     for k in range(5):
@@ -275,7 +276,7 @@ def _chain(top: Floats, heading: float, aim: Floats, run_m: float, radius: float
 
 
 def _floor(air: Airspace, points: Floats, limits: Limits) -> float:
-    """The highest floor along a line of points, and at its end for whatever direction is flown from there."""
+    """The highest floor along a line of points, and at its end for any direction in which the path may continue."""
     low = lowest_amsl(air, float(points[-1, 0]), float(points[-1, 1]), limits)
     for a, b in pairwise(points):
         count = max(2, math.ceil(math.dist(a[:2], b[:2]) / SAMPLE_M) + 1)
@@ -285,6 +286,6 @@ def _floor(air: Airspace, points: Floats, limits: Limits) -> float:
 
 
 def _along(points: Floats, metres: float) -> Floats:
-    """(2,) the point of a way after so many metres; its end if it is shorter."""
+    """(2,) the point of a track after ``metres``; its end if the track is shorter."""
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
     return np.array([np.interp(metres, s, points[:, i]) for i in range(2)])

@@ -1,10 +1,10 @@
-"""A fixed wing's plan: a climb-out, a path of arcs, and an approach, laid end to end.
+"""A fixed wing's plan: a climb-out, a path of arcs, and an approach, joined end to end.
 
-A path of arcs (`planners.turns`) has no heading at its ends, and a fixed wing has one at both. So the ends are laid
-first: straight out of the start as far as it must climb, on the wanted heading or on the first legal one next to the
-way it is to go, a piece straight on to begin the first turn from, and further turns where the heading is far off; the
-same way into the goal, backwards, where it is to land. The planner joins them; the turns at the joints are corners as
-any other. Then the mission is built, and judged as flown.
+A path of arcs (`planners.turns`) has no heading at its ends, but a fixed wing has one at both. So the ends are made
+first. The climb-out goes straight from the start as far as it must climb, on the requested heading or the first legal
+one near the direction of the path; then a straight piece to begin the first turn from, and further turns if the heading
+is far off. If the vehicle lands, the approach to the goal is made likewise, backwards. The planner joins the ends; the
+turns at the joints are corners like any other. Then the mission is built, and judged as flown.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ __all__ = ["plan_wing"]
 ATTEMPTS = 5
 
 MOST_JOINTS = 8
-"""Pairs of climb-outs and approaches for which a path is looked for."""
+"""Most pairs of climb-out and approach for which a path is searched."""
 
 PART_OF_SLOPE = 0.9993
-"""Arcs are judged by their chords, which are shorter, and so steeper."""
+"""Factor on the slope limits: arcs are judged by their chords, which are shorter, and so steeper."""
 
 ACCEPTED_M, CHORDS_M = 1.0, 0.2
-"""What a turn begins early by, since acceptance radii are whole metres, and what arcs are judged wider by."""
+"""Metres by which a turn begins early (acceptance radii are whole metres), and by which arcs are judged wider."""
 
 
 def plan_wing(
@@ -56,7 +56,8 @@ def plan_wing(
 ) -> VehiclePlan:
     """One fixed wing's path, mission and verdict, as `planning.plan_vehicle`. Raises InputError, NoMission.
 
-    ``limited``, ``world``, ``options``: the request under its limits, the world, the options of the search.
+    ``limited``, ``world`` and ``options`` are those of the search: the request with its limits, the world, the
+    planner's options.
     """
     source, vehicle = brief.source, request.vehicle
     margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
@@ -73,7 +74,7 @@ def plan_wing(
         except NoMission:
             if failed is None:
                 raise
-            break  # with so much more room there is none: what was found before is returned
+            break  # there is no path with margins this large: report what the last mission broke
         if not plan.verdict.findings:
             return replace(plan, notes=(*notes, *plan.notes))
         failed = plan
@@ -87,7 +88,7 @@ def plan_wing(
 def _joined(
     brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World
 ) -> VehiclePlan:
-    """The mission between the first ends that a path can be joined to; it need not be legal yet."""
+    """The mission with the first pair of ends that a path can be joined to; it may still break limits."""
     vehicle = request.vehicle
     for tried, (start, goal) in enumerate(_pairs(problem, limited, sharp)):
         if tried == MOST_JOINTS:
@@ -117,14 +118,14 @@ def _pairs(problem: Problem, limited: VehicleRequest, sharp: Floats) -> Iterator
 
 
 def _mendable(plan: VehiclePlan) -> bool:
-    """Whether more room may help: what the ends or the battery break, it does not."""
+    """Whether larger margins may help; they do not where only the ends or the battery break a limit."""
     items, first = plan.mission.items, plan.mission.first_seq
     mended = {i + first for i, item in enumerate(items) if item.command in (cmd.WAYPOINT, cmd.LOITER_UNLIM)}
     return any(f.seq in mended for f in plan.verdict.findings if f.kind != "battery")
 
 
 def _larger(margins: Margins, verdict: Verdict) -> Margins:
-    """Margins for another attempt, by what the last one missed: heights and distances each by themselves."""
+    """Margins for the next attempt, by the shortages of the last one: heights and distances are treated separately."""
     heights = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
     low_m = max((f.by for f in verdict.findings if f.kind in heights), default=0.0)
     near_m = max((f.by for f in verdict.findings if f.kind == "zone"), default=0.0)
@@ -138,7 +139,7 @@ def _larger(margins: Margins, verdict: Verdict) -> Margins:
 
 
 def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
-    """The goal as high as it must be for what is flown around it: a loiter's circle, a turn for home."""
+    """Raise the goal as high as the flight around it needs: the circle of a loiter, or the turn for home."""
     east, north, amsl = problem.goal
     around = {"loiter": circle_m(problem) * circle_growth(amsl + 100.0), "rtl": 2.0 * problem.turn_radius_m}
     reach_m = around.get(request.end)
@@ -156,25 +157,25 @@ def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
     return replace(problem, goal=(east, north, raised))
 
 
-# -- joined --------------------------------------------------------------------------------------------------------
+# -- joining -------------------------------------------------------------------------------------------------------
 
 
 def _inner(problem: Problem, start: FlightEnd, goal: FlightEnd | None) -> Problem:
-    """The planner's part: from where the climb-out and its turns end to where the approach begins."""
+    """The planner's part: from the end of the climb-out and its turns to the begin of the approach."""
     first = tuple(float(x) for x in start.chain[-1])
     last = problem.goal if goal is None else tuple(float(x) for x in goal.chain[-1])
     return replace(problem, start=first, goal=last)  # type: ignore[arg-type]
 
 
 def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightEnd | None) -> Solution:
-    """The solution with the ends laid before and behind it; the bound holds for missions with just these ends."""
+    """The solution with both ends added. Its lower bound holds for missions with exactly these ends."""
     inner = solution.path.points
     before = np.vstack([start.leaves, start.chain[:-1]])
     behind = np.empty((0, 3)) if goal is None else np.vstack([goal.chain[-2::-1], goal.top])
     points = thinned(np.vstack([before[1:], inner, behind]), problem.turn_radius_m)
     points = _slowed(points, start.leaves, problem)
     everything = np.vstack([before, inner, behind])
-    # Each end is as long as its straight pieces; its turns, those at the joints among them, may cut corners.
+    # An end counts by the length of its straight pieces, less what its turns, those at the joints too, may cut off.
     radius = problem.turn_radius_m
     run = np.hypot(*np.diff(everything[:, :2], axis=0).T)
     spare = 2.0 * tangents_m(everything, radius) - 2.0 * radius * np.arctan(tangents_m(everything, radius) / radius)
@@ -188,7 +189,7 @@ def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightE
 
 
 def _slowed(points: Floats, leaves: Floats, problem: Problem) -> Floats:
-    """``points`` lowered where they are too steep: arcs at the joints, which no planner knows of, shorten legs."""
+    """Lower ``points`` where they are too steep: arcs at the joints, unknown to the planner, shorten legs."""
     flown = flown_m(np.vstack([leaves, points]), problem.turn_radius_m)[1:]
     up, down = (PART_OF_SLOPE * s for s in (problem.limits.max_climb_slope, problem.limits.max_descent_slope))
     z = points[:, 2].copy()
@@ -209,7 +210,7 @@ def _order(brief: Brief, request: VehicleRequest, start: FlightEnd, goal: Flight
 
 
 def _fits(points: Floats, order: Order, radius: float) -> bool:
-    """Whether the arcs at all corners, the joints too, have room between their way points."""
+    """Whether the arcs at all corners, joints included, fit between their way points."""
     assert order.wing is not None
     whole = np.array([order.wing.leaves, *points, *([] if order.wing.touch is None else [order.wing.touch])])
     tangent = tangents_m(whole, radius)
@@ -218,7 +219,7 @@ def _fits(points: Floats, order: Order, radius: float) -> bool:
 
 
 def _words(start: FlightEnd, goal: FlightEnd | None) -> Sequence[str]:
-    """Notes for the user on the ends."""
+    """Notes on the ends, for the user."""
     heading = (90.0 - math.degrees(start.heading)) % 360.0
     far_m = math.dist(start.top[:2], start.ground[:2])
     words = [

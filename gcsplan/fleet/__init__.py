@@ -1,1 +1,1 @@
-"""When: motion in time, arrival schedules, and the separation of every pair. Metres and seconds; no degrees."""
+"""Fleet planning: motion in time, arrival schedules, separation of every pair. Metres and seconds, no degrees."""

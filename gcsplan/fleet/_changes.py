@@ -1,6 +1,6 @@
-"""What may be changed about one vehicle's flight so that it keeps clear of those before it, least cost first.
+"""The changes to one vehicle's flight that can keep it clear of the vehicles before it, cheapest first.
 
-A change costs joules beyond the flight as it was scheduled, and seconds by which anything moves; energy counts first.
+A change costs joules beyond the scheduled flight, and seconds by which any time moves; energy is compared first.
 """
 
 from __future__ import annotations
@@ -21,28 +21,30 @@ from gcsplan.vehicle import Vehicle
 How = Literal["as scheduled", "departure", "speed", "hold", "path"]
 
 EARLIER_LATER_S = (1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0, 34.0, 55.0, 89.0, 144.0, 233.0)
-"""Changes of departure that are tried, with the speed that keeps the arrival; then `EVENLY` over all that is left."""
+"""Shifts of the departure to try, s, with the speed that keeps the arrival; then `EVENLY` over the whole range."""
 
 EVENLY = 12
 CLOSER = 4
-"""Halvings between the last departure that does not do and the first that does."""
+"""Halvings between the last departure that conflicts and the first that does not."""
 
 SPARE_M = 0.02
-"""What is changed keeps this much more than needed: whoever times the mission anew finds it kept, rounding and all."""
+"""Metres that a changed flight keeps beyond the need, so that it passes when the mission is timed again and rounded."""
 
 HOLDS_S = (2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)
 SLOWER = (0.9, 0.8, 0.7, 0.6, 0.5)
 LONG_S = 20.0
-"""A change of departure beyond which a lower speed is tried as well; lower ones than `SLOWER` block the others' way."""
+"""Change of departure, s, beyond which lower speeds are tried too. Speeds below `SLOWER` would block the others."""
 
 HORIZONS_S = (40.0, 160.0, 640.0, math.inf)
-"""How far the least change of departure is looked for, one after the other."""
+"""Ranges in which the least change of departure is searched, one after the other, s."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Option:
-    """One way to fly: joules more than scheduled, the seconds by which departure, arrival or hold move, the slot, and
-    its motion."""
+    """One candidate flight: joules more than scheduled, seconds by which its times move, its slot and its motion.
+
+    ``moved_s`` adds up how far departure or arrival (the larger) and the hold move.
+    """
 
     extra_j: float
     moved_s: float
@@ -52,16 +54,16 @@ class Option:
 
     @property
     def cost(self) -> tuple[float, float]:
-        """Least first: energy, then seconds."""
+        """The key to minimise: energy, then seconds."""
         return max(0.0, round(self.extra_j, 6)), self.moved_s
 
 
 @dataclass(frozen=True, slots=True)
 class Freedom:
-    """What may be changed: with ``mode`` sequence or together the arrival stays, with none it is free.
+    """What may be changed. With ``mode`` sequence or together the arrival is fixed, with none it is free.
 
-    Nobody leaves before 0 s; or, where nothing else is free, up to ``before_s`` earlier: the whole fleet then starts,
-    and arrives, so much later.
+    No vehicle leaves before 0 s. If nothing else helps, one may leave up to ``before_s`` earlier; the whole fleet then
+    starts, and arrives, that much later.
     """
 
     mode: Mode
@@ -75,14 +77,14 @@ class Freedom:
 
 
 class Chooser:
-    """The options of one vehicle on one route, against those that have the right of way."""
+    """The options of one vehicle on one route, against the vehicles that have priority."""
 
     def __init__(self, vehicle: Vehicle, route: Route, was: Slot, freedom: Freedom, taken: Taken) -> None:
         self.craft = Craft(Crew(vehicle, route))
         self.was, self.freedom, self.taken = was, freedom, taken
 
     def base(self) -> Option | None:
-        """As scheduled; on another route, with what keeps the arrival. None where that cannot be."""
+        """The flight as scheduled; on another route, one that keeps the arrival. None if that is impossible."""
         was, craft = self.was, self.craft
         if craft.crew.route is was.route:
             return Option(0.0, 0.0, "as scheduled", was, self._motion(was))
@@ -92,14 +94,14 @@ class Chooser:
             found = craft.at(was.arrive_s, self.freedom.hold)
             early_s = was.arrive_s - craft.fast_s
             if found is None and self.freedom.hold == "ground" and -self.freedom.before_s <= early_s < 0.0:
-                found = craft.fly(craft.fastest_m_s, early_s)  # longer than there is time for: before all others
+                found = craft.fly(craft.fastest_m_s, early_s)  # too long for the time left: leave before all others
             if found is None:
                 return None
             slot = found
         return self._option("path", slot)
 
     def best(self, base: Option) -> Option | None:
-        """The cheapest option that keeps clear; None where none of those tried does."""
+        """The cheapest option that keeps clear; None if none of those tried does."""
         if self.clear(base):
             return base
         if not self.freedom.keeps_arrival:
@@ -108,17 +110,17 @@ class Chooser:
             found = self._departures(base, 0.0)
             if found is None and self.freedom.before_s > 0.0:
                 found = self._departures(base, -self.freedom.before_s)
-        return self._holds(base) if found is None else found  # what is free before what costs energy
+        return self._holds(base) if found is None else found  # changes that cost nothing come first
 
     def clear(self, option: Option) -> bool:
-        """Whether an option meets nobody."""
+        """Whether an option keeps clear of all vehicles with priority."""
         spare_m = 0.0 if option.how == "as scheduled" else SPARE_M
         return self.taken.forbidden(option.path, spare_m=spare_m).free(0.0)
 
     # -- the arrival is free ------------------------------------------------------------------------------------
 
     def _delays(self, base: Option) -> Option | None:
-        """The least change of departure that does, exactly; a lower speed where that is long, and moves less."""
+        """The least change of departure that keeps clear, exact; if long, lower speeds that move less are tried."""
         found = self._shifted(base, "departure")
         if found is not None and found.moved_s <= LONG_S:
             return found
@@ -127,7 +129,7 @@ class Chooser:
             option: Option | None = self._option("speed", slot)
             assert option is not None
             if found is not None and option.moved_s >= found.moved_s:
-                break  # slower still moves more
+                break  # a lower speed moves even more
             if not self.clear(option):
                 option = None if found is not None else self._shifted(option, "speed")
             if option is not None and (found is None or option.cost < found.cost):
@@ -135,7 +137,7 @@ class Chooser:
         return found
 
     def _shifted(self, option: Option, how: How) -> Option | None:
-        """The same flight, earlier or later by as little as does."""
+        """The same flight, earlier or later by the least time that keeps clear."""
         if self.freedom.hold != "ground":
             return option if self.clear(option) else None
         last = max((p.end_s for p in self.taken.paths), default=0.0)
@@ -159,7 +161,7 @@ class Chooser:
     # -- the arrival stays --------------------------------------------------------------------------------------
 
     def _departures(self, base: Option, earliest_s: float) -> Option | None:
-        """The nearest other departure that does, at the speed that keeps the arrival."""
+        """The nearest other departure that keeps clear, at the speed that keeps the arrival."""
         if self.freedom.hold != "ground":
             return None
         low, high = self._range(base.slot.hold_s, earliest_s)
@@ -178,7 +180,7 @@ class Chooser:
         return None
 
     def _closer(self, option: Option, bad_s: float, good_s: float, hold_s: float) -> Option:
-        """A departure between one that does not do and one that does, as near the former as a few halvings find."""
+        """The flight whose departure is, by a few halvings, as near as possible to ``bad_s``, one that conflicts."""
         for _ in range(CLOSER):
             middle = 0.5 * (bad_s + good_s)
             other = self._arriving(middle, hold_s, "departure")
@@ -189,19 +191,19 @@ class Chooser:
         return option
 
     def _range(self, hold_s: float, earliest_s: float = 0.0) -> tuple[float, float]:
-        """Departures with which the arrival can be kept, with so long a hold; empty: the first above the second."""
+        """The range of departures that can keep the arrival with this hold; empty if the first is above the second."""
         arrive = self.was.arrive_s
         return max(earliest_s, arrive - self.craft.slow_s - hold_s), arrive - self.craft.fast_s - hold_s
 
     def _arriving(self, depart_s: float, hold_s: float, how: How) -> Option | None:
-        """The flight that leaves about then, holds so long, and arrives as scheduled."""
+        """The flight that leaves near ``depart_s``, holds ``hold_s``, and arrives as scheduled; None if impossible."""
         craft, arrive = self.craft, self.was.arrive_s
         wanted = arrive - depart_s - hold_s
         if not craft.fast_s - WITHIN_S <= wanted <= craft.slow_s + WITHIN_S:
             return None
         speed = speed_for(craft.course.time_to_goal_s, wanted, craft.slowest_m_s, craft.fastest_m_s, 1e-3)
         slot = craft.fly(speed, depart_s, hold_s)
-        # The departure makes up for what the speed, a float32 and found roughly, does not.
+        # The speed is a float32 from a coarse search; the departure corrects its error.
         depart = depart_s + arrive - slot.arrive_s
         if depart_s >= 0.0:
             depart = max(0.0, depart)

@@ -1,4 +1,4 @@
-"""How near two straight pieces of motion come: closed forms, one row for each pair of pieces."""
+"""The least distance of two straight pieces of motion: closed forms, one row per pair of pieces."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 
 PARALLEL = 1e-13
-"""Part of |v|²|u|² below which two velocities count as parallel: the least then lies on an edge as well."""
+"""Part of |v|²|u|² below which two velocities count as parallel: the minimum then also lies on an edge."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """Straight motions: at ``places`` (n, 3) at ``from_s`` (n,), on with ``velocity`` (n, 3) until ``to_s`` (n,)."""
+    """Straight motions: at ``places`` (n, 3) at ``from_s`` (n,), then with ``velocity`` (n, 3) until ``to_s`` (n,)."""
 
     from_s: Floats
     to_s: Floats
@@ -23,11 +23,11 @@ class Pieces:
     velocity: Floats
 
     def take(self, rows: NDArray[np.intp]) -> Pieces:
-        """Some of them, or some several times."""
+        """The pieces of ``rows``, which may repeat."""
         return Pieces(self.from_s[rows], self.to_s[rows], self.places[rows], self.velocity[rows])
 
     def joined(self, other: Pieces) -> Pieces:
-        """These, then others."""
+        """These pieces, followed by others."""
         return Pieces(
             np.concatenate([self.from_s, other.from_s]),
             np.concatenate([self.to_s, other.to_s]),
@@ -43,9 +43,9 @@ class Pieces:
 def nearest(a: Pieces, b: Pieces, apart_s: float = 0.0) -> tuple[Floats, Floats, Floats]:
     """Least distance (n,) between a at t1 and b at t2, and both times, over all |t1 - t2| <= ``apart_s``.
 
-    All rows must overlap in time, or come within ``apart_s`` of it. A convex quadratic in (t1, t2) over a box cut by a
-    strip: its least is inside, or on one of six edges, on each of which it is a quadratic of one variable. Never below
-    the least, and above it only by rounding.
+    All rows must overlap in time, or be within ``apart_s`` of it. The squared distance is a convex quadratic in (t1,
+    t2) over a box cut by a strip. Its minimum is inside, or on one of six edges, where it is a quadratic of one
+    variable. The result is never below the true minimum, and above it only by rounding.
     """
     if apart_s <= 0.0:
         lo, hi = np.maximum(a.from_s, b.from_s), np.minimum(a.to_s, b.to_s)
@@ -89,9 +89,9 @@ def nearest(a: Pieces, b: Pieces, apart_s: float = 0.0) -> tuple[Floats, Floats,
 
 
 def below(a: Pieces, b: Pieces, needed_m: float) -> tuple[Floats, Floats]:
-    """From when until when (n,) two motions at one and the same time are nearer than ``needed_m``.
+    """The time span (n,), (n,) in which two motions, both at the same time, are nearer than ``needed_m``.
 
-    Rows that never are get an empty span: the first later than the second.
+    Rows that never are get an empty span: the first time is later than the second.
     """
     lo, hi = np.maximum(a.from_s, b.from_s), np.minimum(a.to_s, b.to_s)
     gap, closing = a.at(lo) - b.at(lo), a.velocity - b.velocity
@@ -100,7 +100,7 @@ def below(a: Pieces, b: Pieces, needed_m: float) -> tuple[Floats, Floats]:
 
 
 def _on_edge(gap: Floats, rate: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-    """Where |gap + s·rate| is least for s in [low, high], and its square there."""
+    """The s in [low, high] at which |gap + s·rate| is least, and its square there."""
     square = _dot(rate, rate)
     s = -_dot(gap, rate) / np.where(square > 0.0, square, 1.0)
     s = np.minimum(np.maximum(s, low), high)
@@ -113,11 +113,11 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def shifts(a: Pieces, b: Pieces, needed_m: float) -> tuple[Floats, Floats]:
-    """From which until which delay of ``a`` (n,) it comes nearer than ``needed_m`` to ``b``: the range of t2 - t1 over
-    all t1 on a and t2 on b whose places are that near.
+    """The range of delays (n,), (n,) of ``a`` with which it comes nearer than ``needed_m`` to ``b``.
 
-    Rows that never come so near get an empty span: the first later than the second. Those (t1, t2) are an ellipse cut
-    by a box: the ends of the range lie on one of four edges, or where the ellipse itself ends.
+    That is the range of t2 - t1 over all t1 on a and t2 on b whose places are that near. Rows that never come so near
+    get an empty span: the first delay is later than the second. Those (t1, t2) are an ellipse cut by a box, so the ends
+    of the range lie on one of four edges, or at the extremes of the ellipse.
     """
     d = a.places - b.places
     v, u = a.velocity, b.velocity
@@ -154,7 +154,7 @@ def shifts(a: Pieces, b: Pieces, needed_m: float) -> tuple[Floats, Floats]:
 
 
 def _inside(gap: Floats, rate: Floats, long: Floats, needed_m: float) -> tuple[Floats, Floats]:
-    """From where until where in [0, long] |gap + s·rate| is less than ``needed_m``; inf, -inf: nowhere."""
+    """The range of s in [0, long] where |gap + s·rate| is less than ``needed_m``; (inf, -inf) if nowhere."""
     speed2, half, excess = _dot(rate, rate), _dot(gap, rate), _dot(gap, gap) - needed_m * needed_m
     root2 = half * half - speed2 * excess
     moving = speed2 > 1e-12

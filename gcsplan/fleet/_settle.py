@@ -1,4 +1,4 @@
-"""Vehicle after vehicle given its place in time, in order of priority; again with a later clock, or other paths."""
+"""Fix the vehicles' times one after the other, by priority; retry with a later clock or with other paths."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from gcsplan.fleet.timing import Route
 
 Replan = Callable[[str, Sequence[Conflict], int], Route | None]
 """``replan(name, avoid, attempt)``: another route for a vehicle that keeps away from the places of ``avoid`` (or flies
-higher); ``attempt`` counts from 1; None: no more ideas."""
+higher). ``attempt`` counts from 1. None: no more ideas."""
 
 Again = Callable[[float], Schedule]
 """``again(interval_s)``: the schedule of the sequence with that interval."""
 
 ATTEMPTS = 4
 PROMOTIONS = 3
-"""How many vehicles that nothing helps may be put before the one in their way, where no priority is set."""
+"""Most vehicles that may be put before the one in their way if nothing else helps them and no priority is set."""
 
 LATER_S = 600.0
-"""By how much the whole fleet may arrive later where its clock leaves somebody no room."""
+"""Seconds by which the whole fleet may arrive later if its clock leaves a vehicle no possibility to evade."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Change:
-    """What was changed about one vehicle, and the first conflict that made it necessary."""
+    """A change to one vehicle's flight, and the first conflict that made it necessary."""
 
     name: str
     how: str
@@ -41,7 +41,7 @@ class Change:
     because: Conflict
 
     def describe(self, where: Where = in_metres) -> str:
-        """One line for people."""
+        """One line for the user."""
         said = []
         later = self.slot.depart_s - self.was.depart_s
         if abs(later) > 0.005:
@@ -61,7 +61,7 @@ class Change:
 
 
 def maker(plan: Schedule, crews: Sequence[Crew], hold: Hold) -> Again:
-    """Schedules like ``plan`` with another interval, the first arrival as it is."""
+    """A function that makes schedules like ``plan`` with another interval and the same first arrival."""
     first_s = min(s.arrive_s for s in plan.slots)
 
     def again(interval_s: float) -> Schedule:
@@ -72,7 +72,7 @@ def maker(plan: Schedule, crews: Sequence[Crew], hold: Hold) -> Again:
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """What stays the same however often it is tried."""
+    """The arguments of `resolve`, which stay the same over all tries."""
 
     crews: Sequence[Crew]
     rules: Rules
@@ -85,8 +85,10 @@ class Ask:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Stuck:
-    """A vehicle that nothing helps, what it meets first, the names of all that it meets, and whether that is where
-    their goals are: then another order does not help either."""
+    """A vehicle that nothing helps, its first conflict, and the names of all that it meets.
+
+    ``at_goals``: they meet where their goals are, so another order does not help either.
+    """
 
     name: str
     conflict: Conflict
@@ -96,13 +98,13 @@ class Stuck:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Choice:
-    """How a vehicle flies, and what was changed for that."""
+    """How a vehicle flies, and the change that this needed."""
 
     option: Option
     change: Change | None
 
     def later(self, by_s: float) -> Choice:
-        """The same, ``by_s`` later; what was, too."""
+        """The same choice ``by_s`` later, the flight before the change too."""
         option = replace(self.option, slot=_late(self.option.slot, by_s), path=self.option.path.delayed(by_s))
         if self.change is None:
             return Choice(option, None)
@@ -114,11 +116,14 @@ def _late(slot: Slot, by_s: float) -> Slot:
 
 
 Settled = dict[str, Choice]
-"""By name, in the order in which they were fixed."""
+"""Choices by name, in the order in which they were fixed."""
 
 
 def settle(plan: Schedule, ask: Ask) -> Settled | Stuck:
-    """All as they fly, none of them before 0 s; other paths only where nothing else helps."""
+    """Choices for all vehicles. Other paths are used only if nothing else helps.
+
+    A vehicle may leave up to ``ask.later_s`` before 0 s; see `moved`.
+    """
     settled = _settle(plan, replace(ask, replan=None))
     if isinstance(settled, Stuck) and ask.replan is not None:
         settled = _settle(plan, ask)
@@ -126,13 +131,13 @@ def settle(plan: Schedule, ask: Ask) -> Settled | Stuck:
 
 
 def moved(settled: Settled) -> tuple[Settled, float]:
-    """All later by the same, so that nobody leaves before 0 s; and by how much."""
+    """Delay all equally, so that no vehicle leaves before 0 s; returns the choices and the delay, s."""
     later = max(0.0, -min(choice.option.slot.depart_s for choice in settled.values()))
     return (settled if later <= 0.0 else {name: choice.later(later) for name, choice in settled.items()}), later
 
 
 def _settle(plan: Schedule, ask: Ask) -> Settled | Stuck:
-    """Fix all in order; who is stuck goes before those in its way, where no priority is set."""
+    """Fix all in order. Without a set priority, a vehicle that is stuck is moved before those in its way."""
     order = list(plan.order if ask.priority is None else ask.priority)
     promoted: set[str] = set()
     done: Settled = {}
@@ -150,7 +155,7 @@ def _settle(plan: Schedule, ask: Ask) -> Settled | Stuck:
 
 
 def _in_order(plan: Schedule, ask: Ask, order: Sequence[str], done: Settled) -> Stuck | None:
-    """Fix vehicle after vehicle, those in ``done`` as they are there, and add the others to it until one is stuck."""
+    """Fix vehicle after vehicle: keep those in ``done`` as they are, and add the others until one is stuck."""
     vehicles = {c.name: c.vehicle for c in ask.crews}
     taken = Taken(ask.rules)
     freedom = Freedom(plan.mode, ask.hold, ask.later_s)
@@ -186,7 +191,7 @@ def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
 
 
 def _other_path(name: str, chooser: Chooser, met: Sequence[Conflict], replan: Replan, attempts: int) -> Option | None:
-    """The first other route, as the caller has them, with which something keeps clear."""
+    """The first route of ``replan`` on which some option keeps clear; None if there is none."""
     avoid = list(met)
     for attempt in range(1, attempts + 1):
         route = replan(name, tuple(avoid), attempt)
@@ -204,7 +209,7 @@ def _other_path(name: str, chooser: Chooser, met: Sequence[Conflict], replan: Re
 
 
 def _conflicts(path: TimedPath, taken: Taken) -> list[Conflict]:
-    """What a motion meets among those that have the right of way, by time."""
+    """The conflicts of a motion with the vehicles that have priority, by time."""
     spans = taken.forbidden(path)
     others = sorted(set(spans.who[spans.holds(0.0)].tolist()))
     judged = separation([path, *(taken.paths[k] for k in others)], taken.rules)
@@ -212,7 +217,7 @@ def _conflicts(path: TimedPath, taken: Taken) -> list[Conflict]:
 
 
 def _at_goals(conflict: Conflict, plan: Schedule, rules: Rules) -> bool:
-    """Whether two meet about where both arrive."""
+    """Whether two vehicles meet near the goals of both."""
     goals = [plan.of(name).route.points[-1, :2] for name in conflict.worst.vehicles]
     apart = float(np.hypot(*(goals[0] - goals[1])))
     away = [float(np.hypot(*(np.array(p[:2]) - g))) for p, g in zip(conflict.worst.places, goals, strict=True)]

@@ -1,7 +1,7 @@
-"""Which pieces of which vehicles are worth looking at: the fleet's time in slices, with a bound for each pair in each.
+"""Choose the pieces of motion that need an exact look: time slices, with a lower bound for each pair in each slice.
 
-In a slice a vehicle is never further than its ``stray`` from the even motion between its places at the slice's two
-ends; the least distance of two even motions, less both strays, is a bound from below that costs one quadratic.
+In a slice a vehicle is never farther than its ``stray`` from the even motion between its places at the slice's two
+ends. The least distance of two even motions, less both strays, is a lower bound that costs one quadratic.
 """
 
 from __future__ import annotations
@@ -19,26 +19,27 @@ from gcsplan.fleet.motion import TimedPath
 Ints = NDArray[np.intp]
 
 FOREVER_S = 1e9
-"""When the last piece of a vehicle that ends in the air ends."""
+"""End time of the last piece of a vehicle that ends in the air, s."""
 
 PIECES_A_SLICE = 4
 SLICES = (16, 512)
 
 BLOCK = 400_000
-"""Rows looked at together, about: some tens of megabytes."""
+"""Rows that are handled together, about: some tens of megabytes."""
 
 SLACK_M = 1e-7
-"""What a bound may be off by rounding, and so the most that is looked over."""
+"""Metres by which rounding may falsify a bound, and so the largest distance error of the search."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fleet:
     """Motions of V vehicles cut into K slices between ``edges_s`` (K + 1,), narrow where much moves.
 
-    ``pieces`` of all vehicles one after another; ``offset`` (V,) the first of each. ``nodes`` (V, K + 1, 3) places at
-    the slices' ends (standing before take-off and after landing); ``stray`` (V, K); ``fastest`` (V, K) m/s in a slice
-    and a window about it; ``begins``, ``ends`` (V,) in the air; ``first``, ``last`` (V, K) the pieces in a slice and a
-    window about it, counted over all vehicles.
+    ``pieces`` holds those of all vehicles in turn, ``offset`` (V,) the first of each. ``nodes`` (V, K + 1, 3) are the
+    places at the slices' ends (on the ground before take-off and after landing). ``stray`` is (V, K), in metres.
+    ``fastest`` (V, K) is the top speed, m/s, in a slice and a window about it. ``begins`` and ``ends`` (V,) are the
+    times in the air. ``first`` and ``last`` (V, K) are the pieces in a slice and a window about it, numbered over all
+    vehicles.
     """
 
     paths: tuple[TimedPath, ...]
@@ -56,12 +57,12 @@ class Fleet:
 
     @property
     def horizon_s(self) -> float:
-        """The end of the last slice: nobody moves after it."""
+        """The end of the last slice; nobody moves after it."""
         return float(self.edges_s[-1])
 
     @classmethod
     def of(cls, paths: Sequence[TimedPath], window_s: float = 0.0) -> Fleet:
-        """Slice the motions of ``paths`` (at least one), each up to ± ``window_s`` early or late."""
+        """Slice the motions of ``paths`` (at least one), each up to ``window_s`` early or late."""
         edges = _edges(paths, window_s)
         count = len(edges) - 1
         shape = (len(paths), count)
@@ -73,7 +74,7 @@ class Fleet:
             nodes[v], stray[v] = _strays(path, edges)
             low = np.searchsorted(piece.from_s, edges[:-1] - window_s, side="right") - 1
             high = np.searchsorted(piece.from_s, edges[1:] + window_s, side="left") - 1
-            high[-1] = np.searchsorted(piece.from_s, edges[-1] + window_s, side="right") - 1  # standing on, from there
+            high[-1] = np.searchsorted(piece.from_s, edges[-1] + window_s, side="right") - 1  # with the stay at the end
             low, high = np.maximum(low, 0), np.maximum(high, 0)
             speed = np.sqrt((piece.velocity**2).sum(axis=1))
             fastest[v] = _largest(speed, low, high)
@@ -91,8 +92,10 @@ class Fleet:
         return cls(tuple(paths), window_s, edges, pieces, offset, nodes, stray, fastest, begins, ends, first, last)
 
     def bounds(self, i: Ints, j: Ints) -> tuple[Floats, Floats]:
-        """For pairs (M,): a bound from below in each slice (M, K), inf where not both are in the air, and the least
-        distance at the slices' ends (M,), inf where there is none with both in the air."""
+        """For pairs (M,): a lower bound of the distance in each slice (M, K), and the least distance at slice ends.
+
+        Both are inf where the two are not in the air together.
+        """
         edges = self.edges_s
         w = self.window_s
         begin, end = np.maximum(self.begins[i], self.begins[j]), np.minimum(self.ends[i], self.ends[j])
@@ -105,7 +108,7 @@ class Fleet:
             cross += gap[:, :-1] * change
             speed2 += change * change
         part = np.clip(-cross / np.where(speed2 > 0.0, speed2, 1.0), 0.0, 1.0)
-        # The sum cancels where two pass each other closely: what rounding may take is taken off the bound.
+        # The sum cancels where two pass closely, so the possible rounding error is taken off the bound.
         rounding = 4e-15 * np.maximum(square[:, :-1], square[:, 1:])
         least2 = np.maximum(square[:, :-1] + part * (2.0 * cross + part * speed2) - rounding, 0.0)
         bound = np.sqrt(least2) - self.stray[i] - self.stray[j]
@@ -119,7 +122,7 @@ class Fleet:
     def rows(self, i: Ints, j: Ints, k: Ints) -> Iterator[tuple[Ints, Ints, Ints]]:
         """All pairs of overlapping pieces of vehicles ``i`` and ``j`` in slices ``k`` (n,), in blocks.
 
-        Each block: which of the n, and the two pieces' numbers.
+        Each block has the row numbers among the n, and the numbers of the two pieces.
         """
         many_i = self.last[i, k] - self.first[i, k] + 1
         many_j = self.last[j, k] - self.first[j, k] + 1
@@ -162,7 +165,7 @@ class Fleet:
             if not len(of):
                 continue
             distance, t1, t2 = nearest(self.pieces.take(a), self.pieces.take(b), 2.0 * self.window_s)
-            owner = numbers[pair[of]]  # never falls
+            owner = numbers[pair[of]]  # sorted
             heads = np.flatnonzero(np.concatenate([[True], np.diff(owner) > 0]))
             least = np.repeat(np.minimum.reduceat(distance, heads), np.diff(np.append(heads, len(owner))))
             ties = np.flatnonzero(distance <= least)
@@ -176,8 +179,11 @@ class Fleet:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Least:
-    """For pairs (M,): least distance (inf: never both in the air, or not below the cut), when each is there, and on
-    which pieces (M, 2) counted over all vehicles (-1: none)."""
+    """Least distances of pairs (M,), in metres, when each vehicle is there, and on which pieces.
+
+    A distance is inf if the two are never both in the air, or not below the cut. ``pieces`` (M, 2) are numbered over
+    all vehicles (-1: none).
+    """
 
     distance_m: Floats
     first_s: Floats
@@ -186,14 +192,14 @@ class Least:
 
     @classmethod
     def none(cls, count: int) -> Least:
-        """Nothing known yet of ``count`` pairs."""
+        """The state before the search: no distance is known for any of ``count`` pairs."""
         return cls(
             np.full(count, np.inf), np.full(count, np.nan), np.full(count, np.nan), np.full((count, 2), -1, np.intp)
         )
 
 
 def pieces_of(path: TimedPath) -> Pieces:
-    """The pieces of a motion; one that stays in the air has a last one that does not move."""
+    """The pieces of a motion. If it ends in the air, a last piece that does not move is added."""
     times, points = path.times_s, path.points
     if path.ends_in_air:
         times, points = np.append(times, FOREVER_S), np.vstack([points, points[-1:]])
@@ -202,12 +208,12 @@ def pieces_of(path: TimedPath) -> Pieces:
 
 
 def overlap_of(pieces: Pieces, a: Ints, b: Ints, apart_s: float) -> NDArray[np.bool_]:
-    """Whether two pieces each overlap in time, looking at nothing but times."""
+    """Whether two pieces each overlap in time, by their times alone."""
     return np.asarray((pieces.from_s[a] <= pieces.to_s[b] + apart_s) & (pieces.from_s[b] <= pieces.to_s[a] + apart_s))
 
 
 def _edges(paths: Sequence[TimedPath], window_s: float) -> Floats:
-    """The ends of slices: quantiles of all break points' times, so that a vehicle in the air has a few in a slice."""
+    """The ends of slices: quantiles of the times of all break points, so that a vehicle has few pieces in a slice."""
     begin, end = min(p.begin_s for p in paths) - window_s, max(p.end_s for p in paths) + window_s
     times = np.concatenate([p.times_s for p in paths])
     at_a_time = max(1.0, sum(p.end_s - p.begin_s for p in paths) / (end - begin))
@@ -215,7 +221,7 @@ def _edges(paths: Sequence[TimedPath], window_s: float) -> Floats:
     inner = np.quantile(times, np.linspace(0.0, 1.0, count + 1)[1:-1])
     even = np.linspace(begin, end, SLICES[0] + 1)
     edges = np.unique(np.concatenate([even, inner]))
-    # Slivers of a slice would only cost.
+    # Very thin slices would only cost time.
     keep = np.append(True, np.diff(edges) > 1e-6 * (end - begin))
     keep[-1] = True
     if edges[-1] - edges[keep][-2] <= 1e-6 * (end - begin):
@@ -224,7 +230,7 @@ def _edges(paths: Sequence[TimedPath], window_s: float) -> Floats:
 
 
 def _strays(path: TimedPath, edges: Floats) -> tuple[Floats, Floats]:
-    """Places at the slices' ends (K + 1, 3), and how far the motion strays from the even one between (K,)."""
+    """Places at the slices' ends (K + 1, 3), and how far the motion strays from the even motion in each slice (K,)."""
     nodes = path.at(edges)
     k = np.clip(np.searchsorted(edges, path.times_s, side="right") - 1, 0, len(edges) - 2)
     part = (path.times_s - edges[k]) / (edges[k + 1] - edges[k])
@@ -235,7 +241,7 @@ def _strays(path: TimedPath, edges: Floats) -> tuple[Floats, Floats]:
 
 
 def _largest(values: Floats, low: Ints, high: Ints) -> Floats:
-    """Largest of ``values[low : high + 1]`` for each of (K,)."""
+    """The largest of ``values[low : high + 1]`` for each pair of ``low`` and ``high`` (K,)."""
     ends = np.empty(2 * len(low), dtype=np.intp)
     ends[0::2], ends[1::2] = low, high + 1
     return np.maximum.reduceat(np.append(values, 0.0), ends)[0::2]

@@ -1,8 +1,8 @@
-"""What others have taken of space and time, and by how much a motion must be shifted to keep clear of it.
+"""The space and time that vehicles with priority occupy, and the shifts that keep a motion clear of them.
 
-A motion that leaves ``d`` seconds later meets another where its place at t1 is near the other's at t2 = t1 + d: for
-two straight pieces these delays are one interval in closed form (`_nearest.shifts`), so that the least change of
-departure that works is found at once, without trying.
+A motion that leaves ``d`` seconds later meets another if its place at t1 is near the other's at t2 = t1 + d. For two
+straight pieces these delays are one interval in closed form (`_nearest.shifts`), so the least change of departure is
+computed directly, without trials.
 """
 
 from __future__ import annotations
@@ -23,28 +23,30 @@ from gcsplan.fleet.separation import TOLERANCE_M, Rules
 Ints = NDArray[np.intp]
 
 GROUP, LEVELS = 6, 3
-"""So many boxes are gathered into one, so many times over: what does not touch is passed over together."""
+"""Boxes per group, and levels of groups: groups that do not touch are skipped as a whole."""
 
 WHOLE = GROUP**LEVELS
 
 BLOCK = 4000
-"""Pairs of groups opened together."""
+"""Pairs of groups that are opened together."""
 
 EDGE_S = 1e-6
-"""Every forbidden span is this much wider on both sides: what rounding may take."""
+"""Seconds by which every forbidden span is widened on both sides, for rounding."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Boxes:
-    """``low``, ``high`` (n, 4): east_m, north_m, amsl_m and seconds of n pieces, or groups of them; an empty one has
-    its low above its high."""
+    """Boxes of n pieces or groups: ``low``, ``high`` (n, 4) in east_m, north_m, amsl_m and seconds.
+
+    An empty box has its low above its high.
+    """
 
     low: Floats
     high: Floats
 
     @classmethod
     def of(cls, pieces: Pieces) -> Boxes:
-        """One box for each piece, and empty ones up to a whole number of the largest groups."""
+        """One box per piece, padded with empty boxes to a multiple of the largest group."""
         ends = pieces.places + pieces.velocity * (pieces.to_s - pieces.from_s)[:, None]
         size = -(-len(ends) // WHOLE) * WHOLE
         low, high = np.full((size, 4), np.inf), np.full((size, 4), -np.inf)
@@ -53,29 +55,29 @@ class Boxes:
         return cls(low, high)
 
     def grouped(self) -> Boxes:
-        """One box for each `GROUP` of them."""
+        """One box for each group of `GROUP` boxes."""
         return Boxes(
             self.low.reshape(-1, GROUP, 4).min(axis=1), self.high.reshape(-1, GROUP, 4).max(axis=1)
         )  # fmt: skip
 
     def levels(self) -> tuple[Boxes, ...]:
-        """The largest groups first, these last."""
+        """All levels: the largest groups first, the boxes themselves last."""
         out = [self]
         for _ in range(LEVELS):
             out.insert(0, out[0].grouped())
         return tuple(out)
 
     def joined(self, other: Boxes) -> Boxes:
-        """These, then others."""
+        """These boxes, followed by others."""
         return Boxes(np.concatenate([self.low, other.low]), np.concatenate([self.high, other.high]))
 
     def grown(self, less: Floats, more: Floats) -> Boxes:
-        """Wider by ``less`` and ``more`` (4,)."""
+        """The boxes widened by ``less`` downwards and ``more`` upwards, (4,) each."""
         return Boxes(self.low - less, self.high + more)
 
 
 def _touching(a: Boxes, i: Ints, b: Boxes, j: Ints) -> tuple[Ints, Ints]:
-    """Those of the pairs ``i`` of ``a`` with ``j`` of ``b`` (n,) that touch."""
+    """Of the pairs ``i`` of ``a`` with ``j`` of ``b`` (n,), those whose boxes touch."""
     for axis in (3, 0, 1, 2):
         touch = np.flatnonzero((b.high[j, axis] >= a.low[i, axis]) & (b.low[j, axis] <= a.high[i, axis]))
         i, j = i[touch], j[touch]
@@ -84,7 +86,7 @@ def _touching(a: Boxes, i: Ints, b: Boxes, j: Ints) -> tuple[Ints, Ints]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Spans:
-    """Forbidden shifts, seconds: from ``low`` to ``high`` (n,), and the number of the vehicle met, ``who`` (n,)."""
+    """Forbidden shifts, s: from ``low`` to ``high`` (n,), and the number ``who`` (n,) of the vehicle that is met."""
 
     low: Floats
     high: Floats
@@ -92,11 +94,11 @@ class Spans:
 
     @classmethod
     def none(cls) -> Spans:
-        """Everything is allowed."""
+        """No forbidden shift."""
         return cls(np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp))
 
     def joined(self, other: Spans) -> Spans:
-        """What either forbids."""
+        """The spans of both."""
         return Spans(
             np.concatenate([self.low, other.low]),
             np.concatenate([self.high, other.high]),
@@ -104,16 +106,16 @@ class Spans:
         )
 
     def holds(self, shift_s: float) -> NDArray[np.bool_]:
-        """(n,) which of them forbid a shift."""
+        """(n,) whether each span forbids a shift."""
         return np.asarray((self.low < shift_s) & (shift_s < self.high))
 
     def free(self, shift_s: float) -> bool:
-        """Whether a shift is allowed."""
+        """Whether a shift is allowed by all spans."""
         return not self.holds(shift_s).any()
 
     def least(self, low_s: float, high_s: float) -> float | None:
-        """The allowed shift from ``low_s`` to ``high_s`` nearest to none; None where all are forbidden."""
-        # A little beyond each span: at its very end the next look would turn on rounding.
+        """The allowed shift in [``low_s``, ``high_s``] with the least absolute value; None if all are forbidden."""
+        # A little beyond each span: at the very end of a span, rounding would decide the next test.
         ends = np.concatenate([[0.0, low_s, high_s], self.low - EDGE_S, self.high + EDGE_S])
         ends = np.unique(ends[(ends >= low_s) & (ends <= high_s)])
         # An end is inside some open span exactly if more spans have begun before it than have ended at or before it.
@@ -126,20 +128,20 @@ class Spans:
 
 
 class Taken:
-    """Motions that have the right of way, one added after the other."""
+    """Motions that have priority, added one after the other."""
 
     def __init__(self, rules: Rules) -> None:
         self.rules = rules
         self.paths: list[TimedPath] = []
         empty = np.zeros(0)
         self._pieces = Pieces(empty, empty, np.zeros((0, 3)), np.zeros((0, 3)))
-        self._pads = np.zeros((0, 7))  # east and north of start and goal, begin, end, and whether it stands there then
-        self._first: list[int] = []  # of each vehicle, among all pieces and among all boxes
+        self._pads = np.zeros((0, 7))  # east and north of start and goal, begin, end, and whether it stands there after
+        self._first: list[int] = []  # first piece of each vehicle; below, its first box
         self._first_box: list[int] = []
         self._levels = Boxes(np.zeros((0, 4)), np.zeros((0, 4))).levels()
 
     def add(self, path: TimedPath) -> None:
-        """Give ``path`` the right of way over all that come later."""
+        """Give ``path`` priority over all that come later."""
         pieces = pieces_of(path)
         self._first.append(len(self._pieces.from_s))
         self._first_box.append(len(self._levels[-1].low))
@@ -151,8 +153,11 @@ class Taken:
         self.paths.append(path)
 
     def forbidden(self, path: TimedPath, low_s: float = 0.0, high_s: float = 0.0, spare_m: float = 0.0) -> Spans:
-        """The shifts of ``path`` from ``low_s`` to ``high_s`` that bring it, in the air or on a pad, nearer than needed
-        and ``spare_m`` to one that has the right of way; a span may reach beyond the two."""
+        """The shifts of ``path`` in [``low_s``, ``high_s``] that bring it too near to a vehicle with priority.
+
+        Too near is less than the needed distance plus ``spare_m``, in the air or on a pad. A span may reach beyond the
+        two ends.
+        """
         needed_m = self.rules.needed_m - TOLERANCE_M + spare_m
         parts = [*self._in_the_air(path, low_s, high_s, needed_m), self._on_the_pads(path, needed_m)]
         low, high = (np.concatenate([p[k] for p in parts]).astype(np.float64) for k in (0, 1))
@@ -169,7 +174,7 @@ class Taken:
             return []
         near, window = needed_m, 2.0 * self.rules.window_s
         own = pieces_of(path)
-        # Own boxes at any allowed shift, a separation larger: what they do not touch is clear.
+        # Own boxes at any allowed shift, widened by the separation: whatever they do not touch is clear.
         less = np.array([near, near, near, window - low_s])
         levels = [boxes.grown(less, np.array([near, near, near, window + high_s])) for boxes in Boxes.of(own).levels()]
         mine, theirs = np.meshgrid(np.arange(len(levels[0].low)), np.arange(len(self._levels[0].low)), indexing="ij")
@@ -177,7 +182,7 @@ class Taken:
         return [self._met(own, i, j, needed_m) for i, j in self._descend(levels, a, b, 1)]
 
     def _descend(self, levels: Sequence[Boxes], a: Ints, b: Ints, level: int) -> Iterator[tuple[Ints, Ints]]:
-        """Pairs of pieces whose boxes touch, in blocks, within pairs of groups (n,) of the level above."""
+        """Pairs of pieces whose boxes touch, in blocks, within the pairs of groups (n,) of the level above."""
         step = np.arange(GROUP)
         for start in range(0, len(a), BLOCK):
             some = slice(start, start + BLOCK)
@@ -198,7 +203,7 @@ class Taken:
         return low[met], high[met], who[met]
 
     def _on_the_pads(self, path: TimedPath, needed_m: float) -> tuple[Floats, Floats, Ints]:
-        """Spans of shifts in which one takes off or lands beside another that stands on the ground."""
+        """Spans of shifts in which one vehicle takes off or lands beside another that stands on the ground."""
         if not self.paths:
             return np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp)
         starts, goals = self._pads[:, 0:2], self._pads[:, 2:4]
@@ -212,7 +217,7 @@ class Taken:
 
         never = np.full(len(begins), math.inf)
         start, goal, begin, end = path.points[0], path.points[-1], path.begin_s, path.end_s
-        # Another lands where this one waits (and then takes off): the other way round; both land.
+        # In turn: another lands where this one waits and takes off; this one lands where another waits; both land.
         rows.append((lands & near(start, goals), ends - begin, never))
         if mine:
             rows.append((near(goal, starts), -never, begins - end))

@@ -1,13 +1,13 @@
-"""When each vehicle leaves, how fast it flies, and when it arrives: fleets that come together or one after the other.
+"""Arrival schedules: departures, speeds and arrivals of fleets that arrive together or one after the other.
 
 After Tan et al. 2023 ("Multi-UAV path planning based on IB-ABC with restricted planned arrival sequence"): all leave at
-the same time; in a sequence the first flies at its fastest and sets the clock, `T_i = T_1 + (i - 1)·interval`; together
-the slowest sets it; the speeds follow, `v_i = L_i / T_i`. Here the time model of `timing` stands in the place of
-`L / v`: the speed is found as a root, for time never rises with speed.
+the same time. In a sequence the first flies at its fastest and sets the clock, `T_i = T_1 + (i - 1)·interval`;
+together, the slowest sets it. The speeds follow, `v_i = L_i / T_i`. Here the time model of `timing` replaces `L / v`:
+the speed is found as a root, since time never rises with speed.
 
-A vehicle that would have to fly slower than its slowest speed leaves later (costs nothing), or holds at the gate, or
-is given a longer path. For one that cannot come early enough at its fastest the first waits; if that is not wanted
-(``clock="first"``, as in the paper) or cannot be, there is no schedule.
+A vehicle that would have to fly slower than its slowest speed leaves later (which costs nothing), holds at the gate, or
+gets a longer path. If a vehicle is late even at its fastest, the first one waits; if that is not wanted
+(``clock="first"``, as in the paper) or impossible, there is no schedule.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Mode = Literal["sequence", "together", "none"]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Schedule:
-    """Slots in the order of ``order``: of arrival for a sequence and none, as given for together."""
+    """Slots in the order of ``order``: by arrival for sequence and none, as requested for together."""
 
     mode: Mode
     order: tuple[str, ...]
@@ -47,15 +47,15 @@ class Schedule:
 
     @property
     def energy_j(self) -> float:
-        """Energy of all flights."""
+        """Energy of all flights, J."""
         return sum(s.energy_j for s in self.slots)
 
 
 class NoSchedule(NoMission):
     """The vehicles cannot arrive as requested; ``vehicle`` names the one that cannot.
 
-    ``interval_s`` is the smallest interval with which the same order works, ``arrive_s`` the earliest clock (the
-    first arrival of a sequence, the common one of ``together``); None where there is none.
+    ``interval_s`` is the smallest interval with which the same order works, ``arrive_s`` the earliest clock (the first
+    arrival of a sequence, the common arrival of ``together``); None if there is none.
     """
 
     def __init__(
@@ -80,16 +80,17 @@ def schedule(
 ) -> Schedule:
     """Departures and speeds with which the fleet arrives as requested.
 
-    ``mode``: ``sequence``: in ``order`` (names; None: as handed in; ``best``: finishing earliest, exact, see
-    `order.best_order`), ``interval_s`` apart; ``together``; ``none``: everybody at once, at its fastest.
-    The sequence begins as early as all can follow (``clock="fleet"``: the first at its fastest, or later where another
-    one could not keep its turn), or with the first at its fastest whatever the others can (``first``), or the first is
-    there at ``arrive_s`` (of ``together`` the common arrival; else the slowest at its fastest).
-    Who must come later than its slowest speed takes it leaves later (``hold="ground"``: costs nothing), or all leave at
-    once and it holds at the gate (``gate``: multicopters; costs ``hover_w``), or nobody waits (``none``); where it
-    cannot wait ``longer(name, length_m)`` is called for a path of that length.
+    ``mode``: ``sequence`` is in ``order`` (names; None: as in ``crews``; ``best``: the order that finishes earliest,
+    exact, see `order.best_order`), ``interval_s`` apart; ``together`` has a common arrival; with ``none`` all leave at
+    once, at their fastest. With ``arrive_s``, the first of a sequence, or all together, arrive then. Without it,
+    together arrives when the slowest can at its fastest, and a sequence begins as early as all can follow
+    (``clock="fleet"``: the first at its fastest, or later if another one could not keep its turn), or with the first at
+    its fastest whatever the others can (``clock="first"``).
+    A vehicle that must come later than its slowest speed allows leaves later (``hold="ground"``: costs nothing), or all
+    leave at once and it holds at the gate (``gate``: multicopters; costs ``hover_w``), or nobody waits (``none``). If
+    it cannot wait, ``longer(name, length_m)`` is called for a path of that length.
 
-    Raises NoSchedule where somebody cannot, with the smallest interval or the earliest arrival that works.
+    Raises NoSchedule if a vehicle cannot comply, with the smallest interval or the earliest arrival that works.
     """
     craft = [Craft(c) for c in crews]
     if not craft or len({c.name for c in craft}) != len(craft):
@@ -133,7 +134,7 @@ def least_interval_s(
     clock: Clock = "fleet",
     arrive_s: float | None = None,
 ) -> float | None:
-    """The smallest interval with which this order can arrive in sequence (time alone); None where none works."""
+    """The smallest interval with which this order can arrive in sequence (by time alone); None if none works."""
     craft = _by_name([Craft(c) for c in crews], order)
     return _least_interval(craft, hold, clock, arrive_s)
 
@@ -183,7 +184,7 @@ def _refusal(
     craft: Sequence[Craft], turn: int, mode: Mode, step_s: float, hold: Hold, clock: Clock, arrive_s: float | None,
     first_s: float,
 ) -> NoSchedule:  # fmt: skip
-    """Why this turn cannot be taken, and what would work."""
+    """The NoSchedule that says why this turn cannot be kept, and what would work."""
     one, at_s = craft[turn], first_s + turn * step_s
     fast, latest = np.array([c.fast_s for c in craft]), np.array([c.latest_s(hold) for c in craft])
     earliest = earliest_first(fast, latest, step_s)
@@ -225,5 +226,5 @@ def _cannot_wait(one: Craft) -> str:
 
 
 def _up(seconds: float) -> str:
-    """Milliseconds, rounded up: what a user copies must work."""
+    """Milliseconds, rounded up, so that a value that a user copies works."""
     return f"{math.ceil(seconds * 1e3 - 1e-6) / 1e3:.3f}"

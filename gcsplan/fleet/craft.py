@@ -1,7 +1,7 @@
-"""What arrivals are within one vehicle's reach, and how it flies to be there at a given time.
+"""The arrivals that one vehicle can reach, and how it flies to arrive at a requested time.
 
-It flies slower; where that would be slower than its slowest speed it leaves later, holds at the gate, or is given a
-longer path.
+It flies slower. If that would be slower than its slowest speed, it leaves later, holds at the gate, or gets a longer
+path.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ Hold = Literal["ground", "gate", "none"]
 Longer = Callable[[str, float], Route | None]
 
 LONGEST_HOLD_S = 65535.0
-"""A hold is stored as whole seconds in 16 bits (ArduPilot); one of 70000 s came back as 4464."""
+"""Longest hold, s: ArduPilot stores whole seconds in 16 bits, and a hold of 70000 s came back as 4464."""
 
 LONGER_TRIES = 4
 
-# ArduCopter leans no further than ANGLE_MAX (hundredths of a degree): what was measured, whatever is commanded.
+# ArduCopter leans no further than ANGLE_MAX (hundredths of a degree), which limits the speed, m/s (as measured).
 COPTER_CAPS = ((10.0, 3000), (15.0, 4500))
 
 
@@ -47,9 +47,9 @@ class Crew:
 class Slot:
     """One vehicle's part of a schedule.
 
-    It leaves the ground at ``depart_s`` after the common start, holds ``hold_s`` (whole seconds) at the gate, flies
-    at ``speed_m_s`` (a float32, as DO_CHANGE_SPEED carries it) and is at the goal at ``arrive_s``. ``energy_j`` is that
-    of the whole flight. ``route`` is the one to fly: longer than the one handed in where that was needed.
+    It leaves the ground ``depart_s`` after the common start, holds ``hold_s`` (whole seconds) at the gate, flies at
+    ``speed_m_s`` (a float32, as DO_CHANGE_SPEED carries it) and is at the goal at ``arrive_s``. ``energy_j`` is for the
+    whole flight. ``route`` is the one to fly, which is longer than the original one if that was needed.
     """
 
     name: str
@@ -67,10 +67,10 @@ class Slot:
 
 
 class Craft:
-    """A crew laid out in time: what arrivals are within its reach.
+    """A crew with its timing: the arrivals within its reach.
 
-    From leaving the ground at the common start it is at the goal ``fast_s`` later at its fastest and ``slow_s`` later
-    at its slowest; both speeds are float32 within its range.
+    If it leaves the ground at the common start, it is at the goal ``fast_s`` later at its fastest and ``slow_s`` later
+    at its slowest. Both speeds are float32 numbers within its range.
     """
 
     def __init__(self, crew: Crew) -> None:
@@ -82,15 +82,15 @@ class Craft:
         self.slow_s = self.course.time_to_goal_s(self.slowest_m_s)
 
     def latest_s(self, hold: Hold) -> float:
-        """Its latest arrival, with the kind of waiting that is allowed."""
+        """Its latest arrival with the allowed kind of waiting, s."""
         if hold == "ground":
             return math.inf
         return self.slow_s + (LONGEST_HOLD_S if hold == "gate" and self.vehicle.can_hold else 0.0)
 
     def waiting_w(self, hold: Hold) -> float:
-        """What a second costs by which it must be later than its slowest speed takes it.
+        """Cost of each second by which it must be later than its slowest speed takes it, W.
 
-        Nothing on the ground, hovering at the gate; where it cannot wait, about the way of that second.
+        0 on the ground, hovering at the gate; if it cannot wait, about the energy of flying for that second.
         """
         energy = self.vehicle.energy
         if hold == "ground":
@@ -100,7 +100,7 @@ class Craft:
         return max(energy.horizontal_j_per_m, 1.0) * self.slowest_m_s
 
     def fly(self, speed_m_s: float, depart_s: float = 0.0, hold_s: float = 0.0, notes: Sequence[str] = ()) -> Slot:
-        """The slot of flying so."""
+        """The slot of a flight with this speed (put into range), departure and hold."""
         speed = min(max(float(np.float32(speed_m_s)), self.slowest_m_s), self.fastest_m_s)
         arrive_s = depart_s + self.course.time_to_goal_s(speed, hold_s)
         joules = self.crew.route.energy_j(self.vehicle, hold_s)
@@ -108,9 +108,9 @@ class Craft:
         return Slot(self.name, depart_s, hold_s, speed, arrive_s, joules, self.crew.route, said)
 
     def at(self, arrive_s: float, hold: Hold = "ground", longer: Longer | None = None) -> Slot | None:
-        """The slot that arrives then: at a lower speed if that does; else at its slowest, and later as allowed.
+        """The slot that arrives at ``arrive_s``: at a lower speed, else at its slowest, with waiting as allowed.
 
-        None where it can't: too early for its fastest, or too late for its slowest without waiting.
+        None if that is impossible: too early for its fastest, or too late for its slowest without waiting.
         """
         if arrive_s < self.fast_s - WITHIN_S:
             return None
@@ -127,7 +127,7 @@ class Craft:
         return speed_for(self.course.time_to_goal_s, time_s, self.slowest_m_s, self.fastest_m_s)
 
     def _held(self, arrive_s: float, spare_s: float) -> Slot:
-        """Whole seconds at the gate; the speed makes up for the fraction, or the departure where it cannot."""
+        """Hold whole seconds at the gate; the speed makes up for the fraction, or, if it cannot, the departure."""
         hold_s = math.ceil(spare_s - WITHIN_S)
         joules = self.vehicle.energy.hover_w * hold_s
         if arrive_s - hold_s >= self.fast_s:
@@ -139,7 +139,7 @@ class Craft:
         return self.fly(self.slowest_m_s, spare_s - hold_s, float(hold_s), [note])
 
     def _longer(self, arrive_s: float, longer: Longer) -> Slot | None:
-        """A longer path at the slowest speed, or a little faster: requested until it fits."""
+        """Fly a longer path at the slowest speed or a little faster; lengths are tried until one fits."""
         wanted_m = self.crew.route.length_m + (arrive_s - self.slow_s) * self.slowest_m_s
         for _ in range(LONGER_TRIES):
             route = longer(self.name, wanted_m)
@@ -158,7 +158,7 @@ class Craft:
 
 
 def _float32_range(low: float, high: float) -> tuple[float, float]:
-    """The range of float32 numbers within a range; where there is none, the nearest one twice."""
+    """The range of float32 numbers within a range; if it holds none, the nearest one twice."""
     inside_low, inside_high = np.float32(low), np.float32(high)
     if float(inside_low) < low:
         inside_low = np.nextafter(inside_low, np.float32(math.inf))

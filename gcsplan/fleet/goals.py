@@ -1,4 +1,4 @@
-"""What would work where goals are nearer to each other than the separation: the interval, or the goals' distance."""
+"""Cures for goals that are nearer to each other than the separation: the interval, or the goals' distance."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gcsplan.fleet.separation import Rules
 from gcsplan.fleet.timing import Route
 
 MANY = 12
-"""Vehicles up to which the smallest interval is looked for with the whole fleet."""
+"""Most vehicles for which the smallest interval is searched with the whole fleet."""
 
 INTERVAL_STEP_S = 0.1
 LONGER = 1.3
@@ -34,11 +34,11 @@ def least_interval_s(
     again: Again | None = None,
     between: tuple[str, str] | None = None,
 ) -> float | None:
-    """The smallest interval of a sequence, in tenths of a second above the plan's own, at which `resolve` succeeds
-    without other paths; a tenth less fails. None where none up to an hour does.
+    """The smallest interval of a sequence at which `resolve` succeeds without other paths; None if above an hour.
 
-    Looked for around a guess in steps that double, then by halves. Of more than `MANY` vehicles only the two named
-    ``between`` are looked at: their interval is then needed, and may not be enough for all.
+    It is a whole number of tenths of a second, not below the plan's own; a tenth less fails. It is searched around a
+    guess with doubling steps, then by halving. Of more than `MANY` vehicles only the two named ``between`` are
+    considered: the result is then necessary, and may not be enough for all.
     """
     rules = with_leaving(rules, plan)
     if len(plan.slots) > MANY and between is not None:
@@ -79,8 +79,7 @@ def least_interval_s(
 
 
 def _guess(plan: Schedule, crews: Sequence[Crew], rules: Rules, between: tuple[str, str] | None) -> int:
-    """By how many tenths of a second longer the interval may have to be: what one of two, flown as scheduled, would
-    have to be later."""
+    """By how many tenths of a second to lengthen the interval at first: the delay that one of two vehicles needs."""
     if between is None:
         return 1
     by_name = {c.name: c for c in crews}
@@ -101,10 +100,10 @@ def least_goals_m(
     hold: Hold = "ground",
     later_s: float = LATER_S,
 ) -> float | None:
-    """A distance of two goals with which the two keep apart at the plan's interval: the needed separation, or the least
-    beyond it that works, in steps of 30 %. None where none up to ten times as much does.
+    """A distance of two goals with which the two keep apart at the plan's interval, in metres; None if none was found.
 
-    Tried by moving the second's last point back along its own way (or, where that is too short, towards its start).
+    It is the needed separation, or the first beyond it that works, in steps of 30 %, up to ten times as much. Each is
+    tried with the second's last point moved back from the first's goal towards its own start.
     """
     rules = with_leaving(rules, plan)
     pair = _pair(plan, between)
@@ -130,7 +129,7 @@ def _pair(plan: Schedule, names: tuple[str, str]) -> Schedule:
 
 
 def _ended(route: Route, goal: Floats, distance_m: float) -> Route:
-    """A route that ends ``distance_m`` short of a goal, on the side that it comes from."""
+    """A route that ends ``distance_m`` short of a goal, on the side of its start."""
     points = route.points.copy()
     back = points[0, :2] - goal[:2]
     points[-1, :2] = goal[:2] + back * (distance_m / max(float(np.hypot(*back)), 1e-9))
@@ -138,5 +137,5 @@ def _ended(route: Route, goal: Floats, distance_m: float) -> Route:
 
 
 def rounded_up(metres: float) -> float:
-    """Tenths, rounded up: what a user copies must work."""
+    """Tenths, rounded up, so that a value that a user copies works."""
     return math.ceil(metres * 10.0 - 1e-6) / 10.0

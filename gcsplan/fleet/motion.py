@@ -1,4 +1,4 @@
-"""Where a vehicle is, and when: the one thing that schedule, separation and report hand to each other."""
+"""The position of a vehicle over time: the data that schedule, separation and report exchange."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from gcsplan.arrays import Floats
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TimedPath:
-    """Piecewise linear motion of one vehicle through the air, take-off to landing.
+    """Piecewise linear motion of one vehicle through the air, from take-off to landing.
 
-    ``times_s`` (N,) seconds since the fleet's common start, strictly rising; ``points`` (N, 3) east_m, north_m and
-    amsl_m at those times. Before the first time and after the last the vehicle stands where it is, on the ground
-    (or, with ``ends_in_air``, stays at its last point for good). ``arrive_s`` is reaching the goal at approach_agl_m.
-    ``pieces`` (N - 1,) is the caller's own number for each piece (its wire item), -1 where there is none.
+    ``times_s`` (N,) are seconds since the fleet's common start, strictly rising; ``points`` (N, 3) are east_m, north_m
+    and amsl_m at those times. Before the first and after the last time the vehicle stands on the ground at its first or
+    last point (with ``ends_in_air`` it stays at its last point for good). ``arrive_s`` is the time at which it reaches
+    the goal at approach_agl_m. ``pieces`` (N - 1,) is the caller's number of each piece (its wire item), -1 if there is
+    none.
     """
 
     name: str
@@ -35,16 +36,16 @@ class TimedPath:
 
     @property
     def begin_s(self) -> float:
-        """When it leaves the ground."""
+        """The time at which it leaves the ground, s."""
         return float(self.times_s[0])
 
     @property
     def end_s(self) -> float:
-        """When it is on the ground again, or at its last point."""
+        """The time at which it is on the ground again, or at its last point, s."""
         return float(self.times_s[-1])
 
     def at(self, times_s: ArrayLike) -> Floats:
-        """(M, 3) places at ``times_s`` (M,)."""
+        """(M, 3) positions at ``times_s`` (M,)."""
         t = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
         return np.column_stack([np.interp(t, self.times_s, self.points[:, k]) for k in range(3)])
 

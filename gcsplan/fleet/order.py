@@ -1,7 +1,7 @@
-"""In which order a fleet may arrive: windows of time for each vehicle, turns at equal intervals.
+"""The orders in which a fleet may arrive: a time window for each vehicle, turns at equal intervals.
 
-A vehicle can be at the goal from ``fast_s`` (its fastest) to ``latest_s`` (its slowest, or inf where it may wait); the
-turn ``p`` of a sequence that begins at ``first_s`` is at ``first_s + p·interval_s``.
+A vehicle can be at the goal from ``fast_s`` (its fastest) to ``latest_s`` (its slowest, or inf if it may wait). Turn
+``p`` of a sequence that begins at ``first_s`` is at ``first_s + p·interval_s``.
 """
 
 from __future__ import annotations
@@ -20,23 +20,22 @@ Clock = Literal["first", "fleet"]
 Cost = Callable[[Floats], Floats]
 
 WITHIN_S = 1e-6
-"""Times nearer than this are the same."""
+"""Times that differ by less than this, s, count as equal."""
 
 MOST_CLOCKS = 400
-"""Beginnings of a sequence that are tried at most where vehicles can neither be early nor wait."""
+"""Most begin times of a sequence that are tried if vehicles can neither be early nor wait."""
 
 
 def interval_range(fast_s: Floats, latest_s: Floats, clock: Clock, first_s: float | None) -> tuple[float, float]:
-    """Smallest and largest interval with which vehicles in this order can arrive; the smallest is above the largest
-    where none works.
+    """Smallest and largest interval with which vehicles in this order can arrive.
 
-    ``first_s``: when the first is to be there; None: at its fastest (``first``), or as early as the whole fleet
-    can do it (``fleet``).
+    The smallest is above the largest if no interval works. ``first_s`` is the arrival of the first, s; None: at its
+    fastest (``first``), or as early as the whole fleet can follow (``fleet``).
     """
     n = len(fast_s)
     turn = np.arange(n, dtype=np.float64)
     if first_s is None and clock == "fleet":
-        # Some beginning lies after every fast_j - j·d and before every latest_i - i·d.
+        # A begin time must be after every fast_j - j·d and before every latest_i - i·d.
         gap, apart = latest_s[:, None] - fast_s[None, :], turn[:, None] - turn[None, :]
         later, sooner = apart > 0.0, apart < 0.0
         low = float((gap[sooner] / apart[sooner]).max(initial=0.0))
@@ -50,7 +49,7 @@ def interval_range(fast_s: Floats, latest_s: Floats, clock: Clock, first_s: floa
 
 
 def earliest_first(fast_s: Floats, latest_s: Floats, interval_s: float) -> float | None:
-    """The earliest beginning of a sequence in this order; None where no beginning suits all."""
+    """The earliest begin of a sequence in this order, s; None if no begin suits all vehicles."""
     turns = np.arange(len(fast_s)) * interval_s
     low, high = float((fast_s - turns).max()), float((latest_s - turns).min())
     return low if low <= high + WITHIN_S else None
@@ -59,13 +58,13 @@ def earliest_first(fast_s: Floats, latest_s: Floats, interval_s: float) -> float
 def best_order(
     fast_s: Floats, latest_s: Floats, interval_s: float, clock: Clock, first_s: float | None, cost: Cost | None = None
 ) -> Ints | None:
-    """The order that finishes earliest, and among those of one beginning the cheapest; None where no order works.
+    """The order that finishes earliest, and among the orders with the same begin the cheapest; None if none works.
 
-    ``cost`` gives joules (n, n) of each vehicle (row) arriving at the times (n,) handed in. Exact for any number of
-    vehicles: for a given beginning, turns are assigned as a linear assignment problem (where waiting is free, sorting
-    by ``fast_s`` solves it: swapping two neighbours that are out of order never helps the later one); beginnings
-    are tried from the earliest. Of a ``fleet`` clock whose vehicles cannot wait, `MOST_CLOCKS` beginnings are tried:
-    exact up to 20 vehicles.
+    ``cost`` returns joules (n, n) of each vehicle (row) for arriving at the times (n,) that are passed to it. Exact for
+    any number of vehicles: for a given begin, turns are assigned as a linear assignment problem (if waiting costs
+    nothing, sorting by ``fast_s`` solves it: swapping two neighbours that are out of order never helps the later one),
+    and begins are tried from the earliest. For a ``fleet`` clock whose vehicles cannot wait, `MOST_CLOCKS` begins are
+    tried: exact up to 20 vehicles.
     """
     n = len(fast_s)
     by_speed = np.argsort(fast_s, kind="stable").astype(np.intp)
@@ -97,18 +96,18 @@ def _rows(cost: Cost, rows: Ints) -> Cost:
 
 
 def _assigned(fast_s: Floats, latest_s: Floats, times: Floats, cost: Cost | None, by_speed: Ints) -> Ints | None:
-    """Which vehicle takes each of the ``times``, at least cost; None where they cannot all be served."""
+    """The vehicle for each of the ``times``, at the least cost; None if the times cannot all be kept."""
     n = len(times)
     if n == 0:
         return np.empty(0, dtype=np.intp)
     if (fast_s[by_speed] > times + WITHIN_S).any():
-        return None  # in rising order of fast_s somebody is late: in any other order somebody is too
+        return None  # sorted by fast_s a vehicle is late, so one is late in any other order too
     joules = np.zeros((n, n)) if cost is None else cost(times)
     able = (fast_s[:, None] <= times[None, :] + WITHIN_S) & (latest_s[:, None] >= times[None, :] - WITHIN_S)
     turn = np.arange(n)
     if able[by_speed, turn].all() and joules[by_speed, turn].sum() <= 0.0:
         return by_speed
-    from scipy.optimize import linear_sum_assignment  # heavy: only where sorting does not do
+    from scipy.optimize import linear_sum_assignment  # slow to import, so only if sorting does not solve it
 
     worst = 2.0 * (float(joules.max()) + 1.0) * n
     row, column = linear_sum_assignment(np.where(able, joules, worst))

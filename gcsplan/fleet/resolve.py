@@ -1,9 +1,9 @@
-"""Conflicts resolved in order of priority: departure, speed, a hold, another path; least cost first; or a refusal.
+"""Resolve conflicts by priority, at the least cost: by departure, speed, a hold or another path; or refuse.
 
-Vehicles are fixed one after the other. Who meets one of those before it is given the cheapest change that keeps clear
-of all of them (`_changes`): in a fleet that arrives on time a departure changes together with the speed, so that the
-arrival stays. What nothing helps is refused with the two vehicles, the place and the time, and, where goals are the
-reason, with the smallest interval or distance of goals that works. The last word is `separation` of the whole fleet.
+Vehicles are fixed one after the other. A vehicle that meets one of those before it gets the cheapest change that keeps
+clear of all of them (`_changes`). In a fleet with fixed arrivals, a departure changes together with the speed, so that
+the arrival stays. If nothing helps, the refusal names the two vehicles, the place and the time, and, if the goals are
+the reason, the smallest interval or distance of goals that works. At the end `separation` judges the whole fleet.
 """
 
 from __future__ import annotations
@@ -41,8 +41,11 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Resolved:
-    """A fleet that keeps its separation: the schedule with every slot as it is flown, the motions in its order, what
-    was changed, the exact judgement, and by how much all arrive later."""
+    """A fleet that keeps its separation.
+
+    ``schedule`` has every slot as it is flown, ``paths`` the motions in its order, ``changes`` what was changed,
+    ``separation`` the exact judgement. ``later_s`` is the delay of all arrivals.
+    """
 
     schedule: Schedule
     paths: tuple[TimedPath, ...]
@@ -51,7 +54,7 @@ class Resolved:
     later_s: float = 0.0
 
     def notes(self, where: Where = in_metres) -> tuple[str, ...]:
-        """What was changed, for people, a line each."""
+        """The changes in words for the user, one line each."""
         lines = [change.describe(where) for change in self.changes]
         if self.later_s > 0.0:
             lines.insert(
@@ -61,10 +64,11 @@ class Resolved:
 
 
 class NotSeparated(NoMission):
-    """No way was found to keep two vehicles apart.
+    """No possibility was found to keep two vehicles apart.
 
-    ``conflict`` has the two, the places, the time; ``interval_s`` the smallest interval that works, and ``goals_m`` the
-    distance of goals that works, where goals nearer than needed are the reason (else, or where none does, None).
+    ``conflict`` has the two vehicles, the places and the time. If goals nearer than the needed distance are the reason,
+    ``interval_s`` is the smallest interval that works, and ``goals_m`` the distance of goals that works; both are None
+    otherwise, or if none works.
     """
 
     def __init__(
@@ -77,17 +81,17 @@ class NotSeparated(NoMission):
 
     @property
     def vehicles(self) -> tuple[str, str]:
-        """The two that meet."""
+        """The two vehicles that meet."""
         return self.conflict.worst.vehicles
 
     @property
     def place(self) -> Place:
-        """Half-way between the two: east_m, north_m, amsl_m."""
+        """The middle between the two: east_m, north_m, amsl_m."""
         return self.conflict.worst.middle
 
     @property
     def time_s(self) -> float:
-        """When they are nearest."""
+        """The time at which they are nearest, s."""
         return self.conflict.worst.time_s
 
 
@@ -110,14 +114,15 @@ def resolve(
     again: Again | None = None,
     where: Where = in_metres,
 ) -> Resolved:
-    """Change ``plan`` until every two vehicles keep ``rules``, whatever the vehicles before them in priority do.
+    """Change ``plan`` until every two vehicles keep ``rules``.
 
-    ``priority`` names all, first come first served (None: the schedule's order; then a vehicle that nothing helps may
-    be put before the one in its way). With mode sequence or together all arrivals stay as scheduled, or, where that is
-    too tight, all move by the same time of at most ``later_s`` (0: the clock stands); with none they are free.
-    ``hold`` as in `arrival.schedule`: ``ground`` departures may change, and where that does not help a multicopter
-    holds at the gate; ``gate`` all leave as scheduled; ``none`` nobody waits. Routes that end with ``none`` are gone on
-    arrival. ``replan`` is called last. ``again(interval_s)`` makes a schedule anew (None: from ``crews``).
+    ``priority`` names all vehicles; the first has the right of way (None: the schedule's order; a vehicle that nothing
+    helps may then be put before the one in its way). With mode sequence or together, all arrivals stay as scheduled,
+    or, if that is too tight, all move by the same time of at most ``later_s`` (0: arrivals are fixed); with none they
+    are free. ``hold`` is as in `arrival.schedule`: with ``ground`` departures may change, and if that does not help a
+    multicopter holds at the gate; with ``gate`` all leave as scheduled; with ``none`` nobody waits. Vehicles whose
+    route ends with ``none`` are gone on arrival. ``replan`` is called last. ``again(interval_s)`` makes a new schedule
+    (None: from ``crews``).
 
     Raises NotSeparated (NoMission, ``separation``).
     """
@@ -136,7 +141,7 @@ def resolve(
     paths = tuple(done[s.name].option.path for s in slots)
     changes = tuple(choice.change for choice in done.values() if choice.change is not None)
     judged = separation(paths, rules)
-    if not judged.safe:  # the shifts and the judgement are two ways to one answer
+    if not judged.safe:  # a cross-check: shifts and judgement are computed independently
         worst = judged.conflicts[0]
         raise NotSeparated(f"{worst.describe(where)}: resolving it failed", conflict=worst)
     return Resolved(replace(plan, order=tuple(s.name for s in slots), slots=slots), paths, changes, judged, moved_s)
@@ -146,7 +151,7 @@ def resolve(
 
 
 def _refuse_goals(plan: Schedule, crews: Sequence[Crew], rules: Rules, hold: Hold, where: Where) -> None:
-    """Refuse at once what no departure, speed or path can help: where two of the fleet end up too near each other."""
+    """Refuse at once if two goals are so near that no departure, speed or path can help."""
     vehicles = {c.name: c.vehicle for c in crews}
     slots, needed = plan.slots, rules.needed_m - TOLERANCE_M
     goals = np.array([s.route.points[-1] for s in slots])

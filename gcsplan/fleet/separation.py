@@ -1,7 +1,8 @@
-"""How near the vehicles of a fleet come to each other, exactly, in space and time, from take-off to landing.
+"""The exact least distances between the vehicles of a fleet, in space and time, from take-off to landing.
 
 Motions are piecewise linear, so the distance of two vehicles is the root of a quadratic on every pair of overlapping
-pieces; the fleet's time is cut into slices whose bounds say which pieces need no look (`_sweep`). Nothing is sampled.
+pieces. Time is cut into slices, and a bound for each slice shows which pieces need no exact look (`_sweep`). Nothing is
+sampled.
 """
 
 from __future__ import annotations
@@ -22,26 +23,26 @@ from gcsplan.fleet.motion import TimedPath
 
 Place = tuple[float, float, float]
 Where = Callable[[Place], str]
-"""Turns east_m, north_m, amsl_m into words for people; whoever knows degrees hands one in."""
+"""Turns east_m, north_m, amsl_m into words for the user. Callers that know degrees pass their own function."""
 
 Kind = Literal["air", "take-off", "landing"]
 
 TOLERANCE_M = 1e-6
-"""Touching the separation is legal; this is what rounding may take."""
+"""Allowance for rounding, m: a distance equal to the separation is legal."""
 
 
 def in_metres(place: Place) -> str:
-    """A place in words, where nobody handed in better ones."""
+    """A place in words, the default if the caller has no better words."""
     return f"east {place[0]:.0f} m, north {place[1]:.0f} m, {place[2]:.0f} m above sea level"
 
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """The requested ``separation_m`` between any two, of which each may be ``error_m`` away from its place in the
-    model, and up to ± ``window_s`` early or late, independently of the others.
+    """The requested separation and the errors of the motions.
 
-    A landed vehicle stands where it landed for ``pad_clear_s`` (inf: for good). ``leaving`` names those that fly on and
-    away where their motion ends, so that they stand nowhere.
+    ``separation_m`` holds between any two vehicles. Each of them may be ``error_m`` away from its modelled position,
+    and up to ``window_s`` early or late, independently of the others. A landed vehicle stays where it landed for
+    ``pad_clear_s`` (inf: for good). Those in ``leaving`` fly away where their motion ends, so they stand nowhere.
     """
 
     separation_m: float
@@ -58,14 +59,17 @@ class Rules:
 
     @property
     def needed_m(self) -> float:
-        """Distance in the model that keeps the separation in the air."""
+        """Distance in the model that ensures the separation in the air, m."""
         return self.separation_m + 2.0 * self.error_m
 
 
 @dataclass(frozen=True, slots=True)
 class Encounter:
-    """Two vehicles where they are nearest: names, metres, the moment (with a window: the middle of the two in
-    ``times_s``, when each is there by its own plan), both places, and the number of each one's piece (-1: none)."""
+    """The nearest approach of two vehicles: names, distance, time, places and piece numbers.
+
+    ``times_s`` is when each is there by its own plan, ``time_s`` the middle of the two (they differ only with a
+    window). ``pieces`` is the number of each one's piece (-1: none).
+    """
 
     vehicles: tuple[str, str]
     distance_m: float
@@ -76,17 +80,17 @@ class Encounter:
 
     @property
     def middle(self) -> Place:
-        """Half-way between the two."""
+        """The middle between the two."""
         a, b = self.places
         return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
 
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """Two vehicles nearer than ``needed_m`` from ``from_s`` until ``until_s`` (inf: for good); the worst of that time.
+    """Two vehicles nearer than ``needed_m`` from ``from_s`` until ``until_s`` (inf: for good), and the worst moment.
 
-    ``kind``: both in the ``air``; or the *first* of the two takes off from, or lands, beside the second, which stands
-    on the ground. With a window the span is that of the pieces that may meet, rounded outward.
+    ``kind``: both are in the ``air``; or the *first* takes off or lands beside the second, which stands on the ground.
+    With a window the time span is that of the pieces that may meet, rounded outward.
     """
 
     kind: Kind
@@ -96,7 +100,7 @@ class Conflict:
     until_s: float
 
     def describe(self, where: Where = in_metres) -> str:
-        """One sentence: who, how near, when, and where."""
+        """One sentence: which vehicles, how near, when, and where."""
         a, b = self.worst.vehicles
         near = f"{self.worst.distance_m:.1f} m, needed {self.needed_m:g} m"
         at = f"at {self.worst.time_s:.1f} s ({where(self.worst.middle)})"
@@ -108,8 +112,11 @@ class Conflict:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Separation:
-    """What was found: ``distance_m`` (V, V) the exact least distance of every pair while both are in the air (inf:
-    never both), ``least`` of all, ``conflicts`` by time, and ``notes`` for people."""
+    """The result: ``distance_m`` (V, V) is the exact least distance of every pair while both are in the air.
+
+    It is inf for a pair that never is. ``least`` is the nearest approach of all, ``conflicts`` are sorted by time,
+    ``notes`` are for the user.
+    """
 
     rules: Rules
     names: tuple[str, ...]
@@ -121,11 +128,11 @@ class Separation:
 
     @property
     def safe(self) -> bool:
-        """Whether every pair keeps its distance."""
+        """Whether every pair keeps the separation."""
         return not self.conflicts
 
     def between(self, a: str, b: str) -> Encounter | None:
-        """Where two vehicles are nearest; None if they are never both in the air."""
+        """The nearest approach of two vehicles; None if they are never both in the air."""
         return self._pairs.encounter(self.names.index(a), self.names.index(b))
 
 
@@ -139,7 +146,7 @@ class Pairs:
     least: Least
 
     def encounter(self, a: int, b: int) -> Encounter | None:
-        """Of two vehicles by number, in this order."""
+        """The nearest approach of two vehicles by number, in this order; None if they are never both in the air."""
         rows = np.flatnonzero(((self.i == a) & (self.j == b)) | ((self.i == b) & (self.j == a)))
         if not len(rows) or not math.isfinite(self.least.distance_m[rows[0]]):
             return None
@@ -155,11 +162,11 @@ class Pairs:
 def separation(paths: Sequence[TimedPath], rules: Rules) -> Separation:
     """Judge a fleet: every pair's exact least distance (within 1e-6 m, never optimistic beyond it), every conflict.
 
-    Pairs are judged while both are in the air (a vehicle that ends in the air stays there for good); then the pads: a
-    vehicle that takes off from, or lands, nearer than ``rules.needed_m`` (horizontally) to where another has landed
-    and stands, or lands so near to one that still waits. Those that wait are not judged against each other, nor against
-    one that takes off beside them; a note tells. Who flies over one that stands on the ground is not judged against it:
-    that is min AGL's part. Raises InputError for two vehicles of one name.
+    Pairs are judged while both are in the air (a vehicle that ends in the air stays there for good). Then the pads are
+    judged: a vehicle conflicts if it takes off or lands nearer than ``rules.needed_m`` (horizontally) to a landed
+    vehicle, or lands that near to a waiting one. Waiting vehicles are not judged against each other, nor against one
+    that takes off beside them; a note says so. A vehicle that flies over one on the ground is not judged against it,
+    because min AGL covers that. Raises InputError for two vehicles of one name.
     """
     names = tuple(p.name for p in paths)
     if len(set(names)) != len(names):
@@ -185,7 +192,7 @@ def separation(paths: Sequence[TimedPath], rules: Rules) -> Separation:
 
 
 def in_the_air(pairs: Pairs, rules: Rules) -> list[Conflict]:
-    """Every span of time in which a pair is nearer than needed, with its worst moment."""
+    """Every time span in which a pair is nearer than needed, with its worst moment."""
     needed = rules.needed_m - TOLERANCE_M
     bad = np.flatnonzero(pairs.least.distance_m < needed)
     found: list[Conflict] = []
@@ -221,7 +228,7 @@ Span = tuple[float, float, float, float, float, int, int]
 
 
 def _merged(spans: list[Span]) -> list[list[Span]]:
-    """Spans that touch, together."""
+    """Group the spans that touch."""
     groups: list[list[Span]] = []
     end = -math.inf
     for span in spans:
@@ -234,7 +241,7 @@ def _merged(spans: list[Span]) -> list[list[Span]]:
 
 
 def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
-    """Vehicles that take off or land beside one that stands on the ground."""
+    """Conflicts of vehicles that take off or land beside one that stands on the ground."""
     begins, ends = np.array([p.begin_s for p in paths]), np.array([p.end_s for p in paths])
     starts, goals = np.array([p.points[0] for p in paths]), np.array([p.points[-1] for p in paths])
     landing = np.array([not p.ends_in_air and p.name not in rules.leaving for p in paths])
@@ -247,7 +254,7 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
         return out
 
     cleared = ends + rules.pad_clear_s
-    # [y, x]: y moves, x stands.
+    # [y, x]: vehicle y moves, vehicle x stands.
     stands = landing[None, :] & (begins[:, None] >= ends[None, :] - apart) & (begins[:, None] < cleared[None] + apart)
     leaves_beside = near(starts, goals) & stands
     later = ends[:, None] - ends[None, :]
@@ -279,7 +286,7 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
 
 
 def waiting_note(paths: Sequence[TimedPath], rules: Rules) -> tuple[str, ...]:
-    """A note on start pads nearer to each other than needed."""
+    """A note on start places that are nearer to each other than needed."""
     starts = np.array([p.points[0, :2] for p in paths])
     i, j = np.triu_indices(len(paths), 1)
     apart = np.hypot(*(starts[i] - starts[j]).T)
@@ -296,7 +303,7 @@ def waiting_note(paths: Sequence[TimedPath], rules: Rules) -> tuple[str, ...]:
 def encounter(
     fleet: Fleet, pair: tuple[int, int], distance_m: float, times_s: tuple[float, float], pieces: tuple[int, int]
 ) -> Encounter:
-    """Two vehicles at two moments on two pieces, counted over all vehicles."""
+    """The Encounter of two vehicles at two times, on two pieces numbered over all vehicles."""
     a, b = pair
     places = [np.asarray(fleet.paths[v].at(t)[0]).tolist() for v, t in zip(pair, times_s, strict=True)]
     numbers = [_number(fleet.paths[v], piece - int(fleet.offset[v])) for v, piece in zip(pair, pieces, strict=True)]
@@ -307,14 +314,14 @@ def encounter(
 
 
 def swapped(met: Encounter) -> Encounter:
-    """The same with the two vehicles in the other order."""
+    """The same encounter with the two vehicles in the other order."""
     return Encounter(
         met.vehicles[::-1], met.distance_m, met.time_s, met.times_s[::-1], met.places[::-1], met.pieces[::-1]
     )
 
 
 def _number(path: TimedPath, piece: int) -> int:
-    """The caller's number of a piece; of the last one where it is that of standing in the air."""
+    """The caller's number of a piece; the piece that stays in the air has the number of the last one."""
     if path.pieces is None:
         return -1
     return int(path.pieces[min(piece, len(path.pieces) - 1)])

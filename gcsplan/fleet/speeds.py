@@ -1,11 +1,11 @@
-"""How fast a vehicle is at each point of one stretch of its way, from a standstill to the next.
+"""The speed of a vehicle at each point of one stretch of its path, from a standstill to the next.
 
-The speed along the path is the largest that keeps the horizontal part within the cruise speed, the rise and the sink
-within the climb and descent rates, and the turn within the corner's acceleration, that a leg's own S-curve comes to
-(ArduPilot flies short legs slowly), and that can be reached and braked from with one acceleration: with ``u = v²`` and
-``s`` metres along the path, ``|du/ds| <= 2a``. The largest such profile at the nodes is
-``u_i = min_j(cap_j² + 2a·|s_i - s_j|)``: two running minima, no loop (for the two passes over the speed limits see
-Bobrow, Dubowsky and Gibson 1985, "Time-optimal control of robotic manipulators along specified paths").
+The speed along the path is the largest that keeps five limits: the cruise speed horizontally, the climb and descent
+rates, the corner's acceleration in turns, the peak of a leg's own S-curve (ArduPilot flies short legs slowly), and one
+acceleration to reach it and to brake from it: with ``u = v²`` and ``s`` metres along the path, ``|du/ds| <= 2a``. The
+largest such profile at the nodes is ``u_i = min_j(cap_j² + 2a·|s_i - s_j|)``: two running minima, no loop (for the two
+passes over the speed limits see Bobrow, Dubowsky and Gibson 1985, "Time-optimal control of robotic manipulators along
+specified paths").
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from gcsplan.vehicle import Vehicle
 Ints = NDArray[np.intp]
 
 CUT_M = 2.0
-"""How far inside the way point a rounded corner passes: 1 to 2 m were measured on a real ArduCopter at 10 m/s."""
+"""Distance between a way point and its rounded corner, m: 1 to 2 m were measured on a real ArduCopter at 10 m/s."""
 
 POSITION_ERROR_M = 0.25
-"""Straight pieces at constant speed stray this far at most from the curved, accelerated motion that they stand for."""
+"""Largest distance, m, of the straight pieces at constant speed from the curved, accelerated motion they replace."""
 
 LEG_ACCEL_M_S2 = 2.5
-"""ArduCopter's WPNAV_ACCEL, default."""
+"""ArduCopter's default of WPNAV_ACCEL."""
 
 LEG_SHARE = 0.96
-"""Of the peak of a short leg's S-curve, what a real ArduCopter flew."""
+"""Part of the peak speed of a short leg's S-curve that a real ArduCopter flew."""
 
 _LEAST_RADIUS_M = 1e-9
 _LEAST_LENGTH_M = 1e-9
@@ -42,10 +42,10 @@ _LEAST_TURN = 1e-7  # radians
 class Stretch:
     """Segments between two standstills: straight ones and the arcs of rounded corners.
 
-    ``start``, ``end`` (S, 3) metres; ``length_m`` (S,) along the path; the speed along a segment is at most
+    ``start``, ``end`` are (S, 3) metres; ``length_m`` (S,) is along the path. The speed along a segment is at most
     ``most_m_s`` (S,) and at most the cruise speed times ``per_cruise`` (S,). Arcs have ``radius_m`` > 0 (S,) and turn
-    by ``turn`` (S,) radians, left positive, from ``heading`` (S,), anticlockwise from the east. ``owner`` (S,) is the
-    caller's number of the leg. ``accel_m_s2`` may be inf. ``stops`` False: it ends at speed (a touch-down).
+    by ``turn`` (S,) radians, left positive, from ``heading`` (S,), anticlockwise from east. ``owner`` (S,) is the
+    caller's number of the leg. ``accel_m_s2`` may be inf. With ``stops`` False it ends at speed (a touch-down).
     """
 
     start: Floats
@@ -61,7 +61,7 @@ class Stretch:
     stops: bool = True
 
     def _profile(self, cruise_m_s: float) -> tuple[Floats, Floats]:
-        """Caps (S,) of the segments, squared speeds (S + 1,) at the nodes (meaningless with an accel of inf)."""
+        """Speed caps (S,) of the segments, and squared speeds (S + 1,) at the nodes (meaningless if accel is inf)."""
         cap = np.minimum(self.most_m_s, cruise_m_s * self.per_cruise)
         node = np.empty(len(cap) + 1)
         node[0] = 0.0
@@ -79,7 +79,7 @@ class Stretch:
         return cap, np.maximum(node, 0.0)
 
     def _phases(self, cruise_m_s: float) -> tuple[Floats, Floats, Floats, Floats]:
-        """Speeds at entry, peak and exit of each segment (S,); seconds (3, S) of speeding up, cruise and braking."""
+        """Speeds at entry, peak and exit of each segment (S,); seconds (3, S) of acceleration, cruise and braking."""
         cap, u = self._profile(cruise_m_s)
         if math.isinf(self.accel_m_s2):
             nothing = np.zeros_like(cap)
@@ -98,8 +98,8 @@ class Stretch:
     def motion(self, cruise_m_s: float, error_m: float = POSITION_ERROR_M) -> tuple[Floats, Floats, Ints]:
         """Times (M,) since the stretch began, places (M, 3) and legs (M,) at the end of each of M straight pieces.
 
-        Between them constant speed on a straight line strays ``error_m`` at most from the true motion: with
-        accelerations up to A a piece of t seconds strays by A·t²/8.
+        Straight motion at constant speed between them is at most ``error_m`` away from the true motion: with
+        accelerations up to A, a piece of t seconds differs by A·t²/8.
         """
         entry, peak, leave, seconds = self._phases(cruise_m_s)
         slope = np.hypot(1.0, (self.end[:, 2] - self.start[:, 2]) / np.maximum(self._run_m(), 1e-300))
@@ -135,12 +135,13 @@ class Stretch:
         return np.where(self.radius_m > 0.0, self.radius_m * np.abs(self.turn), straight)
 
     def _places(self, segment: Ints, share: Floats) -> Floats:
-        """(M, 3) points at ``share`` of ``segment``."""
+        """(M, 3) points at the part ``share`` of ``segment``."""
         start, end = self.start[segment], self.end[segment]
         places = start + (end - start) * share[:, None]
         arc = np.flatnonzero((self.radius_m[segment] > 0.0) & (share < 1.0))
         s = segment[arc]
-        # The chord of a part of the arc: its length, and its direction half the turned angle from the heading.
+        # The chord of a part of the arc: its length, and its direction, which is half the turned angle from the
+        # heading.
         part = self.turn[s] * share[arc]
         chord = 2.0 * self.radius_m[s] * np.sin(0.5 * np.abs(part))
         course = self.heading[s] + 0.5 * part
@@ -152,12 +153,12 @@ class Stretch:
 def legs(
     points: Floats, vehicle: Vehicle, owner: Ints, leg_m: Floats | None = None, pace: Floats | None = None
 ) -> Stretch | None:
-    """The stretch through ``points`` (N, 3) without a stop on the way, its corners rounded; None where nothing moves.
+    """The stretch through ``points`` (N, 3) without a stop, its corners rounded; None if nothing moves.
 
-    ``owner`` (N - 1,) numbers the legs. With a corner acceleration of inf the corners are sharp. In the middle of a
-    corner the vehicle is as high as the way point: tangents of nearly straight tracks are half a leg long.
-    ``leg_m`` (N - 1,): lengths from way point to way point, where these legs are parts of longer ones. ``pace``
-    (N - 1,): the speed that comes of a cruise speed of 1, where that is not 1.
+    ``owner`` (N - 1,) numbers the legs. With a corner acceleration of inf, corners are sharp. In the middle of a corner
+    the vehicle has the way point's altitude, because the tangents of nearly straight tracks are half a leg long.
+    ``leg_m`` (N - 1,) are lengths from way point to way point, for legs that are parts of longer ones. ``pace`` (N -
+    1,) is the speed that results from a cruise speed of 1, if that is not 1.
     """
     whole = np.linalg.norm(np.diff(points, axis=0), axis=1)
     keep = np.append(True, whole > _LEAST_LENGTH_M)
@@ -172,7 +173,7 @@ def legs(
     share = np.where(run > _LEAST_LENGTH_M, 1.0 / np.maximum(run, _LEAST_LENGTH_M), 0.0)
     leave = p[:-1] + d * (back[:-1] * share)[:, None]
     reach = p[1:] - d * (back[1:] * share)[:, None]
-    # Leg, corner, corner, leg, …, leg: a corner's halves belong each to its own leg, in slope and in speed.
+    # Leg, corner, corner, leg, …, leg: each half of a corner belongs to its own leg, in slope and in speed.
     size = 3 * n - 2
     bend, round_m = turn[1:-1], radius[1:-1]
     middle = reach[:-1].copy()
@@ -210,9 +211,9 @@ def legs(
 
 
 def _corners(heading: Floats, run: Floats, corner_accel_m_s2: float) -> tuple[Floats, Floats, Floats]:
-    """Tangent length, turn and radius (N,) of the corner at each point, between legs of ``heading``, ``run`` (N - 1,).
+    """Tangent length, turn and radius (N,) of the corner at each point, for legs of ``heading`` and ``run`` (N - 1,).
 
-    All 0 at the ends and where the path goes straight on, or up or down.
+    All are 0 at the ends, and where the path goes straight on, up or down.
     """
     n = len(run)
     back, turn, radius = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
@@ -222,7 +223,7 @@ def _corners(heading: Floats, run: Floats, corner_accel_m_s2: float) -> tuple[Fl
     shorter = np.minimum(run[:-1], run[1:])
     turns = (shorter > _LEAST_LENGTH_M) & (np.abs(bend) >= _LEAST_TURN)
     half = 0.5 * np.abs(bend[turns])
-    # R = cut/(1/cos - 1) and R·tan(half), written so that a turn back (half = 90 degrees) has a value too.
+    # R = cut/(1/cos - 1) and R·tan(half), in a form that also has a value for a turn back (half = 90 degrees).
     tangent = np.minimum(CUT_M / np.tan(0.5 * half), 0.5 * shorter[turns])
     at = np.flatnonzero(turns) + 1
     back[at], turn[at], radius[at] = tangent, bend[turns], np.maximum(tangent / np.tan(half), _LEAST_RADIUS_M)
@@ -230,10 +231,10 @@ def _corners(heading: Floats, run: Floats, corner_accel_m_s2: float) -> tuple[Fl
 
 
 def _most_of_legs(length: Floats, vehicle: Vehicle) -> Floats:
-    """(N,) the fastest that each leg can be flown for its length (m) between two way points, however they are passed.
+    """(N,) the highest speed that the length of each leg (m, between two way points) allows, stopped at or not.
 
-    ArduPilot lays a leg out as an S-curve that stops at its end, and lets the next begin while this one brakes: what
-    counts is the peak of the leg's own curve. Measured on ArduCopter: 12 m at 3.1 m/s, 23 at 4.8, 50 at 8.1, 70 at 10.
+    ArduPilot plans a leg as an S-curve that stops at its end, and begins the next one while this one brakes, so the
+    peak of the leg's own curve counts. Measured on ArduCopter: 12 m at 3.1 m/s, 23 at 4.8, 50 at 8.1, 70 at 10.
     """
     jerk = vehicle.leg_jerk_m_s3
     if not vehicle.lays_curves:
@@ -250,7 +251,7 @@ def _most_of_legs(length: Floats, vehicle: Vehicle) -> Floats:
 def column(heights_m: Floats, most_m_s: Floats, place: Floats, vehicle: Vehicle, owner: int, *, stops: bool) -> Stretch:
     """A vertical stretch over ``place`` (2,) through ``heights_m`` (S + 1,) amsl, at most ``most_m_s`` (S,).
 
-    A speed of inf is the cruise speed.
+    A speed of inf means the cruise speed.
     """
     n = len(most_m_s)
     start, end = np.empty((n, 3)), np.empty((n, 3))
@@ -265,7 +266,7 @@ def column(heights_m: Floats, most_m_s: Floats, place: Floats, vehicle: Vehicle,
 
 
 def _bounds(length: Floats, run: Floats, rise: Floats, vehicle: Vehicle) -> tuple[Floats, Floats]:
-    """Largest speed along each segment from climb and descent rates, and its ratio to the cruise speed."""
+    """Largest speed along each segment by climb and descent rates, and its ratio to the cruise speed."""
     rate = np.where(rise >= 0.0, vehicle.climb_m_s, vehicle.descent_m_s)
     in_space = np.isinf(rate)
     with np.errstate(divide="ignore", invalid="ignore"):

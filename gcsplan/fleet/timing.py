@@ -1,9 +1,9 @@
 """From a path to a motion in time: take-off, gate, way-point legs with acceleration and corners, landing.
 
-A multicopter that follows way points: vertical take-off from rest to rest; an optional hold at the top (the gate), then
-the speed is set from a standstill; legs at the largest speed that cruise, climb and descent rates, their own length,
-corners and the acceleration allow, looking ahead (`speeds`); way points without a hold are passed in a rounded corner,
-the goal is reached with a stop: that moment is the arrival. Wind and noise are not in here.
+The model is a multicopter that follows way points. It takes off vertically from rest to rest, may hold at the top (the
+gate), and then sets its speed from a standstill. It flies legs at the largest speed that cruise, climb and descent
+rates, leg lengths, corners and the acceleration allow, looking ahead (`speeds`). It passes way points without a hold in
+a rounded corner, and stops at the goal: that time is the arrival. Wind and noise are not modelled.
 """
 
 from __future__ import annotations
@@ -28,25 +28,26 @@ Ints = NDArray[np.intp]
 End = Literal["land", "loiter", "rtl", "none"]
 
 LAND_SLOWLY_M = 10.0
-"""Height above ground below which a landing is slow (ArduCopter's LAND_ALT_LOW)."""
+"""Height above ground, m, below which a landing is slow (ArduCopter's LAND_ALT_LOW)."""
 
 _LEAST_S = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Route:
-    """Where one vehicle flies, without when.
+    """The flight of one vehicle in space, without times.
 
-    ``points`` (N, 3), N >= 2: east_m, north_m, amsl_m from the top of take-off to the approach point. Grounds are
-    amsl; without ``start_ground_amsl_m`` the flight begins in the air at the first point (the papers'), without
-    ``goal_ground_amsl_m`` there is no landing. ``end`` as in a mission file; ``rtl`` climbs to ``rtl_amsl_m`` if it is
-    lower, flies straight home at cruise speed, and lands; ``none`` is gone on arrival. ``holds_s`` (N,): seconds of
-    standing at each point; the first one's is the gate. ``items`` (N + 1,): the caller's number of the take-off, of
-    each way point but the first, and of what ends the flight; a number twice running is one leg in parts. ``pace``
-    (N,): the speed over ground that comes of a commanded one of 1 on each leg, and last on the straight way home.
+    ``points`` (N, 3), N >= 2, are east_m, north_m, amsl_m from the top of take-off to the approach point. Grounds are
+    amsl. Without ``start_ground_amsl_m`` the flight begins in the air at the first point (as in the papers); without
+    ``goal_ground_amsl_m`` there is no landing. ``end`` is as in a mission file: ``rtl`` climbs to ``rtl_amsl_m`` if it
+    is lower, flies straight home at cruise speed, and lands; ``none`` is gone on arrival. ``holds_s`` (N,) are seconds
+    of holding at each point; the first is the gate. ``items`` (N + 1,) are the caller's numbers of the take-off, of
+    each way point but the first, and of the end of the flight; legs with the same number are parts of one leg. ``pace``
+    (N,) is the speed over ground that results from a commanded speed of 1 on each leg, and last on the straight line
+    home.
 
     A fixed wing has no columns: ``climb_out`` (K, 3) leads from the ground to the first point, ``glide`` (K, 3) from
-    the last one down to the ground where it lands; home after a return it circles, and stays in the air.
+    the last point down to the ground if it lands. After a return it circles over home and stays in the air.
     """
 
     name: str
@@ -80,13 +81,14 @@ class Route:
 
     @property
     def length_m(self) -> float:
-        """Length in space of the way-point legs, corners not cut."""
+        """Length in space of the way-point legs, with corners not cut, m."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
     def energy_j(self, vehicle: Vehicle, hold_s: float = 0.0) -> float:
-        """Energy of the flight (krill paper, Table 1: R1 a vertical metre, R2 a horizontal one; ``hover_w`` in holds).
+        """Energy of the flight, J: krill paper, Table 1 (R1 per vertical metre, R2 per horizontal one), ``hover_w`` in
+        holds.
 
-        Corners are not cut; ``hold_s`` comes on top of the route's own holds. Standing on the ground costs nothing.
+        Corners are not cut. ``hold_s`` is added to the route's own holds. Waiting on the ground costs nothing.
         """
         corners = _flown(self)
         d = np.diff(corners, axis=0)
@@ -100,10 +102,10 @@ class Route:
 
 
 class Course:
-    """A route laid out for a vehicle: its stretches, ready for any speed.
+    """The stretches of a route for a vehicle, ready for any speed.
 
-    ``to_goal`` is what lies before the arrival, ``after`` what follows; each entry is a stretch and the seconds of
-    standing behind it.
+    ``to_goal`` are those before the arrival, each with the seconds of holding after it; ``after`` are those after the
+    arrival.
     """
 
     def __init__(self, route: Route, vehicle: Vehicle) -> None:
@@ -123,7 +125,7 @@ class Course:
             if stretch is not None:
                 self.to_goal.append((stretch, held))
             else:
-                waited += held  # a hold where it stands already: at the gate, or longer at the last one
+                waited += held  # it is at this place already: the hold adds to the gate or to the hold before
                 if self.to_goal:
                     last, before = self.to_goal[-1]
                     self.to_goal[-1], waited = (last, before + waited), 0.0
@@ -139,7 +141,7 @@ class Course:
     def fly(
         self, speed_m_s: float, depart_s: float = 0.0, hold_s: float = 0.0, error_m: float = POSITION_ERROR_M
     ) -> TimedPath:
-        """The motion of the whole flight, within ``error_m`` of the true one at every moment; see `fly`."""
+        """The motion of the whole flight, within ``error_m`` of the true motion at every time; see `fly`."""
         route = self.route
         start = route.points[0] if self.takeoff is None else self.takeoff.start[0]
         motion = _Motion(depart_s, start)
@@ -167,19 +169,19 @@ def fly(
 ) -> TimedPath:
     """The motion of a whole flight at a cruise speed, leaving at ``depart_s``, with ``hold_s`` at the gate.
 
-    Accelerated and curved parts are cut into straight pieces of constant speed that stray at most ``error_m`` from
-    the true motion at any moment (`motion_error_m`). Pieces carry the route's item numbers.
+    Accelerated and curved parts are cut into straight pieces of constant speed that are at most ``error_m`` from the
+    true motion at any time (`motion_error_m`). Pieces carry the route's item numbers.
     """
     return Course(route, vehicle).fly(speed_m_s, depart_s, hold_s, error_m)
 
 
 def time_to_goal_s(route: Route, vehicle: Vehicle, speed_m_s: float) -> float:
-    """Seconds from leaving the ground to the arrival; never rises with the speed. For many speeds: `Course`."""
+    """Seconds from leaving the ground to the arrival; never rises with the speed. For many speeds use `Course`."""
     return Course(route, vehicle).time_to_goal_s(speed_m_s)
 
 
 def motion_error_m(vehicle: Vehicle, error_m: float = POSITION_ERROR_M) -> float:
-    """How far a `TimedPath` made here may be from the true motion: 0 where nothing accelerates or turns."""
+    """Largest distance, m, of a `TimedPath` of this module from the true motion; 0 if nothing accelerates or turns."""
     sharp = math.isinf(vehicle.corner_accel_m_s2)
     instant = math.isinf(vehicle.accel_m_s2) and math.isinf(vehicle.vertical_accel_m_s2)
     return 0.0 if sharp and instant else error_m
@@ -188,9 +190,9 @@ def motion_error_m(vehicle: Vehicle, error_m: float = POSITION_ERROR_M) -> float
 def speed_for(
     time_s: Callable[[float], float], wanted_s: float, slow_m_s: float, fast_m_s: float, within_s: float = 1e-9
 ) -> float:
-    """The speed between two at which ``time_s`` (falling) takes ``wanted_s``: the faster end where it is flat.
+    """The speed between two at which ``time_s`` (falling) is ``wanted_s``; the faster end where it is flat.
 
-    ``wanted_s`` must lie between the times at the two ends, or the nearer end is given.
+    If ``wanted_s`` is not between the times at the two ends, the nearer end is returned.
     """
     low, high = slow_m_s, fast_m_s
     t_low, t_high = time_s(low) - wanted_s, time_s(high) - wanted_s
@@ -198,7 +200,7 @@ def speed_for(
         return high
     if t_low <= within_s:
         return low
-    # Regula falsi in 1/v, in which time is nearly a straight line (Illinois: an end that stays is halved).
+    # Regula falsi in 1/v, in which time is nearly linear (Illinois: the value at an end that stays is halved).
     x_low, x_high = 1.0 / low, 1.0 / high
     side = 0
     for _ in range(200):
@@ -218,7 +220,7 @@ def speed_for(
 
 
 class _Motion:
-    """Breakpoints of a flight, gathered one stretch after the other."""
+    """The break points of a flight, collected stretch by stretch."""
 
     def __init__(self, depart_s: float, start: Floats) -> None:
         self.now_s = depart_s
@@ -247,7 +249,7 @@ class _Motion:
         legs_ = np.concatenate(self.legs)
         keep = np.append(True, np.diff(times) > _LEAST_S)
         keep[-1] = True
-        if times[-1] - times[keep][-2] <= _LEAST_S:  # the last point stays, a sliver before it goes
+        if times[-1] - times[keep][-2] <= _LEAST_S:  # keep the last point, drop one that is almost at the same time
             keep[np.flatnonzero(keep)[-2]] = False
         items = np.full(len(legs_), -1, dtype=np.intp) if route.items is None else route.items[legs_]
         stays = route.end == "loiter" or (route.end == "rtl" and route.climb_out is not None)
@@ -255,9 +257,9 @@ class _Motion:
 
 
 def _leg_m(route: Route) -> Floats:
-    """(N - 1,) from way point to way point, metres: of the mission's leg that each piece of the route is part of.
+    """(N - 1,) metres from way point to way point, of the mission's leg that each piece of the route is part of.
 
-    Pieces with one item number are one leg, cut to follow the ground.
+    Pieces with the same item number are one leg, cut to follow the ground.
     """
     p = route.points
     own = np.asarray(np.linalg.norm(np.diff(p, axis=0), axis=1))
@@ -280,7 +282,7 @@ def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | None:
 
 
 def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
-    """What follows the arrival."""
+    """The stretches after the arrival."""
     goal, home = route.points[-1], route.points[0]
     number = len(route.points)
     slanted = route.glide
@@ -307,7 +309,7 @@ def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
 
 
 def _home(route: Route) -> tuple[float, float]:
-    """Ground at home and height of the way there, amsl, of a route that ends with a return."""
+    """Ground at home and altitude of the flight there, both amsl, for a route that ends with a return."""
     if route.start_ground_amsl_m is None or route.rtl_amsl_m is None:
         raise ValueError(f"{route.name}: a return needs rtl_amsl_m and the ground at home")
     return route.start_ground_amsl_m, route.rtl_amsl_m
@@ -325,7 +327,7 @@ def _landing(top: Floats, ground: float, vehicle: Vehicle, number: int) -> list[
 
 
 def _flown(route: Route) -> Floats:
-    """The corners of the whole flight as a polyline, columns and the way home included."""
+    """The corners of the whole flight as a polyline, with columns and the return."""
     first, last = route.points[0], route.points[-1]
     before, behind = [], []
     if route.climb_out is not None:
