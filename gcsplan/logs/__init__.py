@@ -1,1 +1,1 @@
-"""Flight logs: where an aircraft was and what its battery gave, and the energy model that fits them."""
+"""Flight logs: position and battery power over time, and the energy model that fits them."""

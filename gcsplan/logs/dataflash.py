@@ -1,7 +1,7 @@
 """ArduPilot's onboard logs (.bin), read with pymavlink's DFReader.
 
-BAT: Volt, Curr of each battery instance (AP_BattMonitor; CURR before 4.0). POS: the estimator's place; GPS where there
-is none. TimeUS in microseconds since boot.
+BAT holds Volt and Curr of each battery instance (AP_BattMonitor; CURR before 4.0). POS is the estimator's position; GPS
+is used if there is none. TimeUS is in microseconds since boot.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FIX_3D = 3
 
 
 def read_dataflash(file: Path) -> FlightLog:
-    """The flight in a .bin; InputError where it is none, is cut short at the front, or holds no battery."""
+    """The flight in a .bin; InputError if it is not one, is damaged, or has no places or battery readings."""
     with file.open("rb") as opened:
         if opened.read(2) != HEAD:
             raise InputError("is no ArduPilot log: it does not begin with A3 95", where=str(file))
@@ -39,7 +39,7 @@ def read_dataflash(file: Path) -> FlightLog:
             log = DFReader.DFReader_binary(str(file))
             while (m := log.recv_match(type=["BAT", "CURR", "POS", "GPS"])) is not None:
                 _take(m, places, gps, batteries, old)
-        except Exception as error:  # the reader knows no error of its own for a damaged file
+        except Exception as error:  # the reader has no error class for a damaged file
             raise InputError(
                 f"could not be read by pymavlink ({type(error).__name__}: {error}): it is damaged or not whole; "
                 f"download it again",
@@ -62,7 +62,7 @@ def read_dataflash(file: Path) -> FlightLog:
 
 @contextmanager
 def _overheard() -> Iterator[Callable[[], bool]]:
-    """Keeps what pymavlink says of damage, from Python and from C, from between our lines; whether it spoke."""
+    """Keep pymavlink's messages about damage, from Python and C, off the console; yields whether there were any."""
     words = io.StringIO()
     length = 0
     with tempfile.TemporaryFile() as kept, redirect_stderr(words), redirect_stdout(words):

@@ -1,10 +1,10 @@
-"""R1, R2 and the power of hovering from flown energy: what a metre up or down, a metre along and a second still cost.
+"""Fit R1, R2 and hover power to flown energy: the cost of a vertical metre, a horizontal metre and a second of hover.
 
-The model is the one that missions are planned with (`gcsplan.vehicle.Energy`): a step of the flight takes R1 times its
-vertical metres plus R2 times its horizontal ones, and hover power times its seconds where it stands still. Weighted
-least squares over steps of a few seconds, made robust by Huber's weights; no coefficient below 0. A coefficient is
-given only where the log can tell it: where enough was flown of it, where it is not the mere shadow of another (the part
-of its column that the others do not explain), and where its 95 % interval is narrow.
+The model is that of `gcsplan.vehicle.Energy`, with which missions are planned: a step of the flight takes R1 times its
+vertical metres plus R2 times its horizontal ones, and hover power times its seconds of hovering. The fit is weighted
+least squares over steps of a few seconds, robust by Huber's weights, with no coefficient below 0. A coefficient is
+reported only if the log determines it: enough of its motion was flown, the other columns do not explain its column, and
+its 95 % interval is narrow.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ from gcsplan.errors import InputError
 from gcsplan.logs.flight_log import FlightLog
 
 STEP_S = 5.0
-"""Long enough that noise of the height is small beside what is climbed in it, short enough to be of one kind."""
+"""Length of a step: long enough that height noise is small beside the climb, short enough to be of one kind."""
 
 STILL_M_S, STILL_RISE_M_S = 1.0, 0.3
-"""Slower than both is standing still."""
+"""Horizontal and vertical speed below which the vehicle hovers."""
 
 UP_M, RUNNING = 2.0, 0.05
-"""In the air: so much above the lowest place, with at least this part of the median power."""
+"""In the air: this far above the lowest place, m, and with at least this part of the median power."""
 
 LEAST = (20.0, 200.0, 20.0)
-"""Metres up and down, metres along, seconds still, below which nothing is said."""
+"""Least vertical metres, horizontal metres and seconds of hovering for a coefficient."""
 
 LEAST_STEPS = 4
-"""Likewise steps that a coefficient has a part in."""
+"""Least number of steps that contribute to a coefficient."""
 
 UNIQUE = 0.03
-"""Part of a column's square that the other columns must leave unexplained."""
+"""Least part of a column's square that the other columns must leave unexplained."""
 
 WIDEST = 0.25
-"""Half of the 95 % interval beside the value, at most."""
+"""Largest half of the 95 % interval, as a part of the value."""
 
 FASTEST_M_S = 150.0
-"""What is faster is a damaged reading."""
+"""A higher speed is a damaged reading."""
 
 HUBER, ROUNDS = 1.345, 30
 GAP_S = 3.0
-"""Where positions or battery readings pause for longer, the step is left out."""
+"""Longest pause of positions or battery readings within a step that is used, s."""
 
 NAMES = ("vertical_j_per_m", "horizontal_j_per_m", "hover_w")
 WORDS = ("vertical metres", "horizontal metres", "hovering")
@@ -56,7 +56,7 @@ AMOUNTS = ("m up and down", "m along", "s of hovering")
 
 @dataclass(frozen=True, slots=True)
 class Coefficient:
-    """One number of the model, ± ``half_95``. ``value`` None: the log cannot tell it, and ``why`` says why."""
+    """One number of the model, ± ``half_95``. ``value`` None: the log does not determine it; ``why`` is the reason."""
 
     name: str
     value: float | None
@@ -66,7 +66,7 @@ class Coefficient:
 
 @dataclass(frozen=True, slots=True)
 class EnergyFit:
-    """What one or more logs say. ``off_percent``: by how much the model misses a step's energy, median."""
+    """The fit to one or more logs. ``off_percent`` is the median error of the model in a step's energy."""
 
     vertical: Coefficient
     horizontal: Coefficient
@@ -79,11 +79,11 @@ class EnergyFit:
 
     @property
     def told(self) -> bool:
-        """Whether R1 and R2 are both known (hover_w is of use, but a mission can be planned without it)."""
+        """Whether R1 and R2 are both known (hover_w is useful, but a mission can be planned without it)."""
         return self.vertical.value is not None and self.horizontal.value is not None
 
     def yaml(self) -> str:
-        """The lines of a mission file's vehicle, to paste."""
+        """The lines to paste into a vehicle of a mission file."""
         lines = ["energy:"]
         for c in (self.vertical, self.horizontal, self.hover):
             if c.value is None:
@@ -93,7 +93,7 @@ class EnergyFit:
         return "\n".join(lines) + "\n"
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """The fit as plain values."""
         return {
             c.name: {"value": c.value, "half_95": c.half_95, "why": c.why or None}
             for c in (self.vertical, self.horizontal, self.hover)
@@ -105,7 +105,7 @@ class EnergyFit:
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """N steps: ``design`` (N, 3) vertical metres, horizontal metres, seconds still; ``energy_j``; ``rise_m`` signed."""
+    """N steps: ``design`` (N, 3) vertical metres, horizontal metres, hover seconds; ``energy_j``; signed ``rise_m``."""
 
     design: Floats
     energy_j: Floats
@@ -113,7 +113,7 @@ class Steps:
 
 
 def fit_energy(logs: Sequence[FlightLog]) -> EnergyFit:
-    """The model that fits all ``logs`` together. Raises InputError where they hold no flight."""
+    """The model that fits all ``logs`` together. Raises InputError if they hold no flight."""
     parts = [steps_of(log) for log in logs]
     x = np.concatenate([p.design for p in parts])
     y = np.concatenate([p.energy_j for p in parts])
@@ -124,7 +124,7 @@ def fit_energy(logs: Sequence[FlightLog]) -> EnergyFit:
         )
     rise = np.concatenate([p.rise_m for p in parts])
     amount = x.sum(axis=0)
-    amount[0] = x[np.abs(rise) > STILL_RISE_M_S * STEP_S, 0].sum()  # what is less may be the noise of the height
+    amount[0] = x[np.abs(rise) > STILL_RISE_M_S * STEP_S, 0].sum()  # smaller changes may be height noise
     taking_part = [np.abs(rise) > STILL_RISE_M_S * STEP_S, x[:, 1] > 0.0, x[:, 2] > 0.0]
     parts_of = np.array([t.sum() for t in taking_part])
     has = (amount >= np.array(LEAST)) & (parts_of >= LEAST_STEPS)
@@ -203,7 +203,7 @@ def steps_of(log: FlightLog) -> Steps:
     flying = (amsl[at[:-1]] > amsl.min() + UP_M) & (amsl[at[1:]] > amsl.min() + UP_M)
     flying &= watts > RUNNING * np.median(watts[flying]) if flying.any() else flying
     whole = ~_paused(log.place_s, second[at]) & ~_paused(log.power_s, second[at])
-    # A step that turns from climb to descent, or begins and ends standing, is of two kinds.
+    # A step that turns from climb to descent, or begins or ends in a hover, is of two kinds and is left out.
     one_kind = np.abs(up) > 0.8 * np.abs(rise).sum(axis=1) - STILL_RISE_M_S * STEP_S
     one_kind &= slow | (run.min(axis=1) >= STILL_M_S) | (along == 0.0)
     columns = np.where(still, 0.0, np.abs(up)), np.where(slow, 0.0, along), np.where(still, STEP_S, 0.0)
@@ -213,7 +213,7 @@ def steps_of(log: FlightLog) -> Steps:
 
 
 def _smoothed(t: Floats, a: Floats, at: Floats) -> Floats:
-    """The mean over a second around each of ``at``, where there are several readings; else between neighbours."""
+    """The mean over a second around each of ``at`` if it has several readings; otherwise interpolated."""
     total = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))])
 
     def until(x: Floats) -> Floats:
@@ -227,14 +227,14 @@ def _smoothed(t: Floats, a: Floats, at: Floats) -> Floats:
 
 
 def _energy_until(t: Floats, watts: Floats, at: Floats) -> Floats:
-    """Joules from the first reading up to each of ``at``, power linear between readings."""
+    """Joules from the first reading up to each of ``at``, with power linear between readings."""
     total = np.concatenate([[0.0], np.cumsum(0.5 * (watts[1:] + watts[:-1]) * np.diff(t))])
     k = np.clip(np.searchsorted(t, at, "right") - 1, 0, len(t) - 2)
     return np.asarray(total[k] + 0.5 * (watts[k] + np.interp(at, t, watts)) * (at - t[k]))
 
 
 def _paused(t: Floats, at: Floats) -> NDArray[np.bool_]:
-    """(N,) steps between neighbours of ``at`` that a pause of the readings reaches into."""
+    """(N,) whether a pause of the readings reaches into each step between neighbours of ``at``."""
     long = np.flatnonzero(np.diff(t) > GAP_S)
     out = np.zeros(len(at) - 1, np.bool_)
     for k in long.tolist():
@@ -243,7 +243,7 @@ def _paused(t: Floats, at: Floats) -> NDArray[np.bool_]:
 
 
 def _robust(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Coefficients >= 0 and final weights: Huber's, on residuals relative to what the model says."""
+    """Coefficients >= 0 and final weights: Huber's, on residuals relative to the model's prediction."""
     from scipy.optimize import nnls
 
     scale = np.maximum(y, 0.2 * np.median(y))
@@ -263,7 +263,7 @@ def _robust(x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def _covariance(x: Floats, y: Floats, beta: Floats, weight: Floats) -> Floats:
-    """Of the coefficients, from the residuals themselves (White's sandwich)."""
+    """Covariance of the coefficients, from the residuals themselves (White's sandwich)."""
     bread = np.linalg.pinv(x.T @ (weight[:, None] * x))
     inner = x * (weight * (y - x @ beta))[:, None]
     return np.asarray(bread @ (inner.T @ inner) @ bread * (len(y) / max(len(y) - x.shape[1], 1)))
@@ -292,7 +292,7 @@ def _shadow(k: int, columns: Sequence[int], x: Floats) -> str:
 
 
 def _up_and_down(x: Floats, y: Floats, rise: Floats, made: Sequence[Coefficient]) -> list[str]:
-    """What a metre up and a metre down cost each: the model takes one number for both."""
+    """A note on the separate costs of a metre up and a metre down, for which the model has one number."""
     if made[0].value is None or made[1].value is None:
         return []
     up, down = np.where(rise > 0.0, x[:, 0], 0.0), np.where(rise < 0.0, x[:, 0], 0.0)

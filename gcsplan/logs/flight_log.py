@@ -1,4 +1,4 @@
-"""`FlightLog`: place and power over time, whichever kind of file they come from."""
+"""`FlightLog`: position and power over time, from any kind of file."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from gcsplan.errors import InputError
 EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
 LEAST_POINTS = 20
 LONGEST_S, FARTHEST_DEG = 86_400.0, 3.0
-"""From the middle of a log: what is farther off in time or place is a damaged reading, or one before the fix."""
+"""Readings farther than this from the middle of a log, in time or place, are damaged, or from before the GPS fix."""
 
 
 @dataclass(frozen=True, eq=False)
 class FlightLog:
     """Two series of one flight, each with its own clock readings (seconds, rising).
 
-    ``place_s`` (P,), ``east_m``, ``north_m``, ``amsl_m`` (P,); ``power_s`` (Q,), ``power_w`` (Q,). ``notes`` on what
-    was taken and what was passed over.
+    ``place_s``, ``east_m``, ``north_m``, ``amsl_m`` are (P,), ``power_s``, ``power_w`` are (Q,). ``notes`` state which
+    data was used and which was skipped.
     """
 
     name: str
@@ -39,9 +39,9 @@ class FlightLog:
         cls, name: str, places: list[tuple[float, float, float, float]], power: list[tuple[float, float]],
         notes: tuple[str, ...] = (), *, degrees: bool = True,
     ) -> FlightLog:  # fmt: skip
-        """From (seconds, latitude, longitude, AMSL) and (seconds, watts), in any order; what is no number is left out.
+        """A log from (seconds, latitude, longitude, AMSL) and (seconds, watts), in any order, without rows with NaN.
 
-        Raises InputError where there is too little to say anything.
+        Raises InputError if there is too little data.
         """
         at, watts = _sorted(places), _sorted(power)
         if degrees and len(at):
@@ -56,18 +56,18 @@ class FlightLog:
 
 
 def _sorted(rows: Sequence[tuple[float, ...]]) -> Floats:
-    """By time, one row for each reading of the clock."""
+    """The rows sorted by time, one row per clock reading."""
     if not rows:
         return np.zeros((0, 4))
     a = np.array(rows, dtype=np.float64)
     a = a[np.isfinite(a).all(axis=1)]
-    a = a[np.abs(a[:, 0] - np.median(a[:, 0])) < LONGEST_S] if len(a) else a  # a damaged log holds any number
+    a = a[np.abs(a[:, 0] - np.median(a[:, 0])) < LONGEST_S] if len(a) else a  # a damaged log may hold any number
     a = a[np.argsort(a[:, 0], kind="stable")]
     return a[np.concatenate([[True], np.diff(a[:, 0]) > 0.0])] if len(a) else a
 
 
 def _in_metres(lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
-    """East and north of the first place, by the ellipsoid's radii in the middle: distances are good to 0.1 %."""
+    """East and north of the first place, m, by the ellipsoid's radii at the middle latitude: distances within 0.1 %."""
     lat = math.radians(0.5 * (float(lat_deg.min()) + float(lat_deg.max())))
     w = 1.0 - ECCENTRICITY_2 * math.sin(lat) ** 2
     north = EQUATOR_M * (1.0 - ECCENTRICITY_2) / w**1.5 * np.radians(lat_deg - lat_deg[0])
@@ -76,7 +76,7 @@ def _in_metres(lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
 
 
 def together(batteries: dict[int, list[tuple[float, float]]]) -> list[tuple[float, float]]:
-    """The power of all batteries, at the readings of the one with the most."""
+    """The sum of the power of all batteries, at the times of the one with the most readings."""
     series = sorted(batteries.values(), key=len, reverse=True)
     if len(series) == 1:
         return series[0]

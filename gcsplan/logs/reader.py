@@ -1,4 +1,4 @@
-"""A flight log of any kind that is read: ArduPilot's .bin, MAVLink .tlog, CSV."""
+"""Reader for flight logs of all supported kinds: ArduPilot's .bin, MAVLink .tlog, CSV."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from gcsplan.logs.telemetry import read_telemetry
 
 
 def read_log(file: Path, *, columns: Mapping[str, str] | None = None, sysid: int | None = None) -> FlightLog:
-    """The flight in ``file``: ArduPilot's .bin (.BIN, .log is refused), a .tlog, or CSV by its name's ending.
+    """The flight in ``file``: ArduPilot's .bin (or .BIN; .log is refused), a .tlog, or CSV, by its ending.
 
-    ``columns``: names of a CSV's columns; ``sysid``: which vehicle of a .tlog. Raises InputError with the cure.
+    ``columns`` are the names of a CSV's columns; ``sysid`` selects the vehicle of a .tlog. Raises InputError with a
+    cure.
     """
     if not file.exists():
         raise InputError("there is no such file", where=str(file))

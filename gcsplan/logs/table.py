@@ -1,4 +1,4 @@
-"""CSV logs: a header line that names the columns, one reading a line."""
+"""CSV logs: a header line that names the columns, and one reading per line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "volt": ("volt", "voltage", "voltage_v", "volts", "v"),
     "amp": ("amp", "current", "current_a", "amps", "a"),
 }
-"""What a column may be called, by what it is; in any case of letters."""
+"""Accepted column names for each quantity, in any case of letters."""
 
 WANTED = (
     "time_s, lat and lon (or east_m and north_m), amsl_m, and power_w (or volt and amp); name others with "
@@ -33,7 +33,7 @@ MOST_BAD = 0.1
 
 
 def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
-    """The flight in a CSV file; ``columns``: what (see `NAMES`) to the file's own name. Raises InputError."""
+    """The flight in a CSV file; ``columns`` maps a key of `NAMES` to the file's own name. Raises InputError."""
     for key in columns:
         if key not in NAMES:
             near = difflib.get_close_matches(key, NAMES, 1)
@@ -63,7 +63,7 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
         watts = values["power_w"] if "power_w" in at else values["volt"] * values["amp"]
         time_s = values["time_s"]
         good = False
-        if all(math.isfinite(values[k]) for k in keys):  # a line may hold either, where the two have rates of their own
+        if all(math.isfinite(values[k]) for k in keys):  # position and power may be on separate lines
             places.append((time_s, values[keys[1]], values[keys[2]], values["amsl_m"]))
             good = True
         if math.isfinite(time_s) and math.isfinite(watts):
@@ -78,7 +78,7 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
 
 
 def _places(names: list[str], columns: Mapping[str, str], where: str) -> dict[str, int]:
-    """Which column holds what; InputError where something is missing."""
+    """The column number of each quantity; InputError if a required one is missing."""
     lower = [n.lower() for n in names]
     at: dict[str, int] = {}
     for key, known in NAMES.items():

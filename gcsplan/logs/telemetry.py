@@ -1,7 +1,7 @@
 """MAVLink logs of a ground station (.tlog), read with pymavlink.
 
-GLOBAL_POSITION_INT gives the place, BATTERY_STATUS the power (SYS_STATUS where there is none). Each message stands
-behind the ground station's clock, microseconds since 1970.
+GLOBAL_POSITION_INT has the position, BATTERY_STATUS the power (SYS_STATUS is used if there is none). Before each
+message is the ground station's clock, in microseconds since 1970.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ POSITION, BATTERY, STATUS = "GLOBAL_POSITION_INT", "BATTERY_STATUS", "SYS_STATUS
 
 
 def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
-    """The flight of one vehicle in a .tlog; InputError where there are several and ``sysid`` names none."""
+    """The flight of one vehicle in a .tlog; InputError if there are several and ``sysid`` selects none."""
     os.environ.setdefault("MAVLINK20", "1")
     from pymavlink import mavutil
 
@@ -40,7 +40,7 @@ def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
                     batteries.setdefault(who, {}).setdefault(int(m.id), []).append((time_s, watts))
             elif m.current_battery >= 0 and 0 < m.voltage_battery < UNKNOWN_MV:
                 status.setdefault(who, []).append((time_s, m.voltage_battery * 1e-3 * m.current_battery * 1e-2))
-    except Exception as error:  # the reader knows no error of its own for a damaged file
+    except Exception as error:  # the reader has no error class for a damaged file
         raise InputError(
             f"could not be read by pymavlink ({type(error).__name__}: {error}): it is damaged or no .tlog",
             where=str(file),
@@ -68,7 +68,7 @@ def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
 
 
 def _watts(m: Any) -> float:
-    """Voltage times current of one BATTERY_STATUS; NaN where either is not known."""
+    """Voltage times current of one BATTERY_STATUS, W; NaN if either is unknown."""
     cells = [*m.voltages, *(v for v in getattr(m, "voltages_ext", ()) if v)]
     volts = math.fsum(v * 1e-3 for v in cells if 0 < v < UNKNOWN_MV)
     return volts * m.current_battery * 1e-2 if m.current_battery >= 0 and volts > 0.0 else math.nan

@@ -1,4 +1,4 @@
-"""What is wrong with a section of a mission file: pydantic's complaints in our words, each with its place."""
+"""The mistakes in a section of a mission file: pydantic's errors in gcsplan's words, each with its place."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Section = TypeVar("Section", bound=Keys)
 
 
 def read_section(kind: type[Section], value: Any, where: str, problems: list[Problem]) -> Section | None:
-    """``value`` as a section; None, and every mistake in ``problems``, where it is not one.
+    """``value`` as a section; None if it is not one, with every mistake added to ``problems``.
 
-    A section whose only mistakes are unknown keys is given without them.
+    If the only mistakes are unknown keys, the section is returned without them.
     ``where`` is the place so far (``FILE: vehicles[1]``).
     """
     if not isinstance(value, dict):
@@ -32,19 +32,19 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Pro
         unknown = {e["loc"][0] for e in errors if e["type"] == "extra_forbidden" and len(e["loc"]) == 1}
         if len(unknown) < len(errors):
             return None
-    # Nothing but unknown keys: the rest is judged too, so that its mistakes are reported together.
+    # Only unknown keys are wrong: the other keys are read too, so that their mistakes are reported together.
     return kind.model_validate({k: v for k, v in value.items() if k not in unknown})
 
 
 def unknown_keys(given: Iterable[str], known: Iterable[str], where: str) -> list[Problem]:
-    """A problem for each key that is not known, naming the nearest one that is."""
+    """One problem for each unknown key, with the nearest known one."""
     names = list(known)
     prefix = where if where.endswith(": ") else where + "."
     return [Problem(f"{prefix}{key[:80]}", _unknown(key, names)) for key in given if key not in names]
 
 
 def key_path(where: str, loc: Iterable[int | str]) -> str:
-    """``FILE: vehicles[1]`` and ("speed_m_s", 0) to ``FILE: vehicles[1].speed_m_s[0]``."""
+    """Join place and keys: ``FILE: vehicles[1]`` and ("speed_m_s", 0) give ``FILE: vehicles[1].speed_m_s[0]``."""
     path = where
     for part in loc:
         if isinstance(part, int):
@@ -107,7 +107,7 @@ def _form_of(loc: tuple[int | str, ...]) -> str:
 
 
 def _model_at(kind: type[Keys], loc: Iterable[int | str]) -> type[Keys]:
-    """The section that holds the key at ``loc``, for the names that it knows."""
+    """The section that holds the key at ``loc``, whose names are the known ones."""
     for part in loc:
         if part == "{east_m, north_m}":
             kind = LocalPoint

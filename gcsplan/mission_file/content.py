@@ -1,4 +1,4 @@
-"""Where a mission comes from: a file, its text, or a mapping that a script has made; all become the same mapping."""
+"""The source of a mission: a file, its text, or a mapping made by a script; all become the same mapping."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from gcsplan.mission_file.schema import shown
 from gcsplan.mission_file.strict_yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, read_yaml
 
 UNNAMED = Path("mission.yaml")
-"""Stands for the file of a mission without one; its folder, for files that the mission names, is the current one."""
+"""Path of a mission that has no file; files that the mission names are then found from the current folder."""
 
 
 def read_content(
     source: str | os.PathLike[str] | Mapping[str, Any] | None, text: str | None
 ) -> tuple[Path, str, dict[str, Any]]:
-    """The file, what messages call it, and the mapping of keys. Raises InputError, TypeError as `load_mission`."""
+    """The file, its name in messages, and the mapping of keys. Raises InputError, TypeError as `load_mission`."""
     if isinstance(source, str) and ("\n" in source or "\r" in source):
         if text is not None:
             raise TypeError("load_mission takes one text: the first argument is the file's path where text= is given")
@@ -46,7 +46,7 @@ def _text(file: Path, where: str) -> str:
     try:
         if file.is_dir():
             raise InputError("this is a folder; give a mission file (.yaml)", where=where)
-        with file.open("rb") as opened:  # not by its size: a pipe or a device has none
+        with file.open("rb") as opened:  # the size is not asked for, since a pipe or a device has none
             data = opened.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             raise InputError(f"a mission file has at most {MAX_BYTES} bytes, this one has more", where=where)
@@ -62,13 +62,13 @@ def _text(file: Path, where: str) -> str:
 
 
 class _Plain:
-    """A copy of a script's mapping in what YAML can hold: tuples become lists, numpy's numbers Python's."""
+    """Copies a script's mapping into YAML's types: tuples become lists, numpy's numbers become Python's."""
 
     def __init__(self) -> None:
         self._values = 0
 
     def of(self, value: Any, where: str, depth: int) -> Any:
-        """``value`` at ``where``, which lies ``depth`` levels deep."""
+        """``value`` at ``where``, which is ``depth`` levels deep."""
         self._values += 1
         if depth > MAX_DEPTH or self._values > MAX_NODES:
             most = f"{MAX_DEPTH} levels deep" if depth > MAX_DEPTH else f"{MAX_NODES} values"
@@ -84,7 +84,7 @@ class _Plain:
             for key in value:
                 if not isinstance(key, str):
                     raise InputError(f"a key is text, given {key!r}", where=where)
-            # Within the file a place is a key path; the name of the whole and ": " stand before it.
+            # Within the file a place is a key path; before it are the name of the file and ": ".
             return {str(k): self.of(v, f"{where}: {k}" if not depth else f"{where}.{k}", depth + 1)
                     for k, v in value.items()}  # fmt: skip
         if isinstance(value, list | tuple):

@@ -1,6 +1,6 @@
-"""A world without a mission file: terrain, zones and limits as options of a command give them, in the same words.
+"""A world without a mission file: the options of a command state terrain, zones and limits by the same names.
 
-Everything is judged by the same rules as in a mission file; what is wrong is named by its option.
+Everything is judged by the same rules as in a mission file; a mistake is reported by its option.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from gcsplan.world.world import World
 from gcsplan.world.zones import Zone
 
 MARGIN_M, MARGIN_MOST_M = 500.0, 3000.0
-"""Terrain around what is flown: metres, or a tenth of its extent, at most."""
+"""Terrain around the mission: at least the first, m, or a tenth of its extent up to the second, m."""
 
 OPTIONS = {
     "min_agl_m": "--min-agl", "max_agl_m": "--max-agl", "max_amsl_m": "--max-amsl", "speed_m_s": "--speed",
@@ -37,14 +37,14 @@ OPTIONS = {
     "geoid_grid": "--geoid-grid", "obstacle_height_m": "--obstacle-height", "start": "--home",
     "rtl_rel_home_m": "--rtl-altitude", "crs": "--crs",
 }  # fmt: skip
-"""The option that stands for each key of a mission file."""
+"""The option for each key of a mission file."""
 
 
 @dataclass(frozen=True)
 class WorldOptions:
-    """What the options say, under the mission file's names; paths as given, None where not given.
+    """The values of the options, by the mission file's names. Paths are as written; None means not given.
 
-    ``home`` (latitude, longitude) stands for the home of every file.
+    ``home`` (latitude, longitude) is the home of every file.
     """
 
     terrain: Mapping[str, object] = field(default_factory=dict)
@@ -57,7 +57,7 @@ class WorldOptions:
 
 
 class OpenWorld:
-    """Terrain and zones of the options, opened and found good; `around` loads what some places need of them."""
+    """Terrain and zones of the options, opened and checked; `around` loads the part that some places need."""
 
     def __init__(self, options: WorldOptions) -> None:
         problems: list[Problem] = []
@@ -74,7 +74,7 @@ class OpenWorld:
                 problems += why.problems
         self._limits = read_section(LimitKeys, dict(options.limits), "", problems) or LimitKeys()
         if not problems:
-            self.vehicle("file", "arducopter")  # the limits' own contradictions, before any file is opened
+            self.vehicle("file", "arducopter")  # finds contradictions in the limits before any file is opened
         if problems:
             raise InputError.of([_renamed(p) for p in problems])
 
@@ -93,13 +93,13 @@ class OpenWorld:
         return replace(made, name=name)
 
     def around(self, places: Sequence[tuple[float, float]], reach_m: float = 0.0) -> tuple[World, dict[str, object]]:
-        """The world that holds ``places`` (latitude, longitude), and what is to be said of its sources.
+        """The world that holds ``places`` (latitude, longitude), and the description of its sources.
 
-        ``reach_m``: how far beyond them the terrain is wanted; `MARGIN_M` or a tenth of their extent come on top, and
-        the clearance.
+        ``reach_m`` is how far beyond them terrain is needed, in metres; `MARGIN_M` or a tenth of their extent, and the
+        clearance, are added.
 
-        Places that the terrain does not know are left out: what flies there is found to. Raises InputError where none
-        is left, or where they lie too far apart for one plane.
+        Places outside the terrain are left out, and the check reports what flies there. Raises InputError if none is
+        left, or if they are too far apart for one plane.
         """
         assert self._terrain is not None
         known = [p for p in places if self._terrain.covers(*p)]
@@ -115,7 +115,7 @@ class OpenWorld:
                 where="--dem",
             )
         placed, far = place_zones(self._drafts, frame)
-        # One of these would be a zone of the mission; as it stands it would be left out, and flown through.
+        # A swapped zone would belong to the mission; as it stands it would be left out, and flown through.
         problems = [
             Problem(draft.where, f"latitude and longitude of the zone {draft.name!r} look swapped")
             for draft in far
@@ -130,7 +130,7 @@ class OpenWorld:
             settled = settle_zones([(draft, zone)], surface, own)
             west, south, east, north = zone.bounds
             if own and not (west > box[0] and south > box[1] and east < box[2] and north < box[3]):
-                settled, own = [zone], []  # under ground here, and elsewhere nobody looked
+                settled, own = [zone], []  # under ground in the loaded part; the rest of the zone is not loaded
             zones += settled
             problems += own
         if problems:
@@ -145,7 +145,7 @@ class OpenWorld:
         return World(frame, Airspace(surface, zones, scale=scale)), inputs
 
     def _box(self, points: Sequence[tuple[float, float]], reach_m: float) -> Box:
-        """Nobody looks for detours here, so that terrain of a metre's resolution can be held against a long mission."""
+        """The box to load. A check needs no room for detours, so terrain of 1 m resolution fits a long mission."""
         east, north = [p[0] for p in points], [p[1] for p in points]
         low, high = (min(east), min(north)), (max(east), max(north))
         extent = max(high[0] - low[0], high[1] - low[1])
@@ -155,7 +155,7 @@ class OpenWorld:
 
 
 def _drafts(files: Sequence[str], problems: list[Problem], notes: list[str]) -> list[ZoneDraft]:
-    """The zones of all files, each with a name of its own."""
+    """The zones of all files, each with a unique name."""
     drafts: list[ZoneDraft] = []
     for file in files:
         try:
@@ -175,7 +175,7 @@ def _drafts(files: Sequence[str], problems: list[Problem], notes: list[str]) -> 
 
 
 def _renamed(problem: Problem) -> Problem:
-    """``.min_agl_m`` and the like, as the option that says so."""
+    """The problem with its option as the place, in place of a key such as ``.min_agl_m``."""
     key = problem.where.removeprefix(".").split(".")[-1].split("[")[0]
     option = OPTIONS.get(key)
     return Problem(option, problem.message) if option is not None else problem

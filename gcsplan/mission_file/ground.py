@@ -1,6 +1,7 @@
 """The terrain under a mission: the window that is loaded first, and wider ones for paths that would leave it.
 
-Windows are numbered, each at least twice as wide as the one before, so that all vehicles of a file meet the same ones.
+Windows are numbered levels, each at least twice as wide as the one before, so that all vehicles of a file use the same
+windows.
 """
 
 from __future__ import annotations
@@ -24,19 +25,19 @@ from gcsplan.world.zones import Zone
 Placed = Sequence[tuple[ZoneDraft, Zone]]
 
 MOST_LEVELS = 24
-"""Windows of one mission: the last would be wider than the frame by far."""
+"""Most windows of one mission; the last would be much wider than the frame."""
 
 
 EDGE_M = 100.0
-"""So far beyond the terrain's edges the last window goes: its corners are known to a few metres alone."""
+"""Metres by which the last window extends beyond the terrain's edges, whose corners are known to a few metres only."""
 
 QUICK_CELLS = 1_000_000
-"""Of a window that is looked at without need to look at a smaller one first."""
+"""Cells of a window that is small enough to search at once, without a smaller window first."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """One window: its surface, and what the ground decides about zones and terminals."""
+    """One window: its surface, and the zones and terminals as the ground in it decides."""
 
     surface: Surface
     zones: tuple[Zone, ...]
@@ -46,8 +47,10 @@ class Ground:
 
 @dataclass(eq=False)
 class Site:
-    """A mission's places in its plane. ``box`` (west, south, east, north) is the first window; ``good``: the places
-    of ``terminals`` that lie on the terrain."""
+    """A mission's places in its plane.
+
+    ``box`` (west, south, east, north) is the first window. ``good`` are the places of ``terminals`` on the terrain.
+    """
 
     terrain: Terrain
     frame: Frame
@@ -60,13 +63,13 @@ class Site:
     _loaded: WeakValueDictionary[int, MissionFile] = field(default_factory=WeakValueDictionary)
 
     def load(self, problems: list[Problem]) -> Ground | None:
-        """The first window; None and ``problems`` where there is no terrain."""
+        """The first window; None, and ``problems``, if there is no terrain."""
         return self._ground(self.box, None, problems, spare_m=0.0)
 
     def wider(self, source: MissionFile, margin_m: float, most_cells: int) -> MissionFile | None:
-        """See `MissionFile.wider`. A window that is too large gives way to the widest one that is not.
+        """See `MissionFile.wider`. If a window is too large, the widest one that is not is used.
 
-        With no margin to go by, all that is quickly looked at is taken at once.
+        If ``margin_m`` is infinite, the widest window that is quick to search is loaded at once.
         """
         at = source.level
         if math.isinf(margin_m):
@@ -75,7 +78,7 @@ class Site:
         return self._widest(source, self._level_for(margin_m, at), most_cells)
 
     def _widest(self, source: MissionFile, wanted: int, most_cells: int) -> MissionFile | None:
-        """The widest window after the source's, up to level ``wanted``, that has no more than ``most_cells``."""
+        """The widest window beyond the source's, up to level ``wanted``, that has at most ``most_cells``."""
         for level in range(wanted, source.level, -1):
             known = self._loaded.get(level)
             if known is not None and known.surface.ground_m.size <= most_cells:
@@ -105,7 +108,7 @@ class Site:
         return Ground(surface, tuple(zones), scale, tuple(r for r in requests if r is not None))
 
     def _level_for(self, margin_m: float, level: int) -> int:
-        """The first window after ``level`` that is so wide around all terminals, or so many times the first one."""
+        """The first level after ``level`` that extends ``margin_m`` beyond all terminals, or as far as the terrain."""
         east, north = zip(*(p.in_plane(self.frame) for p in self.good), strict=True)
         least, most = (min(east), min(north)), (max(east), max(north))
         need = self._clipped((*(x - margin_m for x in least), *(x + margin_m for x in most)))
@@ -116,8 +119,10 @@ class Site:
         return MOST_LEVELS
 
     def _box(self, level: int) -> Box:
-        """The window of a level, within the frame. Over flat ground it grows until no zone lies across its border:
-        beyond such a border there is nothing that a path could gain."""
+        """The window of a level, within the frame.
+
+        Over flat ground it grows until no zone crosses its border: beyond such a border a path can gain nothing.
+        """
         west, south, east, north = self.box
         if level == 0:
             return self.box
@@ -128,10 +133,10 @@ class Site:
         return self._clipped((west - more, south - more, east + more, north + more))
 
     def _clipped(self, box: Box) -> Box:
-        """``box`` as far as there is terrain, within the frame, and no smaller than the first window."""
+        """``box`` cut to the terrain and the frame, but not smaller than the first window."""
         if self._extent is None:
             self._extent = self.terrain.extent(self.frame, self.box)
-        # The edge itself lies inside, so that terrain that ends here is not taken for terrain that goes on.
+        # The edge itself stays inside, so that the planner sees that the terrain ends here.
         w, s, e, n = self._extent
         more = EDGE_M
         held = (max(box[0], w - more), max(box[1], s - more), min(box[2], e + more), min(box[3], n + more))
@@ -142,7 +147,7 @@ class Site:
 
 
 def _past_zones(box: Box, placed: Placed, spare_m: float) -> Box:
-    """``box`` grown past all zones that lie across its border, with ``spare_m`` beyond them."""
+    """``box`` grown past all zones that cross its border, with ``spare_m`` beyond them."""
     grown = True
     while grown:
         grown = False
@@ -162,7 +167,7 @@ def _within_frame(box: Box) -> Box:
 
 
 def _is_larger(wide: Surface, surface: Surface) -> bool:
-    """Whether a window reaches farther than another; the border of one is not loaded again and again."""
+    """Whether a window reaches farther than another, so that the border of one is not loaded again and again."""
     if wide.ground_m.shape != surface.ground_m.shape:
         return True
     far = wide.ground_m.shape[1] - 1, wide.ground_m.shape[0] - 1
@@ -171,7 +176,7 @@ def _is_larger(wide: Surface, surface: Surface) -> bool:
 
 
 def _moved(source: MissionFile, ground: Ground, level: int) -> MissionFile:
-    """``source`` on another window."""
+    """``source`` with another window."""
     before, now = source.surface.info, ground.surface.info
     old, new = (info.get("notes", ()) for info in (before, now))
     assert isinstance(old, tuple)

@@ -1,7 +1,7 @@
-"""Reads the parts of a mission file in their order and reports every mistake at once.
+"""Reads the parts of a mission file in order and reports every mistake at once.
 
-Each has its file, key path, what was given and what is wanted. What stands where: `schema` (keys), `vehicles` and
-`terminals` (vehicles, limits, where they go), `world` (points, terrain, zones).
+Each mistake has its file, its key path, the given value and the required one. The parts are in `schema` (keys),
+`vehicles` and `terminals` (vehicles, limits, start, via points and goal), and `world` (points, terrain, zones).
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
 
 TERRAIN_ERROR_M = 30.0
-"""How far a vehicle's own terrain may be shifted to fit its altitude at arming (ArduPilot's TERRAIN_OFS_MAX)."""
+"""Metres by which a vehicle's own terrain may be shifted to its altitude at arming (ArduPilot's TERRAIN_OFS_MAX)."""
 
 
 def load_mission(
@@ -61,17 +61,17 @@ def load_mission(
 ) -> MissionFile:
     """Read and judge a mission; nothing is planned yet.
 
-    ``source`` is one of: the path of a mission file (``str`` without a line break, or a path object); the YAML text
-    of one (``str`` with a line break); a mapping of the same keys, lists or tuples and numpy's numbers in it. With
-    ``text``, that is the content, and ``source`` the path that it would have (or nothing). Files that a mission names
-    are found relative to its own path, else to the current folder.
+    ``source`` is one of: the path of a mission file (a ``str`` without a line break, or a path object); the YAML text
+    of one (a ``str`` with a line break); a mapping of the same keys, which may contain lists, tuples and numpy numbers.
+    With ``text``, that is the content, and ``source`` is the path that it would have (or None). Files that a mission
+    names are found relative to its own path, or else to the current folder.
 
-    ``planner_names`` stand for the table of planners. ``around``: places (latitude, longitude) in degrees, besides the
-    mission's own, that the terrain shall be loaded for, where it holds them.
+    ``planner_names`` replaces the table of planners. ``around`` are places (latitude, longitude) in degrees, besides
+    the mission's own, for which terrain is loaded too if it covers them.
 
-    Gives a `MissionFile`: vehicles, zones and terrain in metres. Raises InputError with every problem that was found,
-    each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is ``mission``);
-    TypeError where ``source`` is none of these.
+    Returns a `MissionFile`: vehicles, zones and terrain in metres. Raises InputError with every problem that was found,
+    each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is called
+    ``mission``), and TypeError if ``source`` is none of these.
 
     Examples:
         >>> mission = load_mission({
@@ -91,7 +91,7 @@ def load_mission(
 
 
 class _Reading:
-    """One pass over one file: the steps in order, and what has been found wrong so far."""
+    """One pass over one file: the steps in order, and the problems found so far."""
 
     def __init__(
         self,
@@ -231,7 +231,7 @@ class _Reading:
             self.problems.append(Problem(where, f"must be a list of 1 to 255 vehicles, given {shown(value)}"))
             return []
         shared = self._section(LimitKeys, "limits") or LimitKeys()
-        # Where the shared limits are broken, a vehicle's own complaint of what it misses would be an echo.
+        # If the shared limits are broken, a vehicle's complaint about a missing limit would only repeat that.
         broken = any(p.where.startswith(f"{self.where}limits") for p in self.problems)
         if broken and shared.min_agl_m is None:
             shared = LimitKeys(min_agl_m=0.0)
@@ -276,7 +276,7 @@ class _Reading:
             drafts += make_zones(
                 keys, at, self.file.parent, f"no_fly[{i}]", self.problems, self.notes, local=self.local
             )
-        # Names from other people's files may repeat; reports need them apart.
+        # Names in zone files of other programs may repeat; reports need unique names.
         seen: Counter[str] = Counter()
         for k, draft in enumerate(drafts):
             name = one_line(draft.name)
@@ -285,7 +285,7 @@ class _Reading:
         return drafts
 
     def _far(self, far: list[ZoneDraft], frame: Frame) -> None:
-        """Zones that lie too far away to matter: a slip in this file, but natural in a file of a whole country."""
+        """Report zones too far away to matter: a mistake in this file, but normal in a zone file of a whole country."""
         left_out = 0
         for draft in far:
             if looks_swapped(draft, frame):

@@ -1,4 +1,4 @@
-"""What a mission file asks for, read and found good: metres inside, degrees where the door needs them."""
+"""The contents of a mission file, read and checked: metres inside, degrees where input and output need them."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ End = Literal["land", "loiter", "rtl", "none"]
 
 @dataclass(frozen=True, slots=True)
 class ArrivalRequest:
-    """How the fleet arrives; ``order`` names every vehicle once; ``interval_s`` holds for a sequence.
+    """How the fleet arrives. ``order`` names every vehicle once; ``interval_s`` applies to a sequence.
 
-    ``best_order``: the order is looked for, ``order`` is only that of the file. ``arrive_s``: when the first of a
-    sequence, or all together, are to be there; None: as ``clock`` has it, when the first can (``first``) or when the
-    whole fleet can (``fleet``). ``hold``: how a vehicle waits that would come too early: on the ground, at the gate
-    (the top of take-off), or not. ``window_s``: each may arrive this much earlier or later. ``pad_clear_s``: so long
-    after landing the pad is free again; None: never.
+    ``best_order``: the order is searched, and ``order`` is only that of the file. ``arrive_s`` is the arrival of the
+    first of a sequence, or of all together; None: by ``clock``, when the first can (``first``) or when the whole fleet
+    can (``fleet``). ``hold`` is where a vehicle waits that would arrive too early: on the ground, at the gate (the top
+    of take-off), or nowhere. ``window_s``: each may arrive this much earlier or later. ``pad_clear_s`` is the time
+    after a landing at which the pad is free again; None: never.
     """
 
     mode: Literal["sequence", "together", "none"]
@@ -41,12 +41,12 @@ class ArrivalRequest:
 
 @dataclass(frozen=True, eq=False)
 class VehicleRequest:
-    """What one vehicle shall do.
+    """The request for one vehicle.
 
-    ``start``, ``goal``: east_m, north_m and the *ground* there, AMSL metres; ``start_deg``, ``goal_deg`` the same as
-    (latitude, longitude), as written. ``start_amsl_m``, ``goal_amsl_m``: where they hang in the air instead (local
-    missions), else None. ``takeoff_agl_m``, ``approach_agl_m`` None: the lowest that the limits allow. ``via``:
-    east_m, north_m, agl_m or None for any height.
+    ``start``, ``goal`` are east_m, north_m and the AMSL metres of the *ground* there; ``start_deg``, ``goal_deg`` are
+    the same as (latitude, longitude), as written. ``start_amsl_m``, ``goal_amsl_m`` are their altitudes if they are in
+    the air (local missions), else None. ``takeoff_agl_m``, ``approach_agl_m`` None mean the lowest that the limits
+    allow. ``via`` holds east_m, north_m, and agl_m or None for any height.
     """
 
     vehicle: Vehicle
@@ -66,7 +66,7 @@ class VehicleRequest:
 
 @dataclass(frozen=True, slots=True)
 class PlannerRequest:
-    """Which planner, and how; ``extras`` are the keys that only some planners know."""
+    """The planner and its settings; ``extras`` are the keys that only some planners have."""
 
     name: str = "optimal"
     objective: Literal["length", "energy"] = "length"
@@ -79,14 +79,15 @@ class PlannerRequest:
 
 @dataclass(frozen=True, eq=False)
 class MissionFile:
-    """A mission file, read and found good; metres inside.
+    """A mission file, read and checked; metres inside.
 
-    ``airspace_scale``: largest scale of the plane over the terrain that was loaded. ``inputs`` is what the outputs say
-    of the sources; ``notes`` are said to the user. ``wider(margin_m, most_cells)``: the same file with more terrain
-    loaded, so far around all terminals or at least twice as far as here, or what there is of it; None where that would
-    take more cells, or there is no more. ``level`` counts the times that it was: the terrain of each holds that of the
-    one before. ``reaching(places)``: the same content read again, with terrain for these places (latitude, longitude),
-    too."""
+    ``airspace_scale`` is the largest scale of the plane over the loaded terrain. ``inputs`` describes the sources in
+    the outputs; ``notes`` are for the user. ``wider(margin_m, most_cells)`` returns the same file with more terrain
+    loaded: that far around all terminals, at least twice as far as here, or as far as there is terrain; None if that
+    takes more cells, or if there is no more. ``level`` counts the widenings; the terrain of each contains that of the
+    one before. ``reaching(places)`` reads the same content again, with terrain for these places (latitude, longitude)
+    too.
+    """
 
     name: str
     path: Path

@@ -1,8 +1,8 @@
-"""What may stand in a mission file, key by key, and pydantic's complaints in our words.
+"""The keys of a mission file, and the values that each may have.
 
-Every section is validated on its own, so that a mistake in one vehicle does not hide those in the others, nor the
-checks that need the terrain. Numbers are numbers: no text, no booleans, no NaN; every key that is not here is an
-error that names the nearest one that is.
+Every section is validated separately, so that a mistake in one vehicle does not hide those in the others, nor the
+checks that need the terrain. Numbers must be numbers: no text, no booleans, no NaN. A key that is not here is an error
+that names the nearest known one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
 _FAR = 1e6
 
 LEAST = 1e-3
-"""Of speeds and accelerations, and joules of a battery: what is divided by less has no bound."""
+"""Smallest speed, acceleration, or battery capacity in J: a division by less has no useful bound."""
 
 
 def _no_trifle(value: float) -> float:
@@ -48,18 +48,18 @@ SwarmCost = Literal["krill", "ssgwo", "msfoa", "abo", "ib-abc"]
 
 
 class Keys(BaseModel):
-    """A section of the file. What stands below a key says in the reference what it is (docs/_build_reference.py)."""
+    """A section of the file. The string below a key is its description in the reference (docs/_build_reference.py)."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
     @property
     def given(self) -> dict[str, Any]:
-        """The keys that stand in the file, with their values."""
+        """The keys that are in the file, with their values."""
         return {k: getattr(self, k) for k in self.model_fields_set}
 
 
 class LocalPoint(Keys):
-    """A point of a local frame; on the ground unless ``up_m`` or ``agl_m`` says otherwise."""
+    """A point of a local frame, on the ground unless it has ``up_m`` or ``agl_m``."""
 
     east_m: Metres
     """East of the frame's origin."""
@@ -96,7 +96,7 @@ class FrameKeys(Keys):
     origin: LatLon
     """Latitude and longitude of the point 0, 0."""
     amsl_m: Metres = 0.0
-    """Altitude above sea level of `up_m: 0`."""
+    """Altitude of `up_m: 0` above sea level."""
 
 
 class PeakKeys(Keys):
@@ -107,7 +107,7 @@ class PeakKeys(Keys):
     height_m: Metres
     """Height of its top above the flat ground."""
     decay_m: Annotated[list[Annotated[float, Field(ge=1e-3, le=_FAR)]], Field(min_length=2, max_length=2)]
-    """East and north: at this distance from the top it has fallen to 37 % (1/e) of its height."""
+    """East and north distance from the top at which the height has fallen to 37 % (1/e)."""
 
 
 def _count(value: Any) -> str:
@@ -127,133 +127,133 @@ class TerrainKeys(Keys):
     ) = None
     """A raster (.tif, .hgt, .asc), relative to this file, a list of tiles, or `sample:jacksboro`."""
     vertical_datum: Text | None = None
-    """What heights count from: `EGM96`, `NAVD88`, `WGS84` (ellipsoidal), …; wanted where the raster does not say."""
+    """The zero of heights: `EGM96`, `NAVD88`, `WGS84` (ellipsoidal), …; required if the raster does not state it."""
     geoid_grid: Text | None = None
     """Geoid raster that converts ellipsoidal heights; without it they are refused."""
     crs: Text | None = None
-    """Coordinate system of a raster that does not say, such as `EPSG:32617`."""
+    """Coordinate system of a raster that does not state it, such as `EPSG:32617`."""
     height_unit: Literal["m", "ft", "us_ft"] | None = None
-    """Of a raster that does not say."""
+    """Unit of heights in a raster that does not state it."""
     flat_m: Metres | None = None
-    """No raster: flat ground at this altitude. In a mission with a frame it counts above its zero."""
+    """No raster: flat ground at this altitude, in a mission with a frame above the frame's zero."""
     peaks: Annotated[list[PeakKeys], Field(min_length=1, max_length=1000)] | None = None
     """No raster: hills on flat ground, in a mission with a frame."""
     obstacle_height_m: Length = 0.0
-    """Trees and buildings, everywhere: added to the ground for `min_agl_m`, not for `max_agl_m`."""
+    """Height of trees and buildings everywhere: added to the ground for `min_agl_m`, not for `max_agl_m`."""
     canopy: Text | None = None
-    """A raster of heights above ground; where both are given the higher one counts."""
+    """A raster of heights above ground; together with `obstacle_height_m` the higher one counts."""
     canopy_nodata_m: Annotated[float, Field(ge=0.0, le=250.0)] | None = None
-    """Height of canopy cells without data; not given, the ground there is unknown."""
+    """Height of canopy cells without data; if absent, the ground there is unknown."""
 
 
 class LimitKeys(Keys):
-    """``limits:``; a vehicle may give any of them too."""
+    """``limits:``; a vehicle may have any of them too."""
 
     min_agl_m: Length | None = None
-    """Lowest height above ground and what stands on it; wanted, here or in every vehicle."""
+    """Lowest height above the ground and what stands on it; required here or in every vehicle."""
     max_agl_m: Positive | None = None
-    """Highest height above ground."""
+    """Greatest height above ground."""
     max_amsl_m: Metres | None = None
-    """Highest altitude above sea level."""
+    """Greatest altitude above sea level."""
     horizontal_clearance_m: Length | None = None
-    """No zone is nearer than this, and no ground within it reaches flight level."""
+    """Least distance to every zone, and to ground that reaches flight level."""
     track_error_m: Length | None = None
-    """How far the aircraft may be from its track; every check is widened by it."""
+    """Largest distance of the aircraft from its track; every check is widened by it."""
     altitude_error_m: Length | None = None
-    """How far the aircraft may be from its altitude; every check is widened by it."""
+    """Largest error of the aircraft's altitude; every check is widened by it."""
     max_climb_deg: Angle | None = None
-    """Steepest climb; not given: any for a multicopter, 15 for an arduplane."""
+    """Steepest climb; if absent, any for a multicopter, 15 for an arduplane."""
     max_descent_deg: Angle | None = None
-    """Steepest descent; not given: `max_climb_deg`."""
+    """Steepest descent; if absent, `max_climb_deg`."""
 
 
 class ZoneKeys(Keys):
     """One entry of ``no_fly:``: a circle, a polygon or a file."""
 
     name: Text | None = None
-    """Names it in messages and reports."""
+    """Name of the zone in messages and reports."""
     center: Point | None = None
-    """Middle of a circle; goes with `radius_m`."""
+    """Centre of a circle; needs `radius_m`."""
     radius_m: float | None = None
-    """Radius of a circle, 100 000 at most."""
+    """Radius of a circle, at most 100 000."""
     polygon: list[Point] | None = None
-    """Corners of a polygon, in order; it is closed by itself."""
+    """Corners of a polygon, in order; it is closed automatically."""
     file: Text | None = None
-    """Zones of a .geojson or .kml file; the other keys then stand in the file."""
+    """A .geojson or .kml file of zones; the other keys are then in that file."""
     floor_agl_m: Metres | None = None
-    """Lowest height above ground, point by point; not given or 0, nothing passes below."""
+    """Floor of the zone above ground, point by point; if absent or 0, nothing passes below."""
     ceiling_agl_m: Metres | None = None
-    """Highest height above ground, point by point; no ceiling: nothing passes above."""
+    """Ceiling of the zone above ground, point by point; without a ceiling, nothing passes above."""
     floor_amsl_m: Metres | None = None
-    """The same above sea level."""
+    """Floor of the zone above sea level."""
     ceiling_amsl_m: Metres | None = None
-    """The same above sea level."""
+    """Ceiling of the zone above sea level."""
 
 
 class EnergyKeys(Keys):
     """``energy:`` of a vehicle."""
 
     vertical_j_per_m: Annotated[float, Field(ge=0.0, le=1e9)] = 120.0
-    """Energy of a metre up or down."""
+    """Energy per metre up or down."""
     horizontal_j_per_m: Annotated[float, Field(ge=0.0, le=1e9)] = 100.0
-    """Energy of a metre along."""
+    """Energy per horizontal metre."""
     hover_w: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
-    """Power of standing still; a hold costs it."""
+    """Power of hovering; counts during a hold."""
     battery_j: Annotated[float, Field(gt=0.0, le=1e15), AfterValidator(_no_trifle)] | None = None
-    """Energy of the full battery; not given, the battery is not judged."""
+    """Energy of the full battery; if absent, the battery is not judged."""
     reserve: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.2
-    """Part of the battery that is left at the end, 0 to 1."""
+    """Part of the battery that must be left at the end, 0 to 1."""
 
 
 class VehicleKeys(LimitKeys):
     """One entry of ``vehicles:``."""
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)]
-    """Letters, digits, _ and -; names its files."""
+    """Name of the vehicle and of its files: letters, digits, _ and -."""
     sysid: Annotated[int, Field(ge=1, le=255)]
     """MAVLink system id."""
     autopilot: Literal["arducopter", "arduplane", "px4"]
-    """Whose rules the mission is written for and judged by."""
+    """The autopilot that the mission is written for and judged by."""
     start: Point
-    """Where it stands on the ground."""
+    """Place of the take-off, on the ground."""
     goal: Point
-    """Where it flies to."""
+    """Place to fly to."""
     takeoff_agl_m: Positive | None = None
-    """Top of the vertical take-off; the path begins there. Not given: the lowest that is legal."""
+    """Top of the vertical take-off, where the path begins; if absent, the lowest legal height."""
     approach_agl_m: Positive | None = None
-    """End of the path above the goal. Not given: the lowest that is legal."""
+    """End of the path above the goal; if absent, the lowest legal height."""
     via: Annotated[list[ViaPoint], Field(max_length=500)] = []
     """Points to pass, in order: a place, with or without its height above ground."""
     end: Literal["land", "loiter", "rtl", "none"] = "land"
     """What follows the path: a landing, a hold or circle, the autopilot's return, or nothing."""
     rtl_rel_home_m: Positive | None = None
-    """Height above home of the autopilot's own return; goes with `end: rtl`."""
+    """Height above home of the autopilot's own return; needed with `end: rtl`."""
     takeoff_heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | None = None
-    """Launch heading of a fixed wing; not given, the planner looks for one."""
+    """Launch heading of a fixed wing; if absent, the planner chooses one."""
     speed_m_s: Annotated[list[Speed], Field(min_length=2, max_length=2)] = [3.0, 15.0]
-    """Slowest and fastest cruise."""
+    """Slowest and fastest cruise speed."""
     climb_m_s: Speed = 2.5
-    """Fastest climb; slows steep legs."""
+    """Fastest climb rate; slows steep legs."""
     descent_m_s: Speed = 1.5
-    """Fastest descent; slows steep legs."""
+    """Fastest descent rate; slows steep legs."""
     land_m_s: Speed = 0.5
-    """Descent just above ground."""
+    """Descent rate just above the ground."""
     accel_m_s2: Accel = 1.5
-    """Speeding up and braking along the path."""
+    """Acceleration and braking along the path."""
     corner_accel_m_s2: Accel = 2.5
-    """Bounds the speed in a corner."""
+    """Acceleration that bounds the speed in a corner."""
     vertical_accel_m_s2: Accel = 1.0
-    """Speeding up and braking of take-off and landing."""
+    """Acceleration and braking in take-off and landing."""
     leg_jerk_m_s3: Accel = 1.0
-    """Of ArduPilot's S-curves, which bound the speed on a short leg."""
+    """Jerk of ArduPilot's S-curves, which bound the speed on a short leg."""
     turn_radius_m: Length = 0.0
     """Above 0: a fixed wing, whose corners are planned and judged as arcs."""
     energy: EnergyKeys = EnergyKeys()
-    """What flying costs."""
+    """Energy that flying takes."""
     link: Text | None = None
     """URL for `--upload link`."""
     limits: LimitKeys | None = None
-    """Limits of this vehicle alone; they may stand beside its other keys too."""
+    """Limits of this vehicle alone; they may also be written beside its other keys."""
 
 
 def _order_form(value: Any) -> Any:
@@ -269,23 +269,23 @@ class ArrivalKeys(Keys):
     """``arrival:``."""
 
     mode: Literal["sequence", "together", "none"]
-    """One after the other, all at once, or as each likes."""
+    """One after the other, all at the same time, or without a rule."""
     order: Annotated[_Order | None, BeforeValidator(_order_form)] = None
-    """Every vehicle's name once, or `best`; not given: the order of the file."""
+    """Every vehicle's name once, or `best`; if absent, the order of the file."""
     interval_s: Seconds | None = None
-    """Between one arrival and the next; a sequence needs it."""
+    """Time between one arrival and the next; required for a sequence."""
     arrive_s: Annotated[float, Field(gt=0.0, le=86400.0)] | None = None
-    """When the first is to arrive, or all together."""
+    """Arrival time of the first of a sequence, or of all together."""
     clock: Literal["first", "fleet"] | None = None
-    """Who sets the time of a sequence: the first vehicle, or the whole fleet."""
+    """Whose fastest flight sets the time of a sequence: the first vehicle's, or the whole fleet's."""
     hold: Literal["ground", "gate", "none"] = "ground"
-    """Where a vehicle waits that would come too early."""
+    """Where a vehicle waits that would arrive too early."""
     window_s: Seconds = 0.0
-    """Each may arrive so much earlier or later."""
+    """Each vehicle may arrive this much earlier or later."""
     pad_clear_s: Seconds | None = None
-    """So long after a landing the pad is free again; not given: never."""
+    """Time after a landing at which the pad is free again; if absent, never."""
     separation_m: Length | None = None
-    """Least distance of every pair, from take-off to landing."""
+    """Least distance between any two vehicles, from take-off to landing."""
 
 
 def _plain_values(parameters: dict[str, Any]) -> dict[str, Any]:
@@ -301,63 +301,63 @@ class PlannerKeys(Keys):
     name: Text = "optimal"
     """One of the [planners](planners.md)."""
     objective: Literal["length", "energy"] = "length"
-    """What is made least."""
+    """The quantity to minimise."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 1
-    """Of everything random."""
+    """Seed of all random numbers."""
     gap_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
-    """Planning stops when path and bound are that near."""
+    """Planning stops when path and bound are this near to each other."""
     budget_s: Annotated[float, Field(gt=0.0, le=86400.0)] = 10.0
-    """Time for what comes after the first path; a first path may take three times as long."""
+    """Time for the search after the first path; a first path may take three times as long."""
     budget_mb: Annotated[float, Field(ge=64.0, le=1e6)] = 1024.0
-    """Memory for the searches, above the terrain itself."""
+    """Memory for the searches, in addition to the terrain itself."""
     encoding: Encoding | None = None
-    """How a swarm's numbers become a path."""
+    """How the numbers of a swarm become a path."""
     cost: SwarmCost | None = None
-    """Which paper's cost a swarm makes least."""
+    """The paper whose cost a swarm minimises."""
     points: Annotated[int, Field(ge=1, le=1000)] | None = None
-    """Way points of a swarm's path."""
+    """Number of way points of a swarm's path."""
     population: Annotated[int, Field(ge=2, le=100_000)] | None = None
-    """Members of a swarm."""
+    """Number of members of a swarm."""
     iterations: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
-    """Rounds of a swarm."""
+    """Number of iterations of a swarm."""
     evaluations: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
-    """Paths that a swarm may try."""
+    """Most paths that a swarm may try."""
     parameters: Annotated[dict[str, Any], AfterValidator(_plain_values)] | None = None
-    """A swarm's own parameters, by their names."""
+    """A swarm's own parameters, by name."""
 
 
 class MissionKeys(Keys):
-    """The whole file. Each of its sections is read on its own."""
+    """The whole file. Each of its sections is read separately."""
 
     version: Literal[1]
     """Version of this format."""
     name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
-    """Of the mission; not given: the file's own name."""
+    """Name of the mission; if absent, the file's own name."""
     terrain: TerrainKeys
     """The ground, and what stands on it."""
     limits: LimitKeys | None = None
-    """What every vehicle is held to; a vehicle may override any of them."""
+    """Limits of every vehicle; a vehicle may override any of them."""
     no_fly: list[ZoneKeys] = []
-    """Zones that nobody enters."""
+    """Zones that no vehicle enters."""
     vehicles: Annotated[list[VehicleKeys], Field(min_length=1, max_length=255)]
-    """Who flies, from where to where."""
+    """The vehicles, with their starts and goals."""
     arrival: ArrivalKeys | None = None
-    """How several vehicles arrive; not given, their separation is not judged."""
+    """How several vehicles arrive; if absent, their separation is not judged."""
     planner: PlannerKeys = PlannerKeys()
-    """Who plans, for what, how long."""
+    """The planner, its objective and its budget."""
     altitude_frame: Literal["relative", "amsl", "terrain"] = "relative"
-    """What the mission's altitudes count from: home, the sea, or the ground (not for px4)."""
+    """What the mission's altitudes count from: home, sea level, or the ground (not for px4)."""
     frame: FrameKeys | None = None
-    """Makes this a mission in local metres, as the papers' worlds are."""
+    """Makes this a mission in local metres, like the papers' worlds."""
     terrain_error_m: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
-    """With `altitude_frame: terrain`: how far the vehicle's own terrain may be off."""
+    """With `altitude_frame: terrain`: largest error of the vehicle's own terrain."""
 
 
 TOP_KEYS = tuple(MissionKeys.model_fields)
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it: short, and telling text from numbers."""
+    """A value in the words of a message: short, with text distinguished from numbers."""
     if value is None:
         return "nothing"
     if isinstance(value, str):
@@ -374,6 +374,6 @@ def shown(value: Any) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """`` (did you mean …?)`` or nothing."""
+    """``; did you mean …?`` with the nearest known word, or an empty text."""
     close = difflib.get_close_matches(word[:80], list(known), n=1, cutoff=0.6)
     return f"; did you mean {close[0]}?" if close else ""

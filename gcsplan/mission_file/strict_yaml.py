@@ -1,7 +1,7 @@
-"""YAML as people mean it: the core schema of YAML 1.2, no tags, no duplicate keys, and bounds on everything.
+"""YAML as its authors mean it: the core schema of YAML 1.2, no tags, no duplicate keys, everything bounded.
 
-PyYAML alone reads ``5.0e6`` as text, ``no`` as False and ``12:30`` as 750, lets a key overwrite its twin in silence,
-and can be made to spend all memory on a few lines of aliases.
+PyYAML alone reads ``5.0e6`` as text, ``no`` as False and ``12:30`` as 750, silently lets a key overwrite its duplicate,
+and can be made to use all memory by a few lines of aliases.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MAX_BYTES = 5_000_000
 MAX_DEPTH = 40
 MAX_ALIASES = 200
 MAX_NODES = 500_000
-"""After every alias is followed."""
+"""Most values, with every alias expanded."""
 
 _TAG = "tag:yaml.org,2002:"
 _PLAIN = "plain"
@@ -32,7 +32,7 @@ _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _Loader(_Base):  # type: ignore[misc]
-    """Marks plain scalars with a tag of their own: what they mean is decided in `_scalar`."""
+    """Marks plain scalars with a tag of their own, so that `_scalar` decides their type."""
 
     def resolve(self, kind: type[yaml.Node], value: str, implicit: Any) -> str:
         if kind is yaml.ScalarNode:
@@ -41,9 +41,9 @@ class _Loader(_Base):  # type: ignore[misc]
 
 
 def read_yaml(text: str, *, where: str) -> Any:
-    """The one document in ``text``: dicts with text keys, lists, str, int, float, bool, None.
+    """The single document in ``text``: dicts with text keys, lists, str, int, float, bool, None.
 
-    Raises InputError, with line and column, for anything that is not YAML, for tags, duplicate keys, and text beyond
+    Raises InputError, with line and column, for text that is not YAML, for tags, duplicate keys, and for text beyond
     the bounds of this module.
     """
     if len(text) > MAX_BYTES:
@@ -68,7 +68,7 @@ def read_yaml(text: str, *, where: str) -> Any:
 
 
 def _measure(text: str, where: str) -> None:
-    """Refuse bombs while they are still a stream of events: composing them would recurse without end."""
+    """Refuse oversized text by its stream of events, since composing it first could recurse without end."""
     depth = nodes = aliases = 0
     for event in yaml.parse(text, Loader=_Loader):
         nodes += isinstance(event, yaml.NodeEvent)
@@ -85,7 +85,7 @@ def _measure(text: str, where: str) -> None:
 
 
 def _count(node: yaml.Node, sizes: dict[int, int], where: str) -> int:
-    """Values below ``node`` with every alias followed; refuses loops and too many."""
+    """The number of values below ``node`` with every alias expanded; refuses loops and more than `MAX_NODES`."""
     if isinstance(node, yaml.ScalarNode):
         return 1
     known = sizes.get(id(node))
@@ -136,7 +136,7 @@ def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
 
 def _scalar(node: yaml.Node, where: str) -> Any:
     text = node.value
-    if node.tag != _PLAIN:  # quoted, a block of text, or with a tag of its own
+    if node.tag != _PLAIN:  # quoted, a block of text, or with an explicit tag
         _require_tag(node, "str", where)
         return text
     if _NULL.match(text):
@@ -144,7 +144,7 @@ def _scalar(node: yaml.Node, where: str) -> Any:
     if _BOOL.match(text):
         return text[0] in "tT"
     if _INT.match(text):
-        if len(text) > 4000:  # int() has a limit of its own, a little above
+        if len(text) > 4000:  # Python's int() has a limit slightly above
             raise InputError(f"a number of {len(text)} digits", where=_place(where, node.start_mark))
         base = {"0o": 8, "0x": 16}.get(text[:2], 10)
         return int(text, base)

@@ -1,4 +1,4 @@
-"""Where one vehicle starts, passes and arrives, on the ground and among the zones that are really there."""
+"""Start, via points and goal of one vehicle, checked against the ground and the zones."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Zone
 
 ON_GROUND_M = 0.5
-"""An ``up_m`` this near to the ground stands on it."""
+"""An ``up_m`` within this distance of the ground, m, counts as on the ground."""
 
 
 @dataclass(frozen=True, slots=True)
 class Terminals:
-    """One vehicle's keys and places, None where they are no good."""
+    """One vehicle's keys and places; None where they are wrong."""
 
     keys: VehicleKeys
     vehicle: Vehicle | None
@@ -31,13 +31,13 @@ class Terminals:
 
     @property
     def all(self) -> list[Place]:
-        """Those that are good so far."""
+        """The places that are right so far."""
         return [p for p in (self.start, self.goal, *self.via) if p is not None]
 
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """A start or goal: east, north, ground, and its height where it hangs above that."""
+    """A start or goal: east, north, ground, and its altitude if it is above the ground."""
 
     at: tuple[float, float, float]
     amsl_m: float | None
@@ -51,9 +51,9 @@ def make_request(
     good: Collection[Place],
     problems: list[Problem],
 ) -> VehicleRequest | None:
-    """A vehicle's request on its ground; None and ``problems`` where a place is on unknown ground or in a zone.
+    """A vehicle's request over the ground; None, and ``problems``, if a place is on unknown ground or in a zone.
 
-    Only places in ``good`` are looked at: the others are in ``problems`` already.
+    Only places in ``good`` are checked; the others are in ``problems`` already.
     """
     before = len(problems)
     keys, start, goal = terminals.keys, None, None
@@ -84,7 +84,7 @@ def make_request(
 
 
 def _ground(place: Place, frame: Frame, surface: Surface, problems: list[Problem]) -> tuple[float, float, float] | None:
-    """East, north and ground; None and a problem where the ground is unknown."""
+    """East, north and ground; None, and a problem, if the ground is unknown."""
     east, north = place.in_plane(frame)
     ground_m = float(surface.ground_at(east, north))
     if math.isnan(ground_m):
@@ -133,7 +133,7 @@ def _via(
     east, north, ground_m = at
     agl_m = place.agl_m if place.up_m is None else frame.amsl_m + place.up_m - ground_m
     if agl_m is None:
-        # Any height will do, unless a zone takes all of them.
+        # Any height is acceptable, unless a zone occupies all heights.
         walls = [z for z in zones if z.floor is None and z.ceiling is None]
         zone = zone_around(walls, east, north, ground_m, ground_m)
     else:

@@ -1,4 +1,4 @@
-"""Vehicles, limits and order of arrival out of the keys of a mission file: everything that needs no terrain."""
+"""Vehicles, limits and order of arrival from the keys of a mission file: everything that needs no terrain."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 
 ERRORS = {"horizontal_clearance_m": 30.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
-"""What holds in a mission on the real Earth where the file does not say; in local metres they are 0."""
+"""Defaults in metres for a mission on the real Earth; in local metres the defaults are 0."""
 
 PLANE_CLIMB_DEG = 15.0
-"""A fixed wing is never taken to climb at any angle."""
+"""Default steepest climb of an ArduPlane: a fixed wing cannot climb at any angle."""
 
 STEEPEST_WING_DEG = 45.0
 
 MOST_BANK_DEG = 45.0
-"""ArduPlane's ROLL_LIMIT_DEG, default."""
+"""ArduPlane's default of ROLL_LIMIT_DEG."""
 
 GRAVITY_M_S2 = 9.80665
 
@@ -31,14 +31,14 @@ SEPARATION_M = 30.0
 MOTION = (
     "climb_m_s", "descent_m_s", "land_m_s", "accel_m_s2", "corner_accel_m_s2", "vertical_accel_m_s2", "leg_jerk_m_s3",
 )  # fmt: skip
-"""What bounds a vehicle's motion besides its cruise speed. In local metres (the papers' worlds) what is not given does
-not bound it: speed is instant, and counts in space."""
+"""The keys that bound a vehicle's motion besides its cruise speed. In local metres (the papers' worlds) an absent key
+is no bound: speed changes at once, and counts in space."""
 
 
 def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -> tuple[str, ...]:
-    """Find doubled names and system ids among the vehicles as written; returns the names.
+    """Report duplicate names and system ids among the vehicles as written; returns the names.
 
-    Names differ by more than upper and lower case: they become file names.
+    Names must differ by more than upper and lower case, because they become file names.
     """
     names: dict[str, int] = {}
     sysids: dict[int, int] = {}
@@ -61,9 +61,9 @@ def make_vehicle(
     keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Problem], notes: list[str],
     *, local: bool, obstacle_m: float,
 ) -> Vehicle | None:  # fmt: skip
-    """A vehicle with its limits merged: the file's, overridden by its own. None and ``problems`` where it is off.
+    """A vehicle with its limits merged: the file's, overridden by its own. None, and ``problems``, if it is wrong.
 
-    ``obstacle_m``: obstacle height that holds everywhere, added to min AGL in what take-off must reach.
+    ``obstacle_m`` is the obstacle height that applies everywhere; it is added to min AGL in the least take-off height.
     """
     before = len(problems)
     limits = _limits(keys, shared, where, problems, notes, local=local)
@@ -93,7 +93,7 @@ def make_vehicle(
 
 
 def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Problem]) -> None:
-    """What turns with a radius must fly: only ArduPlane begins them where the mission says."""
+    """Check a vehicle with a turn radius: only ArduPlane begins turns where the mission says."""
     radius, at = keys.turn_radius_m, f"{where}.turn_radius_m"
     if keys.autopilot == "arducopter":
         words = f"a multicopter has no turn radius: use 0, or autopilot: arduplane for a fixed wing, given {radius:g}"
@@ -123,7 +123,7 @@ def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: 
 
 
 def _wing_motion(keys: VehicleKeys, limits: Limits) -> dict[str, float]:
-    """A fixed wing's speed is constant: its slopes are its limits', unless rates are given."""
+    """Rates of a fixed wing: its speed is constant, so they follow from the slope limits unless they are given."""
     fast = keys.speed_m_s[1]
     rates = {
         "climb_m_s": fast * limits.max_climb_slope,
@@ -171,7 +171,7 @@ def _limits(
 
 
 def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list[Problem], obstacle_m: float) -> None:
-    """Room between min and max AGL, and take-off, approach and via heights within it."""
+    """Check that max AGL leaves room above min AGL, and that take-off, approach and via heights are within it."""
     error_m = limits.altitude_error_m
     low = limits.min_agl_m + error_m + obstacle_m
     words = f"min_agl_m {limits.min_agl_m:g} + altitude_error_m {error_m:g}"
@@ -209,7 +209,7 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
 def make_arrival(
     keys: ArrivalKeys | None, names: Collection[str], where: str, problems: list[Problem]
 ) -> ArrivalRequest | None:
-    """The order of arrival; ``names`` are the vehicles' as written."""
+    """The fleet's arrival; ``names`` are the vehicles' names as written."""
     if keys is None:
         return None
     order = keys.order if isinstance(keys.order, list) else list(names)

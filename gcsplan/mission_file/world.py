@@ -1,4 +1,4 @@
-"""Where a mission takes place: its points, plane, piece of terrain, and zones, judged against each other."""
+"""The place of a mission: its points, plane, part of the terrain, and zones, checked against each other."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gcsplan.world.zones import Circle, Level, Zone
 Box = tuple[float, float, float, float]
 
 MARGIN_M, MARGIN_PART, MARGIN_MOST_M = 3000.0, 1.0, 25_000.0
-"""Room for detours around a mission's points: metres, or this part of their extent if that is more."""
+"""Margin for detours: the first, m, or this part of the points' extent if larger, up to the third, m."""
 
 LOCAL_MARGIN_M, LOCAL_MARGIN_PART = 50.0, 0.5
 
@@ -31,7 +31,7 @@ _MANY_NODES = 250_000
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A point as it was written: degrees, or metres of the local frame with a height above its zero or ground."""
+    """A point as written: in degrees, or in metres of the local frame with a height above its zero or the ground."""
 
     where: str
     degrees: tuple[float, float] | None = None
@@ -48,7 +48,7 @@ class Place:
         return float(east), float(north)
 
     def in_degrees(self, frame: Frame) -> tuple[float, float]:
-        """Latitude and longitude; as they were written, where they were."""
+        """Latitude and longitude; unchanged if they were written in degrees."""
         if self.degrees is not None:
             return self.degrees
         assert self.metres is not None
@@ -57,7 +57,7 @@ class Place:
 
 
 def make_place(point: list[float] | LocalPoint, where: str, problems: list[Problem], *, local: bool) -> Place | None:
-    """A point of the file; None and ``problems`` where it cannot be a place."""
+    """A point of the file; None, and ``problems``, if it cannot be a place."""
     if isinstance(point, LocalPoint):
         if not local:
             problems.append(Problem(where, "local metres need `frame: {origin: [lat, lon], amsl_m: …}` in the mission"))
@@ -70,7 +70,7 @@ def make_place(point: list[float] | LocalPoint, where: str, problems: list[Probl
 
 
 def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
-    """The terrain as `gcsplan.world.terrain` takes it; paths are made relative to the mission file's folder."""
+    """The terrain in the form of `gcsplan.world.terrain`; paths are relative to the mission file's folder."""
     dem = () if keys.dem is None else (keys.dem,) if isinstance(keys.dem, str) else tuple(keys.dem)
     return TerrainSpec(
         dem=tuple(d if d.startswith("sample:") else str(folder / d) for d in dem),
@@ -87,7 +87,7 @@ def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
 
 
 def covered(places: Sequence[Place], terrain: Terrain, problems: list[Problem]) -> list[Place]:
-    """The places that the DEM holds; the others go to ``problems``, with a guess at swapped numbers."""
+    """The places that the DEM covers; the others go to ``problems``, with a guess at swapped numbers."""
     good = []
     for place in places:
         if place.degrees is None or terrain.covers(*place.degrees):
@@ -103,7 +103,7 @@ def covered(places: Sequence[Place], terrain: Terrain, problems: list[Problem]) 
 
 
 def make_frame(places: Sequence[Place], keys: FrameKeys | None, problems: list[Problem], where: str) -> Frame | None:
-    """The mission's plane; None and ``problems`` where the points are too far apart for one."""
+    """The mission's plane; None, and ``problems``, if the points are too far apart for one plane."""
     try:
         if keys is not None:
             frame = Frame(keys.origin[0], keys.origin[1], keys.amsl_m)
@@ -124,23 +124,23 @@ def make_frame(places: Sequence[Place], keys: FrameKeys | None, problems: list[P
 
 
 def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, local: bool) -> Box:
-    """The piece of the plane that a planner may need: the points with room for detours, and around near zones."""
+    """The part of the plane that a planner may need: the points with room for detours, and around near zones."""
     p = np.asarray(points, float)
     low, high = p.min(axis=0), p.max(axis=0)
     least, part = (LOCAL_MARGIN_M, LOCAL_MARGIN_PART) if local else (MARGIN_M, MARGIN_PART)
     extent = float((high - low).max())
-    # A way round a ridge may be as long as the mission itself: the map's border must not be what forbids it.
+    # A detour around a ridge may be as long as the mission itself, and the map's border must not prevent it.
     margin = max(least, min(part * extent, MARGIN_MOST_M), 0.25 * extent)
     box = np.array([*(low - margin), *(high + margin)])
     grown = box.copy()
-    # Past the end of a zone there must be room for its clearance twice: from the zone, and from unknown ground.
+    # Past the end of a zone twice its clearance must fit: from the zone, and from unknown ground.
     beside = max(least, 0.1 * extent)
     for zone in zones:
         west, south, east, north = zone.bounds
         if west < box[2] and east > box[0] and south < box[3] and north > box[1]:
             grown[:2] = np.minimum(grown[:2], (west - beside, south - beside))
             grown[2:] = np.maximum(grown[2:], (east + beside, north + beside))
-    # A zone as large as a country must not load a country's DEM.
+    # A zone as large as a country must not make gcsplan load a country's DEM.
     grown[:2] = np.maximum(grown[:2], low - 3.0 * margin)
     grown[2:] = np.minimum(grown[2:], high + 3.0 * margin)
     return float(grown[0]), float(grown[1]), float(grown[2]), float(grown[3])
@@ -149,7 +149,7 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
 def make_zones(
     keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[str], *, local: bool
 ) -> list[ZoneDraft]:
-    """The zones of one entry of ``no_fly``: one, or all of a file's."""
+    """The zones of one entry of ``no_fly``: a single zone, or all zones of a file."""
     kinds = [k for k in ("center", "polygon", "file") if getattr(keys, k) is not None]
     if len(kinds) != 1:
         given = " and ".join(kinds) or "none"
@@ -190,8 +190,10 @@ def make_zones(
 
 
 def settle_zones(placed: Sequence[tuple[ZoneDraft, Zone]], surface: Surface, problems: list[Problem]) -> list[Zone]:
-    """Zones with what the ground decides: one wholly under it goes to ``problems``, a floor that is nowhere above it
-    is no floor (nothing passes below the zone)."""
+    """The zones after comparison with the ground.
+
+    A zone wholly under ground goes to ``problems``. A floor nowhere above ground is removed (nothing passes below).
+    """
     zones = []
     for draft, zone in placed:
         floor, ceiling = zone.floor, zone.ceiling
@@ -222,7 +224,7 @@ def settle_zones(placed: Sequence[tuple[ZoneDraft, Zone]], surface: Surface, pro
 
 
 def zone_around(zones: Sequence[Zone], east_m: float, north_m: float, amsl_m: float, ground_m: float) -> Zone | None:
-    """The first zone with the point strictly inside; touching is outside."""
+    """The first zone with the point strictly inside; a point on the border is outside."""
     for zone in zones:
         west, south, east, north = zone.bounds
         if not (west < east_m < east and south < north_m < north):
@@ -231,7 +233,7 @@ def zone_around(zones: Sequence[Zone], east_m: float, north_m: float, amsl_m: fl
         if isinstance(shape, Circle):
             inside = math.hypot(east_m - shape.east_m, north_m - shape.north_m) < shape.radius_m
         else:
-            import shapely  # many missions have no polygons
+            import shapely  # imported here because many missions have no polygons
 
             inside = bool(shapely.Polygon(shape.vertices).contains(shapely.Point(east_m, north_m)))
         if (
@@ -248,7 +250,7 @@ def _amsl(level: Level, ground_m: float) -> float:
 
 
 def _crossed(floor: Level | None, ceiling: Level | None, low: float, high: float) -> float | None:
-    """How far a floor of one datum is above a ceiling of the other everywhere; None where it is not."""
+    """Least height of a floor of one datum above a ceiling of the other, if it is above everywhere; None otherwise."""
     if floor is None or ceiling is None or floor.datum == ceiling.datum:
         return None
     gap = floor.value_m - ceiling.value_m + (low if floor.datum == "agl" else -high)
@@ -256,9 +258,9 @@ def _crossed(floor: Level | None, ceiling: Level | None, low: float, high: float
 
 
 def _ground_under(zone: Zone, surface: Surface) -> tuple[float, float] | None:
-    """Lowest and highest known ground within a zone's outline; None where none is known.
+    """Lowest and highest known ground within a zone's outline; None if none is known.
 
-    A bilinear surface has its extremes over a region on its nodes inside and on the region's border.
+    A bilinear surface has its extremes over a region at the nodes inside it and on its border.
     """
     shape = zone.shape
     west, south, east, north = zone.bounds
@@ -288,7 +290,8 @@ def _ground_under(zone: Zone, surface: Surface) -> tuple[float, float] | None:
 
                 inside = shapely.contains_xy(shapely.Polygon(shape.vertices), plane[..., 0], plane[..., 1])
             block = block[inside]
-        # Beyond that the whole rectangle is taken: its extremes enclose the true ones, so nothing is refused wrongly.
+        # With more nodes the whole rectangle is used: its extremes enclose the true ones, so no zone is refused
+        # wrongly.
         heights = np.concatenate([heights, block.ravel()])
     heights = heights[np.isfinite(heights)]
     return (float(heights.min()), float(heights.max())) if heights.size else None

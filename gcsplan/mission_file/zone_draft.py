@@ -1,4 +1,4 @@
-"""No-fly zones as people write them, in degrees or local metres, and their way into the plane."""
+"""No-fly zones as users write them, in degrees or local metres, and their conversion into the plane."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
 MAX_VERTICES = 100_000
-"""Of one polygon."""
+"""Most vertices of one polygon."""
 
 
 @dataclass(frozen=True, slots=True)
 class ZoneDraft:
     """A zone before there is a plane.
 
-    ``points``: the centre alone (with ``radius_m``) or a polygon's vertices, not closed: (latitude, longitude)
-    degrees, or (east_m, north_m) where ``local``. ``where`` is its place in the user's file.
+    ``points`` is the centre alone (with ``radius_m``) or a polygon's vertices, not closed: (latitude, longitude) in
+    degrees, or (east_m, north_m) if ``local``. ``where`` is its place in the user's file.
     """
 
     name: str
@@ -43,7 +43,7 @@ class ZoneDraft:
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """The four words for a zone's floor and ceiling, as given; None where not given."""
+    """The four keys for a zone's floor and ceiling; None if absent."""
 
     floor_agl_m: float | None = None
     ceiling_agl_m: float | None = None
@@ -93,7 +93,7 @@ def circle(
     name: str, where: str, centre: tuple[float, float], radius_m: float, bounds: Bounds, problems: list[Problem],
     *, local: bool = False,
 ) -> ZoneDraft | None:  # fmt: skip
-    """A cylinder; None, and ``problems`` grown, where it is not a good one."""
+    """A cylinder; None, and new ``problems``, if it is wrong."""
     before = len(problems)
     if not 0.0 < radius_m <= LARGEST_RADIUS_M:
         problems.append(
@@ -114,7 +114,7 @@ def polygon(
     name: str, where: str, points: Sequence[tuple[float, float]], bounds: Bounds, problems: list[Problem],
     *, local: bool = False, key: str = "polygon",
 ) -> ZoneDraft | None:  # fmt: skip
-    """A prism; None, and ``problems`` grown, where its outline is not simple or its bounds contradict."""
+    """A prism; None, and new ``problems``, if its outline is not simple or its bounds contradict each other."""
     before = len(problems)
     at = f"{where}.{key}" if key else where
     if len(points) > MAX_VERTICES:
@@ -123,7 +123,7 @@ def polygon(
     if not local:
         for i, point in enumerate(points):
             if not check_degrees(point, f"{at}[{i}]", problems):
-                break  # one swapped point means that all are
+                break  # one swapped point means that all are swapped
     floor, ceiling = bounds.levels(where, problems)
     if len(problems) > before:
         return None
@@ -135,7 +135,7 @@ def polygon(
 
 
 def check_degrees(point: tuple[float, float], where: str, problems: list[Problem]) -> bool:
-    """True where (latitude, longitude) may be a place; else ``problems`` grow, by a guess at swapped numbers too."""
+    """Whether (latitude, longitude) can be a place; if not, a problem is added, with a guess at swapped numbers."""
     lat, lon = point
     if abs(lat) <= 90.0 and abs(lon) <= 180.0:
         return True
@@ -151,10 +151,10 @@ def check_degrees(point: tuple[float, float], where: str, problems: list[Problem
 
 
 def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[ZoneDraft, Zone]], list[ZoneDraft]]:
-    """Each draft's zones in the plane (a polygon cut at the edge of the world may give several, or none).
+    """Each draft's zones in the plane, and the drafts that are too far away to matter.
 
-    Also the drafts that lie too far away to matter. Polygons are cut to what is within `FAR_M`: beyond that no
-    mission goes.
+    A polygon cut at the edge of the world may give several zones, or none. Polygons are cut to `FAR_M`: no mission goes
+    beyond that.
     """
     placed: list[tuple[ZoneDraft, Zone]] = []
     far: list[ZoneDraft] = []
@@ -169,7 +169,7 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
 
 
 def looks_swapped(draft: ZoneDraft, frame: Frame) -> bool:
-    """True where a zone that is far away would be near with latitude and longitude the other way round."""
+    """Whether a far zone would be near if latitude and longitude were exchanged."""
     if draft.local or any(abs(lon) > 85.0 for _, lon in draft.points):
         return False
     turned = replace(draft, points=tuple((lon, lat) for lat, lon in draft.points))
@@ -177,12 +177,12 @@ def looks_swapped(draft: ZoneDraft, frame: Frame) -> bool:
 
 
 def one_line(text: str) -> str:
-    """``text`` fit for tables, files and terminals: one line, no control characters, no halves of surrogates."""
+    """``text`` for tables, files and terminals: one line, no control characters, no halves of surrogate pairs."""
     return "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in text).strip()
 
 
 def zones_sha256(drafts: Sequence[ZoneDraft]) -> str:
-    """Hash of what the zones say, wherever they were written and however they were laid out."""
+    """Hash of the zones' contents, independent of where and in what layout they were written."""
     plain = [
         [d.name, d.points, d.local, d.radius_m, d.floor and str(d.floor), d.ceiling and str(d.ceiling)] for d in drafts
     ]

@@ -1,8 +1,8 @@
-"""Zones from other people's files: what one file holds, whichever format it has.
+"""The zones of one file from another program, in any of the formats.
 
-Polygons are prisms, Points with ``radius_m`` cylinders; ``floor_agl_m``, ``ceiling_agl_m``, ``floor_amsl_m``,
-``ceiling_amsl_m`` stand in a feature's properties, or in a Placemark's ExtendedData. What cannot be understood is
-refused, never skipped: a zone that is left out is a zone that is flown through. A hole counts as no-fly.
+Polygons are prisms, Points with ``radius_m`` are cylinders. ``floor_agl_m``, ``ceiling_agl_m``, ``floor_amsl_m``,
+``ceiling_amsl_m`` are in a feature's properties, or in a Placemark's ExtendedData. A feature that cannot be understood
+is refused, never skipped, because a zone that is left out would be flown through. A hole counts as no-fly.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, circle, polygon
 
 MAX_ZONES = 20_000
 LARGEST_M = 1e6
-"""A height or radius beyond it is a slip."""
+"""A height or radius above this, m, is a mistake."""
 
 LEVEL_KEYS = ("floor_agl_m", "ceiling_agl_m", "floor_amsl_m", "ceiling_amsl_m")
 
 
 @dataclass
 class ZoneFile:
-    """What one file holds; ``problems`` are its mistakes, each with its place."""
+    """The contents of one file; ``problems`` are its mistakes, each with its place."""
 
     path: Path
     zones: list[ZoneDraft] = field(default_factory=list)
@@ -31,13 +31,13 @@ class ZoneFile:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Said to the user."""
+        """Notes for the user."""
         if not self.holes:
             return ()
         return (f"{self.path.name}: {self.holes} hole(s) in polygons count as no-fly",)
 
     def add_ring(self, name: str, where: str, ring: list[tuple[float, float]], bounds: Bounds, key: str) -> None:
-        """A polygon's outline, (latitude, longitude)."""
+        """Add a polygon by its outline, (latitude, longitude)."""
         if self._room(where):
             draft = polygon(name, where, ring, bounds, self.problems, key=key)
             self.zones += [draft] if draft is not None else []
@@ -45,7 +45,7 @@ class ZoneFile:
     def add_circle(
         self, name: str, where: str, centre: tuple[float, float], radius_m: float | None, bounds: Bounds
     ) -> None:
-        """A point, (latitude, longitude), which must have a radius."""
+        """Add a circle by its centre, (latitude, longitude); a missing radius is a problem."""
         if radius_m is None:
             self.problems.append(Problem(where, "a Point needs radius_m to be a zone"))
         elif self._room(where):

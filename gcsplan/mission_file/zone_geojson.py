@@ -14,7 +14,7 @@ from gcsplan.mission_file.zone_file import LARGEST_M, LEVEL_KEYS, ZoneFile
 
 
 def read_geojson(path: Path, data: bytes) -> ZoneFile:
-    """Zones of GeoJSON text. Raises InputError where it is not GeoJSON."""
+    """The zones of GeoJSON text. Raises InputError if it is not GeoJSON."""
     found = ZoneFile(path)
     try:
         whole = json.loads(
@@ -22,7 +22,7 @@ def read_geojson(path: Path, data: bytes) -> ZoneFile:
         )
     except RecursionError:
         raise InputError("the file is nested too deeply to be GeoJSON", where=str(path)) from None
-    except ValueError as why:  # bad UTF-8, bad JSON, and our own refusals
+    except ValueError as why:  # bad UTF-8, bad JSON, and the refusals below
         raise InputError(f"this is not GeoJSON: {str(why)[:200]}", where=str(path)) from None
     if not isinstance(whole, dict):
         raise InputError("a GeoJSON file holds one object, for example a FeatureCollection", where=str(path))
@@ -37,7 +37,7 @@ def read_geojson(path: Path, data: bytes) -> ZoneFile:
 
 
 def _require_wgs84(whole: dict[str, Any], path: Path) -> None:
-    """The member of the 2008 draft that RFC 7946 took out; files that still use it mean it."""
+    """Refuse other coordinate systems in `crs`: RFC 7946 removed this member of the 2008 draft, but files use it."""
     crs = whole.get("crs")
     if crs is None:
         return
@@ -63,7 +63,7 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         what = "properties must be an object" if not isinstance(properties, dict) else "the feature has no geometry"
         found.problems.append(Problem(where, what))
         return
-    # gcsplan's own mission.geojson holds its tracks and way points beside the zones.
+    # gcsplan's own mission.geojson contains tracks and way points beside the zones; they are skipped.
     drawn = {"track": ("LineString", "MultiLineString"), "waypoint": ("Point",)}.get(str(properties.get("kind")), ())
     if geometry.get("type") in drawn and "radius_m" not in properties:
         return
@@ -109,7 +109,7 @@ def _rings(found: ZoneFile, rings: Any, name: str, where: str, at: str, bounds: 
 
 
 def _position(found: ZoneFile, position: Any, where: str) -> tuple[float, float] | None:
-    """(latitude, longitude) of GeoJSON's [lon, lat]."""
+    """(latitude, longitude) of GeoJSON's [lon, lat]; None, and a problem, if it is not a position."""
     if not isinstance(position, list) or len(position) < 2 or not all(_is_number(x) for x in position[:2]):
         found.problems.append(Problem(where, f"a position is [longitude, latitude], given {_shown(position)}"))
         return None
@@ -158,5 +158,5 @@ def _no_constant(name: str) -> Iterator[None]:
 
 
 def _bounded_int(digits: str) -> float:
-    # int() refuses thousands of digits with words about its own limits; as a float a long one is inf, and refused.
+    # int() refuses thousands of digits with a message about its own limits; as inf the number is refused by gcsplan.
     return int(digits) if len(digits) <= 300 else math.inf

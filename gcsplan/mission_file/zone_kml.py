@@ -1,7 +1,7 @@
 """Zones from KML: Placemarks with Polygons, or with Points whose ExtendedData has ``radius_m``.
 
-Heights come from ExtendedData alone (``floor_agl_m`` …): the altitudes in the coordinates, and altitudeMode, describe
-how Google Earth draws the outline. Namespaces are not insisted on.
+Heights come from ExtendedData alone (``floor_agl_m`` …), because the altitudes in the coordinates, and altitudeMode,
+only describe how Google Earth draws the outline. Namespaces are not required.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SHAPES = ("Polygon", "Point", "LineString", "LinearRing", "Model", "Track", "Mu
 
 
 def read_kml(path: Path, data: bytes) -> ZoneFile:
-    """Zones of KML text. Raises InputError where it is not KML."""
+    """The zones of KML text. Raises InputError if it is not KML."""
     found = ZoneFile(path)
     try:
         root = defusedxml.ElementTree.fromstring(data, forbid_dtd=True)
@@ -45,7 +45,7 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
 
 
 def _walk(root: Any, path: Path, *, leaves: tuple[str, ...] = ()) -> Iterator[Any]:
-    """Every element in the order of the file, without recursion; what is below ``leaves`` is left out."""
+    """Every element in the order of the file, without recursion; elements below ``leaves`` are left out."""
     stack = [(root, 0)]
     while stack:
         element, depth = stack.pop()
@@ -57,7 +57,7 @@ def _walk(root: Any, path: Path, *, leaves: tuple[str, ...] = ()) -> Iterator[An
 
 
 def _kind(element: Any) -> str:
-    """Tag without its namespace; comments and instructions have none."""
+    """The tag without its namespace; empty for comments and processing instructions."""
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
@@ -103,7 +103,7 @@ def _polygon(found: ZoneFile, shape: Any, name: str, where: str, bounds: Bounds)
 
 
 def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[tuple[float, float]] | None:
-    """(latitude, longitude) of each ``lon,lat[,alt]`` below ``parent``."""
+    """(latitude, longitude) of each ``lon,lat[,alt]`` below ``parent``; None, and a problem, if one is wrong."""
     text = " ".join(e.text or "" for e in _walk(parent, found.path) if _kind(e) == "coordinates")
     points = []
     for word in text.split():

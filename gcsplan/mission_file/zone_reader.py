@@ -1,4 +1,4 @@
-"""Zones from a file of either format: GeoJSON or KML, as its name says."""
+"""Zones from a file of either format, GeoJSON or KML, chosen by its name."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ MAX_BYTES = 20_000_000
 
 
 def read_zones(path: Path, *, where: str) -> ZoneFile:
-    """Zones of a .geojson, .json or .kml file.
+    """The zones of a .geojson, .json or .kml file.
 
-    ``where`` names the key that the zones stand under. Mistakes in single features are collected in ``problems``; a
-    file that cannot be read at all raises InputError.
+    ``where`` is the key that the zones belong to. Mistakes in single features are collected in ``problems``; a file
+    that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
     if kind not in (".geojson", ".json", ".kml"):
