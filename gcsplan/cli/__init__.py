@@ -1,1 +1,1 @@
-"""The command line: options in, one call, tables or JSON out, an exit code; a module for each kind of command."""
+"""The command line: options in, one call, tables or JSON out, an exit code; one module for each kind of command."""

@@ -1,4 +1,4 @@
-"""``gcsplan bench …``: every measurement; each is one call into `gcsplan.bench`."""
+"""``gcsplan bench …``: all measurements; each command is one call into `gcsplan.bench`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def bench_check(
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the legs.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """How many one-kilometre legs are checked in a second, on the sample terrain."""
+    """Measure how many one-kilometre legs are checked per second, on the sample terrain."""
     from gcsplan.bench import check as bench
 
     result = bench.run(legs=legs, seed=seed)
@@ -55,7 +55,7 @@ def bench_upload(
     drop: Annotated[float, typer.Option(metavar="P", help="With --fleet: part of the packets that is lost.")] = 0.05,
     as_json: JsonOption = False,
 ) -> None:
-    """Upload to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
+    """Measure uploads to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
     if fleet is not None:
         from gcsplan.bench import upload_fleet
 
@@ -77,11 +77,11 @@ def bench_functions(
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="CSV and Markdown go there.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """SSGWO's tables 1 and 2 run again, the printed numbers beside ours, optima in the middle and moved."""
+    """Run SSGWO's tables 1 and 2 again, beside the printed numbers, with optima in the middle and moved."""
     from gcsplan.bench import functions as bench
 
     if out is not None:
-        bench.ready(out)  # before the long run
+        bench.ready(out)  # find a bad directory before the long run
     result = bench.run(runs=runs, seed=seed, jobs=jobs)
     if out is not None:
         bench.write(result, out)
@@ -106,7 +106,7 @@ def bench_terrain(
     count: Annotated[int | None, typer.Option(metavar="N", help="Problems of each group [default: all]")] = None,
     without: WithoutOption = None,
 ) -> None:
-    """A set of planning problems made by a seed; every planner held to the same exact check."""
+    """Plan a set of problems made from a seed with every planner; the same exact check judges all."""
     from rich.console import Console
 
     from gcsplan.bench import terrain, terrain_report
@@ -132,7 +132,7 @@ def bench_everyday(
     kinds: Annotated[str | None, typer.Option(metavar="LIST", help="Kinds of missions [default: all]")] = None,
     without: WithoutOption = None,
 ) -> None:
-    """Short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat ground, hills, the sample DEM."""
+    """Plan short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat, hills, the sample DEM."""
     from gcsplan.bench import everyday
     from gcsplan.bench.everyday_missions import KINDS
     from gcsplan.cli.console import say
@@ -169,7 +169,7 @@ def bench_papers(
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Every scenario and algorithm of the five papers, beside their printed numbers, straight line and optimum."""
+    """Run every scenario and algorithm of the five papers, beside their printed numbers, straight line and optimum."""
     if speed:
         from gcsplan.bench import papers_speed
 

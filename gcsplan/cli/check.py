@@ -72,15 +72,15 @@ def check(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Do these .waypoints or .plan files (anybody's) fly safely?
+    """Check whether .waypoints or .plan files, of any origin, fly safely.
 
-    In a mission file's world:    gcsplan check mission.yaml uav1.plan
+    In the world of a mission file:    gcsplan check mission.yaml uav1.plan
 
     Or with options alone:    gcsplan check *.plan --dem dem.tif --vertical-datum EGM96 --zones zones.kml --min-agl 60
 
     Every leg is judged along its whole length, as the autopilot flies it: jumps, loiters, take-off, landing, speeds,
-    each altitude frame. Ends with 0 if all pass, 4 on a violation or on anything that could not be judged, 2 on a file
-    that cannot be read.
+    each altitude frame. The exit code is 0 if all pass, 4 on a violation or if anything could not be judged, 2 if a
+    file cannot be read.
     """
     from gcsplan.app import checking, outputs
     from gcsplan.export.outdir import steady

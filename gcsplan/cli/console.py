@@ -1,4 +1,4 @@
-"""What a person reads: tables, progress, and the words around them, on standard error, never on standard output."""
+"""Output for people: tables, progress and messages, on standard error, never on standard output."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gcsplan.check.verdict import Verdict
     from gcsplan.mavlink.protocol.machine import Progress as Transfer
 
-PLAIN_WIDTH = 130  # of a log file or a pipe, where nobody says how wide it is
+PLAIN_WIDTH = 130  # columns of a log file or a pipe, whose width is unknown
 WIDEST = 100_000
 
 console = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -28,7 +28,7 @@ if not console.is_terminal:
 
 
 def number(value: float | None, decimals: int = 0, unit: str = "") -> str:
-    """A figure for a table; a dash where there is none."""
+    """A number for a table; a dash if there is none."""
     if value is None or not math.isfinite(value):
         return "–"
     return f"{value:,.{decimals}f}{unit}".replace(",", "\u2009")
@@ -44,24 +44,24 @@ def _table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
 
 
 def _width(table: Table) -> int:
-    """Columns of the terminal that ``table`` takes if nothing is cut."""
+    """Terminal columns that ``table`` needs if nothing is cut."""
     return console.measure(table, options=console.options.update(width=WIDEST)).maximum
 
 
 def _print(table: Table) -> None:
-    """Whole, even where the terminal is too narrow and breaks its lines: a verdict that is cut off is none."""
+    """Print the whole table, even if a narrow terminal breaks its lines: a verdict must not be cut off."""
     width = _width(table)
     wide = console if width <= console.width else Console(stderr=True, highlight=False, soft_wrap=True, width=width)
     wide.print(table)
 
 
 def verdict_word(safe: bool | None) -> str:
-    """Safe, UNSAFE or not judged, coloured."""
+    """The coloured words safe, UNSAFE or not judged."""
     return {True: "[green]safe[/]", False: "[bold red]UNSAFE[/]", None: "[yellow]not judged[/]"}[safe]
 
 
 def plan_table(plan: Plan) -> None:
-    """A column for each vehicle of a plan, and the limit beside what was reached; for large fleets a row for each."""
+    """Print a plan: a column for each vehicle, values beside their limits; a row for each in a large fleet."""
     rows = [_plan_row(v, plan.fleet) for v in plan.vehicles]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
     table = _table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
@@ -84,7 +84,7 @@ def plan_table(plan: Plan) -> None:
 
 
 def _say_fleet(plan: Plan) -> None:
-    """How the fleet arrives, and how near two of it come to each other."""
+    """Print how the fleet arrives, and the least distance between two of its vehicles."""
     fleet, arrival = plan.fleet, plan.source.arrival
     if fleet is None or len(fleet.slots) < 2:
         return
@@ -103,7 +103,7 @@ def _say_fleet(plan: Plan) -> None:
 
 
 def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[Table]:
-    """Tables with a column for each of ``rows``, at most ``each`` of them beside each other."""
+    """Tables with a column for each of ``rows``, at most ``each`` of them side by side."""
     tables = []
     for first in range(0, len(rows), each):
         some = rows[first : first + each]
@@ -139,7 +139,7 @@ def _plan_row(v: VehiclePlan, fleet: FleetPlan | None) -> dict[str, str]:
 
 
 def verdict_table(name: str, verdict: Verdict) -> None:
-    """One row for each flown stretch of a mission."""
+    """Print one row for each flown stretch of a mission."""
     columns = [("item", True), ("", False), ("leg m", True), ("to AMSL m", True), ("AGL m", True),
                ("lowest AGL m", True), ("climb °", True), ("nearest zone m", True), ("energy kJ", True),
                ("time s", True)]  # fmt: skip
@@ -153,7 +153,7 @@ def verdict_table(name: str, verdict: Verdict) -> None:
         )
         for leg in verdict.legs
     ]  # fmt: skip
-    for shown in (10, 9, 8):  # on a narrow terminal time and energy are left out: the limits are what counts
+    for shown in (10, 9, 8):  # on a narrow terminal leave out time and energy; the limits matter more
         table = _table(f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe)}", columns[:shown])
         for leg, row in zip(verdict.legs, rows, strict=True):
             table.add_row(*row[:shown], style="red" if leg.seq in bad else None)
@@ -166,7 +166,7 @@ def verdict_table(name: str, verdict: Verdict) -> None:
 
 
 def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
-    """One row for each vehicle that something was sent to, or compared with."""
+    """Print one row for each vehicle that was sent to or compared with."""
     sent = title == "upload"
     columns = [("vehicle", False), ("link", False), ("items", True), *([("outcome", False)] if sent else []),
                ("read back", False), ("s", True), ("retries", True)]  # fmt: skip
@@ -187,7 +187,7 @@ def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
 
 
 def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | None = None) -> None:
-    """When to start each vehicle of a fleet, for whoever does it: we never arm or start one."""
+    """Print when to start each vehicle of a fleet by hand: gcsplan never arms or starts one."""
     if plan.fleet is None or len(plan.fleet.slots) < 2:
         return
     ready = {d.vehicle for d in results if d.verified and not d.code}
@@ -202,7 +202,7 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
 
 
 def homes_table(homes: Mapping[str, WayHome]) -> None:
-    """One row for each vehicle whose way home was judged."""
+    """Print one row for each vehicle whose way home was judged."""
     if not homes:
         return
     columns = [("vehicle", False), ("return at, m above home", True), ("lowest safe from everywhere", True),
@@ -217,13 +217,13 @@ def homes_table(homes: Mapping[str, WayHome]) -> None:
 
 
 def say_notes(notes: Sequence[str]) -> None:
-    """Notes, each once, in the order given."""
+    """Print notes, each once, in order."""
     for note in dict.fromkeys(notes):
         console.print(f"note: {note}", style="dim", markup=False)
 
 
 def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
-    """Notes on vehicles, (name, note) each: what holds for several is said once, with all their names."""
+    """Print notes on vehicles, (name, note) each; a note on several is printed once with all their names."""
     names: dict[str, list[str]] = {}
     for name, note in dict.fromkeys(notes):
         names.setdefault(note, []).append(name)
@@ -232,7 +232,7 @@ def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
 
 @contextmanager
 def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer], None]]:
-    """A live table of transfers, on a terminal only: call the result with (name, progress)."""
+    """Show a live table of transfers, on a terminal only; yields a function to call with (name, progress)."""
     if not console.is_terminal:
         yield lambda name, transfer: None
         return
@@ -258,7 +258,7 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
 
 
 def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
-    """The planners, one a row, on standard output: it is the command's result."""
+    """Print the planners, one per row, on standard output, since they are the command's result."""
     table = _table("planners", [("name", False)])
     for name in ("what it does", "paper", "defaults"):
         table.add_column(name)
@@ -273,12 +273,12 @@ def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
 
 
 def say(message: str) -> None:
-    """One line."""
+    """Print one line."""
     console.print(message, markup=False)
 
 
 def rows_table(title: str, rows: Sequence[Mapping[str, str]], *, left: Sequence[str] = ("vehicle",)) -> None:
-    """Rows of words by the names of their columns; numbers stand to the right, ``left`` to the left."""
+    """Print rows of words by column name; columns in ``left`` are left-aligned, the others right-aligned."""
     table = _table(title, [(name, name not in left) for name in rows[0]])
     for row in rows:
         table.add_row(*row.values())

@@ -1,4 +1,4 @@
-"""How a command ends: one document on standard output, one message on standard error, an exit code of the contract."""
+"""How a command ends: one document on standard output, one message on standard error, an exit code."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from gcsplan.errors import GcsplanError, InputError, UsageError
 
 
 class Interrupted(GcsplanError):
-    """Ctrl-C while vehicles were being talked to: says what is to be done about them."""
+    """Ctrl-C during a conversation with vehicles; the message says what to do about them."""
 
     exit_code: ClassVar[int] = 130
     default_reason: ClassVar[str] = "interrupted"
 
 
 class Terminated(Interrupted):
-    """SIGTERM: the same, sent by another process."""
+    """SIGTERM: as Ctrl-C, but sent by another process."""
 
     exit_code: ClassVar[int] = 143
     default_reason: ClassVar[str] = "terminated"
 
 
 class HungUp(Interrupted):
-    """SIGHUP: the same, because the terminal is gone."""
+    """SIGHUP: as Ctrl-C, but because the terminal is gone."""
 
     exit_code: ClassVar[int] = 129
     default_reason: ClassVar[str] = "terminated"
@@ -44,46 +44,46 @@ _received: list[int] = []
 
 
 def end_in_good_order() -> None:
-    """From now on SIGTERM and SIGHUP end this process as Ctrl-C does: links are closed, what was begun is taken back.
+    """Make SIGTERM and SIGHUP end this process as Ctrl-C does: links are closed, unfinished work is undone.
 
-    A process that was started to ignore one of them (nohup) goes on ignoring it.
+    A process that was started to ignore one of them (nohup) continues to ignore it.
     """
     owner = os.getpid()
 
     def stop(number: int, _: object) -> None:
-        if os.getpid() != owner:  # a child that was forked: not its business
+        if os.getpid() != owner:  # a forked child dies by the signal's default
             signal.signal(number, signal.SIG_DFL)
             os.kill(os.getpid(), number)
         _received.append(number)
         raise KeyboardInterrupt
 
-    here = threading.current_thread() is threading.main_thread()  # elsewhere Python sets no handlers
+    here = threading.current_thread() is threading.main_thread()  # Python sets handlers in the main thread only
     for number in _ENDINGS if here else ():
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, stop)
 
 
 def interrupted(words: str = "") -> Interrupted:
-    """What to end with after a KeyboardInterrupt: by whom it was sent."""
+    """The error to end with after a KeyboardInterrupt, by the signal that caused it."""
     kind = _ENDINGS[_received[0]] if _received else Interrupted
     return kind(words or kind.default_reason)
 
 
 def emit(document: dict[str, Any], error: dict[str, Any] | None = None) -> None:
-    """The one JSON document of ``--json``, with what went wrong."""
+    """Write the single JSON document of ``--json``, with the error if there is one."""
     from gcsplan.export.summary import write_summary
 
     put(write_summary(document | ({"error": error} if error else {}), clocks=True))
 
 
 def put(text: str) -> None:
-    """Write to standard output, now: what does not arrive there is an error. Raises InputError (or BrokenPipeError)."""
+    """Write to standard output and flush, so that a failure is reported. Raises InputError (or BrokenPipeError)."""
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
     except BrokenPipeError:
         raise
-    except (OSError, AttributeError) as error:  # a full disk; a standard output that was closed is None
+    except (OSError, AttributeError) as error:  # a full disk, or a closed standard output, which is None
         with suppress(OSError, AttributeError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         words = getattr(error, "strerror", None) or "it is closed"
@@ -92,7 +92,7 @@ def put(text: str) -> None:
 
 @contextmanager
 def talking(names: Sequence[str]) -> Iterator[None]:
-    """Around a conversation with vehicles: after Ctrl-C the message says what state they may be in."""
+    """Wrap a conversation with vehicles: after Ctrl-C the message says what state they may be in."""
     try:
         yield
     except KeyboardInterrupt:
@@ -103,15 +103,15 @@ def talking(names: Sequence[str]) -> Iterator[None]:
 
 
 def speak_plainly() -> None:
-    """JSON is UTF-8 everywhere, and no terminal or pipe is so poor that a ° or a – would end the program."""
+    """Set the encoding of the outputs: UTF-8 for JSON, and no character such as ° or – can end the program."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(encoding="utf-8" if "--json" in sys.argv else None, errors="backslashreplace")
 
 
 def explained(error: Exception) -> GcsplanError:
-    """What an exception that is none of ours amounts to."""
-    describe = getattr(error, "format_message", None)  # click's usage errors, whichever click typer brings along
+    """The GcsplanError for any other exception."""
+    describe = getattr(error, "format_message", None)  # click's usage errors, in whichever click typer uses
     if describe is not None:
         context = getattr(error, "ctx", None)
         if type(error).__name__ == "NoArgsIsHelpError":
@@ -119,25 +119,25 @@ def explained(error: Exception) -> GcsplanError:
         return UsageError(f"{describe()} (see {context.command_path if context else 'gcsplan'} --help)")
     cause: BaseException | None = error
     while cause is not None:
-        if isinstance(cause, KeyboardInterrupt):  # compiled code turns Ctrl-C into an error of its own
+        if isinstance(cause, KeyboardInterrupt):  # compiled code turns Ctrl-C into another error
             return interrupted()
         cause = cause.__cause__ or cause.__context__
     return GcsplanError(f"internal error, a bug in gcsplan: {type(error).__name__}: {error} (--debug shows where)")
 
 
 def printable(text: str) -> str:
-    """Text for a terminal: names of files and values come from anywhere, and none of them may speak to it."""
+    """Text that is safe for a terminal: file names and values may hold control characters, which are replaced."""
     return "".join(c if c.isprintable() or c in "\n\u2009" else "\ufffd" for c in text)
 
 
 def complain(error: GcsplanError) -> None:
-    """One message on standard error."""
-    with suppress(OSError):  # nobody reads it any more
+    """Print one message on standard error."""
+    with suppress(OSError):  # standard error may be closed
         print(f"gcsplan: {printable(str(error))}", file=sys.stderr)
 
 
 def fail(error: GcsplanError, as_json: bool, debug: bool) -> NoReturn:
-    """One message on standard error, one JSON document on request, and the exit code."""
+    """Print one message on standard error and, with ``as_json``, one JSON document; then exit with the error's code."""
     code = error.exit_code
     if debug:
         traceback.print_exc()

@@ -29,11 +29,11 @@ def fit_energy(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit the energy model to flight logs: joules for a metre up or down, a metre along, and watts of hovering.
+    """Fit the energy model to flight logs: joules per metre up or down and along, and watts of hovering.
 
-    Fly some of it level, some of it up and down, and hover for half a minute; the log must hold battery voltage and
-    current. Standard output is what to paste into a vehicle of the mission file; exit code 4 says that the log cannot
-    tell R1 or R2.
+    Fly parts of it level, parts up and down, and hover for half a minute; the log must hold battery voltage and
+    current. Standard output is what to paste into a vehicle of the mission file. Exit code 4 means that the log does
+    not determine R1 or R2.
     """
     from gcsplan.cli.console import say
     from gcsplan.logs.fit import fit_energy as fit
@@ -67,7 +67,7 @@ def fit_energy(
 
 
 def _columns(text: str) -> dict[str, str]:
-    """``what=name,what=name`` as a table; UsageError for anything else."""
+    """The table of ``what=name,what=name``; UsageError for other text."""
     found: dict[str, str] = {}
     for part in (p.strip() for p in text.split(",") if p.strip()):
         what, equals, name = part.partition("=")

@@ -20,7 +20,7 @@ def sim(
     sysid: SimSysidOption = None,
     misbehave: MisbehaveOption = "",
 ) -> None:
-    """A loopback vehicle (or one for each of the mission's vehicles) that takes missions like a real one.
+    """Simulate a loopback vehicle (or one per vehicle of a mission) that takes missions like a real one.
 
     Ctrl-C ends it.
     """

@@ -1,4 +1,4 @@
-"""What talks to vehicles: `gcsplan upload`, `verify`, `download`, `clear`."""
+"""The commands that talk to vehicles: `gcsplan upload`, `verify`, `download`, `clear`."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def upload(
 ) -> None:
     """Check mission files, upload them, read them back, and compare.
 
-    A file goes out only with a passing verdict in --mission's world, or with --unchecked. The file's name (uav1.plan)
-    or NAME= says which vehicle of the mission it is for.
+    A file is sent only with a passing verdict in --mission's world, or with --unchecked. The file's name (uav1.plan) or
+    NAME= states which vehicle of the mission it is for.
     """
     from gcsplan.app import checking, fencing, pipeline, uploads
     from gcsplan.app.upload_job import UploadOptions
@@ -76,7 +76,7 @@ def upload(
                 "--sysid goes with --unchecked: with --mission each vehicle's number is the mission file's"
             )
         source = pipeline.load_mission(mission)
-        uploads.targets([to], [r.vehicle for r in source.vehicles])  # a slip in the URL shows before the tables do
+        uploads.targets([to], [r.vehicle for r in source.vehicles])  # report a wrong URL before any table
         with steady(checking.split_name(file)[1] for file in files):
             checked = checking.check_files(source, files)
         if not as_json:
@@ -111,7 +111,7 @@ def verify(
     timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Is exactly this file on board? Reads the mission back and compares; sends nothing else."""
+    """Check that exactly this file is on board: read the mission back and compare; nothing else is sent."""
     from gcsplan.app import uploads
     from gcsplan.cli.console import upload_table
     from gcsplan.export.outdir import require_settled

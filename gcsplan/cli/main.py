@@ -1,4 +1,4 @@
-"""The command line: parse, one call, print, exit code. Heavy rooms are imported by the command that needs them."""
+"""The command line: parse, one call, print, exit code. Slow packages are imported by the commands that need them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def root(
 
 
 def main() -> NoReturn:
-    """Entry point: runs a command and ends with its exit code; one message, no traceback (``--debug`` shows it)."""
+    """Run a command and exit with its code; an error prints one message without traceback (``--debug`` shows it)."""
     debug = "--debug" in sys.argv
     arguments = [a for a in sys.argv[1:] if a != "--debug"]
     as_json = "--json" in arguments
@@ -59,9 +59,9 @@ def main() -> NoReturn:
     settle_memory()
     try:
         end_in_good_order()
-        # Outside standalone mode click hands typer.Exit's code back instead of exiting.
+        # With standalone_mode=False click returns the code of typer.Exit instead of exiting.
         code = app(args=arguments, prog_name="gcsplan", standalone_mode=False)
-        if code == Interrupted.exit_code:  # what typer makes of Ctrl-C
+        if code == Interrupted.exit_code:  # typer's code for Ctrl-C
             raise KeyboardInterrupt
         put("")
         sys.exit(code if isinstance(code, int) else 0)
@@ -75,7 +75,7 @@ def main() -> NoReturn:
     except MemoryError:
         words = "not enough memory for this: give a smaller area, coarser terrain, fewer zones or items"
         fail(InputError(words, reason="memory"), as_json, debug)
-    except Exception as error:  # the one place where a bug of ours becomes an exit code
+    except Exception as error:  # the only place where a bug of gcsplan becomes an exit code
         fail(explained(error), as_json, debug)
 
 

@@ -1,4 +1,4 @@
-"""Options and arguments that several commands have, each with the words of its help."""
+"""Options and arguments that several commands share, with their help texts."""
 
 from __future__ import annotations
 

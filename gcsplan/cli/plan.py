@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from gcsplan.app.upload_job import JobResult, UploadJob, UploadOptions
 
 SHOWN = 15
-"""Names of written files that are printed; a fleet has hundreds."""
+"""Names of written files that are printed at most; a fleet has hundreds of files."""
 
 
 def plan(
@@ -94,8 +94,8 @@ def plan(
 ) -> None:
     """Plan a mission file, write its outputs, and upload and verify them on request.
 
-    Without --upload nothing is ever sent. The outputs are written whole or not at all; where no safe mission
-    exists, earlier outputs are moved to DIR/previous, so that no old mission is flown by mistake.
+    Without --upload nothing is sent. The outputs are written whole or not at all. If no safe mission exists, earlier
+    outputs are moved to DIR/previous, so that no old mission is flown by mistake.
     """
     from gcsplan.app import outputs, pipeline
     from gcsplan.app.gate import GateTime
@@ -111,7 +111,7 @@ def plan(
     try:
         source = pipeline.load_mission(mission)
         targets: dict[str, str] = {}
-        if upload or fence or fence_infinite:  # else nothing of what sends is needed
+        if upload or fence or fence_infinite:  # otherwise the upload modules need not be imported
             from gcsplan.app import fencing, uploads
             from gcsplan.app.upload_job import UploadOptions
 
@@ -133,23 +133,23 @@ def plan(
         if upload or fence or fence_infinite:
             jobs = uploads.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""))
         fence_notes: list[tuple[str, str]] = []
-        if fence or fence_infinite:  # one that the mission would breach is found before anything is written
+        if fence or fence_infinite:  # a fence that the mission would breach is refused before anything is written
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
         fences = {job.name: job.fence.items for job in jobs if job.fence is not None}
         files = outputs.outputs_of(planned, homes, fences, rally=rally)
         if report:
             files["report.html"] = outputs.report_of(planned, (), homes)
     except UsageError:
-        raise  # a slip on the command line says nothing against an earlier mission
+        raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
         try:
             if retire_outputs(directory):
                 say(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
-        except InputError as error:  # why there is no mission matters more
+        except InputError as error:  # the reason why there is no mission matters more
             say(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
         raise
     pictures = {} if png is None else _pictures(planned, png, each)
-    # Pictures of this plan that lie beside it are a part of it, and go with it.
+    # Pictures of this plan inside its directory belong to its outputs, and are written and removed with them.
     beside = [file for file in pictures if can_hold(directory, file)]
     in_the_way = write_outputs(directory, {**files, **{file.name: pictures.pop(file) for file in beside}})
     for file, content in pictures.items():
@@ -172,7 +172,7 @@ def plan(
             add_output(directory, "upload.json", outputs.upload_text(planned, results, homes))
             if report:
                 add_output(directory, "report.html", outputs.report_of(planned, results, homes))
-        except InputError as error:  # what became of the upload matters more
+        except InputError as error:  # the outcome of the upload matters more
             say(f"note: what became of the upload is not written: {error}")
     if as_json:
         emit(outputs.summary_of(planned, results, homes), uploads.failure(results) if targets else None)
@@ -180,7 +180,7 @@ def plan(
 
 
 def _require_options(planner: str | None, objective: str | None, png: Path | None, directory: Path) -> bool:
-    """Whether each figure is a picture of its own. Raises UsageError for options that are off."""
+    """Whether ``png`` is a directory of separate figures. Raises UsageError for wrong options."""
     from gcsplan.planners import registry
 
     if planner is not None:
@@ -198,7 +198,7 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
 
 
 def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
-    """One picture of all, or one of each figure in the directory ``png``."""
+    """One picture of everything, or one for each figure in the directory ``png``."""
     from gcsplan.app import outputs
 
     if each:
@@ -209,13 +209,13 @@ def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
 def _upload(
     planned: Plan, jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None, as_json: bool
 ) -> list[JobResult]:
-    """Upload all jobs with their progress shown, and say how each ended and when each vehicle starts."""
+    """Upload all jobs with their progress shown, and print how each ended and when to start each vehicle."""
     from gcsplan.app import uploads
     from gcsplan.cli.console import release_table, transfer_progress, upload_table
     from gcsplan.sim.loopback import loopback_fleet
 
     if gate is not None:
-        gate.require_ahead(datetime.now(UTC))  # planning took its time
+        gate.require_ahead(datetime.now(UTC))  # planning took time, so check again
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
         results = uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)
@@ -226,7 +226,7 @@ def _upload(
 
 
 def planners(as_json: JsonOption = False) -> None:
-    """The table of planners, with paper and default parameters."""
+    """List the planners, with paper and default parameters."""
     from gcsplan.cli.console import planners_table
     from gcsplan.planners import registry
 

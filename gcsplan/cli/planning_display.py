@@ -1,6 +1,6 @@
-"""How planning stands, while it lasts: elapsed time, best path, bound and gap, redrawn by a thread of its own.
+"""The state of planning while it runs: elapsed time, best path, bound and gap, redrawn by a separate thread.
 
-A planner reports only when something changes, and may search for seconds in between; the time goes on all the same.
+A planner reports only changes, and may search for seconds without one; the shown time continues meanwhile.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from gcsplan.native import notice
 from gcsplan.planners.problem import Progress
 
 REDRAWN_HZ = 4.0
-"""On a terminal."""
+"""Redraws per second on a terminal."""
 LINE_S = 5.0
-"""Between two lines where there is no terminal."""
+"""Seconds between two lines if there is no terminal."""
 
 
 class PlanningBoard:
-    """What is known about the planning of some vehicles, as one line. ``objective``: length or energy."""
+    """The state of the planning of some vehicles, as one line. ``objective``: length or energy."""
 
     def __init__(self, names: Sequence[str], objective: str = "length") -> None:
         self._names = list(names)
@@ -36,18 +36,18 @@ class PlanningBoard:
         self._notice = ""
 
     def report(self, who: str, progress: Progress) -> None:
-        """What the planner of vehicle ``who`` reports. A figure that it leaves out keeps its last value."""
+        """Take a report of the planner of vehicle ``who``. A report without figures keeps the last ones."""
         last = self._last
         if who == self._who and progress.lower_bound is None and progress.cost is None:
             progress = Progress(progress.elapsed_s, last.cost, last.lower_bound, progress.phase)
         self._who, self._last, self._notice = who, progress, ""
 
     def note(self, sentence: str) -> None:
-        """Something else is being done."""
+        """Show that something else is being done."""
         self._notice = sentence
 
     def line(self) -> str:
-        """Who is planned, for how long, and how good the path is so far."""
+        """The vehicle that is being planned, the elapsed time, and how good the path is so far."""
         parts = [f"planning {self._who}".rstrip()]
         if len(self._names) > 1 and self._who in self._names:
             parts[0] += f" ({self._names.index(self._who) + 1} of {len(self._names)})"
@@ -65,10 +65,10 @@ class PlanningBoard:
 
 @contextmanager
 def planning_display(names: Sequence[str], objective: str = "length") -> Iterator[Callable[[str, Progress], None]]:
-    """Show how the planning of ``names`` stands: call the result with (vehicle, progress).
+    """Show the state of the planning of ``names``; yields a function to call with (vehicle, progress).
 
-    On a terminal one line that is redrawn several times a second, and is gone in the end; elsewhere a line on standard
-    error every `LINE_S` seconds. That kernels are being compiled, which happens once, is said in a log at once.
+    On a terminal it is one line that is redrawn several times a second and disappears at the end; elsewhere a line on
+    standard error every `LINE_S` seconds. The compilation of kernels, which happens once, is reported there at once.
     """
     board, screen = PlanningBoard(names, objective), words.console
     if screen.is_terminal and not screen.is_dumb_terminal:

@@ -56,8 +56,8 @@ def rehearse(
 ) -> None:
     """Plan, upload to simulated vehicles, fly them all in simulated time, and judge arrivals, separation and limits.
 
-    What is flown is what the vehicles stored. Times come out of how a vehicle moves, and share nothing with what
-    planned them. Exit code 4 where a limit was broken, the order or the separation was lost.
+    The vehicles fly what they stored. Flight times come from a model of motion that shares nothing with the one that
+    planned them. The exit code is 4 if a limit was broken, or the order or the separation was lost.
     """
     from gcsplan.app import pipeline, rehearsing
     from gcsplan.cli.console import say, say_notes
@@ -101,7 +101,7 @@ def rehearse(
 
 
 def _show(planned: Plan, result: Rehearsal) -> None:
-    """A row for each vehicle."""
+    """Print a row for each vehicle."""
     from gcsplan.cli.console import rows_table
 
     by = "built-in simulator" if result.simulator == "gcsplan" else "ArduCopter SITL"
