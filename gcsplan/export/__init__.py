@@ -1,1 +1,1 @@
-"""What a plan leaves on the disk: KML, GeoJSON, the profile, the summary, and the directory that holds them."""
+"""The files that a plan writes: KML, GeoJSON, the profile, the summary, and the directory that holds them."""

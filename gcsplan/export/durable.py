@@ -1,7 +1,7 @@
-"""Files that stay written: whole or not at all, and on the disk before anything relies on them.
+"""Durable files: whole or not at all, and on the disk before anything relies on them.
 
-What was handed to the operating system is not yet on the disk: after a loss of power any part may be missing, in any
-order. `sync_directory` and the `fsync` of a file are the only fences; a write that others rely on passes one first.
+Data handed to the operating system is not yet on the disk: after a power failure any part may be missing, in any order.
+Only `sync_directory` and the `fsync` of a file are barriers, so a write that others rely on is followed by one first.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from gcsplan.errors import InputError
 
 try:
     import fcntl
-except ImportError:  # Windows: no locks and no fences for directories; docs/safety.md says what that costs
+except ImportError:  # Windows: no locks, and no barriers for directories; docs/safety.md states the consequences
     POSIX = False
 else:
     POSIX = True
 
 PART = ".gcsplan-part-"
-"""How a file is called that `write_whole` is writing; it is locked as long as its writer lives."""
+"""Prefix of a file that `write_whole` is writing; the file is locked while its writer lives."""
 
 LOCK_WAIT_S = 10.0
-"""So long one run waits for another one that is writing to the same directory."""
+"""Seconds that a run waits for another one that is writing to the same directory."""
 
 _PART_NAME = re.compile(re.escape(PART) + r"[0-9a-f]{16}")
 _CANNOT_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM}
@@ -39,9 +39,9 @@ _AT_ONCE = 16
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
-    """Write one file of the user's choice, whole or not at all; what is there is replaced. Raises InputError.
+    """Write one file of the user's choice, whole or not at all, replacing an existing one. Raises InputError.
 
-    What an earlier run that was killed left half-written beside it is removed.
+    Half-written files beside it, left by an earlier run that was killed, are removed.
     """
     target = Path(path)
     data = content.encode("utf-8") if isinstance(content, str) else content
@@ -64,7 +64,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
 
 
 def write_new(path: Path, data: bytes) -> None:
-    """Make a file that must not be there yet; `sync_files` brings it to the disk. Raises OSError."""
+    """Create a file that must not exist yet; call `sync_files` to bring it to the disk. Raises OSError."""
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     try:
         _write(handle, data)
@@ -73,14 +73,14 @@ def write_new(path: Path, data: bytes) -> None:
 
 
 def sync_files(paths: Sequence[Path]) -> None:
-    """Return when the content of every one of ``paths`` is on the disk. Raises OSError."""
-    # Several at once, for the disk then takes them with one write of its journal instead of one for each.
+    """Return when the contents of all ``paths`` are on the disk. Raises OSError."""
+    # Several at once, since the disk then needs one write of its journal for all of them.
     with ThreadPoolExecutor(min(len(paths), _AT_ONCE)) as pool:
         list(pool.map(_sync_file, paths))
 
 
 def _sync_file(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY if POSIX else os.O_RDWR)  # Windows secures what it may write alone
+    handle = os.open(path, os.O_RDONLY if POSIX else os.O_RDWR)  # Windows syncs only files that are open for writing
     try:
         os.fsync(handle)
     finally:
@@ -88,14 +88,14 @@ def _sync_file(path: Path) -> None:
 
 
 def sync_directory(path: Path) -> None:
-    """Return when every name in ``path`` is on the disk as it stands, where the file system can do that."""
+    """Return when the present names in ``path`` are on the disk, if the file system supports that."""
     if not POSIX:
         return
     handle = -1
     try:
         handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
         os.fsync(handle)
-    except OSError as error:  # some network file systems have no such call for directories
+    except OSError as error:  # some network file systems cannot sync directories
         if error.errno not in _CANNOT_SYNC:
             raise
     finally:
@@ -105,9 +105,9 @@ def sync_directory(path: Path) -> None:
 
 @contextmanager
 def locked(directory: Path) -> Iterator[None]:
-    """No other gcsplan writes to ``directory`` meanwhile, where the file system has locks.
+    """Keep every other gcsplan from writing to ``directory`` meanwhile, if the file system has locks.
 
-    The lock goes with the process, however it ends. Raises InputError where another one holds it for `LOCK_WAIT_S`.
+    The lock ends with the process, however that ends. Raises InputError if another process holds it for `LOCK_WAIT_S`.
     """
     if not POSIX:
         yield
@@ -117,7 +117,7 @@ def locked(directory: Path) -> Iterator[None]:
         handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
         try:
             free = _take_lock(handle)
-            if free and os.path.samestat(os.fstat(handle), os.stat(directory)):  # else it was made anew meanwhile
+            if free and os.path.samestat(os.fstat(handle), os.stat(directory)):  # otherwise it was replaced meanwhile
                 yield
                 return
         finally:
@@ -132,12 +132,12 @@ def locked(directory: Path) -> Iterator[None]:
 
 
 def is_mine(path: Path | str) -> bool:
-    """Whether what stands there (not what it links to) belongs to the user of this process; True without owners."""
+    """Whether ``path`` itself (not a link's target) belongs to this process's user; True where files have no owner."""
     return not hasattr(os, "geteuid") or os.lstat(path).st_uid == os.geteuid()
 
 
 def _take_lock(handle: int) -> bool:
-    """False where another process holds it; True where it is ours, or there are no locks."""
+    """Take the lock: False if another process holds it, True if it is taken now or there are no locks."""
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -155,18 +155,18 @@ def _write(handle: int, data: bytes) -> None:
 
 
 def _new_part(directory: Path) -> tuple[int, Path]:
-    """A new locked file under a name of its own."""
+    """Create a locked file with a unique name."""
     for _ in range(_ATTEMPTS):
         part = directory / f"{PART}{secrets.token_hex(8)}"
         handle = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
         if not POSIX or (_take_lock(handle) and os.fstat(handle).st_nlink):
             return handle, part
-        os.close(handle)  # another run took it for a dead one's before it was locked
+        os.close(handle)  # another run removed it as a leftover before it was locked
     raise FileExistsError(errno.EEXIST, "other runs keep removing what is written here", str(directory))
 
 
 def _sweep(directory: Path) -> None:
-    """Remove what writers that are dead left: files of ours with the name of a part that nobody has locked."""
+    """Remove leftovers of dead writers: files of this user with a part's name that no process has locked."""
     if not POSIX:
         return
     with os.scandir(directory) as entries:

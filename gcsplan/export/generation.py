@@ -1,15 +1,15 @@
-"""From one generation of outputs to the next, so that no moment shows files of both, whenever the process dies.
+"""The change from one generation of outputs to the next: at no time are files of both visible, even after a crash.
 
-A plan's files belong together: uav1's of today beside uav2's of yesterday would be a collision. No file system renames
-many files at once, so a `Generation` takes three steps, and a loss of power cannot swap them:
+A plan's files belong together: today's uav1 file beside yesterday's uav2 file could mean a collision. No file system
+renames many files at once, so a `Generation` takes three steps, in an order that a power failure cannot change:
 
-1. The new files are written to ``.gcsplan-next/`` and are on the disk; so is a journal there of every move to come.
-2. What leaves is moved away: only files of the earlier generation are seen, fewer and fewer of them.
-3. The new files are moved in: only files of the new generation are seen. Then the journal is removed.
+1. The new files are written to ``.gcsplan-next/`` and brought to the disk, with a journal of all following moves.
+2. The old files are moved away: only files of the earlier generation are visible, fewer and fewer of them.
+3. The new files are moved in: only files of the new generation are visible. Then the journal is removed.
 
-Where a process dies between, the journal stays, and a directory with a journal is *caught*: `settle` takes every move
-back, however many were made, by looking at what stands where. Nothing is ever overwritten: a file that somebody put
-there meanwhile stays, and ours goes to ``previous/``.
+If the process dies in between, the journal stays, and a directory with a journal is *caught*. `settle` then undoes the
+moves, however many were made, by comparing the journal with the files. Nothing is ever overwritten: a file that another
+program put there meanwhile stays, and gcsplan's goes to ``previous/``.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ Move = tuple[str, str]
 
 
 class Generation:
-    """The moves that bring a directory to its next generation: all done, or all taken back.
+    """The moves that bring a directory to its next generation: all are made, or all are undone.
 
-    Used as a context inside `gcsplan.export.durable.locked`: moves are noted in the body and made when it ends well.
+    Used as a context inside `gcsplan.export.durable.locked`: the body records moves, and they are made if it succeeds.
     """
 
     def __init__(self, root: Path) -> None:
@@ -68,7 +68,7 @@ class Generation:
             _abandon(self.root, error)
 
     def bring(self, name: str, content: bytes) -> str:
-        """A new file ``name``; what is there now must leave. Returns its SHA-256."""
+        """Stage a new file ``name``; an existing file there must leave. Returns the SHA-256 of the content."""
         staged, digest = f"new-{len(self.digests)}", hashlib.sha256(content).hexdigest()
         write_new(self.root / STAGE / staged, content)
         self.digests[staged] = digest
@@ -76,17 +76,17 @@ class Generation:
         return digest
 
     def discard(self, name: str) -> None:
-        """A file of ours leaves for good."""
+        """Record that a file of gcsplan leaves for good."""
         self.leaving.append((name, f"{STAGE}/old-{len(self.leaving)}"))
 
     def set_aside(self, name: str) -> None:
-        """A file leaves for ``previous/``, under a name that is free there."""
+        """Record that a file moves to ``previous/``, under a free name."""
         self.wants_previous = True
         taken = {target for _, target in (*self.leaving, *self.coming)}
         self.leaving.append((name, _free(self.root, name.rpartition("/")[2], taken)))
 
     def retire(self, name: str) -> None:
-        """An output goes to ``previous/`` under its own name; what is there now must leave."""
+        """Record that an output moves to ``previous/`` under its own name; an existing file there must leave."""
         self.wants_previous = True
         self.coming.append((name, f"{PREVIOUS}/{name}"))
 
@@ -102,7 +102,7 @@ class Generation:
         }  # fmt: skip
         write_new(stage / f"{JOURNAL}.part", json.dumps(journal).encode("ascii"))
         sync_files([stage / name for name in (*self.digests, f"{JOURNAL}.part")])
-        sync_directory(self.root)  # the stage itself; from the next line on the directory is caught
+        sync_directory(self.root)  # the stage itself; after the next line the directory is caught
         os.replace(stage / f"{JOURNAL}.part", stage / JOURNAL)
         sync_directory(stage)
         if makes_previous:
@@ -117,10 +117,10 @@ class Generation:
 
 
 def is_caught(root: Path) -> bool:
-    """Whether ``root`` was left, or is just now, between two generations."""
+    """Whether ``root`` is between two generations: a run is writing there, or was cut off."""
     try:
         os.lstat(root / STAGE / JOURNAL)
-    except PermissionError:  # there is something, somebody else's, and it is not to be looked into
+    except PermissionError:  # another user's stage, which cannot be read
         return os.access(root, os.X_OK)
     except OSError:
         return False
@@ -128,10 +128,10 @@ def is_caught(root: Path) -> bool:
 
 
 def settle(root: Path) -> bool:
-    """Bring a directory that a killed run left back to the generation before it; whether there was anything to do.
+    """Undo what a killed run left half-done in ``root``; returns whether there was anything to undo.
 
-    To be called inside `gcsplan.export.durable.locked`. Raises InputError where that cannot be done, OSError where
-    the file system does not let it; what is not done yet is done by the next call.
+    Call it inside `gcsplan.export.durable.locked`. Raises InputError if that is impossible, OSError if the file system
+    refuses; the next call continues.
     """
     stage = root / STAGE
     try:
@@ -152,7 +152,7 @@ def settle(root: Path) -> bool:
             _take_back(root, source, target, digests)
         _fence(root)
     if makes_previous:
-        with suppress(OSError):  # somebody else uses it by now
+        with suppress(OSError):  # another program may use it by now
             (root / PREVIOUS).rmdir()
     _end(root)
     return True
@@ -165,7 +165,7 @@ def digest_of_file(path: Path) -> str:
 
 
 def is_plain(path: Path) -> bool:
-    """Whether this is a regular file, and no link to one."""
+    """Whether ``path`` is a regular file, and not a link to one."""
     try:
         return stat.S_ISREG(os.lstat(path).st_mode)
     except (FileNotFoundError, NotADirectoryError):
@@ -173,25 +173,25 @@ def is_plain(path: Path) -> bool:
 
 
 def _take_back(root: Path, source: str, target: str, digests: dict[str, str]) -> None:
-    """Undo one move, if it was made; where somebody has put a file since, that one stays."""
+    """Undo one move, if it was made; a file that was put at its source since then stays."""
     was, now = root / source, root / target
     if not os.path.lexists(now):
         return
     if os.path.lexists(was):
         if target.startswith(f"{STAGE}/") and source.rpartition("/")[2] != MANIFEST:
-            # Ours had left, and its place is taken.
+            # gcsplan's file had left, and another file has its place now.
             if not _is_directory(root / PREVIOUS):
                 (root / PREVIOUS).mkdir()
             os.replace(now, root / _free(root, source.rpartition("/")[2], set()))
         return
     digest = digests.get(source.rpartition("/")[2]) if source.startswith(f"{STAGE}/") else None
     if digest is not None and not (is_plain(now) and digest_of_file(now) == digest):
-        return  # no longer what we put there
+        return  # the file there is no longer the one that gcsplan wrote
     os.replace(now, was)
 
 
 def _read_journal(path: Path) -> tuple[list[Move], list[Move], dict[str, str], bool]:
-    """What a journal says. Raises InputError where it cannot be one of ours; nothing outside its directory is named."""
+    """The contents of a journal. Raises InputError if gcsplan cannot have written it, or it names outside places."""
     try:
         if not is_plain(path):
             raise ValueError("it is no file")
@@ -213,7 +213,7 @@ def _read_journal(path: Path) -> tuple[list[Move], list[Move], dict[str, str], b
 
 
 def _abandon(root: Path, error: BaseException) -> None:
-    """After a failure: everything back to where it was. Raises InputError where that fails as well."""
+    """After a failure, move everything back. Raises InputError if that fails too."""
     try:
         settle(root)
     except (OSError, InputError) as second:
@@ -225,14 +225,14 @@ def _abandon(root: Path, error: BaseException) -> None:
 
 
 def _end(root: Path) -> None:
-    """The directory is whole: say so on the disk before anything that a way back would need is deleted."""
+    """Remove the journal and sync, so that the directory counts as whole before the files for undoing are deleted."""
     os.unlink(root / STAGE / JOURNAL)
     sync_directory(root / STAGE)
     _clear(root)
 
 
 def _clear(root: Path) -> None:
-    """Remove the stage, in which nothing is needed any more."""
+    """Remove the stage, which is not needed any more."""
     stage = root / STAGE
     for name in sorted(os.listdir(stage)):
         if _OURS_IN_STAGE.fullmatch(name):
@@ -241,14 +241,14 @@ def _clear(root: Path) -> None:
 
 
 def _fence(root: Path) -> None:
-    """Every move until now is on the disk before any that comes; where files went to first, so that none is lost."""
+    """Bring every move so far to the disk before any later one; targets are synced first, so that no file is lost."""
     for directory in (root / STAGE, root / PREVIOUS, root):
         if directory.is_dir():
             sync_directory(directory)
 
 
 def _is_directory(path: Path) -> bool:
-    """True for a directory, False for nothing. Raises NotADirectoryError for a link or a file in its place."""
+    """True for a directory, False for nothing. Raises NotADirectoryError for a link or a file."""
     try:
         mode = os.lstat(path).st_mode
     except FileNotFoundError:
@@ -259,7 +259,7 @@ def _is_directory(path: Path) -> bool:
 
 
 def _free(root: Path, name: str, taken: set[str]) -> str:
-    """A place in ``previous/`` that is free there and not among ``taken``."""
+    """A name in ``previous/`` that is free there and not among ``taken``."""
     stem, dot, suffix = name.rpartition(".")
     candidate, number = f"{PREVIOUS}/{name}", 1
     while candidate in taken or os.path.lexists(root / candidate):

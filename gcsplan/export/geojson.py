@@ -1,7 +1,7 @@
-"""`mission.geojson` (RFC 7946): tracks, way points and no-fly zones with the mission file's own property names.
+"""`mission.geojson` (RFC 7946): tracks, way points and no-fly zones, with the mission file's property names.
 
-The zones can be read back as ``no_fly: [{file: mission.geojson}]``: they are the features with ``kind: no_fly``.
-Shapes that cross the antimeridian are cut there (section 3.1.9).
+The zones can be read back as ``no_fly: [{file: mission.geojson}]``: they are the features with ``kind: no_fly``. Shapes
+that cross the antimeridian are cut there (section 3.1.9).
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ Position = list[float]
 
 
 def write_geojson(name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame) -> str:
-    """The GeoJSON text of a mission called ``name``: a FeatureCollection; same input, same bytes.
+    """The GeoJSON text of a mission called ``name``: a FeatureCollection; the same input gives the same bytes.
 
-    Positions are longitude, latitude (and AMSL metres where the feature says so in ``amsl_m``); a zone's floor and
-    ceiling are the mission file's ``floor_agl_m``, ``floor_amsl_m``, ``ceiling_agl_m``, ``ceiling_amsl_m``.
+    Positions are longitude, latitude, and for tracks and way points AMSL metres, which a way point repeats in
+    ``amsl_m``. A zone's floor and ceiling are the mission file's ``floor_agl_m``, ``floor_amsl_m``, ``ceiling_agl_m``,
+    ``ceiling_amsl_m``.
     """
     features: list[dict[str, Any]] = []
     for track in tracks:
@@ -59,7 +60,7 @@ def _position(lon_deg: float, lat_deg: float, amsl_m: float | None = None) -> Po
 
 
 def _unwrapped(lon_deg: Floats) -> Floats:
-    """Longitudes without the jump at ±180°: each within half a turn of the one before."""
+    """Longitudes without the jump at ±180°: each is within half a turn of the one before."""
     steps = (np.diff(lon_deg) + 180.0) % 360.0 - 180.0
     return np.concatenate([lon_deg[:1], lon_deg[0] + np.cumsum(steps)])
 
@@ -85,7 +86,7 @@ def _line(track: Track) -> dict[str, Any]:
 
 
 def _turn(lon_deg: float, towards_deg: float) -> int:
-    """In which turn round the Earth an unwrapped longitude lies; on the seam, the side of ``towards_deg``."""
+    """The turn around the Earth that an unwrapped longitude is in; on the seam, that on the side of ``towards_deg``."""
     turn = int(np.floor((lon_deg + 180.0) / 360.0))
     on_seam = (lon_deg + 180.0) % 360.0 == 0.0
     return turn - 1 if on_seam and towards_deg < lon_deg else turn
@@ -99,7 +100,7 @@ def _area(ring: Floats) -> dict[str, Any]:
         west, east = 360.0 * turn - 180.0, 360.0 * turn + 180.0
         part = _clip(_clip(points, west, keep_east=True), east, keep_east=False)
         corners = [[round(lon, 7), round(lat, 7)] for lon, lat in (part - (360.0 * turn, 0.0)).tolist()]
-        if len({lon for lon, _ in corners}) >= 2:  # more than a hair's breadth beyond the seam
+        if len({lon for lon, _ in corners}) >= 2:  # leave out parts without width at the seam
             polygons.append([[*corners, corners[0]]])
     if len(polygons) == 1:
         return {"type": "Polygon", "coordinates": polygons[0]}

@@ -1,4 +1,4 @@
-"""`mission.kml` (KML 2.2, OGC 07-147r2): tracks at their altitude and no-fly zones as solids, for a look in 3-D."""
+"""`mission.kml` (KML 2.2, OGC 07-147r2): tracks at their altitude and no-fly zones as solids, for a 3-D viewer."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from gcsplan.world.zones import Level, Zone
 
 TRACK_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff3333ff")  # aabbggrr
 DRAWN_TOP_M = 300.0
-"""A zone without a ceiling is drawn to this far above the highest track."""
+"""Metres above the highest track up to which a zone without a ceiling is drawn."""
 
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-"""XML 1.0, production 2 (Char), turned round."""
+"""The characters that XML 1.0 does not allow (complement of production 2, Char)."""
 
 
 def write_kml(name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame) -> str:
-    """The KML text of a mission called ``name``; same input, same bytes.
+    """The KML text of a mission called ``name``; the same input gives the same bytes.
 
-    Heights are AMSL (``absolute``), zones with an AGL level follow the ground (``relativeToGround``). A zone is drawn
-    as a solid from the ground to its ceiling, or as floor and ceiling where it has a floor.
+    Heights are AMSL (``absolute``); zones with an AGL level follow the ground (``relativeToGround``). A zone is drawn
+    as a solid from the ground to its ceiling, or, if it has a floor, as the two faces floor and ceiling.
     """
     top_m = max((float(t.amsl_m.max()) for t in tracks), default=0.0) + DRAWN_TOP_M
     lines = [

@@ -1,8 +1,9 @@
-"""The output directory: one whole plan or none, and never at the cost of a file that is not ours.
+"""The output directory: one whole plan or none, without ever losing a file that gcsplan did not write.
 
-A manifest (``.gcsplan``) names the files that gcsplan wrote, with their SHA-256. A file that stands in the way and is
-not in it, or was edited since, is somebody's work: it is moved to ``previous/``, under a free name, and never lost.
-How a directory gets from one plan to the next so that nobody ever sees files of both: `gcsplan.export.generation`.
+A manifest (``.gcsplan``) names the files that gcsplan wrote, with their SHA-256. A file in the way that is not in the
+manifest, or was edited since, is somebody's work: it is moved to ``previous/``, under a free name.
+`gcsplan.export.generation` changes a directory from one plan to the next so that files of both are never visible
+together.
 """
 
 from __future__ import annotations
@@ -42,18 +43,18 @@ __all__ = [
 
 MAX_MANIFEST_BYTES = 1_000_000
 MAX_OUTPUT_BYTES = 1_000_000_000
-"""No output is as large; what is was put there by somebody, and is not read to find that out."""
+"""No output is this large; a larger file is not gcsplan's, and is not read to find out."""
 
-# What gcsplan's outputs are called, for a directory whose manifest is damaged.
+# Names of gcsplan's outputs, for a directory whose manifest is damaged.
 _OURS = re.compile(r".+\.(waypoints|plan)|mission\.(kml|geojson)|profile\.csv|(summary|upload)\.json|report\.html")
 
 
 def write_outputs(directory: str | os.PathLike[str], files: Mapping[str, str | bytes]) -> list[str]:
-    """Make ``files`` (name to content, text in UTF-8) gcsplan's outputs in ``directory``; earlier ones go.
+    """Make ``files`` (name to content, text in UTF-8) gcsplan's outputs in ``directory``; earlier outputs are removed.
 
-    Returns the names of files of others that stood in the way and were moved to ``previous/``. The directory is made
-    where it is missing. Raises InputError where it cannot be written; then everything is as it
-    was. Raises ValueError for a name that is no plain file name.
+    Returns the names of other files that were in the way and were moved to ``previous/``. Creates the directory if it
+    is missing. Raises InputError if it cannot be written; nothing has changed then. Raises ValueError for a name that
+    is not a plain file name.
     """
     return _write(Path(directory), files, keep=False)
 
@@ -66,8 +67,8 @@ def add_output(directory: str | os.PathLike[str], name: str, content: str | byte
 def retire_outputs(directory: str | os.PathLike[str]) -> list[str]:
     """Move gcsplan's outputs from ``directory`` to ``previous/`` in it, so that no old mission is flown by mistake.
 
-    Returns the names that were moved. What an earlier retirement left in ``previous/`` is replaced; files of others
-    there are kept under a free name. Raises InputError where it cannot be done; then everything is as it was.
+    Returns the names that were moved. Outputs of an earlier retirement in ``previous/`` are replaced; other files there
+    are kept under a free name. Raises InputError if that is impossible; nothing has changed then.
     """
     root = Path(directory)
     with _reported(root):
@@ -101,9 +102,9 @@ def retire_outputs(directory: str | os.PathLike[str]) -> list[str]:
 
 
 def settle_outputs(directory: str | os.PathLike[str]) -> bool:
-    """Where an earlier run was killed while it wrote to ``directory``, put back the outputs before it.
+    """If an earlier run was killed while it wrote to ``directory``, put back the outputs before it.
 
-    Returns whether there was anything to put back. Raises InputError where that cannot be done.
+    Returns whether there was anything to put back. Raises InputError if that is impossible.
     """
     root = Path(directory)
     with _reported(root):
@@ -114,7 +115,7 @@ def settle_outputs(directory: str | os.PathLike[str]) -> bool:
 
 
 def require_settled(files: Iterable[str | os.PathLike[str]]) -> None:
-    """Raise InputError where one of ``files`` lies in a directory that is caught between two plans."""
+    """Raise InputError if one of ``files`` is in a directory that is caught between two plans."""
     for folder in _folders(files):
         if is_caught(folder):
             raise InputError(
@@ -127,14 +128,14 @@ def require_settled(files: Iterable[str | os.PathLike[str]]) -> None:
 
 @contextmanager
 def steady(files: Iterable[str | os.PathLike[str]]) -> Iterator[None]:
-    """Around the reading of several files: raises InputError where a plan was written among them meanwhile."""
+    """Wrap the reading of several files: raises InputError if a plan was written among them meanwhile."""
     files = tuple(files)
     folders = _folders(files)
     require_settled(files)
     before = [_mark(folder) for folder in folders]
     try:
         yield
-    except InputError:  # files that were missing for a moment are no fault of the user's
+    except InputError:  # files that are missing while a plan is written are not the user's mistake
         require_settled(files)
         raise
     require_settled(files)
@@ -177,7 +178,7 @@ def _write(root: Path, files: Mapping[str, str | bytes], *, keep: bool) -> list[
 
 
 def _is_among(root: Path, name: str, others: Iterable[str]) -> bool:
-    """Whether ``name`` is one of ``others`` in other letters, on a disk where upper and lower case are the same."""
+    """Whether ``name`` equals one of ``others`` except for case, on a disk that ignores case."""
     alike = [root / other for other in others if other != name and other.casefold() == name.casefold()]
     return any(os.path.lexists(path) and os.path.samefile(path, root / name) for path in alike)
 
@@ -211,7 +212,7 @@ def _reported(root: Path) -> Iterator[None]:
 
 @contextmanager
 def _made(root: Path) -> Iterator[None]:
-    """Make ``root`` and what is missing above it; unmake it if what follows fails."""
+    """Create ``root`` and its missing parents; remove them again if the body fails."""
     missing = [p for p in (root, *root.parents) if not os.path.lexists(p)]
     made: list[Path] = []
     try:
@@ -228,12 +229,12 @@ def _made(root: Path) -> Iterator[None]:
 
 
 def _folders(files: Iterable[str | os.PathLike[str]]) -> list[Path]:
-    """Where ``files`` lie, links followed; nothing for what can be no name of a file."""
+    """The directories of ``files``, links followed; names that no file can have are skipped."""
     return sorted({Path(os.path.realpath(file)).parent for file in files if "\0" not in os.fspath(file)})
 
 
 def _mark(folder: Path) -> tuple[int, int, int] | None:
-    """What tells one plan in ``folder`` from the next; None where gcsplan wrote none."""
+    """An identifier of the present plan in ``folder``; None if gcsplan wrote none there."""
     try:
         status = os.lstat(folder / MANIFEST)
     except OSError:
@@ -242,7 +243,7 @@ def _mark(folder: Path) -> tuple[int, int, int] | None:
 
 
 def _is_ours(path: Path, digest: str | None) -> bool:
-    """True for a plain file that still is what gcsplan wrote."""
+    """Whether ``path`` is a plain file with the content that gcsplan wrote."""
     if digest is None or not is_plain(path) or os.lstat(path).st_size > MAX_OUTPUT_BYTES:
         return False
     return digest_of_file(path) == digest
@@ -253,7 +254,7 @@ def _manifest_text(record: Mapping[str, str | None]) -> bytes:
 
 
 def _manifest(directory: Path) -> dict[str, str | None]:
-    """Names that gcsplan wrote here to their digests; None for those of a damaged manifest, known by their names."""
+    """Names that gcsplan wrote here, with digests; from a damaged manifest, names that look like outputs, with None."""
     path = directory / MANIFEST
     if not os.path.lexists(path):
         return {}

@@ -1,4 +1,4 @@
-"""`profile.csv`: a row for each item, for spreadsheets and scripts."""
+"""`profile.csv`: one row per item, for spreadsheets and scripts."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ COLUMNS: tuple[tuple[str, str, int], ...] = (
     ("cumulative_energy_j", "cumulative_energy_j", 1),
     ("time_s", "time_s", 2),
 )
-"""Column, field of `ItemRow`, decimals; after vehicle, seq and command."""
+"""Column, field of `ItemRow`, decimals; the columns follow vehicle, seq and command."""
 
 
 def write_profile(rows: Iterable[ItemRow]) -> str:
-    """The CSV text: a header and a line for each of ``rows``; LF, a point for the decimals, empty where unknown."""
+    """The CSV text: a header and one line per row, with LF and a decimal point; unknown values are empty."""
     out = io.StringIO()
     table = csv.writer(out, lineterminator="\n")
     table.writerow(["vehicle", "seq", "command", *(name for name, _, _ in COLUMNS)])

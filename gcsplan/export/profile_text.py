@@ -13,10 +13,10 @@ GROUND, TRACK, BOTH, UNKNOWN = "█", "•", "▒", "?"
 
 
 def profile_lines(verdict: Verdict, world: World, *, columns: int = 72, rows: int = 10) -> list[str]:
-    """``rows`` lines with the altitude AMSL in front, and one below with the way flown; none where nothing is flown.
+    """``rows`` lines that begin with the altitude AMSL, and one below with the track length; none if nothing is flown.
 
-    In each column ground is filled up to its highest sample, the track is drawn where it runs, and ``▒`` marks where
-    both fall into one cell. Columns of take-off and landing are left out: they have no width.
+    In each column, ground is filled up to its highest sample, the path is drawn at its altitude, and ``▒`` marks a cell
+    with both. Columns of take-off and landing are left out, because they have no width.
     """
     legs = [leg for leg in verdict.legs if not leg.column and leg.horizontal_m > 0.0]
     total_m = math.fsum(leg.horizontal_m for leg in legs)
@@ -35,7 +35,7 @@ def profile_lines(verdict: Verdict, world: World, *, columns: int = 72, rows: in
     both = np.concatenate([ground[np.isfinite(ground)], track.ravel()])
     low, high = float(both.min()), float(both.max())
     span = max(high - low, 10.0)
-    low, high = low - span / rows, high + 0.02 * span  # the lowest ground fills a row of its own
+    low, high = low - span / rows, high + 0.02 * span  # the lowest ground gets a row of its own
     step = (high - low) / rows
     top = np.array([np.nan if np.isnan(g).all() else np.nanmax(g) for g in ground])
     lines = []
@@ -43,7 +43,7 @@ def profile_lines(verdict: Verdict, world: World, *, columns: int = 72, rows: in
         above, below = high - row * step, high - (row + 1) * step
         cells = []
         for column in range(columns):
-            fill = top[column] > 0.5 * (above + below)  # NaN is not
+            fill = top[column] > 0.5 * (above + below)  # False for NaN
             here = bool(((track[column] >= below) & (track[column] <= above)).any())
             unknown = row == rows - 1 and math.isnan(top[column])
             if here:

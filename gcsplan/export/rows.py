@@ -1,4 +1,4 @@
-"""What the writers are handed: a row for each item, a track for each vehicle, and the outline of a zone in degrees."""
+"""The data for the writers: a row per item, a track per vehicle, and the outline of a zone in degrees."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from gcsplan.world.zones import Circle, Level, Zone
 
 CIRCLE_CORNERS = 72
 OUTLINE_MARGIN_M = 0.02
-"""Corners are written to 1e-7 degrees (11 mm); a circle's outline keeps this much outside it, so it still holds it."""
+"""Metres that a circle's outline stays outside the circle, to contain it after rounding to 1e-7 degrees (11 mm)."""
 
 
 @dataclass(frozen=True, slots=True)
 class ItemRow:
-    """One mission item in numbers; None or NaN where there is none (a command without a place, unknown ground)."""
+    """One mission item in numbers; None or NaN if there is none (a command without a place, unknown ground)."""
 
     vehicle: str
     seq: int
@@ -39,7 +39,7 @@ class ItemRow:
 class Track:
     """The line that one vehicle flies: (N,) degrees and AMSL metres, N >= 2, straight between neighbours.
 
-    ``labels`` (N,): a word for each point (its item's command), empty for points that are no items.
+    ``labels`` (N,) has a word for each point (its item's command), empty for points that are not items.
     """
 
     vehicle: str
@@ -66,7 +66,7 @@ class Track:
 def outline_deg(zone: Zone, frame: Frame) -> Floats:
     """(N, 2) latitude, longitude of the corners of ``zone``, counter-clockwise, not closed.
 
-    A circle becomes a polygon of `CIRCLE_CORNERS` corners that holds the whole of it.
+    A circle becomes a polygon of `CIRCLE_CORNERS` corners that contains all of it.
     """
     shape = zone.shape
     if isinstance(shape, Circle):
@@ -77,7 +77,7 @@ def outline_deg(zone: Zone, frame: Frame) -> Floats:
 
 
 def extent_words(zone: Zone) -> str:
-    """From where to where a zone reaches in height, in words."""
+    """The range of heights of a zone, in words."""
 
     def words(level: Level | None, none: str) -> str:
         return none if level is None else str(level)

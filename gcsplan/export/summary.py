@@ -1,4 +1,4 @@
-"""`summary.json`: a plan in one JSON document, keys in the order of the contract, the same bytes for the same input."""
+"""`summary.json`: a plan as one JSON document, keys in the order of the contract; same input, same bytes."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ ORDER: dict[str, tuple[str, ...]] = {
     "fleet": ("mode", "order", "min_separation_m", "closest"),
     "closest": ("vehicles", "time_s"),
 }  # fmt: skip
-"""Order of the known keys of each object, by the key that it stands under; others follow as they come."""
+"""Order of the known keys of each object, by the key of the object; other keys follow in their own order."""
 
 CLOCKS = frozenset({"planning_s", "first_path_s", "search", "upload"})
-"""Clock readings, and what holds some: different each time, so they stand in ``--json`` and upload.json only."""
+"""Clock readings and their objects: they differ each time, so only ``--json`` and upload.json hold them."""
 
 DECIMALS = (
     ("lat_deg", 7),
@@ -41,10 +41,11 @@ OTHER_DECIMALS = 6
 
 
 def write_summary(summary: Mapping[str, Any], *, clocks: bool = False) -> str:
-    """The JSON text of ``summary``; NaN and infinity become null, numpy's numbers plain ones.
+    """The JSON text of ``summary``; NaN and infinity become null, numpy's numbers become plain ones.
 
     ``clocks`` keeps the clock readings. Floats are rounded by their unit; least values and lower bounds (``min_…``,
-    ``lower_bound_…``) downwards, so that none looks better than it is. Raises TypeError for what JSON has not.
+    ``lower_bound_…``) are rounded down, so that none looks better than it is. Raises TypeError for a type that JSON
+    lacks.
     """
     return json.dumps(_plain(summary, "", clocks), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -60,7 +61,7 @@ def _plain(value: Any, key: str, clocks: bool) -> Any:
         return str(value)
     if value is None or isinstance(value, bool | int):
         return value
-    if hasattr(value, "tolist"):  # numpy's scalars and arrays, without importing numpy for it
+    if hasattr(value, "tolist"):  # numpy's scalars and arrays, without an import of numpy
         return _plain(value.tolist(), key, clocks)
     if isinstance(value, float):
         return _rounded(value, key)
@@ -73,6 +74,6 @@ def _rounded(value: float, key: str) -> float | None:
     decimals = next((n for suffix, n in DECIMALS if key.endswith(suffix)), OTHER_DECIMALS)
     if key.startswith(("min_", "lower_bound")):
         scaled = value * 10.0**decimals
-        # 60.0 that came out as 59.999999999999 is 60.0: what is smaller than the sixth place is noise.
+        # A true 60.0 may arrive as 59.999999999999: differences below the sixth place are noise.
         value = math.floor(scaled + 1e-3) / 10.0**decimals if abs(scaled) < 1e15 else value
     return round(value, decimals) + 0.0

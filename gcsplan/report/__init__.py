@@ -1,1 +1,1 @@
-"""What a person looks at before the flight."""
+"""The report for a person to read before the flight."""

@@ -1,4 +1,4 @@
-"""A line chart: curves in an SVG that stretches with the page, and its numbers beside it as HTML, never stretched."""
+"""A line chart: curves in an SVG that stretches with the page, and its numbers as HTML beside it, not stretched."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ UNITS = 10_000.0
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """What a chart spans; its curves are paths in units of 1/10000 of its width and height."""
+    """The range of a chart; its curves are SVG paths in units of 1/10000 of its width and height."""
 
     x0: float
     x1: float
@@ -29,17 +29,17 @@ class Axes:
     y_label: str
 
     def xy(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """(N, 2) in units, y down; held within three heights of the chart."""
+        """(N, 2) in units, y down, limited to three chart heights beyond the chart."""
         u = (np.asarray(x, float) - self.x0) / (self.x1 - self.x0)
         v = np.clip((self.y1 - np.asarray(y, float)) / (self.y1 - self.y0), -3.0, 4.0)
         return UNITS * np.stack(np.broadcast_arrays(u, v), axis=-1)
 
     def line(self, x: ArrayLike, y: ArrayLike, kind: str) -> str:
-        """A curve, broken where y is unknown."""
+        """A curve, interrupted where y is unknown."""
         return f'<path class="{kind}" d="{"".join(_run(p, "") for p in _pieces(self.xy(x, y)))}"/>'
 
     def area(self, x: ArrayLike, low: ArrayLike, high: ArrayLike, kind: str, title: str = "") -> str:
-        """What lies between two curves; infinite ends reach beyond the chart."""
+        """The area between two curves; infinite values reach beyond the chart."""
         span = self.y1 - self.y0
         bottom = np.nan_to_num(np.asarray(low, float), nan=np.nan, neginf=self.y0 - span, posinf=self.y1 + span)
         top = np.nan_to_num(np.asarray(high, float), nan=np.nan, neginf=self.y0 - span, posinf=self.y1 + span)
@@ -48,13 +48,13 @@ class Axes:
         return f'<path class="{kind}" d="{"".join(paths)}">{f"<title>{esc(title)}</title>" if title else ""}</path>'
 
     def mark(self, x: float, y: float, kind: str, label: str, tip: str, rank: int) -> Mark:
-        """A mark at a place of the chart."""
+        """A mark at a point of the chart."""
         u, v = self.xy(x, y) / UNITS
         return Mark(float(u), float(v), kind, label, tip, rank)
 
 
 def chart_html(name: str, axes: Axes, shapes: Sequence[str], marks: Sequence[Mark], words: str, tall: float) -> str:
-    """The figure ``name``; ``words`` say what it shows to somebody who cannot see it; ``tall`` is height over width."""
+    """The figure ``name``; ``words`` describe it for a reader who cannot see it; ``tall`` is height over width."""
     xs, ys = ticks(axes.x0, axes.x1, 8), ticks(axes.y0, axes.y1, 6)
     grid = "".join(
         f'<path class="grid" d="M{u:.0f} 0V10000"/>' for u in axes.xy(xs, np.full(len(xs), axes.y0))[:, 0]
@@ -78,7 +78,7 @@ def chart_html(name: str, axes: Axes, shapes: Sequence[str], marks: Sequence[Mar
 
 
 def ticks(low: float, high: float, wanted: int) -> Floats:
-    """Round values between two, about ``wanted`` of them."""
+    """About ``wanted`` round values between two."""
     step = nice_step((high - low) / wanted)
     return np.asarray(step * np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1), float)
 
@@ -96,6 +96,6 @@ def _pieces(points: Floats) -> list[Floats]:
 
 
 def _run(points: Floats, first: str) -> str:
-    """Rows as path commands, whole units, points on one straight step left out."""
+    """Rows as path commands, rounded to whole units."""
     whole = np.rint(points).astype(int).tolist()
     return (first or "M") + "L".join(f"{x} {y}" for x, y in whole)

@@ -1,4 +1,4 @@
-"""A fleet in time: how far each vehicle is when, how near they come to each other, and the schedule in numbers."""
+"""A fleet over time: distance flown by each vehicle, distances between them, and the schedule in numbers."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from gcsplan.report.subject import Page
 
 INSTANTS = 600
 MOST_PAIRS = 6
-"""Drawn one by one; of more only the nearest at each moment."""
+"""Most pairs that are drawn one by one; with more, only the nearest two at each time are drawn."""
 TALL = 0.34
 
 
 def motions_of(page: Page) -> list[tuple[int, TimedPath]]:
-    """The subjects that have a place in the fleet's time, by number; empty for a single one."""
+    """The subjects that have a motion in the fleet's time, by number; empty for a single one."""
     found = [(i, s.motion) for i, s in enumerate(page.subjects) if s.motion is not None]
     return found if len(found) > 1 else []
 
 
 def fleet_html(page: Page, charts: dict[str, object]) -> str:
-    """The two pictures and the table; their numbers are added to ``charts`` for the page's script."""
+    """The two charts and the table; the charts' numbers are added to ``charts`` for the page's script."""
     motions = motions_of(page)
     if not motions:
         return ""
@@ -48,7 +48,7 @@ def fleet_html(page: Page, charts: dict[str, object]) -> str:
 
 
 def instants(motions: Sequence[tuple[int, TimedPath]]) -> Floats:
-    """Moments for the pictures: even ones, and every moment at which some vehicle begins a new piece."""
+    """The times for the charts: evenly spaced, plus every time at which a vehicle begins a new piece."""
     begin, end = min(m.begin_s for _, m in motions), max(m.end_s for _, m in motions)
     own = np.concatenate([m.times_s for _, m in motions])
     if len(own) > 2 * INSTANTS:
@@ -57,14 +57,14 @@ def instants(motions: Sequence[tuple[int, TimedPath]]) -> Floats:
 
 
 def flown_m(motion: TimedPath, times_s: Floats) -> Floats:
-    """(M,) horizontal way at each moment; NaN before take-off and after the end."""
+    """(M,) horizontal distance flown at each time; NaN before take-off and after the end."""
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(motion.points[:, :2], axis=0).T))])
     inside = (times_s >= motion.begin_s - 1e-6) & (times_s <= motion.end_s + 1e-6)
     return np.where(inside, np.interp(times_s, motion.times_s, run), np.nan)
 
 
 def apart_m(a: TimedPath, b: TimedPath, times_s: Floats) -> Floats:
-    """(M,) distance in space at each moment while both are in the air; NaN else."""
+    """(M,) distance in space at each time while both are in the air; NaN otherwise."""
     begin = max(a.begin_s, b.begin_s)
     end = min(math.inf if a.ends_in_air else a.end_s, math.inf if b.ends_in_air else b.end_s)
     inside = (times_s >= begin) & (times_s <= end)
@@ -99,7 +99,7 @@ def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
 
 
 def separation_words(page: Page) -> str:
-    """The fleet's exact least distance in a sentence, ready HTML; empty where none was judged."""
+    """The fleet's exact least distance in a sentence of HTML; empty if none was judged."""
     found = page.separation
     if found is None:
         return ""
@@ -166,7 +166,7 @@ def _separation_chart(
 
 
 def _numbers(times: Floats, series: Sequence[tuple[str, str, int, Floats]]) -> dict[str, object]:
-    """What the page's script tells of a chart under the pointer."""
+    """The numbers that the page's script shows of a chart under the pointer."""
     return {
         "x": [round(float(t), 2) for t in times], "xunit": "s",
         "series": [

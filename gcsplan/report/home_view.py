@@ -1,4 +1,4 @@
-"""The way home on the page: how high a return must be from where, where none is safe, and the battery leg by leg."""
+"""The way home on the page: the return altitude needed along the track, unsafe parts, and the battery by leg."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_LINES = 4
 
 
 def home_lines(page: Page) -> str:
-    """Lines for the page's head on ways home that are not safe, or were not judged; of many vehicles, one on all."""
+    """Lines for the page's head on ways home that are unsafe or not judged; one line for all if there are many."""
     several = len(page.subjects) > 1
     lines = [(s, line) for s in page.subjects if (line := _home_line(s, several))]
     if len(lines) <= MOST_LINES:
@@ -33,7 +33,7 @@ def home_lines(page: Page) -> str:
 
 
 def _home_line(subject: Subject, several: bool) -> str:
-    """One line for the page's head where the way home is not safe, or not judged; empty otherwise."""
+    """One line for the page's head if the way home is unsafe or not judged; empty otherwise."""
     home = subject.home
     if home is None or home.safe is True:
         return ""
@@ -51,7 +51,7 @@ def _home_line(subject: Subject, several: bool) -> str:
 
 
 def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object]) -> str:
-    """The section; empty where nobody's way home was judged. The charts' numbers are added to ``charts``."""
+    """The section; empty if no way home was judged. The charts' numbers are added to ``charts``."""
     parts = []
     for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
         if subject.home is not None:

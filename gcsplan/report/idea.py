@@ -1,4 +1,4 @@
-"""A picture of how the default planner knows: what stands above the cap, and where any shorter path could run."""
+"""A picture of the default planner's proof: terrain above the cap, and the cells that a shorter path could meet."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def draw(problem: Problem) -> Figure:
     ground = np.where(np.isnan(plane.grounds[0]), np.nanmin(plane.grounds[0]), plane.grounds[0])
     shade = LightSource(azdeg=315, altdeg=40).hillshade(ground[::-1], vert_exag=1.5, dx=cell_m, dy=cell_m)[::-1]
     ax.pcolormesh(x, y, shade, cmap="gray", vmin=-0.2, vmax=1.1, shading="gouraud", rasterized=True)
-    fine = room.guide.mesh.plane  # cells of a finer lattice where that was looked at
+    fine = room.guide.mesh.plane  # the cells may be of a finer lattice
     layers = ((walls & plane.inside, plane, WALL, 0.45), (room.cells, fine, ROOM, 0.75))
     for mask, lattice, colour, alpha in layers:
         layer = np.where(mask, 1.0, np.nan)
@@ -64,5 +64,5 @@ def draw(problem: Problem) -> Figure:
 
 
 def save(problem: Problem, file: FilePath | IO[bytes]) -> None:
-    """Write `draw`'s picture as PNG."""
+    """Write the picture of `draw` as PNG."""
     draw(problem).savefig(file, format="png", dpi=110, metadata={"Software": None})

@@ -1,4 +1,4 @@
-"""Marks and labels that lie over a figure: HTML at a part of its width and height, so that they keep their size."""
+"""Marks and labels over a figure: HTML at a part of its width and height, so that they keep their size."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from gcsplan.report.markup import esc
 
 ASSUMED_WIDTH_PX = 900.0
-"""Which labels would lie on each other is settled for this width; the page's script settles it anew for its own."""
+"""Width for which label collisions are resolved here; the page's script resolves them again for the real width."""
 LETTER_PX, LINE_PX = 6.6, 16.0
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """``x``, ``y`` in 0 … 1 of the figure; ``kind`` is its class; labels of a lower ``rank`` win where two collide."""
+    """``x``, ``y`` are 0 … 1 of the figure; ``kind`` is the class; if labels collide, the lower ``rank`` stays."""
 
     x: float
     y: float
@@ -25,7 +25,7 @@ class Mark:
 
 
 def marks_html(marks: Sequence[Mark], ratio: float) -> str:
-    """Spans for ``marks``; ``ratio`` is height over width of the figure."""
+    """HTML spans for ``marks``; ``ratio`` is height over width of the figure."""
     muted = _colliding(marks, ratio)
     return "".join(
         f'<span class="mark {m.kind}{" mute" if i in muted else ""}" '
@@ -36,7 +36,7 @@ def marks_html(marks: Sequence[Mark], ratio: float) -> str:
 
 
 def _colliding(marks: Sequence[Mark], ratio: float) -> set[int]:
-    """Indices of the marks whose labels would lie on one of a better rank."""
+    """Indices of the marks whose labels would overlap one of a better rank."""
     taken: list[tuple[float, float, float, float]] = []
     muted = set()
     for i in sorted(range(len(marks)), key=lambda k: marks[k].rank):

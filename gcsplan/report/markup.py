@@ -1,4 +1,4 @@
-"""Words and numbers as HTML: everything that comes from a file is escaped here, every number gets its unit here."""
+"""Words and numbers as HTML: texts from files are escaped here, and every number gets its unit here."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from collections.abc import Iterable, Sequence
 
 THIN, UNIT_GAP = "\u202f", "\u202f"
 _DIRECTION = frozenset("\u200e\u200f\u061c\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-"""Marks that turn the direction of writing: a name that holds one could make its neighbours read otherwise."""
+"""Characters that change the direction of writing: in a name, they could change how its neighbours read."""
 
 
 def plain(text: object) -> str:
-    """``text`` without control characters, marks of direction and halves of surrogate pairs; not yet escaped."""
+    """``text`` without control characters, direction marks and halves of surrogate pairs; not escaped yet."""
     words = "".join(c for c in str(text) if c not in _DIRECTION)
     return "".join("\ufffd" if unicodedata.category(c) in ("Cc", "Cs") and c not in "\n\t" else c for c in words)
 
 
 def esc(text: object) -> str:
-    """``text`` as it may stand in HTML, in an attribute too."""
+    """``text`` escaped for HTML, also in attributes."""
     return html.escape(plain(text), quote=True)
 
 
 def num(value: float | None, decimals: int = 0, unit: str = "") -> str:
-    """A figure with its unit; a dash where there is none."""
+    """A number with its unit; a dash if there is none."""
     if value is None or not math.isfinite(value):
         return "–"
     text = f"{value:,.{decimals}f}".replace(",", THIN)
@@ -35,16 +35,16 @@ def num(value: float | None, decimals: int = 0, unit: str = "") -> str:
 
 
 def least(value: float | None, decimals: int = 1, unit: str = "") -> str:
-    """The same, rounded down: a margin is never shown larger than it is."""
+    """A number as in `num`, but rounded down, so that a margin is never shown larger than it is."""
     if value is None or not math.isfinite(value):
         return "–"
     power = 10.0**decimals
-    # 65.25 that came out as 65.2499999 is 65.25: what is smaller than the sixth place is noise.
+    # A true 65.25 may arrive as 65.2499999: differences below the sixth place are noise.
     return num(math.floor(value * power + 1e-3 * min(power, 1.0) + 1e-6 * power) / power, decimals, unit)
 
 
 def minutes(seconds: float | None) -> str:
-    """A time as 12 min 34 s."""
+    """A time in the form 12 min 34 s."""
     if seconds is None or not math.isfinite(seconds):
         return "–"
     whole = round(seconds)
@@ -55,14 +55,14 @@ def minutes(seconds: float | None) -> str:
 
 
 def place(lat_deg: float, lon_deg: float) -> str:
-    """Latitude and longitude to a metre; a dash where there is no place."""
+    """Latitude and longitude to a metre; a dash if there is no place."""
     return f"{lat_deg:.5f}, {lon_deg:.5f}" if math.isfinite(lat_deg) and math.isfinite(lon_deg) else "–"
 
 
 def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]], *, marks: Sequence[str] = ()) -> str:
-    """A table of ready HTML cells; the first cell of a row is its header. ``marks``: a class for each row.
+    """A table of HTML cells; the first cell of a row is its header. ``marks`` are CSS classes of the rows.
 
-    Columns whose head ends in a bar hold words and stand left; all others hold numbers.
+    Columns whose head ends in a bar hold words and are left-aligned; all others hold numbers.
     """
     words = [h.endswith("|") for h in head]
     kinds = ["" if w else ' class="n"' for w in words]
@@ -80,7 +80,7 @@ def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]], *, m
 
 
 def tools(name: str) -> str:
-    """The buttons of the figure ``name``; the page's script shows them."""
+    """The buttons of the figure ``name``, hidden until the page's script shows them."""
     return (
         f'<div class="tools" data-for="{name}" hidden>'
         '<button type="button" data-do="in" aria-label="zoom in">+</button>'
@@ -90,7 +90,7 @@ def tools(name: str) -> str:
 
 
 def data_block(name: str, value: object) -> str:
-    """``value`` as a JSON block for the page's own script; nothing in it can end the block or begin another."""
+    """``value`` as a JSON block for the page's script; nothing in it can end the block or begin another one."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False, sort_keys=True)
     text = text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
     return f'<script type="application/json" id="{name}">{text}</script>'

@@ -1,8 +1,8 @@
 """The report: one self-contained HTML page for a plan, or for files that were checked.
 
-`render` and `render_check` give the whole page as text: no address outside, no clock, the same bytes for the same
-input. Style and script stand in `assets/`; the script may do nothing but draw (the page's policy says so), and without
-it the page still holds every number, the map and the profiles.
+`render_page` and `render_check` return the whole page as text: no external addresses, no clock, and the same bytes for
+the same input. Style and script are in `assets/`. The script can only draw (the page's policy enforces it), and without
+it the page still has every number, the map and the profiles.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ __all__ = ["render_check", "render_page"]
 
 BARE_DEM = "bare DEM: trees, masts and wires are not in it"
 OPEN_VEHICLES = 3
-"""Profiles of the first few vehicles stand open; the others open on a tap, and on paper. So do a fleet's tables."""
+"""Vehicles whose profiles are open at first; the others open on a tap, and on paper. So do a fleet's tables."""
 MOST_CARDS = 6
-"""Of more vehicles the key figures stand in one table."""
+"""Most vehicles with cards; the key figures of more are in one table."""
 SCRIPTS = ("base.js", "view.js", "charts.js", "mesh.js", "scene.js", "start.js")
 
 
@@ -50,8 +50,8 @@ def render_check(
 ) -> str:
     """The report of files that were checked in ``world``, as HTML text.
 
-    ``inputs`` are those of a mission file, or a surface's ``info``: where ``bare_dem`` is true, the page says so.
-    ``homes``: the way home of each of ``checked``, in the same order, where it was judged.
+    ``inputs`` are those of a mission file, or a surface's ``info``; if ``bare_dem`` is true, the page says so.
+    ``homes`` are the ways home of ``checked``, in the same order, None if not judged.
     """
     return render_page(page_of_check(title, world, checked, inputs=inputs, notes=notes, homes=homes))
 
@@ -103,7 +103,7 @@ def _asset(name: str) -> str:
 def _document(title: str, body: str, data: str) -> str:
     script = "(function(){\n'use strict';\n" + "\n".join(_asset(name) for name in SCRIPTS) + "\n})();"
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    # Nothing may be loaded from anywhere, and no script may run but this one, whatever a file's names try.
+    # Nothing is loaded from elsewhere, and no other script can run, whatever the names in a file contain.
     policy = (
         f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; base-uri 'none'"
     )
@@ -269,7 +269,7 @@ def _end(page: Page) -> str:
 
 
 def _broken(subject: Subject, world: World) -> list[list[object]]:
-    """East, north, AMSL and kind of everything that is broken at a place."""
+    """East, north, AMSL and kind of every finding that has a place."""
     found: list[list[object]] = []
     for f in subject.verdict.findings:
         if math.isfinite(f.lat_deg + f.lon_deg + f.amsl_m):
@@ -279,7 +279,7 @@ def _broken(subject: Subject, world: World) -> list[list[object]]:
 
 
 def _line_data(index: int, subject: Subject, line: Line) -> dict[str, object]:
-    """One line for the page's script; decimetres (of a short one millimetres) are enough to look at."""
+    """One line for the page's script, rounded to decimetres (a short one to millimetres), which is enough to view."""
     legs = subject.verdict.legs
 
     decimals = 1 if line.length_m > 1000.0 else 3

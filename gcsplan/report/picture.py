@@ -1,4 +1,4 @@
-"""Pictures of a report's page as PNG: the map from above, each vehicle's altitude profile, and the fleet in time."""
+"""Pictures of a report's page as PNG: the map from above, each vehicle's altitude profile, and the fleet over time."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PIXELS = 900
 
 
 def draw(page: Page) -> Figure:
-    """Map and profiles of ``page``; everything in metres, labelled."""
+    """Map and profiles of ``page``, in metres, labelled."""
     rows = len(page.subjects)
     west, south, east, north = _extent(page)
     map_inches = min(max(9.0 * (north - south) / (east - west) + 0.8, 2.5), 14.0)
@@ -48,14 +48,16 @@ def draw(page: Page) -> Figure:
 
 
 def save(page: Page, file: FilePath | IO[bytes]) -> None:
-    """Write `draw`'s picture as PNG."""
-    with rc_context({"text.parse_math": False}):  # a dollar sign in a name is one
+    """Write the picture of `draw` as PNG."""
+    with rc_context({"text.parse_math": False}):  # a dollar sign in a name must stay a dollar sign
         draw(page).savefig(file, format="png", dpi=110, metadata={"Software": None})
 
 
 def figures(page: Page) -> dict[str, bytes]:
-    """File name to PNG of each figure alone: report-map.png, report-space.png, report-profile.png, and a fleet's
-    report-fleet.png."""
+    """File name to PNG of each separate figure.
+
+    They are report-map.png, report-space.png, report-profile.png, and for a fleet report-fleet.png.
+    """
     drawn = {"report-map.png": _map_alone(page), "report-profile.png": _profiles_alone(page)}
     tracks = [
         (v.name, colour, line)
@@ -128,13 +130,13 @@ def _colours(n: int) -> list[str]:
 
 
 def track_en(world: World, verdict: Verdict) -> NDArray[np.float64]:
-    """(N, 3) east_m, north_m, amsl_m of the flown stretches' ends, columns included."""
+    """(N, 3) east_m, north_m, amsl_m of the ends of the flown stretches, with columns."""
     places = np.array([verdict.legs[0].start, *(leg.end for leg in verdict.legs)])
     return np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
 
 
 def _extent(page: Page) -> tuple[float, float, float, float]:
-    """West, south, east, north of all tracks with room around."""
+    """West, south, east, north of the box around all tracks, with a margin."""
     every = np.concatenate([track_en(page.world, v.verdict) for v in page.subjects])[:, :2]
     low, high = every.min(axis=0), every.max(axis=0)
     pad = max(0.12 * float((high - low).max()), 50.0)

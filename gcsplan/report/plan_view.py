@@ -1,4 +1,4 @@
-"""The map: shaded ground, contours, zones, tracks, way points and the tight places, seen from above."""
+"""The map: shaded ground, contours, zones, tracks, way points and tight places, seen from above."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Zone
 
 LARGE = 0.12
-"""Part of the map's height from which a zone holds its own name; of smaller ones it stands beside."""
+"""Part of the map's height above which a zone's name is inside it; the names of smaller ones are beside them."""
 COLOURS = 8
-"""Classes t0 … of the style sheet; more vehicles begin again."""
+"""Number of the style sheet's classes t0 …; more vehicles reuse them from the first."""
 
 
 def map_html(page: Page, lines: Sequence[Line | None], relief: Relief) -> str:
@@ -60,7 +60,7 @@ def map_html(page: Page, lines: Sequence[Line | None], relief: Relief) -> str:
 
 
 def legend(page: Page, relief: Relief) -> str:
-    """What the colours mean, under the map and the view in space."""
+    """The legend of colours, for the map and the view in space."""
     tracks = "".join(
         f'<li><i class="swatch t{i % COLOURS}"></i>{esc(s.name)}</li>' for i, s in enumerate(page.subjects)
     )
@@ -89,7 +89,7 @@ def legend(page: Page, relief: Relief) -> str:
 
 
 def zone_heights(zone: Zone) -> str:
-    """From where to where a zone reaches, short."""
+    """The range of heights of a zone, in short words."""
     if zone.floor is None and zone.ceiling is None:
         return "all heights"
     low = "ground" if zone.floor is None or (zone.floor.value_m == 0 and zone.floor.datum == "agl") else str(zone.floor)
@@ -160,7 +160,7 @@ def _track_marks(subject: Subject, line: Line, index: int, extent: Extent, world
 
 
 def _no_return_svg(home: WayHome | None, line: Line, extent: Extent) -> str:
-    """Where the way home is not safe, beside the track."""
+    """Lines along the parts of the track from which the way home is not safe."""
     paths = []
     for s in home.unsafe if home is not None else ():
         mine = np.flatnonzero((line.run_m >= s.from_m) & (line.run_m <= s.to_m))
@@ -174,7 +174,7 @@ def _no_return_svg(home: WayHome | None, line: Line, extent: Extent) -> str:
 
 
 def _home_places(subject: Subject, world: World) -> list[tuple[float, float, str, str, str]]:
-    """Rally points that are proposed, and the point of no return."""
+    """Proposed rally points, and the point of no return."""
     home, found = subject.home, []
     for r in home.rally if home is not None else ():
         e, n = (float(v) for v in world.frame.to_plane(r.lat_deg, r.lon_deg))
@@ -188,7 +188,7 @@ def _home_places(subject: Subject, world: World) -> list[tuple[float, float, str
 
 
 def tight_places(subject: Subject, line: Line, world: World) -> list[tuple[float, float, str, str, str]]:
-    """East, north, class, label and words of the lowest point, the nearest zone, and everything that is broken."""
+    """East, north, class, label and words of the lowest point, the nearest zone, and every finding with a place."""
     found = []
     verdict = subject.verdict
     low, near = verdict.lowest, verdict.nearest

@@ -1,4 +1,4 @@
-"""The altitude profile along the way: ground, what terrain and limits allow, zones over and under, and the path."""
+"""The altitude profile along the track: ground, altitudes that terrain and limits allow, zones, and the path."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def profile_html(subject: Subject, line: Line, found: list[Passage], index: int,
 
 
 def profile_legend(subject: Subject, line: Line, found: list[Passage]) -> str:
-    """What the colours of a profile mean."""
+    """The legend of a profile's colours."""
     limits = subject.vehicle.limits
     trees = not np.array_equal(line.top_m, line.ground_m, equal_nan=True)
     top = np.isfinite(line.ceiling_m).any()
@@ -69,13 +69,13 @@ def profile_legend(subject: Subject, line: Line, found: list[Passage]) -> str:
 
 
 def unit_of(line: Line) -> tuple[float, str]:
-    """What the way along a line is counted in: its metres and its name."""
+    """The unit of distance along a line: its metres and its name."""
     return (1000.0, "km") if line.length_m > 2000.0 else (1.0, "m")
 
 
 def _axes(subject: Subject, line: Line, found: list[Passage]) -> Axes:
     low, high = _least(line.ground_m, line.amsl_m), _most(line.amsl_m, line.ground_m)
-    for p in found:  # a level near the path is shown, one far above would press everything else flat
+    for p in found:  # include a level near the path, but not one far above, which would flatten everything else
         ground = line.ground_m[p.first : p.last + 1]
         levels = np.concatenate(
             [level_amsl(p.zone.floor, ground, math.nan), level_amsl(p.zone.ceiling, ground, math.nan)]
@@ -102,7 +102,7 @@ def _most(*arrays: Floats | float) -> float:
 
 
 def _wide(run: Floats, axes: Axes) -> Floats:
-    """A zone that is passed in an instant is still drawn a little wide."""
+    """Widen a zone that is passed in an instant, so that it can be seen."""
     least_run = 0.002 * (axes.x1 - axes.x0)
     short = least_run - float(run[-1] - run[0])
     return run if short <= 0 else run + short * (np.linspace(-0.5, 0.5, len(run)) if len(run) > 1 else 0.0)
@@ -137,7 +137,7 @@ def _marks(subject: Subject, line: Line, found: list[Passage], axes: Axes, index
 
 
 def _broken(subject: Subject, line: Line, axes: Axes, world: World) -> list[Mark]:
-    """What is broken, at the nearest sample of the item that it is said of."""
+    """Marks of the findings, each at the nearest sample of its item."""
     marks, seq = [], np.array([leg.seq for leg in subject.verdict.legs])
     for f in subject.verdict.findings:
         mine = np.flatnonzero(seq[line.leg] == f.seq)
@@ -150,7 +150,7 @@ def _broken(subject: Subject, line: Line, axes: Axes, world: World) -> list[Mark
 
 
 def passed(p: Passage) -> str:
-    """How a zone is passed, in words; the numbers are of samples."""
+    """How a zone is passed, in words; the numbers come from samples."""
     if p.over_m is not None and p.over_m >= 0.0:
         return f"passed {least(p.over_m, 0, 'm')} above its ceiling"
     if p.under_m is not None and p.under_m >= 0.0:

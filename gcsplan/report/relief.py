@@ -1,4 +1,4 @@
-"""The ground as a picture: which part of the plane is shown, its shaded relief, contours, and a grid to point at."""
+"""The ground as a picture: the extent of the plane, its shaded relief, contours, and a grid for the pointer."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from gcsplan.world.world import World
 from gcsplan.world.zones import Zone
 
 UNITS = 10_000.0
-"""Width of the map in its own units; heights of it follow."""
+"""Width of the map in map units; its height follows from the extent."""
 PIXELS, CONTOUR_EVERY, GRID_EVERY = 720, 3, 5
-"""Along the map's longer side; contours take every third of them, what the page's script holds every fifth."""
+"""Pixels along the map's longer side; contours use every third, the grid of the page's script every fifth of those."""
 LATTICE = 9
 SHAPE = (0.45, 1.3)
-"""Least and greatest height over width of the map: nothing thinner fits a page, nothing taller a screen."""
+"""Least and greatest height over width of the map, so that it fits a page and a screen."""
 UNKNOWN = 65535
 
 TINTS = (
     (0.00, (172, 193, 152)), (0.25, (205, 209, 162)), (0.50, (224, 205, 160)),
     (0.75, (201, 168, 138)), (1.00, (236, 230, 225)),
 )  # fmt: skip
-"""Part of the way from the lowest ground to the highest, and its colour (red, green, blue)."""
+"""Part of the height from the lowest ground to the highest, and its colour (red, green, blue)."""
 UNKNOWN_TINT = (150, 150, 160)
 
 
@@ -46,17 +46,17 @@ class Extent:
 
     @property
     def width_m(self) -> float:
-        """West to east."""
+        """West to east, m."""
         return self.east_m - self.west_m
 
     @property
     def height_m(self) -> float:
-        """South to north."""
+        """South to north, m."""
         return self.north_m - self.south_m
 
     @property
     def scale(self) -> float:
-        """Map units in a metre."""
+        """Map units per metre."""
         return UNITS / self.width_m
 
     def units(self, east_m: Floats, north_m: Floats) -> Floats:
@@ -65,7 +65,7 @@ class Extent:
         return np.stack([x, (self.north_m - np.asarray(north_m, float)) * self.scale], axis=-1)
 
     def grid(self) -> tuple[Floats, Floats]:
-        """East and north of the samples of the ground: columns from the west, rows from the north."""
+        """East and north of the ground samples: columns from the west, rows from the north."""
         longer, every = max(self.width_m, self.height_m), CONTOUR_EVERY * GRID_EVERY
         cols, rows = (
             max(every, round(PIXELS * side / longer / every) * every) for side in (self.width_m, self.height_m)
@@ -74,7 +74,7 @@ class Extent:
 
 
 def extent_of(lines: Sequence[Line], zones: Sequence[Zone], surface: Surface) -> Extent:
-    """The box around all lines with room beside them; around zones, or the middle of the terrain, without any line."""
+    """The box around all lines with a margin; without lines, around the zones or the middle of the terrain."""
     if lines:
         e = np.concatenate([line.east_m for line in lines])
         n = np.concatenate([line.north_m for line in lines])
@@ -99,10 +99,10 @@ def extent_of(lines: Sequence[Line], zones: Sequence[Zone], surface: Surface) ->
 
 @dataclass(frozen=True, eq=False)
 class Relief:
-    """The ground of an extent, ready to be shown. ``low_m``, ``high_m`` AMSL of known ground, NaN where none is.
+    """The ground of an extent, ready for display. ``low_m``, ``high_m`` are AMSL of known ground, NaN if none is known.
 
-    ``picture``: a data URI. ``contours``: an SVG path in map units, a line every ``interval_m``. ``grid``: what the
-    page's script needs to show the ground under the pointer and to build the terrain's mesh.
+    ``picture`` is a data URI. ``contours`` is an SVG path in map units, with a line every ``interval_m``. ``grid`` is
+    the data with which the page's script shows the ground under the pointer and builds the terrain's mesh.
     """
 
     extent: Extent
@@ -132,7 +132,7 @@ def relief_of(world: World, extent: Extent) -> Relief:
 
 
 def tints(part: Floats) -> Floats:
-    """(..., 3) colour 0 … 255 of ground at ``part`` 0 … 1 of the way up."""
+    """(..., 3) colour 0 … 255 of ground at ``part`` 0 … 1 of the height range."""
     at, colours = [t[0] for t in TINTS], np.array([t[1] for t in TINTS], float)
     return np.stack([np.interp(part, at, colours[:, k]) for k in range(3)], axis=-1)
 
@@ -151,8 +151,8 @@ def shaded(ground: Floats, east_m: Floats, north_m: Floats, low: float, high: fl
     z = np.where(known, ground, low if known.any() else 0.0)
     south, east = np.gradient(z, float(north_m[0] - north_m[1]), float(east_m[1] - east_m[0]))
     steep = float(np.percentile(np.hypot(south, east), 95.0))
-    more = 0.7 / steep if steep > 1e-6 else 0.0  # steep ground of any world gets the same shade
-    x, y = -more * east, more * south  # of the normal, east and north
+    more = 0.7 / steep if steep > 1e-6 else 0.0  # the steep ground of every world gets the same shade
+    x, y = -more * east, more * south  # east and north parts of the normal
     light = (-0.5 * x + 0.5 * y + math.sqrt(0.5)) / np.sqrt(x * x + y * y + 1.0)
     shade = np.clip(0.25 + 0.75 * light / math.sqrt(0.5), 0.25, 1.25)
     part = (z - low) / (high - low) if high - low > 1e-6 else np.zeros_like(z)
@@ -164,7 +164,7 @@ def shaded(ground: Floats, east_m: Floats, north_m: Floats, low: float, high: fl
 def _contours(
     ground: Floats, east_m: Floats, north_m: Floats, extent: Extent, low: float, high: float
 ) -> tuple[str, float]:
-    """Contours as one SVG path, and their interval; nothing on flat ground."""
+    """Contours as one SVG path, and their interval; an empty path on flat ground."""
     if not high - low > 0.5:
         return "", 0.0
     interval = nice_step((high - low) / 12.0)
@@ -183,13 +183,13 @@ def _contours(
 
 
 def nice_step(at_least: float) -> float:
-    """The least of 1, 2, 5 × 10ⁿ that is not smaller."""
+    """The least of 1, 2, 5 × 10ⁿ that is not below ``at_least``."""
     power = 10.0 ** math.floor(math.log10(at_least))
     return next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= at_least * (1.0 - 1e-9))
 
 
 def _grid(world: World, extent: Extent, ground: Floats, low: float, high: float) -> dict[str, object]:
-    """Heights as 16-bit steps, and latitudes and longitudes on a coarse lattice, linear between."""
+    """Heights as 16-bit steps, and latitudes and longitudes on a coarse lattice, to interpolate linearly."""
     base, step = (low, max((high - low) / 65000.0, 1e-4)) if math.isfinite(low) else (0.0, 1.0)
     whole = np.where(np.isnan(ground), UNKNOWN, np.clip(np.nan_to_num((ground - base) / step), 0, 65000))
     lattice = np.meshgrid(

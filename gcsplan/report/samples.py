@@ -1,4 +1,4 @@
-"""A mission's line in samples, for drawing and for hovering; what is judged is never sampled."""
+"""A mission's line as samples, for drawing and for the pointer; the check itself never samples."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from gcsplan.world.zones import Circle, Level, Zone
 
 TERRAIN_FRAMES = (TERRAIN, 11)
 MOST_SAMPLES = 12_000
-"""Of all vehicles together, a little more with many legs."""
+"""Samples of all vehicles together; a few more if there are many legs."""
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One flown line in (N,) samples, metres; the ends of every leg are among them.
+    """One flown line as (N,) samples, metres; the ends of every leg are among them.
 
-    ``run_m`` horizontal way so far; ``ground_m`` and ``top_m`` (with obstacles) NaN where unknown; ``floor_m`` and
-    ``ceiling_m`` the lowest and highest altitude that terrain and limits leave there, errors taken off (columns are
-    exempt from the floor); ``leg`` the index of the leg in the verdict; ``end`` marks the last sample of each leg.
-    ``time_s`` since take-off, ``used_j`` energy so far.
+    ``run_m`` is the horizontal distance so far. ``ground_m`` and ``top_m`` (with obstacles) are NaN where unknown.
+    ``floor_m`` and ``ceiling_m`` are the lowest and highest altitude that terrain and limits allow there, errors taken
+    off (columns are exempt from the floor). ``leg`` is the index of the leg in the verdict; ``end`` marks the last
+    sample of each leg. ``time_s`` is since take-off, ``used_j`` the energy so far.
     """
 
     run_m: Floats
@@ -45,12 +45,12 @@ class Line:
 
     @property
     def length_m(self) -> float:
-        """Horizontal length."""
+        """Horizontal length, m."""
         return float(self.run_m[-1])
 
 
 def line_of(verdict: Verdict, world: World, limits: Limits, *, samples: int = 1200) -> Line | None:
-    """The samples of a verdict's legs; None where it has none (nothing could be followed)."""
+    """The samples of a verdict's legs; None if it has none (nothing could be followed)."""
     legs = verdict.legs
     if not legs:
         return None
@@ -106,7 +106,7 @@ def distance_m(zone: Zone, east_m: Floats, north_m: Floats) -> Floats:
 
 
 def level_amsl(level: Level | None, ground_m: Floats, none: float) -> Floats:
-    """(N,) a zone's floor or ceiling over ``ground_m``, AMSL; ``none`` where there is no such level."""
+    """(N,) a zone's floor or ceiling over ``ground_m``, AMSL; ``none`` if there is no such level."""
     if level is None:
         return np.full(len(ground_m), none)
     return ground_m + level.value_m if level.datum == "agl" else np.full(len(ground_m), level.value_m)
@@ -114,10 +114,10 @@ def level_amsl(level: Level | None, ground_m: Floats, none: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """A zone whose shape and clearance a line passes through: above its ceiling, under its floor, or inside.
+    """A zone whose shape and clearance a line passes: above its ceiling, below its floor, or inside.
 
-    ``over_m`` least height above its ceiling, ``under_m`` least depth below its floor, over the samples that are
-    within the clearance; None where the line does not pass that way. ``first``, ``last``: samples, ends included.
+    ``over_m`` is the least height above its ceiling, ``under_m`` the least depth below its floor, over the samples
+    within the clearance; None if the line does not pass there. ``first``, ``last`` are samples, both included.
     """
 
     zone: Zone
@@ -128,7 +128,7 @@ class Passage:
 
 
 def passages(line: Line, zones: tuple[Zone, ...], reach_m: float) -> list[Passage]:
-    """Where ``line`` comes within ``reach_m`` of each zone's shape, in the order flown."""
+    """The passages of ``line`` within ``reach_m`` of each zone's shape, in the order flown."""
     found = []
     box = (line.east_m.min(), line.north_m.min(), line.east_m.max(), line.north_m.max())
     for zone in zones:

@@ -1,4 +1,4 @@
-"""What the view in space is built from: zones as meshes whose floors and ceilings follow the ground, and the lines."""
+"""Data for the view in space: the zones as meshes whose floors and ceilings follow the ground."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from gcsplan.world.zones import Circle, Polygon, Zone
 CIRCLE_CORNERS = 48
 RINGS = (1.0, 0.66, 0.33)
 EDGE_PARTS = 160
-"""A polygon's edges are cut so that it has about this many corners, each at its own height above ground."""
+"""Corners of a polygon after its edges are cut, about; each corner has its own height above ground."""
 MOST_CORNERS = 240
 BELOW_M = 1.0
-"""A zone without a floor is drawn from this far below the ground."""
+"""Metres below ground at which a zone without a floor is drawn to begin."""
 
 
 def exaggeration(relief: Relief, lines: Sequence[Line]) -> float:
-    """By how much heights are stretched at first: so that they are a tenth of the width; 1 to 8, in halves."""
+    """The factor by which heights are stretched at first, to a tenth of the width: 1 to 8, in halves."""
     highest = max([relief.high_m, *(float(line.amsl_m.max()) for line in lines)])
     span = highest - relief.low_m
     if not span > 1e-6:
@@ -36,7 +36,7 @@ def exaggeration(relief: Relief, lines: Sequence[Line]) -> float:
 def zone_meshes(
     zones: Sequence[Zone], surface: Surface, relief: Relief, lines: Sequence[Line]
 ) -> list[dict[str, object]]:
-    """Each zone that meets the map: name, whether it is cut off above (no ceiling), and the mesh of its sides and lids.
+    """Each zone on the map: name, whether it is open above (no ceiling), and the mesh of its sides and lids.
 
     ``at`` holds x, y, z of each corner (east and north of the map's south-western corner, AMSL, metres), ``faces``
     three corners each, ``edges`` two corners each.
@@ -110,25 +110,25 @@ def _lid(zone: Zone) -> tuple[Floats, Floats, NDArray[np.intp]]:
 
 
 def _thinned(shape: Polygon) -> Floats:
-    """A polygon's corners, some of them left out where there are very many."""
+    """A polygon's corners, thinned out if there are very many."""
     return shape.vertices[:: max(1, len(shape.vertices) // MOST_CORNERS)]
 
 
 def _parts(corners: Floats) -> NDArray[np.intp]:
-    """Into how many parts each edge is cut."""
+    """The number of parts that each edge is cut into."""
     lengths = np.hypot(*(np.roll(corners, -1, axis=0) - corners).T)
     return np.asarray(np.maximum(1, np.round(EDGE_PARTS * lengths / lengths.sum())), dtype=np.intp)
 
 
 def _corners(zone: Zone, n: int) -> NDArray[np.intp]:
-    """Where the polygon's own corners stand among the ``n`` of its cut edges; none where there are too many to draw."""
+    """Positions of the polygon's own corners among the ``n`` of its cut edges; none if too many to draw."""
     assert isinstance(zone.shape, Polygon)
     at = np.concatenate([[0], np.cumsum(_parts(_thinned(zone.shape)))[:-1]])
     return np.asarray(at if len(at) <= 24 and at[-1] < n else at[:0], dtype=np.intp)
 
 
 def triangles(corners: Floats) -> NDArray[np.intp]:
-    """(N - 2, 3) corners of the triangles of a simple polygon (N, 2), counter-clockwise, by cutting its ears off."""
+    """(N - 2, 3) corners of the triangles of a simple polygon (N, 2), counter-clockwise, by ear clipping."""
     left = list(range(len(corners)))
     out: list[tuple[int, int, int]] = []
     size = float(np.abs(corners - corners.mean(axis=0)).max()) ** 2
@@ -148,7 +148,7 @@ def triangles(corners: Floats) -> NDArray[np.intp]:
 
 
 def _is_ear(p: Floats, left: list[int], a: int, b: int, c: int, noise: float, *, flat: bool) -> bool:
-    """``flat``: three corners on one straight edge are an ear too (when nothing else is left)."""
+    """Whether corners a, b, c are an ear; with ``flat``, also if they are on one line (the last resort)."""
 
     def twice(i: int, j: int, at: Floats) -> Floats:
         return np.asarray((p[j, 0] - p[i, 0]) * (at[..., 1] - p[i, 1]) - (p[j, 1] - p[i, 1]) * (at[..., 0] - p[i, 0]))

@@ -1,4 +1,4 @@
-"""The view in space as a still picture: shaded terrain, zones as they stand, and the tracks."""
+"""The view in space as a still picture: shaded terrain, zones as solids, and the tracks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ZONE_COLOUR = "#e0511a"
 
 
 def draw(title: str, world: World, tracks: Sequence[tuple[str, str, Line]]) -> Figure | None:
-    """``tracks``: name, colour and line of each vehicle. None where no ground is known."""
+    """The figure of ``tracks`` (name, colour and line of each vehicle); None if no ground is known."""
     lines = [line for _, _, line in tracks]
     relief = relief_of(world, extent_of(lines, world.airspace.zones, world.airspace.surface))
     if not np.isfinite(relief.low_m):

@@ -1,4 +1,4 @@
-"""What the page is about: one `Page`, a `Subject` for each vehicle; here made from checked files."""
+"""The data of a report: one `Page` with a `Subject` for each vehicle; made here from checked files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gcsplan.world.world import World
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """What is known of the best path: ``bound`` and ``cost`` in ``unit`` (m or J), and why the search stopped."""
+    """The quality of the path: ``bound`` and ``cost`` in ``unit`` (m or J), and why the search stopped."""
 
     objective: str
     unit: str
@@ -29,10 +29,10 @@ class Certificate:
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """One vehicle, or one checked file: its verdict, and what else is known of it.
+    """One vehicle, or one checked file: its verdict, and other data on it.
 
-    ``motion`` and ``slot`` are its place in the fleet's time, None where it flies alone. ``home`` is the way home from
-    everywhere, where it was judged. ``upload`` holds the keys of ``upload.json``, None where nothing was sent.
+    ``motion`` and ``slot`` are its part of the fleet's time table, None if it flies alone. ``home`` is the way home
+    from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if nothing was sent.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Subject:
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """Everything that one report shows. ``facts``: name and value of what was requested, in the order shown."""
+    """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown."""
 
     title: str
     world: World
@@ -61,13 +61,13 @@ class Page:
 
     @property
     def safe(self) -> bool | None:
-        """False where any subject breaks a limit, None where something could not be judged (or there is none)."""
+        """False if any subject breaks a limit, None if something could not be judged (or there is no subject)."""
         verdicts = [s.verdict.safe for s in self.subjects]
         return False if False in verdicts else None if None in verdicts or not verdicts else True
 
 
 class CheckedFile(Protocol):
-    """What a check of one file gives (`gcsplan.app.checking.Checked`)."""
+    """The result of a check of one file (`gcsplan.app.checking.Checked`)."""
 
     @property
     def file(self) -> object: ...
@@ -88,9 +88,9 @@ def page_of_check(
     notes: Sequence[str] = (),
     homes: Sequence[WayHome | None] = (),
 ) -> Page:
-    """The page of files that were checked; each is named by its file where one vehicle has several.
+    """The page of checked files; subjects are named by file if one vehicle has several files.
 
-    ``homes``: the way home of each of ``checked``, in the same order, where it was judged.
+    ``homes`` are the ways home of ``checked``, in the same order, if they were judged.
     """
     names = [c.vehicle.name for c in checked]
     subjects = tuple(

@@ -1,4 +1,4 @@
-"""The page's tables: legs, limits and how near each came to binding, zones, certificate, battery, upload."""
+"""The page's tables: legs, limits with what is left of each, zones, certificate, upload, inputs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gcsplan.report.samples import Line, Passage
 from gcsplan.report.subject import Page, Subject
 
 CLOSE = 0.02
-"""A limit of whose value less than this part is left is called close."""
+"""Part of a limit's value: if less than this is left, the limit is called close."""
 
 
 def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
@@ -43,7 +43,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
 
 
 def legs_table(subject: Subject) -> str:
-    """Each flown stretch: where to, how high above what, how steep, how near to a zone, energy and time."""
+    """Each flown stretch: its end, heights, climb angle, nearest zone, energy and time."""
     bad = {f.seq for f in subject.verdict.findings}
     battery = subject.vehicle.energy.battery_j
     used, clock, rows, marks = 0.0, 0.0, [], []
@@ -67,7 +67,7 @@ def legs_table(subject: Subject) -> str:
 
 
 def limits_table(subject: Subject, line: Line | None) -> str:
-    """Every limit, with the errors it is widened by, what was reached, and what was left."""
+    """Every limit with its errors, the value that was reached, and what is left."""
     rows, marks = [], []
     for name, needed, reached, left, unit, where, share in _limits(subject, line):
         broken = left is not None and left < -1e-6
@@ -80,7 +80,7 @@ def limits_table(subject: Subject, line: Line | None) -> str:
 
 
 Row = tuple[str, str, str, float | None, str, str, float | None]
-"""Limit, what is needed, what was reached, what is left, its unit, where, and what counts as close."""
+"""Limit, required value, value reached, what is left, its unit, place, and what is left at most to be called close."""
 
 
 def _limits(subject: Subject, line: Line | None) -> list[Row]:
@@ -131,7 +131,7 @@ def _limits(subject: Subject, line: Line | None) -> list[Row]:
 
 
 def _height_left(subject: Subject, line: Line) -> list[Row]:
-    """The least room above all that terrain asks for: min AGL, clearance and errors together, at the samples."""
+    """The least height above all that terrain requires: min AGL, clearance and errors together, at the samples."""
     legs = subject.verdict.legs
     free = np.array([leg.column for leg in legs])[line.leg]
     room = np.where(free | ~np.isfinite(line.floor_m), np.inf, line.amsl_m - line.floor_m)
@@ -161,7 +161,7 @@ def _steepness(flown: Sequence[LegFigures], climb_deg: float, descent_deg: float
 
 
 def zones_table(page: Page, subject: Subject, line: Line, found: Sequence[Passage]) -> str:
-    """The zones on the way of one vehicle: those passed over, under or at their height."""
+    """The zones along the track of one vehicle: those passed over, under or at their height."""
     if not found:
         return ""
     rows = []
@@ -195,7 +195,7 @@ def certificate_table(page: Page) -> str:
 
 
 def upload_table(page: Page) -> str:
-    """How each upload ended; empty where nothing was sent."""
+    """The result of each upload; a note if nothing was sent."""
     rows, marks = [], []
     for s in page.subjects:
         u = s.upload
@@ -225,7 +225,7 @@ def _warnings(upload: Mapping[str, object]) -> Sequence[object]:
 
 
 def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]]) -> str:
-    """What went in: terrain model, its datum and resolution, hashes; and what was asked."""
+    """The inputs: terrain model, its datum and resolution, hashes; and what was requested."""
     names = {
         "dem_sha256": "terrain model, SHA-256", "vertical_datum": "vertical datum", "resolution_m": "resolution",
         "bare_dem": "terrain model", "zones_sha256": "zones, SHA-256",
