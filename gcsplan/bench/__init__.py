@@ -1,1 +1,1 @@
-"""Every benchmark lives here; each prints what it measured and a ratio, since machines are noisy."""
+"""Benchmarks. Each prints what it measured, and a ratio, because machines are noisy."""

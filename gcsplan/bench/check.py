@@ -1,4 +1,4 @@
-"""How many legs the exact check judges in a second, on one core, over the sample DEM."""
+"""Legs per second of the exact check, on one core, over the sample DEM."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import TerrainSpec, load_terrain
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
-MIDDLE_DEG = (36.5896, -84.2458)  # of the sample DEM
+MIDDLE_DEG = (36.5896, -84.2458)  # middle of the sample DEM
 LEG_M = 1000.0
-HALF_M = (13_000.0, 14_000.0)  # east and north, from the middle of the sample; legs start within
-AGL_M = (70.0, 200.0)  # of both ends of a leg, at random
+HALF_M = (13_000.0, 14_000.0)  # east and north from the middle; legs start within this box
+AGL_M = (70.0, 200.0)  # range of the random heights of both ends of a leg
 LIMITS = Limits(
     min_agl_m=60.0,
     horizontal_clearance_m=30.0,
@@ -32,11 +32,11 @@ LIMITS = Limits(
 
 
 def run(legs: int = 200_000, seed: int = 1, repeats: int = 5) -> dict[str, Any]:
-    """Judge ``legs`` random one-kilometre legs ``repeats`` times; medians, in legs a second.
+    """Judge ``legs`` random one-kilometre legs ``repeats`` times; medians, in legs per second.
 
-    Held to min AGL, terrain clearance, climb angle and a dozen zones, with track and altitude error. ``clear`` says
-    yes or no, ``examine`` finds every number and every violation; ``examine_legal`` is the same for the legs that are
-    clear. ``first_call_s`` is what the first call costs, compilation included where numba's cache is cold.
+    Each leg is judged for min AGL, terrain clearance, climb angle and a dozen zones, with track and altitude error.
+    ``clear`` answers yes or no, ``examine`` finds every number and every violation; ``examine_legal`` is ``examine`` on
+    the legs that are clear. ``first_call_s`` is the time of the first call, with compilation if numba's cache is cold.
     """
     if legs < 1 or repeats < 1:
         raise ValueError(f"legs and repeats must be 1 or more, given {legs} and {repeats}")
@@ -62,7 +62,7 @@ def run(legs: int = 200_000, seed: int = 1, repeats: int = 5) -> dict[str, Any]:
 
 
 def scene(legs: int, seed: int) -> tuple[Airspace, Legs]:
-    """The sample DEM with a dozen zones, and random one-kilometre legs over it, by a seed."""
+    """The sample DEM with a dozen zones, and random one-kilometre legs over it, made from a seed."""
     frame = Frame(MIDDLE_DEG[0], MIDDLE_DEG[1])
     box = (-HALF_M[0] - LEG_M, -HALF_M[1] - LEG_M, HALF_M[0] + LEG_M, HALF_M[1] + LEG_M)
     spec = TerrainSpec(dem=("sample:jacksboro",), vertical_datum="EGM96")
@@ -88,7 +88,7 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _median_s(work: Callable[[], object], repeats: int) -> float:
-    """Median duration of ``work`` over ``repeats``, after one that does not count."""
+    """Median duration of ``work`` over ``repeats``, after one run that does not count."""
     work()
     took = []
     for _ in range(repeats):
@@ -99,7 +99,7 @@ def _median_s(work: Callable[[], object], repeats: int) -> float:
 
 
 def _zones(rng: np.random.Generator) -> list[Zone]:
-    """A dozen: cylinders and prisms, some over ground, some with a floor."""
+    """Twelve zones: cylinders and prisms, some from the ground up, some with a floor."""
     levels = [
         (None, None),
         (None, Level(100.0, "agl")),
@@ -117,7 +117,7 @@ def _zones(rng: np.random.Generator) -> list[Zone]:
 
 
 def _legs(rng: np.random.Generator, surface: Surface, count: int) -> Legs:
-    """Random places and directions; both ends at random heights above their own ground."""
+    """Legs at random places and in random directions, with both ends at random heights above their own ground."""
     turn = rng.uniform(0.0, 2.0 * np.pi, count)
     a = rng.uniform(-1.0, 1.0, (count, 2)) * HALF_M
     b = a + LEG_M * np.stack([np.cos(turn), np.sin(turn)], axis=-1)

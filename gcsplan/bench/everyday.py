@@ -1,7 +1,7 @@
-"""``gcsplan bench everyday``: the default planner on a working day's missions, beside a visibility graph.
+"""``gcsplan bench everyday``: the default planner on everyday missions, compared with a visibility graph.
 
-Every mission runs in a process of its own, so that its memory and its seconds are its own, and so that one that runs
-away is ended without taking the others along.
+Every mission runs in a separate process, so that its memory and seconds are its own, and so that a runaway one can be
+killed without affecting the others.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from gcsplan.planners.registry import get as get_planner
 
 COUNT = 100
 KILL_MB, KILL_S = 6000.0, 120.0
-"""A process that takes more is ended."""
+"""Megabytes and seconds above which a process is killed."""
 GROUND_ALIKE_M = 1e-6
 WORTH = 1e-3
 """Percent that a search must gain to count."""
@@ -41,9 +41,12 @@ WORTH = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One mission. ``oracle_m``: the shortest track on flat ground among zones that nobody enters; ``over_percent``:
-    how much longer ours is, on the ground, than that. ``status``: solved, infeasible (proved), not found, unsafe,
-    failed, killed. Seconds are wall clock's; ``memory_mb`` is the peak above what the process had before."""
+    """The result of one mission.
+
+    ``oracle_m`` is the shortest track on flat ground around the zones; ``over_percent`` is how much longer the
+    planner's track is. ``status`` is solved, infeasible (proved), not found, unsafe, failed or killed. Seconds are
+    wall-clock seconds; ``memory_mb`` is the peak above what the process had before.
+    """
 
     name: str
     kind: str
@@ -62,17 +65,17 @@ class Outcome:
     stopped_by: str = ""
     detail: str = ""
     search: str = "[]"
-    """JSON: the steps of the plan, as `gcsplan.planners.problem.Step` has them."""
+    """JSON: the steps of the plan, as `gcsplan.planners.problem.Step`."""
 
 
 def problem_of(one: Everyday) -> Problem:
-    """The planner's question of an everyday mission, margins for rounding included, as ``gcsplan plan`` asks it."""
+    """The planner's problem of an everyday mission, with the margins for rounding of ``gcsplan plan``."""
     source = load_mission(Path(f"{one.kind}.yaml"), text=yaml.safe_dump(one.document))
     return make_problem(source, source.vehicles[0], world_of(source), "length", source.planner.seed)[0]
 
 
 def oracle_m(problem: Problem) -> float | None:
-    """The visibility graph's length, of missions on flat ground; inf where zones enclose a place, None elsewhere."""
+    """The visibility graph's length on flat ground, m; inf if zones enclose a place, None if the ground is not flat."""
     ground, air = problem.airspace.surface.top_m, problem.airspace
     if float(ground.max() - ground.min()) > GROUND_ALIKE_M:
         return None
@@ -92,16 +95,16 @@ def run(
     without: Sequence[str] = (),
     tell: Callable[[str], None] = lambda words: None,
 ) -> list[Outcome]:
-    """Plan ``count`` missions of each seed (those of ``kinds``); ``everyday.csv`` and ``.md`` go to ``directory``.
+    """Plan ``count`` missions of each seed (those of ``kinds``); write ``everyday.csv`` and ``.md`` to ``directory``.
 
-    ``without``: sources of paths and bounds that the planner does without. Raises InputError for unknown kinds.
+    ``without``: sources of paths and bounds that the planner must not use. Raises InputError for unknown kinds.
     """
     for kind in kinds:
         if kind not in KINDS:
             raise InputError(f"the kinds of missions are {', '.join(KINDS)}, given {kind!r}")
     require_names(without)
     outcomes = []
-    _solve(problem_of(draw(1, KINDS.index("discs"))))  # machine code is made before anything is timed
+    _solve(problem_of(draw(1, KINDS.index("discs"))))  # compiles the kernels before anything is timed
     for seed in seeds:
         for number in range(count):
             if KINDS[number % len(KINDS)] not in kinds:
@@ -117,7 +120,7 @@ def run(
 
 
 def measure(one: Everyday, without: Sequence[str] = ()) -> Outcome:
-    """One mission in a process of its own."""
+    """Plan one mission in a separate process."""
     problem = problem_of(one)
     if without:
         problem = replace(problem, options={**problem.options, "without": tuple(without)})
@@ -164,7 +167,7 @@ def _solve(problem: Problem) -> dict[str, Any]:
     except Exception as why:
         return {"status": "failed", "detail": f"{type(why).__name__}: {why}"}
     cost, bound = problem.cost(solution.path), solution.lower_bound
-    looked_at = solution.problem or problem  # ground drawn of peaks is another raster in a wider window
+    looked_at = solution.problem or problem  # a wider window samples analytic peaks on another raster
     return {
         "status": "solved" if passes(looked_at, solution.path.points) else "unsafe",
         "cost": cost, "bound": bound, "first_path_s": solution.first_path_s, "stopped_by": solution.stopped_by,
@@ -180,7 +183,7 @@ def _resident_mb(pid: int | None) -> float:
 
 
 def line(o: Outcome) -> str:
-    """One mission in a line."""
+    """One mission in one line."""
 
     def number(value: float | None, form: str) -> str:
         return "-" if value is None else format(value, form)
@@ -194,7 +197,7 @@ def line(o: Outcome) -> str:
 
 
 def as_csv(outcomes: Sequence[Outcome]) -> str:
-    """A row for each mission."""
+    """CSV with one row per mission."""
     out = io.StringIO()
     rows = csv.DictWriter(out, [f.name for f in fields(Outcome)])
     rows.writeheader()
@@ -203,7 +206,7 @@ def as_csv(outcomes: Sequence[Outcome]) -> str:
 
 
 def report(outcomes: Sequence[Outcome]) -> str:
-    """By kind and in all: solved, gaps, lengths over the oracle's, seconds, megabytes; Markdown."""
+    """Solved, gaps, lengths over the oracle's, seconds, megabytes, by kind and in total; Markdown."""
     lines = [
         "| kind | missions | solved | infeasible | not found | other | gap p50, p90, max % | over the graph max % | "
         "first path p50, max s | whole p50, p90, max s | MB max |",
@@ -222,7 +225,7 @@ def report(outcomes: Sequence[Outcome]) -> str:
 
 
 def _searches(outcomes: Sequence[Outcome]) -> list[str]:
-    """What each search did in all missions; Markdown."""
+    """The runs and results of each search over all missions; Markdown."""
     found: dict[str, list[dict[str, Any]]] = {}
     for outcome in outcomes:
         for step in json.loads(outcome.search):

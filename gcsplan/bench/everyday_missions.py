@@ -1,17 +1,17 @@
-"""The missions of ``gcsplan bench everyday``: what people ask for on a working day, drawn from a seed.
+"""The missions of ``gcsplan bench everyday``: typical missions of a working day, drawn from a seed.
 
-Each mission is a mission file (a mapping, as YAML gives it) on flat ground unless said otherwise. Kinds:
+Each mission is a mission file (a mapping, as read from YAML), on flat ground unless stated otherwise. Kinds:
 
-- ``leg``: nothing is in the way, 30 m to 8 km; ``tiny``: 20 to 150 m, with up to two small zones;
+- ``leg``: nothing in the way, 30 m to 8 km; ``tiny``: 20 to 150 m, with up to two small zones;
 - ``wall``: one long thin zone across the line; ``detour``: a wall two to four times as long as the straight line;
 - ``hook``, ``comb``, ``ring``: an L or U around the start or goal, walls with gaps on alternate sides, a C around the
-  goal (or the start) that opens anywhere;
+  goal (or the start) with an opening in any direction;
 - ``discs``, ``blocks``: 1 to 300 circles or polygons; ``vias``: one to four points to pass among circles;
-- ``levels``: circles and polygons with floors and ceilings over ground;
+- ``levels``: circles and polygons with floors and ceilings above ground;
 - ``peaks``, ``sample``: zones among Gaussian hills, and over the sample DEM.
 
-Half of all have the default clearance and errors, half have none. A mission is dropped, and drawn again, only where its
-start, goal or a via lies in a zone. Nothing here knows a planner.
+Half of the missions have the default clearance and errors, half have none. A mission is drawn again only if its start,
+goal or a via lies in a zone. This module uses no planner.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ KINDS = (
 )  # fmt: skip
 SHORTEST_M, LONGEST_M = 400.0, 8000.0
 CLEARANCE_M, TRACK_ERROR_M, ALTITUDE_ERROR_M = 30.0, 3.0, 5.0
-"""What a mission file that says nothing gets."""
+"""Defaults of a mission file, m."""
 SPARE_M = 2.0
-"""Places keep so much more from zones than the margins ask for, for what a plan adds for rounding."""
+"""Metres that places keep from zones beyond the margins, for what a plan adds for rounding."""
 MIN_AGL_M = 30.0
 SAMPLE_MIN_AGL_M = 60.0
 METRES_PER_DEGREE = 111_200.0
@@ -44,7 +44,7 @@ DRAWS = 1000
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Everyday:
-    """One mission: its name (seed/number), kind, and the mission file's content; ``redraws`` before it were illegal."""
+    """One mission: name (seed/number), kind, content of the mission file, and number of illegal draws before it."""
 
     name: str
     kind: str
@@ -66,7 +66,7 @@ class _Draft:
 
 
 def draw(seed: int, number: int) -> Everyday:
-    """Mission ``number`` of a seed. Raises RuntimeError where no legal one is found in `DRAWS` draws."""
+    """Mission ``number`` of a seed. Raises RuntimeError if no legal one is found in `DRAWS` draws."""
     kind = KINDS[number % len(KINDS)]
     rng = np.random.default_rng([seed, number])
     margins = bool((number // len(KINDS)) % 2)
@@ -92,7 +92,7 @@ def _document(draft: _Draft, kind: str, name: str, rng: np.random.Generator, *, 
     scale = METRES_PER_DEGREE * np.array([1.0, math.cos(math.radians(lat0))])
 
     def point(place: Floats) -> list[float] | Document:
-        if draft.peaks:  # peaks stand in local metres
+        if draft.peaks:  # peaks are in local metres
             return {"east_m": round(float(place[0]), 2), "north_m": round(float(place[1]), 2)}
         return [round(float(x), 7) for x in np.array([lat0, lon0]) + np.asarray(place)[::-1] / scale]
 
@@ -130,7 +130,7 @@ def _document(draft: _Draft, kind: str, name: str, rng: np.random.Generator, *, 
 
 
 def _ends(rng: np.random.Generator, low: float = SHORTEST_M, high: float = LONGEST_M) -> tuple[Floats, Floats, Floats]:
-    """Start, goal, and the unit vector from the one to the other; the middle is the origin."""
+    """Start, goal, and the unit vector from start to goal; the middle is the origin."""
     length = math.exp(rng.uniform(math.log(low), math.log(high)))
     turn = rng.uniform(0.0, 2.0 * math.pi)
     along = np.array([math.cos(turn), math.sin(turn)])

@@ -1,8 +1,8 @@
-"""How short a track on flat ground can be among zones that nobody may enter: a visibility graph of its own.
+"""The length of the shortest track on flat ground around zones: an independent visibility graph.
 
-Zones are added one by one: the shortest track past those that are known is exact as soon as it meets no other. It
-shares nothing with the planners. Arcs are chords inside the true arc, so the length is never too long by them, and too
-short by less than one part in ten thousand.
+Zones are added one by one: the shortest track around the known zones is exact as soon as it meets no other zone. The
+module shares nothing with the planners. Arcs are replaced by chords inside the true arc, so the length is never too
+long because of them, and too short by less than one part in ten thousand.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from gcsplan.arrays import Floats
 from gcsplan.world.zones import Circle, Zone
 
 SEGMENTS = 24
-"""Chords of a quarter circle."""
+"""Chords per quarter circle."""
 TOUCH_M = 1e-4
-"""A line that enters a shape by less touches it."""
+"""A line that enters a shape by less than this, m, only touches it."""
 ROUNDS = 400
 
 
 class Unreachable(Exception):
-    """No track: zones enclose one of the places."""
+    """There is no track: zones enclose one of the places."""
 
 
 @dataclass(eq=False)
 class Plane:
-    """Shapes that nobody may enter, grown by ``reach_m``, in the plane."""
+    """The shapes in the plane that no track may enter, grown by ``reach_m``."""
 
     shapes: list[shapely.Polygon]
 
     @classmethod
     def of(cls, zones: Sequence[Zone], reach_m: float, scale: float = 1.0) -> Plane:
-        """Those of zones; ``scale``: of circles' radii, as the check has it."""
+        """The grown shapes of zones; ``scale`` multiplies the radii of circles, as in the check."""
         shapes = []
         for zone in zones:
             if isinstance(zone.shape, Circle):
@@ -51,7 +51,7 @@ class Plane:
         return cls(shapes)
 
     def shortest(self, places: Sequence[tuple[float, float]]) -> float:
-        """Metres of the shortest track past all ``places`` in order. Raises Unreachable."""
+        """Metres of the shortest track through all ``places`` in order. Raises Unreachable."""
         return sum(self._leg(np.array(a), np.array(b)) for a, b in pairwise(places))
 
     def _leg(self, a: Floats, b: Floats) -> float:
@@ -67,8 +67,10 @@ class Plane:
 
 
 def _past(a: Floats, b: Floats, shapes: list[shapely.Polygon]) -> Floats:
-    """(N, 2) the shortest track from ``a`` to ``b`` past shapes: A* over their convex corners, lines looked at when
-    they are needed."""
+    """(N, 2) the shortest track from ``a`` to ``b`` around shapes.
+
+    A* over the shapes' convex corners; lines are tested only when they are needed.
+    """
     if not shapes:
         return np.stack([a, b])
     union = shapely.unary_union(shapes)
@@ -92,7 +94,7 @@ def _past(a: Floats, b: Floats, shapes: list[shapely.Polygon]) -> Floats:
             break
         way = np.hypot(*(nodes - nodes[k]).T)
         better = ~done & (cost[k] + way < cost - 1e-9) & (way > 1e-9)
-        # A shortest track turns around corners alone: the line must touch the shape at both its ends.
+        # A shortest track turns only around corners, so the line must touch the shape at both of its ends.
         better &= _touches(nodes[k], nodes, left, right) & _touches_at(nodes, nodes[k], left[k], right[k], k < 2)
         some = np.flatnonzero(better)
         if not len(some):
@@ -114,12 +116,12 @@ def _holes(union: shapely.Geometry) -> list[bool]:
 
 
 def _outward(ring: Floats, hole: bool) -> Floats:
-    """A ring that has the free side on its right, whether it bounds a shape or a hole in one."""
+    """The ring with the free side on its right, whether it bounds a shape or a hole in one."""
     return ring[::-1] if shapely.LinearRing(ring).is_ccw == hole else ring
 
 
 def _convex(ring: Floats) -> tuple[Floats, Floats, Floats]:
-    """Corners of a ring around which a track may turn, and the corners before and after each."""
+    """The corners of a ring around which a track may turn, and the corners before and after each."""
     before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
     u, v = ring - before, after - ring
     convex = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0.0
@@ -127,7 +129,7 @@ def _convex(ring: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _touches(origin: Floats, nodes: Floats, before: Floats, after: Floats) -> NDArray[np.bool_]:
-    """(N,) whether lines from ``origin`` leave both neighbours of a corner on one side."""
+    """(N,) whether the line from ``origin`` to each corner has both neighbours of the corner on the same side."""
     d = nodes - origin
     u, v = before - nodes, after - nodes
     one = d[:, 0] * u[:, 1] - d[:, 1] * u[:, 0]
@@ -136,7 +138,7 @@ def _touches(origin: Floats, nodes: Floats, before: Floats, after: Floats) -> ND
 
 
 def _touches_at(nodes: Floats, corner: Floats, before: Floats, after: Floats, free: bool) -> NDArray[np.bool_]:
-    """(N,) the same of lines that leave a corner; ``free``: it is a place, around which any line may turn."""
+    """(N,) as `_touches`, for the corner that the lines leave; ``free``: it is a place, where any line may turn."""
     if free:
         return np.ones(len(nodes), np.bool_)
     d = nodes - corner

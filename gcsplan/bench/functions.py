@@ -1,11 +1,11 @@
-"""SSGWO's tables 1 and 2 run again: nine functions, five kinds of grey wolf, the printed numbers beside ours.
+"""SSGWO's tables 1 and 2 run again: nine functions, five kinds of grey wolf, beside the printed numbers.
 
-Two settings stand side by side. *Middle*: the optimum in the middle of the box and the wolves' rule bound to the same
-point (origin 0.5), which is what table 2 measured. *Shifted*: the same rule, the optimum moved. What a rule owes to
-the middle is lost there. A 0 of ours in the middle means less than the unit box can tell apart about 0.5, where doubles
-lie 1e−16 apart: about 1e−26 on f1. Rankings among such values are neither reproduced nor not.
+There are two settings. *Middle*: the optimum is in the middle of the box, and the wolves' rule is bound to the same
+point (origin 0.5), which is what table 2 measured. *Shifted*: the same rule with the optimum moved, so that a rule
+loses what it owes to the middle. A result of 0 in the middle is less than the unit box resolves near 0.5, where doubles
+are 1e−16 apart: about 1e−26 on f1. Rankings of such values count neither as reproduced nor as not reproduced.
 
-Every algorithm meets the same first population in the same run, so runs are compared in pairs.
+Every algorithm starts from the same population in the same run, so runs are compared in pairs.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from gcsplan.optimisers.driver import minimise
 from gcsplan.optimisers.functions import FUNCTIONS
 from gcsplan.optimisers.registry import get
 
-CLAIMED = "ssgwo"  # the paper says that it has the least mean, or shares it, on every function
+CLAIMED = "ssgwo"  # the paper claims that it has the least mean, alone or shared, on every function
 SETTINGS = ("middle", "shifted")
 DIM, POPULATION, ITERATIONS = 30, 30, 500  # table 1 and section 5.1
 MOST_RUNS = 10_000
@@ -63,11 +63,11 @@ def run(
     iterations: int = ITERATIONS,
     done: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Run every algorithm on every function in both settings, ``runs`` times each; the same seed, the same numbers.
-
-    Over ``jobs`` processes (all cores unless given). ``done`` is told how many of how many parts are finished. The
-    result: ``settings`` of the experiment, ``rows`` (mean, std, median, best of each, with table 2's), ``costs`` (of
-    each run), ``claims`` (table 2's rankings, each reproduced or not). Raises InputError for what cannot be run.
+    """Run every algorithm on every function in both settings, ``runs`` times each; same seed, same numbers.
+    ``jobs`` is the number of processes (all cores if None). ``done`` is called with the number of finished parts and of
+    all parts. The result has ``settings`` of the experiment, ``rows`` (mean, std, median, best of each, with table
+    2's), ``costs`` (of each run), and ``claims`` (table 2's rankings, each reproduced or not). Raises InputError for
+    invalid arguments.
     """
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
     if not 1 <= runs <= MOST_RUNS or jobs < 1:
@@ -110,7 +110,7 @@ def run(
 
 
 def report(result: dict[str, Any]) -> str:
-    """The table in plain text: the printed mean, ours in its setting, ours with the optimum moved."""
+    """The table as plain text: the printed mean, the measured mean in its setting, and with the optimum moved."""
     from rich.console import Console
     from rich.table import Table
 
@@ -148,7 +148,7 @@ def report(result: dict[str, Any]) -> str:
 
 
 def ready(out: Path) -> None:
-    """Make the directory, before the long run that is to fill it. Raises InputError where that cannot be done."""
+    """Create the output directory before the long run. Raises InputError if that fails."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -156,9 +156,9 @@ def ready(out: Path) -> None:
 
 
 def write(result: dict[str, Any], out: Path) -> list[Path]:
-    """``functions.csv`` (a row for each function, algorithm and setting), ``functions-runs.csv``, ``functions.md``.
+    """Write ``functions.csv`` (a row per function, algorithm and setting), ``functions-runs.csv`` and ``functions.md``.
 
-    Each whole or not at all. Raises InputError where one cannot be written.
+    Each file is written whole or not at all. Raises InputError if one cannot be written.
     """
     ready(out)
     table, runs = io.StringIO(newline=""), io.StringIO(newline="")
@@ -248,8 +248,8 @@ def _claims(
 ) -> list[dict[str, Any]]:
     """Table 2's ranking of SSGWO against each rival on each function, by Wilcoxon's signed ranks, Holm-corrected.
 
-    A printed tie counts as reproduced where no difference is significant. Neither reproduced nor not, but None, is a
-    ranking of values that double precision cannot tell apart.
+    A printed tie counts as reproduced if no difference is significant. A ranking of values that double precision cannot
+    distinguish is None: neither reproduced nor not.
     """
     rivals = [name for name in algorithms if name in WOLVES and name != CLAIMED]
     if CLAIMED not in algorithms or runs < LEAST_RUNS_TO_JUDGE:
@@ -282,7 +282,7 @@ def _claims(
 
 
 def _signed_rank(ours: NDArray[np.float64], theirs: NDArray[np.float64], *, two_sided: bool) -> float:
-    """p of "no difference" against "ours is less", or "they differ"; 1 where all pairs are equal."""
+    """p of "no difference" against "ours is less", or "they differ"; 1 if all pairs are equal."""
     from scipy.stats import wilcoxon
 
     if np.array_equal(ours, theirs):

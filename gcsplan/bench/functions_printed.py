@@ -1,4 +1,4 @@
-"""Table 2 of Feng et al. 2024 (Electronics 13, 68) as printed, and which of its rows no experiment can have given."""
+"""Table 2 of Feng et al. 2024 (Electronics 13, 68) as printed, and which of its rows no experiment can produce."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 WOLVES = ("gwo", "mgwo", "igwo", "sogwo", "ssgwo")
 RUNS = 50
 
-# In the order of WOLVES.
+# Columns in the order of WOLVES.
 _TABLE_2 = """
 f1 mean  3.2532e-26 3.5394e-196  2.8327e-28  3.3227e-76           0
 f1 std   1.3267e-26 2.8467e-198  3.2597e-29 2.79548e-78 2.6741e-199
@@ -50,13 +50,13 @@ class Printed:
 
     @property
     def fault(self) -> str:
-        """Why no 50 values, none negative, can have these three numbers; empty if some can."""
+        """The reason why no 50 values, none negative, can have these three numbers; empty if some can."""
         if self.mean < self.best:
             return "the mean is below the best"
-        # One value lies mean − best below the mean; the spread is least where the others share what is missing evenly.
+        # One value is mean − best below the mean; the spread is least if the other values make up for it evenly.
         if self.std < 0.999 * (self.mean - self.best) / math.sqrt(RUNS - 1):
             return "the spread is too small for this mean and best"
-        # It is largest where one value holds the whole sum.
+        # The spread is largest if one value holds the whole sum.
         if self.std > 1.001 * self.mean * math.sqrt(RUNS):
             return "the spread is too large for this mean"
         return ""

@@ -1,7 +1,8 @@
-"""The five papers' experiments run again: every scenario, every algorithm, the printed numbers beside ours.
+"""The five papers' experiments run again: every scenario and algorithm, beside the printed numbers.
 
-What is run stands in `papers_scenarios`, how one run goes in `papers_runs`, what the papers print in `papers_printed`.
-All algorithms get the same seeds. Every finished run is kept in the output directory; the same call goes on from there.
+`papers_scenarios` holds what is run, `papers_runs` how a run is done, `papers_printed` what the papers print. All
+algorithms get the same seeds. Every finished run is kept in the output directory, and the same call continues from
+there.
 """
 
 from __future__ import annotations
@@ -36,21 +37,21 @@ def run(
     """Do every run that ``out`` does not hold yet, and sum up.
 
     Args:
-        scenarios: names; all unless given.
-        algorithms: of the papers' own, by name; all unless given.
-        runs: of each algorithm in each scenario; the paper's number unless given (30 where it names none).
-        seed: of the first vehicle's first run and all others.
-        jobs: local processes; all cores unless given. Of no effect with ``cluster``.
-        out: directory of the runs (`KEPT`) and the report; made if missing.
+        scenarios: names; None: all.
+        algorithms: names of the papers' own algorithms; None: all.
+        runs: runs of each algorithm in each scenario; None: the paper's number (30 if it names none).
+        seed: seed from which the seeds of all runs are derived.
+        jobs: local processes; None: all cores. Unused with ``cluster``.
+        out: directory of the runs (`KEPT`) and the report; created if missing.
         cluster: address of a dask.distributed scheduler that does the runs instead (extra ``cluster``).
-        done: told how many of how many runs are there.
-        missions: directory of the scenarios' mission files, where it is not the usual one.
+        done: called with the number of finished runs and of all runs.
+        missions: directory of the scenarios' mission files; None: the usual folders.
 
     Returns:
         ``settings``; ``scenarios``, each with straight line, optimum, rows and printed numbers; ``claims``.
 
     Raises:
-        InputError: what cannot be run or written, and a cluster that is not there.
+        InputError: for what cannot be run or written, and for a cluster that does not answer.
     """
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
     if (runs is not None and not 1 <= runs <= MOST_RUNS) or jobs < 1 or seed < 0:
@@ -96,7 +97,7 @@ def run(
 
 
 def ready(out: Path) -> None:
-    """Make the directory. Raises InputError where that cannot be done."""
+    """Create the directory. Raises InputError if that fails."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -104,7 +105,7 @@ def ready(out: Path) -> None:
 
 
 def plain(result: dict[str, Any]) -> dict[str, Any]:
-    """`run`'s result for JSON: without the runs and the world, printed numbers as printed."""
+    """`run`'s result for JSON: without the runs and the world, and with printed numbers as printed."""
     left_out = ("set", "records", "best_path", "printed")
     scenarios = [
         {key: value for key, value in s.items() if key not in left_out}
@@ -126,7 +127,7 @@ def _key(record: Record) -> Key:
 def _summary(
     scenario: Scenario, prepared: Set, names: Sequence[str], found: dict[tuple[str, str], list[Record]]
 ) -> dict[str, Any]:
-    """Everything the report says of a scenario; ``set`` and ``records`` are for its pictures."""
+    """All that the report says of a scenario; ``set`` and ``records`` are for its pictures."""
     records = {name: found[scenario.name, name] for name in names}
     level = equal_evaluations(r for some in records.values() for r in some)
     least = Least.sum_of(prepared.least)

@@ -30,20 +30,20 @@ COST_UNITS = {
     "ib-abc": "parts of the straight line's, all vehicles",
 }  # fmt: skip
 WIDE = 4.0
-"""Costs that differ by more than so many times are shown on a logarithmic scale."""
+"""Ratio of costs above which they are drawn on a logarithmic scale."""
 CELLS = 400
 STEPS = 200
 _LINES = ("-", "--", "-.", ":")
 
 
 def best_run(records: Sequence[Record]) -> Record | None:
-    """The run of least cost that breaks no limit, or else the one of least cost; None where all were refused."""
+    """The legal run of least cost, or, if no run is legal, the run of least cost; None if all were refused."""
     found = [r for r in records if r["status"] == "found" and r["cost"] is not None]
     return min(found, key=lambda r: (not legal(r), r["cost"]), default=None)
 
 
 def draw_map(summary: dict[str, Any]) -> bytes:
-    """Plan view with the best run of each algorithm, and the profile of the paper's own; metres everywhere."""
+    """Plan view with the best run of each algorithm, and the profile of the paper's own algorithm; in metres."""
     figure = Figure(figsize=(8.6, 10.2), layout="constrained")
     FigureCanvasAgg(figure)
     plan, profile = figure.subplots(2, 1, height_ratios=(3.2, 1.0))
@@ -86,7 +86,7 @@ def _ground(ax: Axes, ready: Set, places: Floats) -> None:
     e, n = np.meshgrid(np.linspace(west, east, CELLS), np.linspace(south, north, CELLS))
     ground = ready.world.airspace.surface.ground_at(e, n)
     if np.nanmax(ground) - np.nanmin(ground) > 0.01:
-        land = ListedColormap(colormaps["terrain"](np.linspace(0.25, 1.0, 192)))  # below it are the colours of water
+        land = ListedColormap(colormaps["terrain"](np.linspace(0.25, 1.0, 192)))  # without the colours of water
         image = ax.imshow(
             ground,
             extent=(west, east, south, north),
@@ -133,7 +133,7 @@ def _profile(ax: Axes, ready: Set, run: Record | None, name: str) -> None:
 
 
 def draw_convergence(summary: dict[str, Any]) -> bytes:
-    """Median of the best cost so far with the tenth and ninetieth percentile, over iterations and over evaluations."""
+    """Median of the best cost so far with 10th and 90th percentile, over iterations and over evaluations."""
     figure = Figure(figsize=(10.5, 4.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(1, 2, sharey=True)
@@ -152,7 +152,7 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
             ax.plot(grid[shown], middle[shown], color=colour, lw=1.5, zorder=2.9 - 0.1 * rank, label=name)
             ax.fill_between(grid[shown], low[shown], high[shown], color=colour, alpha=0.15, lw=0)
             lowest = min(lowest, float(low[shown].min()))
-            # The first batches' costs are of no interest: the scale begins where a quarter of the way is gone.
+            # The costs of the first batches do not matter: the scale begins after 2 % of the grid.
             later = middle[shown & (grid >= 0.02 * grid[-1])]
             least, most = min(least, float(low[shown].min())), max(most, float(later.max(initial=-math.inf)))
         of = {"iterations": " of each vehicle's search", "evaluations": " of all vehicles' costs"}[along]
@@ -176,7 +176,7 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
 
 
 def stepwise(x: Sequence[float], y: Sequence[float | None], grid: Floats) -> Floats:
-    """Values of a curve that holds each ``y`` until the next ``x``; inf before the first and where it is None."""
+    """Values of a curve that holds each ``y`` until the next ``x``; inf before the first and where ``y`` is None."""
     values = np.array([math.inf if v is None else v for v in y])
     place = np.searchsorted(np.asarray(x, dtype=np.float64), grid, side="right") - 1
     return np.where(place < 0, np.inf, values[np.maximum(place, 0)])

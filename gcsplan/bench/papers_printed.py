@@ -1,7 +1,7 @@
 """The five papers' result tables as printed, and which of their numbers no aircraft can have flown.
 
-Numbers keep their printed form: one is impossible only if it stays below the least value after rounding. What is least
-follows from the ends of the way alone (`Least`), by arithmetic, never from a result of ours.
+Numbers keep their printed form: one is impossible only if it is below the least value after rounding. The least value
+follows from the ends of the flight alone (`Least`), by arithmetic, never from a result of gcsplan.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ class Number:
         return 0.5 * 10.0 ** -len(self.text.partition(".")[2])
 
     def below(self, least: float) -> bool:
-        """True where whatever was rounded to this number is below ``least``."""
+        """Whether every value that rounds to this number is below ``least``."""
         return self.value + self.half_unit < least
 
     def above(self, most: float) -> bool:
-        """True where whatever was rounded to this number is above ``most``."""
+        """Whether every value that rounds to this number is above ``most``."""
         return self.value - self.half_unit > most
 
 
 @dataclass(frozen=True, slots=True)
 class Least:
-    """What a straight flight from end to end takes, metres: in space, in the plane, and up or down."""
+    """The metres of a straight flight from end to end: in space, in the plane, and up or down."""
 
     length_m: float
     flat_m: float
@@ -48,30 +48,30 @@ class Least:
 
     @classmethod
     def between(cls, start: Sequence[float], goal: Sequence[float]) -> Least:
-        """Of the way from ``start`` to ``goal``, each (east, north, up) in metres."""
+        """The straight flight from ``start`` to ``goal``, each (east, north, up) in metres."""
         return cls(
             math.dist(start, goal), math.dist(start[:2], goal[:2]), abs(goal[2] - start[2])
         )  # no path is shorter in any of the three
 
     @classmethod
     def sum_of(cls, parts: Sequence[Least]) -> Least:
-        """Of a fleet."""
+        """The sum over a fleet."""
         return cls(sum(p.length_m for p in parts), sum(p.flat_m for p in parts), sum(p.rise_m for p in parts))
 
     def energy_j(self, vertical_j_per_m: float, horizontal_j_per_m: float) -> float:
-        """No path takes less: ``R1·Σ|Δz| + R2·Σ horizontal`` (krill paper, Table 1)."""
+        """The least energy of any path, J: ``R1·Σ|Δz| + R2·Σ horizontal`` (krill paper, Table 1)."""
         return vertical_j_per_m * self.rise_m + horizontal_j_per_m * self.flat_m
 
     def most_pitch_deg(self, length_m: float) -> float:
-        """The mean pitch of evenly spaced nodes is not above this on a path of ``length_m``.
+        """The largest mean pitch of evenly spaced nodes on a path of ``length_m``, degrees.
 
-        Their cosines' mean is flat_m / length_m at least, and the cosine is concave.
+        The mean of their cosines is at least flat_m / length_m, and the cosine is concave.
         """
         return math.degrees(math.acos(min(1.0, self.flat_m / length_m)))
 
 
 Row = Mapping[str, Number]
-"""Printed numbers of one algorithm in one scenario, by measure. ``length_1_m`` … are those of each vehicle."""
+"""Printed numbers of one algorithm in one scenario, by measure. ``length_1_m`` … belong to single vehicles."""
 
 _MOUND, _FOREST = ((0.0, 0.0, 0.0), (100.0, 100.0, 60.0)), ((0.0, 0.0, 0.0), (120.0, 120.0, 80.0))
 _FIELD = ((0.0, 0.0, 0.0), (800.0, 800.0, 15.0))
@@ -90,7 +90,7 @@ ENDS: Mapping[str, tuple[tuple[Point, Point], ...]] = {
     "ib-abc-together": _FOUR,
     "ib-abc-sequence": _FOUR,
 }
-"""Start and goal of each vehicle as the papers print them; MSFOA shows pictures only."""
+"""Start and goal of each vehicle as the papers print them; MSFOA shows only pictures."""
 
 _KRILL = "length_m time_s energy_j"
 _SSGWO = "best_length_m mean_length_m collisions pitch_deg yaw_deg nearest_m"
@@ -98,7 +98,7 @@ _MSFOA_2 = "best_cost_1 best_cost_2 best_cost_3 best_cost_sum"
 _MSFOA_3 = "best_cost mean_cost median_cost"
 _IB_ABC = " ".join(f"length_{i}_m time_{i}_s speed_{i}_m_s" for i in (1, 2, 3, 4))
 
-# Krill: Tables 2-4. SSGWO: Tables 4, 6, 8; collisions are of 50 runs. MSFOA: Tables 2, 3. IB-ABC: Tables II, IV.
+# Krill: Tables 2-4. SSGWO: Tables 4, 6, 8; collisions count among 50 runs. MSFOA: Tables 2, 3. IB-ABC: Tables II, IV.
 _TABLES: tuple[tuple[str, str, str], ...] = (
     ("krill-mound", _KRILL, "aco 161.6551 97.29 1784.02 | abc 153.5562 82.51 1653.80 | krill 150.6818 24.17 1475.18"),
     ("krill-forest", _KRILL, "aco 194.4623 119.19 2784.70 | abc 192.2746 47.67 2753.36 | krill 190.3142 35.75 2725.30"),
@@ -160,12 +160,12 @@ PRINTED: Mapping[tuple[str, str], Row] = _read()
 
 
 def least_of(scenario: str) -> tuple[Least, ...]:
-    """The straight way of each vehicle between the ends that the paper prints; empty where it prints none."""
+    """The straight flight of each vehicle between the ends that the paper prints; empty if it prints none."""
     return tuple(Least.between(*ends) for ends in ENDS.get(scenario, ()))
 
 
 def faults(row: Row, least: Sequence[Least], vertical_j_per_m: float, horizontal_j_per_m: float) -> dict[str, str]:
-    """Why printed numbers are impossible, by measure; those that are possible are left out."""
+    """The reasons why printed numbers are impossible, by measure; possible ones are left out."""
     out: dict[str, str] = {}
     if not least:
         return out

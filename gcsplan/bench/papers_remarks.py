@@ -1,4 +1,4 @@
-"""What is to be said beside a paper's printed table, each worked out from its own numbers."""
+"""Remarks on the papers' printed tables, each computed from the table's own numbers."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _msfoa(rows: dict[str, Row]) -> list[str]:
     ]
     sums = {
         name: round(sum(row[f"best_cost_{i}"].value for i in (1, 2, 3)), 2) for name, row in rows.items()
-    }  # rows of Table 2 are printed to 0.01
+    }  # Table 2 is printed to 0.01
     wrong = [name for name, row in rows.items() if abs(sums[name] - row["best_cost_sum"].value) > 0.02]
     if wrong:
         words = ", ".join(f"{name} {sums[name]:.2f} (printed {rows[name]['best_cost_sum'].text})" for name in wrong)
@@ -77,7 +77,7 @@ def _msfoa(rows: dict[str, Row]) -> list[str]:
 
 
 def schedules(summary: dict[str, Any]) -> tuple[tuple[str, ...], Rows]:
-    """Header and rows of IB-ABC's schedule, from our mean lengths and from the printed ones; no rows for others."""
+    """Header and rows of IB-ABC's schedule, by the measured and the printed lengths; no rows for other papers."""
     header = (
         "algorithm", "vehicle", "L, m", "T, s", "v = L/T, m/s", "", "printed L, m", "its T, s", "its v, m/s",
         "printed T, s", "printed v, m/s",
@@ -96,7 +96,7 @@ def schedules(summary: dict[str, Any]) -> tuple[tuple[str, ...], Rows]:
         count = len(ready.problems)
         theirs = None if printed is None else [printed[f"length_{i}_m"].value for i in range(1, count + 1)]
         right = None if theirs is None else schedule(theirs, *told)
-        # The printed lengths are rounded, so what follows from them is known to a tolerance only.
+        # The printed lengths are rounded, so the results that follow from them have a tolerance.
         off_m = 0.0 if printed is None else max(printed[f"length_{i}_m"].half_unit for i in range(1, count + 1))
         off_s = off_m / vehicle.speed_max_m_s
         for i, request in enumerate(ready.source.vehicles):
@@ -121,13 +121,13 @@ def schedules(summary: dict[str, Any]) -> tuple[tuple[str, ...], Rows]:
 
 
 def _against(printed: Number, right: float, tolerance: float) -> str:
-    """The printed number, marked where the arithmetic does not round to it."""
+    """The printed number, marked if the arithmetic does not round to it."""
     off = printed.below(right - tolerance) or printed.above(right + tolerance)
     return f"{printed.text} ≠" if off else printed.text
 
 
 def legend(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """What the marks in a schedule mean, where it has any."""
+    """The meaning of the marks in a schedule, if it has any."""
     if not any("≠" in cell for row in rows for cell in row):
         return []
     return ["≠ not what T and v = L/T are by the paper's own rule from its own printed lengths (“its T”, “its v”)."]

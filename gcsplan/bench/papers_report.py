@@ -1,4 +1,4 @@
-"""The papers' report: plain text for the terminal; CSV, Markdown, PNG and one self-contained page of HTML to keep."""
+"""The papers' report: plain text for the terminal; CSV, Markdown, PNG and one self-contained HTML page as files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Summary = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """``ours`` words a row's value; ``printed``: the papers' names for it; ``brief``: shown in the terminal too."""
+    """``ours`` formats a row's value; ``printed`` are the papers' names for it; ``brief``: also in the terminal."""
 
     title: str
     ours: Callable[[dict[str, Any]], str]
@@ -41,7 +41,7 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Plain cells under a heading, and what is to be said above and below."""
+    """Plain cells under a heading, with notes."""
 
     heading: str
     header: tuple[str, ...]
@@ -54,7 +54,7 @@ def _number(key: str, digits: int) -> Callable[[dict[str, Any]], str]:
 
 
 def _significant(value: float | None) -> str:
-    """Five digits or more, so that a cost of any size can be read."""
+    """A number with five digits or more, so that a cost of any size can be read."""
     if value is None:
         return "–"
     whole = len(str(int(abs(value)))) if abs(value) >= 1.0 else 0
@@ -98,7 +98,7 @@ _COLUMNS = (
 
 
 def scenario_table(summary: Summary, *, brief: bool = False) -> Table:
-    """A scenario's algorithms, each number of ours followed by the printed one where there is any."""
+    """A scenario's algorithms; each measured number is followed by the printed one if there is one."""
     cells: list[list[str]] = [[] for _ in summary["rows"]]
     header: list[str] = []
     for column in _COLUMNS:
@@ -200,7 +200,7 @@ def verdicts(claims: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def tables(result: dict[str, Any]) -> Iterator[tuple[Summary | None, Table]]:
-    """Every table, those of a scenario with its summary."""
+    """All tables; those of scenarios come with their summary."""
     for summary in result["scenarios"]:
         yield summary, scenario_table(summary)
         header, rows = schedules(summary)
@@ -211,7 +211,7 @@ def tables(result: dict[str, Any]) -> Iterator[tuple[Summary | None, Table]]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """For the terminal: the main columns of each scenario, and the verdicts."""
+    """The report for the terminal: the main columns of each scenario, and the verdicts."""
     from rich.console import Console
     from rich.table import Table as RichTable
 
@@ -231,9 +231,9 @@ def report(result: dict[str, Any]) -> str:
 
 
 def write(result: dict[str, Any], out: Path) -> list[Path]:
-    """``papers.csv``, ``papers-claims.csv``, ``papers.md``, ``papers.html``, and two pictures for each scenario.
+    """Write ``papers.csv``, ``papers-claims.csv``, ``papers.md``, ``papers.html``, and two pictures per scenario.
 
-    Each whole or not at all. Raises InputError where one cannot be written.
+    Each file is written whole or not at all. Raises InputError if one cannot be written.
     """
     from gcsplan.bench.papers_pictures import draw_convergence, draw_map
 

@@ -1,7 +1,7 @@
-"""One run of one algorithm in one scenario, the file that keeps every run, and how runs are carried out in parallel.
+"""One run of one algorithm in one scenario, the file that keeps the runs, and their parallel execution.
 
-Runs are kept as JSON lines, each on the disk before the next is asked for. A run is known by scenario, algorithm, seed,
-number and a digest of everything that decides its result: mission file, settings and the code itself.
+Runs are kept as JSON lines, each on the disk before the next is requested. A run is identified by scenario, algorithm,
+seed, number and a digest of everything that decides its result: mission file, settings and the code itself.
 """
 
 from __future__ import annotations
@@ -41,26 +41,26 @@ Record = dict[str, Any]
 Key = tuple[str, str, int, int, str]
 
 OPTIMA = {"optimal": "length", "optimal-energy": "energy"}
-"""Names under which the planner `optimal` is run for each objective."""
+"""Names under which the planner `optimal` runs, and the objective of each."""
 
 POINTS_OF_HISTORY = 100
 DRAWN_M = 1e-4
-"""Paths are kept for the map only: by way points, no point of the curve further away than this part of its length."""
+"""Part of a path's length by which the points kept for the map may be off its curve."""
 ANSWER_S = 20.0
-"""A cluster's scheduler must answer within this."""
+"""Seconds within which a cluster's scheduler must answer."""
 CLOSE = 0.01
-"""A run has converged when its cost is within this part of its last."""
+"""A run has converged when its cost is within this part of its final cost."""
 
 CODE = (
     "planners/**/*.py", "swarm/*.py", "world/*.py", "mission_file/*.py", "pipeline.py", "steps/planning.py",
     "vehicle.py", "bench/papers_runs.py", "bench/papers_scenarios.py",
 )  # fmt: skip
-"""Source files that decide a run's result, within the package; rather one too many than one too few."""
+"""Source files within the package that decide a run's result; a superfluous file is better than a missing one."""
 
 
 @lru_cache(maxsize=1)
 def code_digest() -> str:
-    """Digest of what decides a run's result beside the run itself: source files, and the libraries' versions."""
+    """Digest of everything but the run itself that decides a run's result: source files and library versions."""
     root, total = Path(__file__).parents[1], hashlib.sha256(f"{np.__version__} {version('scipy')}".encode())
     for pattern in CODE:
         for file in sorted(root.glob(pattern)):
@@ -82,12 +82,12 @@ class PaperRun:
 
     @property
     def key(self) -> Key:
-        """What the run is known by."""
+        """The identity of the run."""
         return (self.scenario, self.algorithm, self.seed, self.number, self.digest)
 
     @property
     def digest(self) -> str:
-        """Of everything that decides the result."""
+        """Digest of everything that decides the result."""
         told: list[object] = [self.text, self.code]
         if self.algorithm not in OPTIMA:
             c = self.contender
@@ -102,13 +102,13 @@ class PaperRun:
 
 
 class Store:
-    """The file of runs. A line that cannot be read, such as a last one cut short, counts as not written."""
+    """The file of runs. A line that cannot be read, such as a truncated last one, counts as not written."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def load(self) -> dict[Key, Record]:
-        """Every run in the file. Raises InputError where it cannot be read."""
+        """Every run in the file. Raises InputError if the file cannot be read."""
         try:
             lines = self.path.read_bytes().split(b"\n")
         except FileNotFoundError:
@@ -126,7 +126,7 @@ class Store:
         return out
 
     def append(self, record: Record) -> None:
-        """Add a run, on a line of its own even where the line before it was cut short."""
+        """Append a run, on a line of its own even if the line before it is truncated."""
         try:
             with self.path.open("ab+") as file:
                 if file.seek(0, os.SEEK_END):
@@ -141,7 +141,7 @@ class Store:
 
 
 def work(job: PaperRun) -> Record:
-    """Do one run. Raises InputError where this machine's code is not that of the one who asks."""
+    """Do one run. Raises InputError if the code on this machine differs from the code that requested the run."""
     optimal = job.algorithm in OPTIMA
     if job.code != code_digest():
         raise InputError(
@@ -160,7 +160,7 @@ def work(job: PaperRun) -> Record:
 
 
 def _best(ready: Set, objective: str) -> Record:
-    """What the planner `optimal` finds, vehicle by vehicle, and below what no path can be."""
+    """The paths of the planner `optimal`, vehicle by vehicle, with their costs and lower bounds."""
     began = time.thread_time()
     costs, bounds, paths = [], [], []
     for problem in ready.problems:
@@ -188,10 +188,10 @@ def _search(problem: Problem, contender: Contender, settings: Settings) -> Found
 
 @lru_cache(maxsize=256)
 def _warm(scenario: str, text: str, algorithm: str) -> None:
-    """Compile and load whatever this contender needs, so that no run's time holds it."""
+    """Compile and load everything that this contender needs, so that no run's time contains it."""
     job = PaperRun(scenario, algorithm, text, 1, 0, "")
     ready = prepare(scenario, text)
-    with suppress(NoMission):  # one round of ants need not arrive
+    with suppress(NoMission):  # a single iteration of ants may not reach the goal
         _search(ready.problems[0], job.contender, replace(settings_of(job.contender, ready.source), iterations=1))
 
 
@@ -233,7 +233,7 @@ def _swarm(job: PaperRun, ready: Set) -> Record:
 
 
 def _history(found: Sequence[Found]) -> dict[str, list[Any]]:
-    """Best cost and evaluations so far at ends of iterations, of the fleet together; None before a cost is finite."""
+    """Best cost and evaluations so far at ends of iterations, of the whole fleet; None before a cost is finite."""
     last = max(f.result.iterations for f in found)
     at = np.unique(np.linspace(0, last, min(last, POINTS_OF_HISTORY) + 1).round().astype(int))
     cost, evaluations = np.zeros(len(at)), np.zeros(len(at), np.int64)
@@ -247,7 +247,7 @@ def _history(found: Sequence[Found]) -> dict[str, list[Any]]:
 
 
 def _converged(history: dict[str, list[Any]]) -> int | None:
-    """The first iteration (of those kept) whose best cost is within `CLOSE` of the last one."""
+    """The first kept iteration whose best cost is within `CLOSE` of the final one."""
     costs = history["cost"]
     if costs[-1] is None:
         return None
@@ -256,7 +256,7 @@ def _converged(history: dict[str, list[Any]]) -> int | None:
 
 
 def _nearest_m(found: Found, problem: Problem) -> float | None:
-    """Mean over the curve of the distance in the plane to the nearest cylinder's wall; None where there is none."""
+    """Mean over the curve of the plane distance to the nearest cylinder's wall, m; None if there is no cylinder."""
     zones = [z.shape for z in problem.airspace.zones if isinstance(z.shape, Circle)]
     if not zones:
         return None
@@ -267,7 +267,7 @@ def _nearest_m(found: Found, problem: Problem) -> float | None:
 
 
 def carry_out(todo: Sequence[PaperRun], jobs: int, cluster: str | None, keep: Callable[[Record], None]) -> None:
-    """Do every job, ``keep`` each record as soon as it is there; what Ctrl-C finds at work is finished and kept."""
+    """Do every job and ``keep`` each record at once; after Ctrl-C, runs in progress are finished and kept."""
     if cluster is not None:
         _over_cluster(todo, cluster, keep)
     elif jobs == 1 or len(todo) <= 1:
@@ -295,7 +295,7 @@ def _over_processes(todo: Sequence[PaperRun], jobs: int, keep: Callable[[Record]
 
 
 def _deaf() -> None:
-    """Ctrl-C is the parent's to hear: a run that has begun is finished."""
+    """Ignore Ctrl-C, which the parent handles, so that a run in progress is finished."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -319,4 +319,4 @@ def _over_cluster(todo: Sequence[PaperRun], address: str, keep: Callable[[Record
                 raise GcsplanError("a worker of the cluster has died; the same command goes on") from error
             keep(record)
     finally:
-        client.close()  # which gives up whatever is still waiting
+        client.close()  # this cancels whatever is still waiting

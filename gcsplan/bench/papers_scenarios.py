@@ -1,7 +1,7 @@
-"""The scenarios of the five papers: mission file, algorithms, number of runs, and what each paper claims.
+"""The scenarios of the five papers: mission file, algorithms, number of runs, and each paper's claims.
 
-A claim is derived from the printed numbers (who is below whom) wherever there are any; the others, of curves that a
-paper shows without numbers, are written out here.
+A claim is derived from the printed numbers (which is below which) if there are any. The claims from curves that a paper
+shows without numbers are written out here.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ FOLDERS = (
     Path(__file__).parents[2] / "missions" / "papers",
     Path(__file__).parents[1] / "missions" / "papers",
 )
-"""Where the mission files are looked for: here, beside the sources, within the package."""
+"""Folders in which the mission files are searched: here, beside the sources, within the package."""
 
 
 @dataclass(frozen=True, slots=True)
 class Contender:
-    """An algorithm of a paper's table: a planner's name, and what it is told on top of the scenario's mission file."""
+    """An algorithm of a paper's table: a planner's name, and its options on top of the scenario's mission file."""
 
     name: str
     planner: str
@@ -42,7 +42,7 @@ class Contender:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """ "``low`` has less of ``measure`` than ``high``", as a paper says."""
+    """ "``low`` has less of ``measure`` than ``high``", as a paper claims."""
 
     measure: str
     low: str
@@ -52,21 +52,21 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Paper:
-    """A paper: its contenders, the number of runs (D: 30 where it names none), its own algorithm first."""
+    """A paper: its contenders, its own algorithm first, and its number of runs (30 if it names none)."""
 
     name: str
     title: str
     runs: int
     contenders: tuple[Contender, ...]
     claimed: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    """Printed measure to the measure of ours that is ranked for it."""
+    """Printed measure to the measure of gcsplan that is ranked for it."""
     shown: tuple[Claim, ...] = ()
     fleet: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A mission file's stem, its paper and what the paper's tables call it."""
+    """A mission file's stem, its paper, and the paper's tables for it."""
 
     name: str
     paper: Paper
@@ -93,7 +93,7 @@ _SSGWO = Paper(
 )  # fmt: skip
 _MSFOA = Paper(
     "msfoa", "Shi, Zhang, Xia 2020, Applied Sciences 10, 2822", 40,
-    # Table 1 gives the bees 50 employed and 50 onlookers: 50 sources.
+    # Table 1 gives the bees 50 employed and 50 onlookers: 50 food sources.
     (*_plain("msfoa", "foa", "pso", "de"), Contender("abc", "abc", MappingProxyType({"population": 50})),
      *_plain("iffo", "mfoa")),
     MappingProxyType({"mean_cost": "cost"}), fleet="priority",
@@ -127,9 +127,9 @@ SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
 
 
 def choose(names: Sequence[str] | None, algorithms: Sequence[str] | None) -> list[tuple[Scenario, list[Contender]]]:
-    """The scenarios called ``names`` (all if None), each with those of its paper's ``algorithms`` that are asked for.
+    """The scenarios called ``names`` (None: all), each with the contenders of its paper that ``algorithms`` names.
 
-    Raises InputError for a name that is not known, and where nothing is left.
+    Raises InputError for an unknown name, and if nothing is left.
     """
     asked = _known("scenario", names, SCENARIOS)
     here = {c.name: None for name in asked for c in SCENARIOS[name].paper.contenders}
@@ -150,13 +150,13 @@ def _known(what: str, names: Sequence[str] | None, known: Mapping[str, object]) 
 
 
 def claims_of(scenario: Scenario) -> list[Claim]:
-    """What the paper says of its algorithm against each other one, and of whatever it prints between two."""
+    """The paper's claims: its algorithm against each other one, and the printed order of the others."""
     own = scenario.paper.contenders[0].name
     out: list[Claim] = []
     rows = {c.name: printed_measures(scenario.name, c.name) for c in scenario.paper.contenders}
     names = [name for name, row in rows.items() if row]
     pairs = [(own, rival) for rival in names if rival != own]
-    if scenario.paper in (_KRILL, _IB_ABC):  # these rank their baselines too
+    if scenario.paper in (_KRILL, _IB_ABC):  # these papers rank their baselines too
         pairs += [(a, b) for i, a in enumerate(names) for b in names[i + 1 :] if own not in (a, b)]
     for printed, ours in scenario.paper.claimed.items():
         for a, b in pairs:
@@ -176,7 +176,7 @@ def printed_measures(scenario: str, algorithm: str) -> dict[str, float]:
 
 
 def mission_text(name: str, folder: Path | None = None) -> str:
-    """The scenario's mission file. Raises InputError that says where it was looked for."""
+    """The text of the scenario's mission file. Raises InputError with the folders that were searched."""
     folders = FOLDERS if folder is None else (folder,)
     for place in folders:
         file = place / f"{name}.yaml"
@@ -190,7 +190,7 @@ def mission_text(name: str, folder: Path | None = None) -> str:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Set:
-    """A scenario's mission, ready to be searched: a problem for each vehicle."""
+    """A scenario's mission, ready for a search: one problem per vehicle."""
 
     source: MissionFile
     world: World
@@ -198,13 +198,13 @@ class Set:
 
     @property
     def least(self) -> tuple[Least, ...]:
-        """The straight way of each vehicle, as the mission has its ends."""
+        """The straight flight of each vehicle between the mission's ends."""
         return tuple(Least.between(p.start, p.goal) for p in self.problems)
 
 
 @lru_cache(maxsize=20)
 def prepare(name: str, text: str) -> Set:
-    """The mission ``text`` of scenario ``name``; no margin is kept for the wire, since nothing is sent."""
+    """The mission ``text`` of scenario ``name``, without margins for the wire, since nothing is sent."""
     from gcsplan.app.pipeline import load_mission, world_of
     from gcsplan.app.problems import make_problem
 
@@ -217,7 +217,7 @@ def prepare(name: str, text: str) -> Set:
 
 
 def settings_of(contender: Contender, source: MissionFile) -> Settings:
-    """How a contender searches here: its planner's defaults, the mission's keys on top, then its own."""
+    """The settings of a contender: its planner's defaults, overridden by the mission's keys, then by its options."""
     options: dict[str, object] = dict(source.planner.extras)
     for key, value in contender.options.items():
         if key == "parameters":

@@ -1,6 +1,6 @@
-"""How fast the swarms are: whole runs, beside mealpy's GWO and one-path-at-a-time calls, and path costs a second.
+"""Speed of the swarms: whole runs, compared with mealpy's GWO and with one path per call, and path costs per second.
 
-Everything is timed in one process, one after the other, best of a few: the ratios are what counts.
+Everything is timed in one process, one after the other, best of a few; the ratios are what matters.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from gcsplan.planners.swarm.objectives import Cost, get_objective
 from gcsplan.planners.swarm.scene import Scene
 
 CASE = "ssgwo-table5"
-"""Twelve cylinders, population 30, 500 iterations, 30 nodes."""
+"""The scenario that is timed: twelve cylinders, population 30, 500 iterations, 30 nodes."""
 KRILL = ("krill-mound", "krill-forest", "krill-hills")
 BATCH = 2048
 COSTS = (("krill", "bspline"), ("ssgwo", "bspline"), ("msfoa", "bspline"), ("ib-abc", "sections"))
 AIMS = {"run_s": 0.25, "mealpy_ratio": 10.0, "single_ratio": 3.0, "costs_per_s": 300_000.0, "krill_s": 0.5}
-"""What is aimed for: seconds at most, ratios and rates at least."""
+"""The aims: most seconds, least ratios and rates."""
 
 
 def run(repeats: int = 3, *, missions: Path | None = None, mealpy: bool = True) -> dict[str, Any]:
-    """Time everything, best of ``repeats``; ``mealpy``: its GWO too. Raises InputError where that is not installed."""
+    """Time everything, best of ``repeats``; ``mealpy``: its GWO too. Raises InputError if that is not installed."""
     if repeats < 1:
         raise InputError(f"repeats must be 1 or more, given {repeats}")
     cost, size, rounds = _cost_of(CASE, missions)
@@ -59,7 +59,7 @@ def run(repeats: int = 3, *, missions: Path | None = None, mealpy: bool = True) 
 
 
 def report(result: dict[str, Any]) -> str:
-    """The figures of `run` beside what is aimed for."""
+    """The figures of `run` beside the aims."""
 
     def line(what: str, value: str, aim: str, reached: bool) -> str:
         return f"  {what:<44} {value:>14}   {aim:<18} {'reached' if reached else 'missed'}"
@@ -88,7 +88,7 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _best_s(asked: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
-    """Least seconds of this thread that each took, in turn, after one round that does not count."""
+    """Least thread seconds of each function, called in turn, after one round that does not count."""
     took: dict[str, list[float]] = {name: [] for name in asked}
     for turn in range(repeats + 1):
         for name, work in asked.items():
@@ -131,7 +131,7 @@ def _mealpy(cost: Cost, size: int, rounds: int) -> Callable[[], object]:
 
 
 def _batch(objective: str, encoding: str) -> Callable[[], object]:
-    """Paths to be decoded, splined and measured: between opposite corners of the sample DEM, past 12 zones."""
+    """The cost of a batch of paths between opposite corners of the sample DEM, among 12 zones."""
     airspace, _ = scene(2, 1)
     ends = [(e, e, float(airspace.surface.top_at(e, e)) + 2.0 * LIMITS.min_agl_m) for e in (-9000.0, 9000.0)]
     problem = Problem(airspace, LIMITS, ends[0], ends[1])

@@ -1,7 +1,7 @@
-"""What runs amount to: rows of the tables, the papers' rankings under a rank test, and IB-ABC's schedules.
+"""Statistics of runs: rows of the tables, the papers' rankings under a rank test, and IB-ABC's schedules.
 
 Rankings are tested by Mann and Whitney's U on runs, one-sided, and corrected by Holm over all claims of a paper. A run
-that breaks a limit by the exact check ranks behind every one that breaks none, however short it is.
+that breaks a limit under the exact check ranks behind every legal run, however short it is.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _LEGAL_FIRST = {"length": "length_m", "energy": "energy_j"}
 
 
 def legal(record: Record) -> bool:
-    """The run found a path that the exact check passes."""
+    """Whether the run found a path that passes the exact check."""
     return bool(record["status"] == "found" and record["violations"] == 0)
 
 
@@ -68,7 +68,7 @@ def less(low: Floats, high: Floats) -> float:
     """p of "``low`` is not less than ``high``" by Mann and Whitney's U (normal approximation, corrected for ties)."""
     from scipy.stats import mannwhitneyu, rankdata
 
-    ranks = rankdata(np.concatenate([low, high]))  # infinities tie with one another
+    ranks = rankdata(np.concatenate([low, high]))  # infinities tie with each other
     if np.ptp(ranks) == 0.0:
         return 1.0
     return float(mannwhitneyu(ranks[: len(low)], ranks[len(low) :], alternative="less", method="asymptotic").pvalue)
@@ -85,12 +85,12 @@ def holm(p: Sequence[float]) -> list[float]:
 
 
 def equal_evaluations(records: Iterable[Record]) -> int:
-    """The number of evaluations that every run has done: the least there is."""
+    """The number of evaluations that every run has reached: the least of all runs."""
     return min((int(r["evaluations"]) for r in records if r["status"] == "found"), default=0)
 
 
 def judge(scenarios: Sequence[Scenario], runs: Mapping[tuple[str, str], Sequence[Record]]) -> list[dict[str, Any]]:
-    """Every claim of the papers about what was run, each reproduced or not; ``runs`` by scenario and algorithm."""
+    """Every claim of the papers on what was run, reproduced or not; ``runs`` by scenario and algorithm."""
     out: list[dict[str, Any]] = []
     for scenario in scenarios:
         here = {name: found for (place, name), found in runs.items() if place == scenario.name and name not in OPTIMA}
@@ -112,7 +112,7 @@ def judge(scenarios: Sequence[Scenario], runs: Mapping[tuple[str, str], Sequence
 
 def _case(
     scenario: Scenario, claim: Claim, here: Mapping[str, Sequence[Record]], evaluations: int
-) -> dict[str, Any]:  # p is corrected, and the verdict given, when all of the paper's are there
+) -> dict[str, Any]:  # p is corrected, and the verdict set, when all claims of the paper are there
     low, high = (values(here[name], claim.measure, evaluations) for name in (claim.low, claim.high))
     p, verdict = None, ""
     if min(len(low), len(high)) < LEAST_RUNS_TO_JUDGE:
@@ -137,7 +137,7 @@ def _case(
 
 
 def row(scenario: str, algorithm: str, records: Sequence[Record], evaluations: int) -> dict[str, Any]:
-    """A line of the table. Lengths, pitch, yaw and energy are of all runs, as in the papers, legal or not."""
+    """A row of the table. Lengths, pitch, yaw and energy cover all runs, legal or not, as in the papers."""
     found = [r for r in records if r["status"] == "found"]
     out: dict[str, Any] = {
         "scenario": scenario,
@@ -179,7 +179,7 @@ def _spread(numbers: Floats) -> dict[str, float | None]:
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """When a vehicle arrives and how fast it flies; ``trouble`` is empty, or why it cannot."""
+    """Arrival time and speed of a vehicle; ``trouble`` is empty, or the reason why it cannot."""
 
     time_s: float
     speed_m_s: float
@@ -191,7 +191,7 @@ def schedule(
 ) -> list[Slot]:
     """IB-ABC's arithmetic: v_i = L_i / T_i.
 
-    ``together``: T is the longest way at full speed. ``sequence``: T_1 = L_1 / v_max, T_i = T_1 + interval·(i - 1).
+    ``together``: T is the longest path at full speed. ``sequence``: T_1 = L_1 / v_max, T_i = T_1 + interval·(i - 1).
     """
     if mode == "together":
         times = [max(lengths_m) / fastest_m_s] * len(lengths_m)

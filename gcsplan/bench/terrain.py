@@ -1,6 +1,6 @@
-"""``gcsplan bench terrain``: our planner and other people's on one problem set, under one exact check, in one run.
+"""``gcsplan bench terrain``: gcsplan's and other planners on one problem set, under the same exact check, in one run.
 
-What is asked is in `terrain_problems`; how ours is measured in `terrain_ours`, how others are in `terrain_rivals`.
+`terrain_problems` holds the problems; `terrain_ours` measures gcsplan's planner, `terrain_rivals` the others.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from gcsplan.planners.optimal.searches import require_names
 
 ANSWERS = "rivals.jsonl"
 GAP_PERCENT = 0.1
-"""What a mission is planned to."""
+"""Certified gap to which a mission is planned by default, percent."""
 
 
 @dataclass
 class Result:
-    """All outcomes so far, and what the report says of the run."""
+    """All outcomes so far, and the report's lines about the run."""
 
     outcomes: list[Outcome] = field(default_factory=list)
     about: list[str] = field(default_factory=list)
 
     @property
     def lines(self) -> list[report.Line]:
-        """By group and method."""
+        """The lines by group and method."""
         return report.lines(self.outcomes)
 
     def write(self, directory: Path) -> list[Path]:
-        """``terrain.md``, ``terrain.csv`` and ``terrain.png``; the paths."""
+        """Write ``terrain.md``, ``terrain.csv`` and ``terrain.png``; returns their paths."""
         from gcsplan.export.outdir import write_whole
 
         directory.mkdir(parents=True, exist_ok=True)
@@ -71,13 +71,13 @@ def run(
     without: Sequence[str] = (),
     tell: Callable[[str], None] = lambda words: None,
 ) -> Result:
-    """Measure and write the report to ``directory``; ``tell`` hears what is being done.
+    """Measure and write the report to ``directory``; ``tell`` receives messages on the progress.
 
-    ``seconds``: of OMPL's planners; ``long``: ours again with a minute for each problem; ``errors``: problems with the
-    clearance and errors of a real mission; ``count``: only so many problems of each group; ``gap_percent``: the
-    certified gap at which ours may stop; ``without``: searches that ours does without. Rivals' answers are kept in
-    ``directory`` and not asked for again; ``kept_only``: nor are any others. However it ends, what there is by then is
-    written. Raises InputError for unknown kinds and where a rival is not installed.
+    ``seconds`` are the times of OMPL's planners. ``long`` runs gcsplan's again with a minute per problem. ``errors``
+    uses the clearance and errors of a real mission. ``count`` is the number of problems of each group. ``gap_percent``
+    is the certified gap at which gcsplan's may stop, ``without`` are searches that it must not use. The rivals' answers
+    are kept in ``directory`` and not computed again; with ``kept_only`` no others are computed. However the run ends,
+    all results so far are written. Raises InputError for unknown kinds and if a rival is not installed.
     """
     for kind in kinds:
         if kind not in KINDS:
@@ -133,7 +133,7 @@ def _about(
     outcomes: Sequence[Outcome], seed: int, runs: int, warm_s: float, redraws: Sequence[tuple[int, int]],
     errors: bool, asked: Sequence[others.Rival],
 ) -> list[str]:  # fmt: skip
-    """What was measured, and on what."""
+    """Lines on what was measured, and on which machine."""
     sweeps = [o.sweep_s for o in outcomes if o.sweep_s is not None]
     held = "with the clearance and errors of a real mission" if errors else "with no clearance and no errors"
     pairs, sets = (max((r[i] for r in redraws), default=0) for i in (0, 1))
@@ -158,6 +158,6 @@ def _about(
 
 
 def _gaps_asked(outcomes: Sequence[Outcome]) -> str:
-    """By our methods, in words."""
+    """The requested gaps by method, in words."""
     asked = {(o.method, o.gap_asked_percent) for o in outcomes if o.gap_asked_percent is not None}
     return ", ".join(f"{gap:g} % ({method})" for method, gap in sorted(asked)) or "no size"

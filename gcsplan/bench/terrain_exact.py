@@ -1,8 +1,8 @@
-"""The exact check of one leg at a time, as quick as of many: for planners that ask for no more than one.
+"""The exact check of single legs, as fast per leg as of many legs: for planners that check one leg at a time.
 
-`Airspace.clear` of a single leg spends a hundred times the kernel's own time on getting into compiled code. Here
-everything but the leg's ends is kept in an object compiled around the very same kernel, which leaves about a
-microsecond and a half.
+For a single leg, `Airspace.clear` spends a hundred times the kernel's own time on entering compiled code. Here
+everything but the leg's ends is kept in an object that is compiled around the same kernel, which leaves about 1.5
+microseconds.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ OneLeg = Callable[[float, float, float, float, float, float], bool]
 """``clear(east0_m, north0_m, amsl0_m, east1_m, north1_m, amsl1_m)``."""
 
 NAMES = tuple(inspect.signature(judge.py_func).parameters)
-"""Of the kernel's arguments, in its order."""
+"""Names of the kernel's arguments, in its order."""
 
 _classes: dict[tuple[Any, ...], Any] = {}
 
 
 def one_leg(airspace: Airspace, limits: Limits) -> OneLeg:
-    """A function that answers as ``airspace.clear`` does for a leg with the errors of ``limits``.
+    """A function with the answer of ``airspace.clear`` for one leg with the errors of ``limits``.
 
     The first one in a process takes half a minute to compile.
     """
@@ -47,7 +47,7 @@ def one_leg(airspace: Airspace, limits: Limits) -> OneLeg:
 
 
 def _arguments(airspace: Airspace, limits: Limits) -> tuple[Any, ...]:
-    """What `Airspace.clear` hands to the kernel, for one leg."""
+    """The arguments that `Airspace.clear` passes to the kernel, for one leg."""
     surface, scale = airspace.surface, airspace.scale
     field = Field.of(surface.grid)
     zones = zones_as_arrays(airspace.zones, surface, field, scale)
@@ -66,7 +66,7 @@ def _arguments(airspace: Airspace, limits: Limits) -> tuple[Any, ...]:
 
 
 def _compiled(types: tuple[Any, ...]) -> Any:
-    """A class with a field for each of the kernel's arguments; written out, since numba takes no list of them."""
+    """A class with a field for each of the kernel's arguments, from source text, since numba takes no list of them."""
     source = "\n".join(
         [
             "class OneLeg:",

@@ -1,4 +1,4 @@
-"""What is kept of one planner's attempt at one problem, and how an attempt's memory is measured."""
+"""The outcome of one planner's attempt at one problem, and the measurement of its memory."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ OURS = "gcsplan"
 OURS_LONG = "gcsplan 60 s"
 SAGITTA_M = 0.05
 SAME_M = 1e-6
-"""Points of a track no farther apart are one: between them an angle of climb would be that of rounding errors."""
+"""Points of a track within this distance, m, are merged: a climb angle between them would be a rounding error."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """One method's attempt at one problem; times are medians of ``runs``.
 
-    ``status``: solved means that the exact check passes the whole path from start to goal, infeasible that its absence
-    is proved; unsafe that a path was given which the check rejects. ``cost`` and ``bound`` in metres or joules;
-    ``raw_cost`` before a rival's path was simplified. ``sweep_s``: the exact check of 100,000 one-kilometre legs, in
-    between. ``memory_mb``: peak above what was in use before. ``points``: the path, of rivals only.
-    ``gap_asked_percent``: the certified gap at which ours may stop.
+    ``status``: solved means that the whole path from start to goal passes the exact check; infeasible, that no path
+    exists, with proof; unsafe, that the exact check rejects the returned path. ``cost`` and ``bound`` are in metres or
+    joules; ``raw_cost`` is the cost before a rival's path was simplified. ``sweep_s`` is the time of an exact check of
+    100,000 one-kilometre legs, measured in between. ``memory_mb`` is the peak above the use before. ``points`` is the
+    path, of rivals only. ``gap_asked_percent`` is the certified gap at which gcsplan's planner may stop.
     """
 
     key: str
@@ -60,14 +60,14 @@ class Outcome:
 
     @property
     def gap_percent(self) -> float | None:
-        """Above its own bound, percent; None without either."""
+        """Percent above its own bound; None if cost or bound is missing."""
         return None if not self.cost or not self.bound else 100.0 * (self.cost / self.bound - 1.0)
 
 
 def passes(problem: Problem, points: object) -> bool:
-    """True where a path leads from start to goal and the exact check finds nothing on any leg, arcs included.
+    """Whether a path leads from start to goal and the exact check finds no violation on any leg, arcs included.
 
-    With a turn radius every corner is flown as the arc tangent to both legs, and arcs must not overlap.
+    With a turn radius, every corner is flown as the arc tangent to both legs, and arcs must not overlap.
     """
     p = np.asarray(points, dtype=np.float64)
     if p.ndim != 2 or p.shape[1] != 3 or len(p) < 2 or not np.isfinite(p).all():
@@ -86,12 +86,12 @@ def passes(problem: Problem, points: object) -> bool:
 
 
 def flown(points: Floats, radius_m: float) -> tuple[Floats, NDArray[np.bool_]] | None:
-    """The track that a fixed wing flies by way points (N, 3): legs, and arcs as chords within `SAGITTA_M`.
+    """The track that a fixed wing flies along way points (N, 3): legs, and arcs as chords within `SAGITTA_M`.
 
-    (M, 3) its points, none within `SAME_M` of the one before, and (M - 1,) whether a chord leads to the next.
-    The altitude of a way point is reached in the middle of its arc and is linear along the track between. None where
-    the arcs of neighbours overlap, so that it cannot be flown. Written for this judgement alone: it shares nothing
-    with the planners.
+    Returns its points (M, 3), none within `SAME_M` of the one before, and (M - 1,) whether a chord leads to the next.
+    The altitude of a way point is reached in the middle of its arc and is linear along the track between. None if the
+    arcs of neighbours overlap, so that the track cannot be flown. Written for this check alone; it shares nothing with
+    the planners.
     """
     legs = np.diff(points[:, :2], axis=0)
     lengths = np.hypot(*legs.T)
@@ -123,10 +123,10 @@ def flown(points: Floats, radius_m: float) -> tuple[Floats, NDArray[np.bool_]] |
 
 
 def _distinct(track: Floats, chord: Sequence[bool]) -> tuple[Floats, NDArray[np.bool_]]:
-    """Without points within `SAME_M` of the last one kept; the first and the last point always stay.
+    """The track without points within `SAME_M` of the last one kept; the first and the last point always stay.
 
-    ``chord``: of each point, whether it is a chord that leads to it. Distances are those in space, so that no climb on
-    the spot is lost.
+    ``chord`` states for each point whether a chord leads to it. Distances are in space, so that no climb on the spot is
+    lost.
     """
     kept = [0]
     for i in range(1, len(track)):
@@ -138,10 +138,10 @@ def _distinct(track: Floats, chord: Sequence[bool]) -> tuple[Floats, NDArray[np.
 
 
 class Memory:
-    """Peak resident memory of this process within a ``with`` block of `peak`, above what was in use before it.
+    """Peak resident memory of this process within a ``with`` block of `peak`, above the use before it, MB.
 
-    Of the resident set, since arrays of compiled code and of other people's C++ count too, which tracing Python's
-    allocations would miss. None where the system does not tell (it needs Linux's ``/proc``).
+    It is the resident set, because arrays of compiled code and of other planners' C++ count too, which tracing Python's
+    allocations would miss. None if the system does not provide it (it needs Linux's ``/proc``).
     """
 
     def __init__(self) -> None:
@@ -149,10 +149,10 @@ class Memory:
 
     @contextlib.contextmanager
     def peak(self) -> Iterator[None]:
-        """Measure what runs inside."""
+        """Measure the memory of the body."""
         gc.collect()
         with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(None).malloc_trim(0)  # memory freed but kept by the C library would hide what comes
+            ctypes.CDLL(None).malloc_trim(0)  # memory that the C library keeps after free would hide new use
         before = None
         with contextlib.suppress(OSError):
             Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
@@ -171,10 +171,10 @@ def _status_kb(key: str) -> float | None:
 
 
 def percentile(values: list[float], percent: float) -> float | None:
-    """Linear between neighbours; None of none."""
+    """Percentile, linear between neighbours; None of an empty list."""
     return float(np.percentile(values, percent)) if values else None
 
 
 def beyond(cost: float | None, bound: float | None) -> float | None:
-    """Percent of ``cost`` above ``bound``; None without either."""
+    """Percent of ``cost`` above ``bound``; None if either is missing."""
     return None if cost is None or not bound or not math.isfinite(bound) else 100.0 * (cost / bound - 1.0)

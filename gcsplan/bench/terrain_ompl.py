@@ -1,13 +1,13 @@
-"""OMPL's asymptotically optimal planners on a problem: the same exact check, one leg at a time.
+"""OMPL's asymptotically optimal planners on a problem, with the same exact check, one leg at a time.
 
 They search the box of the surface between the lowest legal altitude and the ceiling, for length in space, with OMPL's
-own defaults. States and motions are judged by `terrain_exact.one_leg`: exact, climb limit and zones included, no
+own defaults. States and motions are judged by `terrain_exact.one_leg`: exact, with climb limit and zones, without
 sampling.
 
-Their seconds are those of the processor, so that other work on the machine takes nothing from them, and the crossing
-from C++ to Python and back, about as long as RRT*'s own work, does not count against what they are given: it is timed
-before each run, at its quickest, and the clock is put back by it for every check. They get about what they would with
-the check in their own language. The time to the first path is the processor's, with nothing taken off.
+Their seconds are processor seconds, so that other work on the machine does not count. The crossing from C++ to Python
+and back takes about as long as RRT*'s own work and is not counted either: its least time is measured before each run,
+and subtracted for every check. So they get about the time that they would have with the check in their own language.
+The time to the first path is the processor's, with nothing subtracted.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ CURE = "this benchmark needs OMPL and mealpy: pip install 'gcsplan[bench]', or s
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A rival's answer: the path (None where there is none), its length as it was found and after simplifying it."""
+    """A rival's answer: the path (None if there is none), its length as found and after simplification."""
 
     points: list[list[float]] | None
     cost: float | None
@@ -44,7 +44,7 @@ class Found:
 
 
 def release() -> str:
-    """The installed version. Raises InputError where OMPL is missing."""
+    """The installed version. Raises InputError if OMPL is missing."""
     try:
         return f"ompl {version('ompl')}"
     except PackageNotFoundError:
@@ -52,7 +52,7 @@ def release() -> str:
 
 
 def warm_up(problem: Problem) -> None:
-    """Compile what the check of one leg needs, so that no run is charged with it."""
+    """Compile the check of one leg, so that no run's time contains it."""
     from gcsplan.bench.terrain_exact import one_leg
 
     one_leg(problem.airspace, problem.limits)(*problem.start, *problem.start)
@@ -61,8 +61,8 @@ def warm_up(problem: Problem) -> None:
 def plan(problem: Problem, name: str, seconds: float, seed: int) -> Found:
     """Run the planner of `PLANNERS` called ``name`` for ``seconds``, then simplify its path, which takes milliseconds.
 
-    The better of the path as found and as simplified is kept. ``seed`` counts for the first run in a process only;
-    planners that stop by the clock do not repeat themselves anyway. Raises InputError where OMPL is missing.
+    The shorter of the path as found and as simplified is kept. ``seed`` has an effect only in the first run of a
+    process; planners that stop by the clock are not repeatable anyway. Raises InputError if OMPL is missing.
     """
     try:
         base, geometric, util = (import_module(f"ompl.{name}") for name in ("base", "geometric", "util"))
@@ -110,7 +110,7 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> Found:
         return Found(None, None, None, None, planned_s, counts[0])
     path = asked.getSolutionPath()
     raw = _points(path)
-    geometric.PathSimplifier(info).simplify(path, 10.0 * seconds)  # ends by itself long before
+    geometric.PathSimplifier(info).simplify(path, 10.0 * seconds)  # ends by itself long before that time
     simple = _points(path) if path.check() else raw
     best = min(raw, simple, key=_length)
     took = elapsed_s()
@@ -118,7 +118,7 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> Found:
 
 
 def box_of(problem: Problem) -> list[tuple[float, float]]:
-    """East, north and altitude within which a planner may look: the whole surface, lowest floor to highest ceiling."""
+    """East, north and altitude ranges of the search: the whole surface, lowest floor to highest ceiling."""
     surface, limits = problem.airspace.surface, problem.limits
     rows, cols = surface.ground_m.shape
     corners = surface.grid.to_plane([0, 0, cols - 1, cols - 1], [0, rows - 1, 0, rows - 1])
@@ -133,8 +133,8 @@ def box_of(problem: Problem) -> list[tuple[float, float]]:
 
 
 def _judges(base: Any, info: Any, problem: Problem, counts: list[int]) -> tuple[Any, Any]:
-    """Validity of a state and of a motion, both by the exact check, counted."""
-    from gcsplan.bench.terrain_exact import one_leg  # numba is not for those who run no rivals
+    """Validity of a state and of a motion, both by the exact check, with a count of the checks."""
+    from gcsplan.bench.terrain_exact import one_leg  # imported here because only rivals need numba's compiler
 
     clear = one_leg(problem.airspace, problem.limits)
 
@@ -153,7 +153,7 @@ def _judges(base: Any, info: Any, problem: Problem, counts: list[int]) -> tuple[
 
 
 def _crossing_s(info: Any, state: Any, problem: Problem) -> float:
-    """Seconds of one check that are neither the planner's nor the kernel's: the least of some timings."""
+    """Seconds of one check that neither the planner nor the kernel uses: the least of several timings."""
     e, n, h = problem.start
     legs = Legs.of_path(np.tile([[e, n, h]], (CROSSINGS + 1, 1)), problem.limits)
     taken = []

@@ -1,4 +1,4 @@
-"""Our planner on the problems: cold but for compiled code, again and again, beside a sweep of the exact check."""
+"""gcsplan's planner on the problems: warm only in compiled code, run repeatedly, beside a sweep of the exact check."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ LONG_S = 60.0
 
 
 class Sweep:
-    """The yardstick: seconds for the exact check of 100,000 random one-kilometre legs, on this machine just now."""
+    """The yardstick: seconds for the exact check of 100,000 random one-kilometre legs, on this machine at this time."""
 
     def __init__(self, legs: int = SWEEP_LEGS) -> None:
         self._airspace, self._legs = scene(legs, seed=1)
-        self()  # compiles
+        self()  # compiles the kernel
 
     def __call__(self) -> float:
         began = time.perf_counter()
@@ -34,7 +34,7 @@ class Sweep:
 
 
 def warm_up(problems: Sequence[NamedProblem], planner: str = "optimal") -> float:
-    """Plan the first problem of every group once, so that every kernel is compiled; the seconds it took."""
+    """Plan the first problem of every group once, so that every kernel is compiled; returns the seconds it took."""
     began = time.perf_counter()
     seen = set()
     for one in problems:
@@ -45,10 +45,10 @@ def warm_up(problems: Sequence[NamedProblem], planner: str = "optimal") -> float
 
 
 def measure(one: NamedProblem, sweep: Sweep, *, runs: int = 9, planner: str = "optimal", long: bool = False) -> Outcome:
-    """Our planner's outcome: medians of ``runs``; ``long`` gives it a minute and asks for no gap, once.
+    """The outcome of gcsplan's planner: medians of ``runs``; ``long`` runs it once with a minute and no gap.
 
-    Every run gets an airspace and a surface of its own (over the same heights), so that nothing kept from the run
-    before helps; making them is not counted, what the planner makes of them is.
+    Every run gets its own airspace and surface (over the same heights), so that nothing kept from the run before helps.
+    Creating them is not counted, but what the planner derives from them is.
     """
     problem = replace(one.problem, budget_s=LONG_S, gap_percent=0.0) if long else one.problem
     memory, answers, swept, took = Memory(), [], [], []
@@ -94,7 +94,7 @@ def _anew(problem: Problem) -> Problem:
 
 
 def _attempt(problem: Problem, planner: str) -> tuple[Solution | Exception, float]:
-    """The answer and its seconds. An error of ours is an answer too: it must not cost the other problems theirs."""
+    """The answer and its seconds. An exception is an answer too, so that the other problems still run."""
     plan: Callable[[Problem], Solution] = get_planner(planner).plan
     began = time.perf_counter()
     try:

@@ -1,9 +1,9 @@
-"""Starts, goals, ceilings and zones over the sample DEM, drawn by a seed: what the problems are made of.
+"""Starts, goals, ceilings and zones over the sample DEM, drawn from a seed: the parts of the problems.
 
-A pair is kept if a ceiling exists that blocks the straight line and yet leaves start and goal joined below it; zones
-are kept if those of unlimited height leave them joined still. Both are found by flooding the cells of the DEM from the
-start, with a cell as high as its highest corner and blocked by a zone that touches it, so what is called joined is.
-Whether climb limit and the other zones leave a way is for the planners to say.
+A pair is kept if a ceiling exists that blocks the straight line but leaves start and goal joined below it. Zones are
+kept if those of unlimited height leave them joined too. Both are found by flooding the cells of the DEM from the start;
+a cell is as high as its highest corner and blocked by a zone that touches it, so cells that count as joined are joined.
+Whether the climb limit and the other zones leave a path is for the planners to find.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
 from gcsplan.world.zones import Circle, Level, Zone
 
-MIDDLE_DEG = (36.5896, -84.2458)  # of the sample DEM
-HALF_M = (13_000.0, 14_000.0)  # east and north, from there: starts and goals lie within
-WAY_M = (5_000.0, 25_000.0)  # from start to goal, straight: the shortest and the longest stratum begin and end here
+MIDDLE_DEG = (36.5896, -84.2458)  # middle of the sample DEM
+HALF_M = (13_000.0, 14_000.0)  # east and north from the middle: starts and goals lie within this box
+WAY_M = (5_000.0, 25_000.0)  # straight distance from start to goal: from the shortest to the longest stratum
 PAIRS = 20
 MIN_AGL_M = 60.0
 STEEPEST_DEG = (10.0, 15.0)
-ABOVE_JOIN_M = (5.0, 60.0)  # of the ceiling, above the lowest one that joins start and goal
+ABOVE_JOIN_M = (5.0, 60.0)  # height of the ceiling above the lowest one that joins start and goal
 RADIUS_M = (200.0, 1200.0)
 SMALL_RADIUS_M = (30.0, 150.0)
-CLEAR_OF_ENDS_M = 150.0  # between a zone and a start or goal: clearance and errors fit in
-MOST_ZONE_SETS = 200  # drawn for one pair before the pair itself is drawn anew
+CLEAR_OF_ENDS_M = 150.0  # between a zone and a start or goal, enough for clearance and errors
+MOST_ZONE_SETS = 200  # drawn for one pair before the pair itself is drawn again
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A start and a goal, (east_m, north_m) in the plane of ``frame``, and the surface as a mission would load it.
+    """A start and a goal, (east_m, north_m) in the plane of ``frame``, and the surface that a mission would load.
 
-    ``ceiling_m``: max AMSL that blocks the straight line; ``steepest_deg``: climb and descent alike, so that a leg is
-    legal both ways (planners that grow trees from both ends take that for granted). ``redraws``: of the pair, and of
-    its zones.
+    ``ceiling_m`` is the max AMSL that blocks the straight line. ``steepest_deg`` is the climb and descent limit: they
+    are equal, so that a leg is legal in both directions, which planners that grow trees from both ends assume.
+    ``redraws`` counts those of the pair and of its zones.
     """
 
     number: int
@@ -62,8 +62,8 @@ class Pair:
 class Cells:
     """The cells of a surface.
 
-    ``floor_m`` (rows, cols): lowest altitude legal everywhere in each, NaN or inf where unknown; ``east_m``,
-    ``north_m``: their middles; ``reach_m``: from the middle to the farthest corner.
+    ``floor_m`` (rows, cols) is the lowest altitude that is legal everywhere in the cell, NaN or inf if unknown;
+    ``east_m``, ``north_m`` are the cells' middles; ``reach_m`` is the distance from the middle to the farthest corner.
     """
 
     floor_m: Floats
@@ -73,7 +73,7 @@ class Cells:
 
     @classmethod
     def of(cls, airspace: Airspace, limits: Limits) -> Cells:
-        """Of the airspace's surface, held to ``limits``; zones are not in it."""
+        """The cells of the airspace's surface under ``limits``, without zones."""
         surface = airspace.surface
         rows, cols = surface.ground_m.shape
         if limits.horizontal_clearance_m > 0.0 or limits.track_error_m > 0.0:
@@ -89,7 +89,7 @@ class Cells:
     def joined(
         self, surface: Surface, a: tuple[float, float], b: tuple[float, float], open_: NDArray[np.bool_]
     ) -> bool:
-        """True where ``open_`` cells that share edges lead from the cell of ``a`` to that of ``b``."""
+        """Whether ``open_`` cells that share edges lead from the cell of ``a`` to that of ``b``."""
         from scipy.ndimage import label
 
         (c0, r0), (c1, r1) = (np.floor(surface.grid(*p)).astype(int) for p in (a, b))
@@ -99,8 +99,8 @@ class Cells:
         return bool(piece[r0, c0] == piece[r1, c1])
 
     def lowest_join(self, surface: Surface, a: tuple[float, float], b: tuple[float, float]) -> float:
-        """Lowest altitude, to half a metre above, below which ``a`` and ``b`` are joined; inf where there is none."""
-        known = self.floor_m[np.isfinite(self.floor_m)]  # close to the map's border nothing is legal: inf
+        """The lowest altitude, to half a metre above, below which ``a`` and ``b`` are joined; inf if there is none."""
+        known = self.floor_m[np.isfinite(self.floor_m)]  # near the map's border nothing is legal: inf
         low, high = float(known.min()), float(known.max())
         if not self.joined(surface, a, b, self.floor_m <= high):
             return math.inf
@@ -110,7 +110,7 @@ class Cells:
         return high
 
     def outside(self, zones: tuple[Zone, ...] | list[Zone], clearance_m: float = 0.0) -> NDArray[np.bool_]:
-        """(rows, cols) cells that no zone of unlimited height touches."""
+        """(rows, cols) the cells that no zone of unlimited height touches."""
         free = np.ones(self.floor_m.shape, np.bool_)
         for zone in zones:
             if zone.floor is None and zone.ceiling is None and isinstance(zone.shape, Circle):
@@ -121,12 +121,12 @@ class Cells:
 
 @cache
 def sample() -> Terrain:
-    """The sample DEM, as a mission file that names it opens it."""
+    """The sample DEM, opened as for a mission file that names it."""
     return open_terrain(TerrainSpec(dem=("sample:jacksboro",), vertical_datum="EGM96"), where="the benchmark's terrain")
 
 
 def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int, *, ceiling: bool) -> Pair:
-    """Pair ``number`` of `PAIRS`, with its ceiling (where ``ceiling``) and its zones, for limits without either."""
+    """Pair ``number`` of `PAIRS`, with its ceiling (if ``ceiling``) and its zones; ``limits`` have no ceiling."""
     pairs = sets = 0
     step = (WAY_M[1] - WAY_M[0]) / PAIRS
     way = WAY_M[0] + (number + rng.uniform()) * step
@@ -151,9 +151,9 @@ def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int,
 
 
 def draw_ceiling(rng: np.random.Generator, pair: Pair, cells: Cells, limits: Limits) -> float | None:
-    """A max AMSL at x.5 m above the lowest that joins start and goal and below the straight line's highest floor.
+    """A max AMSL at x.5 m, above the lowest that joins start and goal and below the straight line's highest floor.
 
-    The half keeps it off every sum of whole metres, the heights of this DEM. None where there is none.
+    The half metre keeps it off all sums of whole metres, the heights of this DEM. None if there is none.
     """
     least = cells.lowest_join(pair.surface, pair.start, pair.goal) + ABOVE_JOIN_M[0]
     t = np.linspace(0.0, 1.0, 1 + math.ceil(math.dist(pair.start, pair.goal) / 5.0))
@@ -169,10 +169,10 @@ def draw_ceiling(rng: np.random.Generator, pair: Pair, cells: Cells, limits: Lim
 def draw_zones(
     rng: np.random.Generator, pair: Pair, count: int, radius_m: tuple[float, float] = RADIUS_M
 ) -> list[Zone]:
-    """Discs around the way from start to goal, none over either; radii evenly spread in their logarithm.
+    """Discs around the line from start to goal, none over either; radii are spread evenly in their logarithm.
 
-    Of each four two are of unlimited height, one has a ceiling (to be flown over), one a floor (to be flown under) and,
-    every other time, a ceiling as well; levels are over ground or, as often, above mean sea level.
+    Of each four, two have unlimited height, one has a ceiling (to be flown over), and one a floor (to be flown under)
+    and, in half of the cases, a ceiling too. Levels are above ground or, equally often, above mean sea level.
     """
     a, b = np.array(pair.start), np.array(pair.goal)
     way = float(math.dist(a, b))
@@ -198,7 +198,7 @@ def draw_zones(
 
 
 def _place(rng: np.random.Generator, number: int, way_m: float, steepest_deg: float) -> Pair:
-    """A pair without ceiling and zones, over the piece of the sample that a mission between its points would load."""
+    """A pair without ceiling and zones, over the part of the sample that a mission between its points would load."""
     whole = Frame(*MIDDLE_DEG)
     while True:
         a = rng.uniform(-1.0, 1.0, 2) * HALF_M
@@ -217,7 +217,7 @@ def _place(rng: np.random.Generator, number: int, way_m: float, steepest_deg: fl
 
 
 def _nodes(surface: Surface, col: Floats, row: Floats) -> tuple[Floats, Floats]:
-    """East and north of a lattice of grid points, interpolated between some that are exact, to millimetres."""
+    """East and north of a lattice of grid points, interpolated between exact ones, to millimetres."""
     from scipy.interpolate import RectBivariateSpline
 
     rows, cols = surface.ground_m.shape

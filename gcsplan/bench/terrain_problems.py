@@ -1,19 +1,19 @@
-"""The problem set of ``gcsplan bench terrain``: real ground, made by a seed alone, the same on every machine.
+"""The problem set of ``gcsplan bench terrain``: real ground, made from a seed alone, the same on every machine.
 
 Kinds:
 
-- ``main``: 20 pairs 5 to 25 km apart, each with 0, 10 and 40 zones (the ten are the first of the forty); 60 m over
-  ground at least, a max AMSL that blocks the straight line, climb and descent of 10 to 15 degrees;
+- ``main``: 20 pairs 5 to 25 km apart, each with 0, 10 and 40 zones (the ten are the first of the forty); at least 60 m
+  above ground, a max AMSL that blocks the straight line, climb and descent of 10 to 15 degrees;
 - ``energy``: all of ``main``, in joules;
-- ``band``: 20 pairs, 60 to 120 m over ground, climb and descent of 10 degrees and again of 15, no max AMSL, no zones:
-  nobody knows beforehand whether there is a way;
-- ``large``: five pairs of ``main`` with ten zones over the whole sample, refined ten times by cubic splines
-  (3431 × 4021 nodes);
+- ``band``: 20 pairs, 60 to 120 m above ground, climb and descent of 10 degrees and again of 15, no max AMSL, no zones:
+  it is not known beforehand whether a path exists;
+- ``large``: five pairs of ``main`` with ten zones over the whole sample, refined ten times by cubic splines (3431 ×
+  4021 nodes);
 - ``many``: a pair of ``main`` with a thousand small zones;
 - ``turn``: all of ``main`` with a turn radius of 100 m, and again of 200 m.
 
-Starts and goals are as low as is legal, rounded up to a centimetre. Clearance and errors are zero, so that other
-people's planners need no more than a yes or no; ``errors`` asks for those of a real mission.
+Starts and goals are at the lowest legal altitude, rounded up to a centimetre. Clearance and errors are zero, so that
+other planners need only a yes or no; ``errors`` sets those of a real mission.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ REAL_ERRORS = Limits(min_agl_m=MIN_AGL_M, horizontal_clearance_m=30.0, track_err
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NamedProblem:
-    """A problem with its name (kind, seed, pair, what varies), its kind, and the group it is reported in.
+    """A problem with its name (kind, seed, pair, what varies), its kind, and the group for the report.
 
-    ``redraws``: how many pairs and how many sets of zones were drawn in vain before it.
+    ``redraws`` are the pairs and the sets of zones that were drawn in vain before it.
     """
 
     name: str
@@ -76,7 +76,7 @@ def problems(
 ) -> list[NamedProblem]:
     """The problems of one kind, or the first ``count`` of each group. Raises InputError for an unknown kind.
 
-    ``errors``: with the clearance and the errors of a real mission, for which ceilings and zones are drawn anew.
+    ``errors``: with the clearance and errors of a real mission; ceilings and zones are then drawn for those.
     """
     make = _KINDS.get(kind)
     if make is None:
@@ -92,9 +92,9 @@ def problems(
 
 
 def key_of(problem: Problem) -> str:
-    """A hash of everything in ``problem`` that bears on its answer, the same for equal problems on any machine.
+    """A hash of everything in ``problem`` that affects its answer, the same for equal problems on every machine.
 
-    Metres are rounded to a millimetre in it: libraries differ in the last digits of a projection.
+    Metres are rounded to a millimetre in it, because libraries differ in the last digits of a projection.
     """
     surface, p = problem.airspace.surface, problem
     zones = [
@@ -117,7 +117,7 @@ def key_of(problem: Problem) -> str:
 
 @cache
 def pair_of(seed: int, number: int, limits: Limits, kind: str = "main") -> Pair:
-    """Pair ``number``; each has random numbers of its own, so that none depends on how many are asked for."""
+    """Pair ``number``; each has its own random numbers, so that none depends on how many are requested."""
     rng = np.random.default_rng([seed, number, 0 if kind == "main" else 1])
     return draw_pair(rng, number, limits, max(ZONES) if kind == "main" else 0, ceiling=kind == "main")
 
@@ -152,7 +152,7 @@ def _band(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
 def _large(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
     for number in LARGE_PAIRS[:count]:
         pair = pair_of(seed, number, limits)
-        far = (-1e5, -1e5, 1e5, 1e5)  # the whole sample, wherever the pair lies on it
+        far = (-1e5, -1e5, 1e5, 1e5)  # the whole sample, wherever the pair is on it
         surface = _refined(sample().load(pair.frame, far))
         rows, cols = surface.ground_m.shape
         corners = surface.grid.to_plane([0, 0, cols - 1, cols - 1], [0, rows - 1, 0, rows - 1])
@@ -161,12 +161,12 @@ def _large(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProble
         held = _held(pair, limits)
         assert pair.ceiling_m is not None
         if not _joined(airspace, pair, limits, pair.ceiling_m):
-            # A spline rises above the saddles between the nodes of the DEM now and then.
+            # Sometimes a spline rises above the saddles between the nodes of the DEM.
             join = Cells.of(airspace, limits).lowest_join(surface, pair.start, pair.goal)
             held = replace(held, max_amsl_m=math.floor(join + ABOVE_JOIN_M[0] + limits.altitude_error_m) + 0.5)
         name = f"large {seed}/{number:02d}, 10 zones"
         problem = _problem(pair, airspace, held)
-        # A new airspace: what was worked out for the old one takes hundreds of megabytes.
+        # A new airspace, because the data derived for the old one takes hundreds of megabytes.
         problem = replace(problem, airspace=Airspace(surface, airspace.zones, scale=scale))
         yield NamedProblem(name, problem, "large", f"{rows} × {cols} nodes", pair.redraws)
 
@@ -204,7 +204,7 @@ KINDS = tuple(_KINDS)
 
 
 def _spread(count: int | None) -> list[int]:
-    """Numbers of pairs: all, or so many from short to long."""
+    """The numbers of the pairs: all, or ``count`` of them from short to long."""
     if count is None or count >= PAIRS:
         return list(range(PAIRS))
     return [(2 * k + 1) * PAIRS // (2 * count) for k in range(count)]
@@ -224,7 +224,7 @@ def _problem(pair: Pair, airspace: Airspace, limits: Limits) -> Problem:
 
 
 def _joined(airspace: Airspace, pair: Pair, limits: Limits, ceiling_m: float) -> bool:
-    """Whether the ceiling and the zones of unlimited height leave start and goal joined."""
+    """Whether start and goal are joined under the ceiling and among the zones of unlimited height."""
     cells = Cells.of(airspace, limits)
     free = cells.outside(airspace.zones, limits.horizontal_clearance_m + limits.track_error_m)
     free &= cells.floor_m <= ceiling_m - limits.altitude_error_m
@@ -232,7 +232,7 @@ def _joined(airspace: Airspace, pair: Pair, limits: Limits, ceiling_m: float) ->
 
 
 def _refined(surface: Surface) -> Surface:
-    """The surface on a grid finer by `FINER`: cubic splines through the nodes, to the centimetre."""
+    """The surface on a grid that is `FINER` times finer: cubic splines through the nodes, rounded to the centimetre."""
     grid = surface.grid
     finer = GridMap(grid.coefficients * FINER, grid.centre, grid.scale_m, grid.error_m)
     ground = _refined_ground(surface.ground_m.tobytes(), surface.ground_m.shape)

@@ -12,7 +12,7 @@ from rich.table import Table
 from gcsplan.bench.terrain_measure import OURS, OURS_LONG, Outcome, beyond, percentile
 
 LEAST_GAP = 1e-3
-"""Percent; smaller gaps are drawn here."""
+"""Percent at which smaller gaps are drawn."""
 
 MAIN_GROUPS = ("0 zones", "10 zones", "40 zones")
 COLUMNS = (
@@ -25,9 +25,10 @@ COLUMNS = (
 class Line:
     """One method on one group of problems.
 
-    ``gaps``: percent above the best certified bound there is for the problem, where there is one; of our own runs, and
-    of those alone, above the run's own bound. ``shorter``: problems on which it beats our planner's ordinary run.
-    Percentiles (50, 90) of seconds, and of the whole time over that of the sweep (median); peak memory, most of all.
+    ``gaps`` are percent above the best certified bound of the problem if there is one; for gcsplan's own runs, above
+    the run's own bound. ``shorter`` counts problems on which the method beats gcsplan's ordinary run. Percentiles (50,
+    90) are of seconds; ``ratio`` is the median of the whole time over that of the sweep; ``memory_mb`` is the largest
+    peak.
     """
 
     group: str
@@ -44,7 +45,7 @@ class Line:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """In the order of `COLUMNS`."""
+        """The line's cells in the order of `COLUMNS`."""
         proved = f" +{self.infeasible} proved infeasible" if self.infeasible else ""
         gap = [percentile(list(self.gaps), p) for p in (50, 90, 100)]
         return (
@@ -64,7 +65,7 @@ def best_bounds(outcomes: Sequence[Outcome]) -> dict[str, float]:
 
 
 def lines(outcomes: Sequence[Outcome]) -> list[Line]:
-    """A line for each group and method, in the order in which they first come."""
+    """A line for each group and method, in the order of their first outcomes."""
     bounds = best_bounds(outcomes)
     ours = {o.key: o.cost for o in outcomes if o.method == OURS and o.status == "solved" and o.cost is not None}
     groups: dict[tuple[str, str], list[Outcome]] = {}
@@ -99,7 +100,7 @@ def _line(
 
 
 def unsolved(outcomes: Sequence[Outcome]) -> list[str]:
-    """Every problem that our planner did not solve, in words, and the best that others made of it."""
+    """Every problem that gcsplan's planner did not solve, in words, and the methods that did."""
     out = []
     for o in outcomes:
         if o.method == OURS and o.status != "solved":
@@ -110,7 +111,7 @@ def unsolved(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def beaten_by(outcomes: Sequence[Outcome]) -> list[str]:
-    """Every problem on which somebody else's path is shorter than ours, and by how much."""
+    """Every problem on which another planner's path is shorter than gcsplan's, with both costs."""
     ours = {o.key: o.cost for o in outcomes if o.method == OURS and o.status == "solved" and o.cost is not None}
     return [
         f"{o.name}: {o.method} {o.cost:.2f} against {ours[o.key]:.2f}"
@@ -121,7 +122,7 @@ def beaten_by(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def table(found: Sequence[Line], title: str) -> Table:
-    """For the terminal."""
+    """The table for the terminal."""
     out = Table(title=title)
     for k, name in enumerate(COLUMNS):
         out.add_column(name, justify="left" if k < 2 else "right", no_wrap=k < 3)
@@ -135,7 +136,7 @@ def table(found: Sequence[Line], title: str) -> Table:
 
 
 def markdown(found: Sequence[Line], outcomes: Sequence[Outcome], about: Sequence[str]) -> str:
-    """The table with what was measured, and what was not solved."""
+    """The table with what was measured, and the problems that were not solved."""
     rows = [COLUMNS, tuple("---" for _ in COLUMNS), *(line.cells for line in found)]
     text = ["# Planners over real terrain", "", *about, "", *(f"| {' | '.join(row)} |" for row in rows), ""]
     for heading, items in (
@@ -152,7 +153,7 @@ def _failed(o: Outcome) -> bool:
 
 
 def as_csv(outcomes: Sequence[Outcome]) -> str:
-    """Every outcome, a row each; without the paths."""
+    """CSV with one row per outcome, without the paths."""
     names = [f.name for f in fields(Outcome) if f.name != "points"]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

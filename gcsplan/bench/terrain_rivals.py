@@ -1,7 +1,7 @@
-"""Other people's planners, in a process of their own, each answer written down before the next is asked for.
+"""Other planners, run in a separate process; each answer is written to a file before the next is requested.
 
-A run takes minutes to hours: what is in the file is not run again, whoever interrupts. A rival that crashes or hangs
-costs its own answer alone.
+A run takes minutes to hours, so what is in the file is not run again after an interruption. A rival that crashes or
+hangs loses only its own answer.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 
 KINDS = ("main", "band")
-"""Length without a turn radius is what all of them can minimise."""
+"""The kinds that all rivals can solve: length without a turn radius."""
 
-START_S = 180.0  # to import, make the problems, compile
+START_S = 180.0  # seconds to import, make the problems and compile
 
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """A method: ``family`` ompl or mealpy, its planner's name, and the seconds it is given (ompl)."""
+    """A method: ``family`` (ompl or mealpy), the planner's name, and its seconds (ompl only)."""
 
     family: str
     planner: str
@@ -41,23 +41,23 @@ class Rival:
 
     @property
     def limit_s(self) -> float:
-        """After this on the clock on the wall it is taken to hang: the processor may be shared with many."""
+        """Wall-clock seconds after which it counts as hanging; generous, since the processor may be shared."""
         return 120.0 + (40.0 * self.seconds if self.family == "ompl" else 1200.0)
 
 
 def rivals(seconds: Sequence[float], *, ompl: bool = True, swarms: bool = True) -> list[Rival]:
-    """All of them: OMPL's planners at each of ``seconds``, mealpy's swarms."""
+    """All rivals: OMPL's planners at each of ``seconds``, and mealpy's swarms."""
     out = [Rival("ompl", p, s) for s in sorted(seconds) for p in terrain_ompl.PLANNERS] if ompl else []
     return out + [Rival("mealpy", p) for p in terrain_swarms.SWARMS] if swarms else out
 
 
 def release(rival: Rival) -> str:
-    """The version of what is asked, by which a kept answer is told from an outdated one. Raises InputError."""
+    """The version of the rival's package, which separates valid kept answers from outdated ones. Raises InputError."""
     return terrain_ompl.release() if rival.family == "ompl" else terrain_swarms.release()
 
 
 class Answers:
-    """A file of answers, one JSON object a line, by problem, method and version; the last line of each counts."""
+    """A file of answers, one JSON object per line, by problem, method and version; the last line of each counts."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -68,23 +68,23 @@ class Answers:
                 row = json.loads(line)
                 outcome = Outcome(**{k: v for k, v in row.items() if k in names})
             except (ValueError, TypeError, AttributeError):
-                continue  # half a line, of a run that was killed
-            if outcome.status != "failed":  # of a crash another run may know better
+                continue  # a partial line of a run that was killed
+            if outcome.status != "failed":  # a crash is tried again
                 self._known[outcome.key, outcome.method, outcome.version] = outcome
 
     def get(self, key: str, method: str, version: str | None) -> Outcome | None:
-        """What is known, or None; ``version`` None: the last line of any version."""
+        """The known answer, or None; with ``version`` None, the last line of any version."""
         if version is not None:
             return self._known.get((key, method, version))
         found = [o for (k, m, _), o in self._known.items() if (k, m) == (key, method)]
         return found[-1] if found else None
 
     def add(self, outcome: Outcome) -> None:
-        """Keep an answer, on the disk before this returns."""
+        """Keep an answer; it is on the disk when this returns."""
         self._known[outcome.key, outcome.method, outcome.version] = outcome
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", encoding="utf-8") as file:
-            # A line of its own even after one that was cut off; the empty lines are skipped.
+            # Begin a new line, since the last one may be truncated; empty lines are skipped.
             file.write("\n" + json.dumps(asdict(outcome)) + "\n")
             file.flush()
             os.fsync(file.fileno())
@@ -94,10 +94,11 @@ def compare(
     named: Sequence[NamedProblem], asked: Sequence[Rival], answers: Answers, seed: int,
     tell: Callable[[str], None] = lambda words: None, *, kept_only: bool = False,
 ) -> Iterator[Outcome]:  # fmt: skip
-    """Every rival's outcome on every problem, as they come; ``tell`` hears of each. Raises InputError where one is not
-    installed. ``kept_only``: what is in the file, of any version, and nothing else.
+    """Every rival's outcome on every problem, as they come; ``tell`` receives a message on each.
 
-    Paths are judged here by the exact check again, those of earlier runs too: nothing is taken from the file on trust.
+    Raises InputError if a rival is not installed. With ``kept_only``, answers come only from the file, of any version.
+
+    Paths are judged again here by the exact check, those of earlier runs too: the file is not trusted.
     """
     versions = {rival: None if kept_only else release(rival) for rival in asked}
     worker: _Worker | None = None
@@ -127,17 +128,17 @@ def compare(
 
 
 def judged(outcome: Outcome, problem: Problem) -> Outcome:
-    """Solved only if the exact check says so."""
+    """The outcome, which stays solved only if the exact check passes the path."""
     if outcome.status == "solved" and not passes(problem, outcome.points):
         return replace(outcome, status="unsafe", detail="the path does not pass the exact check")
     return outcome
 
 
 class _Worker:
-    """The process: a question in, an answer out."""
+    """The worker process: it receives questions and sends answers."""
 
     def __init__(self) -> None:
-        # A fresh interpreter: neither memory nor random numbers nor threads are shared with ours.
+        # A fresh interpreter shares neither memory nor random numbers nor threads with this process.
         context = multiprocessing.get_context("spawn")
         self._ours, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
@@ -146,7 +147,7 @@ class _Worker:
         self._room_s = START_S
 
     def ask(self, one: NamedProblem, rival: Rival, seed: int) -> Outcome:
-        """The rival's outcome; failed where it crashes or does not come back in time."""
+        """The rival's outcome; failed if it crashes or does not answer in time."""
         base = Outcome(key_of(one.problem), one.name, one.kind, one.group, rival.method, "failed")
         try:
             self._ours.send((one.kind, one.name, one.seed, one.errors, rival, seed, base))
@@ -168,13 +169,13 @@ class _Worker:
 
 
 def _serve(questions: Connection) -> None:
-    """The worker's whole life."""
+    """The main loop of the worker process."""
     made: dict[tuple[str, int, bool], dict[str, Problem]] = {}
     while True:
         try:
             kind, name, problem_seed, errors, rival, seed, base = questions.recv()
         except EOFError:
-            os._exit(0)  # not by way of OMPL's bindings, which complain of themselves on the way out
+            os._exit(0)  # skips the destructors of OMPL's bindings, which print complaints
         try:
             if (kind, problem_seed, errors) not in made:
                 found = problems(kind, problem_seed, errors=errors)
@@ -203,7 +204,7 @@ def _attempt(problem: Problem, rival: Rival, seed: int, base: Outcome) -> Outcom
 
 
 def require(asked: Sequence[Rival]) -> None:
-    """Raise InputError, naming the cure, where a rival is not installed."""
+    """Raise InputError with a cure if a rival is not installed."""
     if not asked:
         raise InputError("no rival is asked for: give --seconds, or say --no-rivals")
     for rival in asked:

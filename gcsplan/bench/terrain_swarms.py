@@ -1,8 +1,8 @@
 """mealpy's swarms on a problem: a B-spline of eight control points, penalties on samples, the exact check at the end.
 
-A control point is a station on the straight line (they are evenly spread), a distance to the side of it and an
-altitude. That suits swarms far better than free points in space do. What is sampled is held to somewhat more than the
-limits, so that what lies between two samples has a chance with the exact check, which alone decides.
+A control point is a station on the straight line (evenly spaced), a distance to its side and an altitude, which suits
+swarms far better than free points in space. Samples are held to slightly tighter limits than the problem's, so that the
+path between two samples is likely to pass the exact check, which alone decides.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ POPULATION, EPOCHS = 30, 500
 CONTROL, SAMPLES = 8, 200
 SPARE_M, SPARE_SLOPE = 5.0, 0.95
 WEIGHT = 30.0
-"""Metres of length that one metre of depth, averaged over the samples it is found in, is worth; and a step of as many
-hundreds for any depth at all, so that no illegal path beats a legal one of a similar length."""
+"""Metres of length that each metre of violation of each sample counts. Any violation at all costs a hundred times that
+in addition, so that no illegal path beats a legal one of similar length."""
 
 
 def release() -> str:
-    """The installed version. Raises InputError where mealpy is missing."""
+    """The installed version. Raises InputError if mealpy is missing."""
     try:
         return f"mealpy {version('mealpy')}"
     except PackageNotFoundError:
@@ -40,7 +40,7 @@ def release() -> str:
 
 
 def plan(problem: Problem, name: str, seed: int) -> Found:
-    """Run the swarm of `SWARMS` called ``name``: 30 members, 500 epochs. Raises InputError where mealpy is missing."""
+    """Run the swarm of `SWARMS` called ``name``: 30 members, 500 epochs. Raises InputError if mealpy is missing."""
     try:
         mealpy = import_module("mealpy")
     except ImportError:
@@ -69,7 +69,7 @@ def plan(problem: Problem, name: str, seed: int) -> Found:
 
 
 def encoding(problem: Problem) -> tuple[Callable[[Floats], Floats], Callable[[Floats], float]]:
-    """From the unit box (16,) to a path (200, 3), and to what a swarm minimises."""
+    """The functions from the unit box (16,) to a path (200, 3), and to the cost that a swarm minimises."""
     from scipy.interpolate import BSpline
 
     start, goal = np.array(problem.start), np.array(problem.goal)
@@ -100,13 +100,13 @@ def encoding(problem: Problem) -> tuple[Callable[[Floats], Floats], Callable[[Fl
 
 
 def _depths(problem: Problem, points: Floats) -> float:
-    """Metres by which samples miss the limits, summed: too low, too high, inside zones, too steep."""
+    """The sum of metres by which samples break the limits: too low, too high, inside zones, too steep."""
     surface, limits = problem.airspace.surface, problem.limits
     e, n, z = points.T
     ground = surface.ground_at(e, n)
     known = ~np.isnan(ground)
     total = 1000.0 * float(np.count_nonzero(~known))
-    # The ends are as low as is legal: spare height is asked for where there can be some.
+    # The ends are at the lowest legal altitude, so spare height is required only away from them.
     spare = np.full(len(points), SPARE_M)
     spare[:4] = spare[-4:] = 0.0
     low = surface.top_at(e, n) + limits.min_agl_m + limits.altitude_error_m + spare - z

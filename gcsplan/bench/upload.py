@@ -1,9 +1,9 @@
 """Upload to the same loopback vehicle by gcsplan and by MAVSDK, in turn, in one run.
 
-The same is timed of both: an upload on a link that is open already, from the call with the items until it returns on
-the final ACK. The vehicle is one process, MAVSDK another (it logs to standard output); who goes first changes from run
-to run, and one upload of each comes before the first. The time of a whole verified upload of ours (transfer, read-back
-and comparison) stands beside it.
+For both, the time is that of an upload on an open link, from the call with the items until it returns on the final ACK.
+The vehicle is one process, MAVSDK another (it logs to standard output). The order changes from run to run, and one
+upload of each comes before the first timed one. The time of a whole verified upload by gcsplan (transfer, read-back and
+comparison) is reported beside it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ PEER_WAIT_S = 180.0
 
 
 def items_of(count: int) -> tuple[MissionItem, ...]:
-    """A mission of ``count`` way points, as PX4 has them (no home item)."""
+    """A mission of ``count`` way points, as for PX4 (no home item)."""
     return tuple(
         MissionItem(WAYPOINT, RELATIVE, x=366_000_000 + 900 * i, y=-843_000_000 + 700 * (i % 7), z=60.0 + i % 40)
         for i in range(count)
@@ -43,9 +43,9 @@ def items_of(count: int) -> tuple[MissionItem, ...]:
 
 
 def run(items: int = 600, runs: int = 15) -> dict[str, Any]:
-    """Seconds of each upload, in turn, and the ratio ours to MAVSDK's of the medians.
+    """Median seconds of the uploads, made in turn, and the median ratio of gcsplan's to MAVSDK's, pair by pair.
 
-    Raises InputError where MAVSDK is not installed, LinkError where an upload fails.
+    Raises InputError if MAVSDK is not installed, LinkError if an upload fails.
     """
     if find_spec("mavsdk") is None:
         raise InputError("this benchmark needs MAVSDK: pip install 'gcsplan[test]'")
@@ -94,7 +94,7 @@ def report(result: dict[str, Any]) -> str:
 
 def _ours(link: Link, items: tuple[MissionItem, ...], *, verify: bool) -> float:
     channel = link.channel(VEHICLE.sysid)
-    link.poll()  # what came while MAVSDK had its turn
+    link.poll()  # drop what arrived during MAVSDK's turn
     channel.inbox.clear()
     started = time.perf_counter()
     if verify:
@@ -113,7 +113,7 @@ def _ours(link: Link, items: tuple[MissionItem, ...], *, verify: bool) -> float:
 
 
 class _Peer:
-    """MAVSDK's upload in a process of its own: one line in for each upload, its seconds out."""
+    """MAVSDK's upload in a separate process: one line in for each upload, its seconds out."""
 
     def __init__(self, url: str, items: tuple[MissionItem, ...]) -> None:
         self._process = subprocess.Popen(
@@ -137,7 +137,7 @@ class _Peer:
         return line
 
     def upload(self) -> float:
-        """One upload; its seconds."""
+        """Do one upload and return its seconds."""
         self._tell("upload")
         return float(self._expect("took").split()[1])
 

@@ -1,8 +1,8 @@
-"""Uploads to a whole fleet at once, beside the slowest of its vehicles alone: a fleet should take as long as that one.
+"""Uploads to a whole fleet at once, beside the slowest of its vehicles alone: both should take the same time.
 
-Every vehicle loses packets by its own seed, in both directions, and has the same seed when it is uploaded to alone.
-Timed is a whole verified upload: discovery, preflight, parameters, transfer, read-back and comparison. The vehicles
-live in a process of their own, with their own clocks' timers (ArduCopter asks again after a second).
+Every vehicle loses packets by its own seed, in both directions, and has the same seed when it is uploaded to alone. The
+time is that of a whole verified upload: discovery, preflight, parameters, transfer, read-back and comparison. The
+vehicles run in a separate process, with their own timers (ArduCopter repeats a request after a second).
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
 
 SLOWEST = 3
-"""So many of the slowest are uploaded to alone; the slowest of these counts."""
+"""Number of the slowest vehicles that are uploaded to alone; the slowest of these counts."""
 
 
 def run(fleet: int = 20, items: int = 50, drop: float = 0.05, autopilot: str = "arducopter") -> dict[str, Any]:
     """Seconds of the fleet at once and of its slowest vehicle alone, and their ratio.
 
-    Raises InputError for odd figures, LinkError where an upload is not verified.
+    Raises InputError for invalid arguments, LinkError if an upload is not verified.
     """
     if not 2 <= fleet <= 254 or not 2 <= items <= 600 or not 0.0 <= drop <= 0.2:
         raise InputError(
