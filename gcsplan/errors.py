@@ -1,11 +1,11 @@
 """Every error that gcsplan raises on purpose, and the exit code that it leads to.
 
-    GcsplanError                    70  our bug, if nothing below fits
+    GcsplanError                    70  a bug of gcsplan, if nothing below fits
     ├── InputError     (ValueError)       2  bad input; carries every problem found, each with its place
     │   └── UsageError                    2  wrong options on the command line
     ├── NoMission      (RuntimeError)     3  no mission exists or was found; ``reason`` says which
     ├── CheckFailed    (RuntimeError)     4  a check or a rehearsal found a violation, or could not judge
-    ├── VehicleRefused (ConnectionError)  5  the vehicle refused, or was refused by us
+    ├── VehicleRefused (ConnectionError)  5  the vehicle refused, or gcsplan refused to send
     ├── LinkError      (ConnectionError)  6  the link is dead, or the outcome is unknown
     └── ReadBackDiffers (RuntimeError)    7  what is on board is not what was sent
 
@@ -86,7 +86,7 @@ class UsageError(InputError):
 
 
 class NoMission(GcsplanError, RuntimeError):
-    """There is no mission, because no path is better than a wrong one. The message names the binding constraint."""
+    """There is no safe mission, and none is better than a wrong one. The message names the binding constraint."""
 
     exit_code = 3
     default_reason = "not_found"

@@ -1,5 +1,5 @@
-"""The way of the data: mission file → world → path → mission → verdict → outputs → vehicles → rehearsal.
+"""The flow of the data: mission file → world → path → mission → verdict → outputs → vehicles → rehearsal.
 
-Each module is one step, a function that takes what the step before it gave; `pipeline` puts them in a row, and
-`scripting` is what `import gcsplan` shows.
+Each module is one step: a function that takes the result of the step before it. `pipeline` runs the steps in order, and
+`scripting` holds the functions that `import gcsplan` provides.
 """

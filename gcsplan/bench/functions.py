@@ -64,6 +64,7 @@ def run(
     done: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
     """Run every algorithm on every function in both settings, ``runs`` times each; same seed, same numbers.
+
     ``jobs`` is the number of processes (all cores if None). ``done`` is called with the number of finished parts and of
     all parts. The result has ``settings`` of the experiment, ``rows`` (mean, std, median, best of each, with table
     2's), ``costs`` (of each run), and ``claims`` (table 2's rankings, each reproduced or not). Raises InputError for

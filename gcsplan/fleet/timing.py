@@ -85,10 +85,10 @@ class Route:
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
     def energy_j(self, vehicle: Vehicle, hold_s: float = 0.0) -> float:
-        """Energy of the flight, J: krill paper, Table 1 (R1 per vertical metre, R2 per horizontal one), ``hover_w`` in
-        holds.
+        """Energy of the flight, J (krill paper, Table 1: R1 per vertical metre, R2 per horizontal one).
 
-        Corners are not cut. ``hold_s`` is added to the route's own holds. Waiting on the ground costs nothing.
+        Holds take ``hover_w``. Corners are not cut. ``hold_s`` is added to the route's own holds. Waiting on the ground
+        costs nothing.
         """
         corners = _flown(self)
         d = np.diff(corners, axis=0)

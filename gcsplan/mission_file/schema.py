@@ -135,7 +135,7 @@ class TerrainKeys(Keys):
     height_unit: Literal["m", "ft", "us_ft"] | None = None
     """Unit of heights in a raster that does not state it."""
     flat_m: Metres | None = None
-    """No raster: flat ground at this altitude, in a mission with a frame above the frame's zero."""
+    """No raster: flat ground at this altitude; in a mission with a frame it counts above the frame's zero."""
     peaks: Annotated[list[PeakKeys], Field(min_length=1, max_length=1000)] | None = None
     """No raster: hills on flat ground, in a mission with a frame."""
     obstacle_height_m: Length = 0.0
