@@ -161,7 +161,7 @@ def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
 
 
 def _inner(problem: Problem, start: FlightEnd, goal: FlightEnd | None) -> Problem:
-    """The planner's part: from the end of the climb-out and its turns to the begin of the approach."""
+    """The planner's part: from the end of the climb-out and its turns to the beginning of the approach."""
     first = tuple(float(x) for x in start.chain[-1])
     last = problem.goal if goal is None else tuple(float(x) for x in goal.chain[-1])
     return replace(problem, start=first, goal=last)  # type: ignore[arg-type]

@@ -92,7 +92,7 @@ class Fleet:
         return cls(tuple(paths), window_s, edges, pieces, offset, nodes, stray, fastest, begins, ends, first, last)
 
     def bounds(self, i: Ints, j: Ints) -> tuple[Floats, Floats]:
-        """For pairs (M,): a lower bound of the distance in each slice (M, K), and the least distance at slice ends.
+        """For pairs (M,): a lower bound in each slice (M, K), and the least distance at the slices' ends (M,), metres.
 
         Both are inf where the two are not in the air together.
         """

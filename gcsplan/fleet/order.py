@@ -23,7 +23,7 @@ WITHIN_S = 1e-6
 """Times that differ by less than this, s, count as equal."""
 
 MOST_CLOCKS = 400
-"""Most begin times of a sequence that are tried if vehicles can neither be early nor wait."""
+"""Most starting times of a sequence that are tried if vehicles can neither be early nor wait."""
 
 
 def interval_range(fast_s: Floats, latest_s: Floats, clock: Clock, first_s: float | None) -> tuple[float, float]:
@@ -35,7 +35,7 @@ def interval_range(fast_s: Floats, latest_s: Floats, clock: Clock, first_s: floa
     n = len(fast_s)
     turn = np.arange(n, dtype=np.float64)
     if first_s is None and clock == "fleet":
-        # A begin time must be after every fast_j - j·d and before every latest_i - i·d.
+        # A starting time must be after every fast_j - j·d and before every latest_i - i·d.
         gap, apart = latest_s[:, None] - fast_s[None, :], turn[:, None] - turn[None, :]
         later, sooner = apart > 0.0, apart < 0.0
         low = float((gap[sooner] / apart[sooner]).max(initial=0.0))
@@ -49,7 +49,7 @@ def interval_range(fast_s: Floats, latest_s: Floats, clock: Clock, first_s: floa
 
 
 def earliest_first(fast_s: Floats, latest_s: Floats, interval_s: float) -> float | None:
-    """The earliest begin of a sequence in this order, s; None if no begin suits all vehicles."""
+    """The earliest starting time of a sequence in this order, s; None if none suits all vehicles."""
     turns = np.arange(len(fast_s)) * interval_s
     low, high = float((fast_s - turns).max()), float((latest_s - turns).min())
     return low if low <= high + WITHIN_S else None
@@ -58,13 +58,13 @@ def earliest_first(fast_s: Floats, latest_s: Floats, interval_s: float) -> float
 def best_order(
     fast_s: Floats, latest_s: Floats, interval_s: float, clock: Clock, first_s: float | None, cost: Cost | None = None
 ) -> Ints | None:
-    """The order that finishes earliest, and among the orders with the same begin the cheapest; None if none works.
+    """The order that finishes earliest, and among those with the same starting time the cheapest; None if none works.
 
     ``cost`` returns joules (n, n) of each vehicle (row) for arriving at the times (n,) that are passed to it. Exact for
-    any number of vehicles: for a given begin, turns are assigned as a linear assignment problem (if waiting costs
-    nothing, sorting by ``fast_s`` solves it: swapping two neighbours that are out of order never helps the later one),
-    and begins are tried from the earliest. For a ``fleet`` clock whose vehicles cannot wait, `MOST_CLOCKS` begins are
-    tried: exact up to 20 vehicles.
+    any number of vehicles: for a given starting time, turns are assigned as a linear assignment problem (if waiting
+    costs nothing, sorting by ``fast_s`` solves it: swapping two neighbours that are out of order never helps the later
+    one), and starting times are tried from the earliest. For a ``fleet`` clock whose vehicles cannot wait,
+    `MOST_CLOCKS` starting times are tried: exact up to 20 vehicles.
     """
     n = len(fast_s)
     by_speed = np.argsort(fast_s, kind="stable").astype(np.intp)
