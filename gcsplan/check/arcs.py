@@ -118,7 +118,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
         f"a bank of {bank_deg:.0f}° at {fastest:g} m/s)"
     )
     if wander_m > 0.0:
-        note += f"; in calm air ArduPlane with NAVL1_PERIOD 17 is up to {wander_m:.0f} m off them"
+        note += f"; in calm air ArduPlane with NAVL1_PERIOD {tuning.l1_period_s:g} is up to {wander_m:.0f} m off them"
         note += ", so the sharpest are judged wider" if wander_m > error_m else ""
     if note not in flight.notes:
         flight.notes.append(note)
@@ -178,7 +178,7 @@ class _Run:
             tangent = tangent_m(self.radius, turn)
             begins = self._begins_m(mission, s, abs(turn), flight)
             early_m, late_m = (abs(b - tangent) for b in begins)
-            wander_m = tracking_m(self.radius, turn, s.speed_m_s)
+            wander_m = tracking_m(self.radius, turn, s.speed_m_s, self.tuning.l1_period_s, self.tuning.l1_damping)
             self.wander_m = max(self.wander_m, wander_m)
             off_m = max(early_m, late_m) * math.sin(min(abs(turn), 0.5 * math.pi))
             off_m += max(0.0, wander_m - self.error_m)
@@ -199,8 +199,9 @@ class _Run:
             )
             # Left sharp, so that the rest can be judged.
             found[k], found[k + 1] = _Corner(off_m=a.off_m), _Corner(off_m=b.off_m)
+        settles_s = SETTLES_S * max(self.tuning.l1_period_s / DEFAULTS.l1_period_s, 1.0)
         for k, s in enumerate(self.run[:-1]):  # on a leg too short to settle, the offset remains at the next turn
-            if self.long_m[k] - found[k].tangent - found[k + 1].tangent < SETTLES_S * s.speed_m_s:
+            if self.long_m[k] - found[k].tangent - found[k + 1].tangent < settles_s * s.speed_m_s:
                 found[k + 1] = replace(found[k + 1], off_m=found[k + 1].off_m + found[k].off_m)
         return found
 

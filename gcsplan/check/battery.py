@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby, repeat
+from itertools import groupby
 from typing import Any
 
 from gcsplan.check.geodesy import flat_m
@@ -22,6 +22,7 @@ from gcsplan.vehicle import Vehicle
 
 HALVINGS = 50
 MOST_ROUNDS = 1000
+"""Rounds of a jump that are judged one by one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +109,11 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
     rows: list[LegBattery] = []
     short: list[tuple[float, float]] = []
     first: tuple[Place, float, int] | None = None
-    for leg in flown(verdict.legs):
+    for leg, skipped_j, skipped_m in flown(verdict.legs):
         if leg.kind == "rtl":
             break
+        spent += skipped_j
+        along += skipped_m
         hold_j = energy.hover_w * (leg.hold_s if math.isfinite(leg.hold_s) else 0.0)
         way_j = leg.energy_j - hold_j
 
@@ -142,10 +145,21 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
     return BatteryHome(usable, energy.battery_j, most, most_at, most_m, place, at_m, seq, tuple(short), tuple(rows))
 
 
-def flown(legs: Sequence[LegFigures]) -> Iterator[LegFigures]:
-    """Yield the legs as often as they are flown: neighbours with the same count n are flown n times as one group."""
-    for times, run in groupby(legs, key=lambda leg: leg.times):
-        yield from (leg for legs_of_run in repeat(list(run), min(times, MOST_ROUNDS)) for leg in legs_of_run)
+def flown(legs: Sequence[LegFigures]) -> Iterator[tuple[LegFigures, float, float]]:
+    """Yield the legs as often as they are flown: neighbours with the same count n are flown n times as one group.
+
+    Of more than `MOST_ROUNDS` the rounds before the last are left out; what they take, J and m, comes with the first
+    leg of the last round, and is 0 with all others.
+    """
+    for times, group in groupby(legs, key=lambda leg: leg.times):
+        run = list(group)
+        round_j, round_m = math.fsum(leg.energy_j for leg in run), math.fsum(leg.horizontal_m for leg in run)
+        rounds = min(times, MOST_ROUNDS)
+        for k in range(rounds):
+            skipped = times - rounds if k == rounds - 1 else 0
+            for leg in run:
+                yield leg, skipped * round_j, skipped * round_m
+                skipped = 0
 
 
 def _between(leg: LegFigures, part: float) -> Place:

@@ -31,29 +31,50 @@ CAPTURE_SINE = math.sqrt(0.5)
 GRAVITY_M_S2 = 9.80665
 
 
-def late_m(turn_rad: float, speed_m_s: float) -> float:
-    """How far outside its arc a turn was measured to lie, m, scaled to a speed."""
+def late_m(turn_rad: float, speed_m_s: float, period_s: float = L1_PERIOD_S) -> float:
+    """How far outside its arc a turn was measured to lie, m, scaled to a speed; and to a NAVL1_PERIOD that is longer
+    than the one it was measured with."""
     turn = min(abs(turn_rad), 0.5 * math.pi)
-    return LATE_S * speed_m_s * min(1.0, LATE_PER_SINE * math.sin(turn))
+    slower = max(period_s / L1_PERIOD_S, 1.0)
+    return LATE_S * slower * speed_m_s * min(1.0, LATE_PER_SINE * math.sin(turn))
 
 
-def tracking_m(radius_m: float, turn_rad: float, speed_m_s: float) -> float:
-    """How far from its arc a turn that begins at the tangent length is flown in calm air, m; 0 at speed 0."""
+def tracking_m(
+    radius_m: float,
+    turn_rad: float,
+    speed_m_s: float,
+    period_s: float = L1_PERIOD_S,
+    damping: float = L1_DAMPING,
+) -> float:
+    """How far from its arc a turn that begins at the tangent length is flown in calm air, m; 0 at speed 0.
+
+    ``period_s``, ``damping``: the vehicle's NAVL1_PERIOD and NAVL1_DAMPING.
+    """
     if not speed_m_s > 0.0:
         return 0.0
-    turn = math.radians(math.ceil(math.degrees(abs(turn_rad)) - 1e-6))
-    return max(late_m(turn_rad, speed_m_s), l1_off_m(radius_m, min(turn, math.radians(170.0)), round(speed_m_s, 1)))
+    turn = min(math.radians(math.ceil(math.degrees(abs(turn_rad)) - 1e-6)), math.radians(170.0))
+    return max(
+        late_m(turn_rad, speed_m_s, period_s),
+        l1_off_m(radius_m, turn, round(speed_m_s, 1), round(period_s, 2), round(damping, 3)),
+    )
 
 
 @lru_cache(maxsize=4096)
-def l1_off_m(radius_m: float, turn_rad: float, speed_m_s: float) -> float:
+def l1_off_m(
+    radius_m: float,
+    turn_rad: float,
+    speed_m_s: float,
+    period_s: float = L1_PERIOD_S,
+    damping: float = L1_DAMPING,
+) -> float:
     """The largest distance from the arc under the L1 law, m, for a turn to the left between long legs."""
     tangent = radius_m * math.tan(0.5 * turn_rad)
-    ahead = L1_DAMPING * L1_PERIOD_S / math.pi * speed_m_s
-    gain = 4.0 * L1_DAMPING**2 * speed_m_s**2 / ahead
+    ahead = damping * period_s / math.pi * speed_m_s
+    gain = 4.0 * damping**2 * speed_m_s**2 / ahead
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
     x, y, heading, bank, worst = -tangent, 0.0, 0.0, 0.0, 0.0  # the corner is the origin, the first leg the x axis
-    steps = math.ceil((2.0 * tangent / speed_m_s + CALM_S) / STEP_S)
+    calm_s = CALM_S * max(period_s / L1_PERIOD_S, 1.0)
+    steps = math.ceil((2.0 * tangent / speed_m_s + calm_s) / STEP_S)
     most = math.radians(MOST_BANK_DEG)
     for _ in range(steps):
         aside = cos * y - sin * x  # left of the new leg

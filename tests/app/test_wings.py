@@ -390,6 +390,14 @@ def test_what_the_simulated_plane_was_off_its_arcs_is_within_what_is_told(
         assert off_m <= tracking_m(radius_m, math.radians(turn_deg), speed_m_s) <= 3.0 * off_m, turn_deg
 
 
+def test_a_slower_l1_controller_is_judged_wider() -> None:
+    for radius_m, turn_deg, speed_m_s in ((100.0, 60.0, 21.0), (180.0, 90.0, 28.0), (100.0, 15.0, 14.6)):
+        turn = math.radians(turn_deg)
+        usual, slow = (tracking_m(radius_m, turn, speed_m_s, period_s) for period_s in (17.0, 30.0))
+        assert usual == tracking_m(radius_m, turn, speed_m_s)
+        assert slow >= 30.0 / 17.0 * usual * 0.9
+
+
 def test_a_turn_that_the_l1_law_cuts_short_is_judged_wider_than_its_arc() -> None:
     assert l1_off_m(100.0, math.radians(60.0), 20.0) < 6.0
     assert l1_off_m(300.0, math.radians(90.0), 20.0) > 50.0  # it turns at 45° to the leg at once

@@ -120,7 +120,16 @@ def test_without_a_capacity_nothing_is_said() -> None:
 def test_rounds_are_flown_as_often_as_they_are() -> None:
     verdict = judge(out(FLAT, (1000.0, 0.0, 80.0), (1000.0, 900.0, 80.0), (0.0, 900.0, 80.0)), craft(None), FLAT)
     legs = [replace(leg, times=3) if leg.seq in (3, 4) else leg for leg in verdict.legs]
-    assert [leg.seq for leg in flown(legs)] == [1, 2, 3, 4, 3, 4, 3, 4, 5]
+    assert [(leg.seq, j, m) for leg, j, m in flown(legs)] == [(k, 0, 0) for k in (1, 2, 3, 4, 3, 4, 3, 4, 5)]
+
+
+def test_rounds_that_are_left_out_count_in_full() -> None:
+    v = craft(1e12)
+    verdict = judge(out(FLAT, (1000.0, 0.0, 80.0), (1000.0, 900.0, 80.0), (0.0, 900.0, 80.0)), v, FLAT)
+    many = replace(verdict, legs=tuple(replace(leg, times=2500) if leg.seq in (3, 4) else leg for leg in verdict.legs))
+    found = home_of(many, v)
+    assert found.legs[-1].spent_j == pytest.approx(math.fsum(leg.energy_j * leg.times for leg in many.legs), rel=1e-9)
+    assert found.most_m > 2500 * 900.0
 
 
 @settings(max_examples=draws(40))

@@ -238,3 +238,16 @@ def test_a_leg_shorter_than_its_arcs_climbs_over_what_is_flown(limit_deg: float,
     found = verdict(Mission(PLANE, HOME, (up, *items, end), "uav1"), FLAT, craft)
     kinds = {f.kind for f in found.findings}
     assert kinds == (set() if safe else {"climb"}), found.describe()
+
+
+def test_a_wing_with_a_slower_l1_controller_than_usual_is_judged_wider() -> None:
+    items = [at(cmd.WAYPOINT, *p, 100, 0.0, 50.0) for p in ((1000.0, 0.0), (1600.0, 900.0), (2500.0, 900.0))]
+    flown = Mission(
+        PLANE, HOME, (at(cmd.VTOL_TAKEOFF, 0, 0, 100), *items, at(cmd.LOITER_UNLIM, 2500, 900, 100)), "uav1"
+    )
+    craft = replace(vehicle(PLANE, horizontal_clearance_m=0.0), turn_radius_m=100.0, speed_max_m_s=21.0)
+    beside = inside(1320.8, 436.1, 2.0)  # 25 m to the right of the second leg
+    assert verdict(flown, beside, craft).safe is True
+    slow = verdict(flown, beside, craft, Tuning.of({"NAVL1_PERIOD": 30.0}))
+    assert {(f.kind, f.zone) for f in slow.findings} == {("zone", "inside")}
+    assert any("NAVL1_PERIOD 30" in note for note in slow.notes)
