@@ -114,7 +114,7 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
             break
         spent += skipped_j
         along += skipped_m
-        hold_j = energy.hover_w * (leg.hold_s if math.isfinite(leg.hold_s) else 0.0)
+        hold_j = leg.hold_j
         way_j = leg.energy_j - hold_j
 
         def used(part: float, leg: LegFigures = leg, way_j: float = way_j, spent: float = spent) -> float:

@@ -150,6 +150,7 @@ def _figures(
         zone = int(report.nearest_zone[near])
         steepest = mine[int(np.abs(report.climb_deg[mine]).argmax())]
         hold_s = 0.0 if math.isinf(s.hold_s) else s.hold_s
+        hold_j = _hold_w(vehicle, s) * hold_s
         lat, lon = world.frame.to_degrees(*low_en)
         highest = report.max_agl_m[mine]
         figures.append(
@@ -165,9 +166,10 @@ def _figures(
                 zone_clearance_m=float(report.zone_clearance_m[near]),
                 nearest_zone=world.airspace.zones[zone].name if zone >= 0 else "",
                 energy_j=energy.vertical_j_per_m * float(np.abs(rise).sum())
-                + energy.horizontal_j_per_m * horizontal_m + energy.hover_w * hold_s,
+                + energy.horizontal_j_per_m * horizontal_m + hold_j,
                 time_s=_time_s(vehicle, s, run, rise) + hold_s,
                 hold_s=s.hold_s,
+                hold_j=hold_j,
                 times=s.times,
                 jumped_from=s.jumped_from,
             )
@@ -270,8 +272,14 @@ def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None
     last = flight.stretches[-1]
     if not math.isinf(last.hold_s):
         return None
-    circling = last.reach_m > 0.0
-    return vehicle.energy.horizontal_j_per_m * last.speed_m_s if circling else vehicle.energy.hover_w
+    return _hold_w(vehicle, last)
+
+
+def _hold_w(vehicle: Vehicle, s: Stretch) -> float:
+    """The power, W, of the hold at the end of a stretch: of hovering, or of circling if that takes more."""
+    circling = s.kind == "loiter" and s.reach_m > 0.0
+    around_w = vehicle.energy.horizontal_j_per_m * s.speed_m_s if circling else 0.0
+    return max(vehicle.energy.hover_w, around_w)
 
 
 def _finding(seq: int, kind: str, message: str, value: float, limit: float, by: float, unit: str) -> Finding:

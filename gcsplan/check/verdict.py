@@ -32,9 +32,9 @@ class LegFigures:
     """Figures of one flown stretch; NaN where the ground is unknown.
 
     ``min_agl_m`` counts from the ground and what stands on it, on the line itself; ``agl_end_m`` from bare ground.
-    ``energy_j`` includes the hold; ``hold_s`` may be infinite (a loiter without end costs nothing here). The figures
-    are those of one pass; ``times``: how often it is flown, if a jump leads back. ``jumped_from``: the jump that leads
-    to it.
+    ``energy_j`` includes ``hold_j``, that of the hold; ``hold_s`` may be infinite (a loiter without end costs nothing
+    here). The figures are those of one pass; ``times``: how often it is flown, if a jump leads back. ``jumped_from``:
+    the jump that leads to it.
     """
 
     seq: int
@@ -55,6 +55,7 @@ class LegFigures:
     energy_j: float
     time_s: float
     hold_s: float
+    hold_j: float = 0.0
     times: int = 1
     jumped_from: int | None = None
 

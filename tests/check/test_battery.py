@@ -123,6 +123,14 @@ def test_rounds_are_flown_as_often_as_they_are() -> None:
     assert [(leg.seq, j, m) for leg, j, m in flown(legs)] == [(k, 0, 0) for k in (1, 2, 3, 4, 3, 4, 3, 4, 5)]
 
 
+def test_a_plane_that_circles_for_a_time_flies_on() -> None:
+    plane = replace(vehicle(Autopilot.ARDUPLANE), turn_radius_m=80.0, energy=Energy(R1, R2, 0.0, 1e9))
+    mission = replace(out(FLAT, (3000.0, 0.0, 80.0), hold_s=600.0, last=RTL), autopilot=Autopilot.ARDUPLANE)
+    (circle,) = [leg for leg in judge(mission, plane, FLAT).legs if leg.kind == "loiter"]
+    assert circle.hold_s == 600.0
+    assert circle.energy_j == circle.hold_j == pytest.approx(R2 * plane.speed_max_m_s * 600.0)
+
+
 def test_rounds_that_are_left_out_count_in_full() -> None:
     v = craft(1e12)
     verdict = judge(out(FLAT, (1000.0, 0.0, 80.0), (1000.0, 900.0, 80.0), (0.0, 900.0, 80.0)), v, FLAT)
