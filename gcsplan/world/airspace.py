@@ -212,9 +212,8 @@ class Airspace:
         return self.clear_counted(legs, limits)[0]
 
     def clear_counted(self, legs: Legs, limits: Limits) -> tuple[NDArray[np.bool_], float]:
-        """The same, and how many pieces of ground beside the legs were cut: most of the work close over ground."""
-        ok = np.zeros(len(legs), np.bool_)
-        self._judge(legs, limits, False, ok, _HELD_NOTHING)
+        """What `clear` returns, and into how many pieces ground beside the legs was cut: most work close to ground."""
+        self._judge(legs, limits, False, ok := np.zeros(len(legs), np.bool_), _HELD_NOTHING)
         return ok, room.cut
 
     def floor_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:

@@ -24,13 +24,13 @@ FAR, MUCH = 5e-3, 5e-2
 """Gaps, as parts: beyond which other sources of paths are tried; and beyond which small worlds are searched before time
 is spent on a bound."""
 TWICE = 2.0
-"""From so many times the wanted gap on bounds that cost more are asked for."""
+"""Times the wanted gap from which on costlier bounds are worth their work."""
 PAST_FINE, ROUNDS = 9, 2
-"""Tracks past what is in the way that are looked at on the finer lattice; and how often."""
+"""Most tracks past obstacles that are tried on the finer lattice at once, and how often that is repeated."""
 FINER = 4
-"""Into how many parts a side cells are cut once more, for walls and zones that the first lattice rounds off."""
+"""Parts a side into which cells are cut once more, for walls and zones that the first lattice rounds off."""
 MOST_CELLS = 50_000
-"""Cells of all corridors whose altitude intervals are looked at, at most."""
+"""Most cells of all corridors for which altitude intervals are computed."""
 
 
 NAMES = (
@@ -38,11 +38,11 @@ NAMES = (
     "roadmap_near", "fine_tracks", "detours", "detours_fine", "bound_corridor", "contour_climb", "lattice",
     "local_roadmap", "cap_pairs", "length_bound", "altitude_intervals", "refinement",
 )  # fmt: skip
-"""Of all searches; which a mission has depends on its objective and limits."""
+"""The names of all searches; which of them a mission has depends on its objective and limits."""
 
 
 def left_out(problem: Problem) -> tuple[str, ...]:
-    """The searches that a problem's options ask to do without. Raises InputError for a name that there is not."""
+    """The searches that a problem's options leave out. Raises InputError for an unknown name."""
     asked = problem.options.get("without", ())
     names = tuple(str(n) for n in asked) if isinstance(asked, tuple | list) else (str(asked),)
     require_names(names)
@@ -57,7 +57,7 @@ def require_names(names: Sequence[str]) -> None:
 
 
 class Searches:
-    """The searches of one problem; each looks at the incumbent, and leaves there what it finds."""
+    """The searches of one problem; each reads the incumbent and improves it."""
 
     def __init__(self, incumbent: Incumbent) -> None:
         self.incumbent, self.problem = incumbent, incumbent.problem
@@ -66,13 +66,13 @@ class Searches:
 
     @property
     def plane(self) -> PlaneSearch:
-        """The lattices of the legs, made when they are first asked for."""
+        """The lattices of the legs, made at first use."""
         if self._plane is None:
             self._plane = PlaneSearch(self.incumbent, in_window(self.incumbent))
         return self._plane
 
     def table(self) -> list[Search]:
-        """All of them: name, share of the gap that it closes, when it applies, what it costs, what it does."""
+        """All searches: name, share of the gap that each closes, when it applies, its size, and what runs it."""
         band = self.problem.limits.max_agl_m is not None
         energy = self.problem.objective == "energy"
         i = self.incumbent
@@ -131,17 +131,17 @@ class Searches:
         ]
 
     def _over(self, run: Callable[[], object]) -> Callable[[], object]:
-        """A search over the legs' lattices, once those hold whatever is not longer than the best path."""
+        """A search over the legs' lattices, which are first widened to all tracks no longer than the best path."""
         return lambda: self.plane.reach_longest() and run()
 
-    # -------------------------------------------------------------------- what they cost
+    # -------------------------------------------------------------------- sizes
 
     def _of(self, seconds: float, per_zone_s: float) -> Callable[[], Size]:
         zones = len(self.problem.airspace.zones)
         return lambda: (seconds + per_zone_s * zones, 40.0)
 
     def _nodes(self, looks: float) -> Callable[[], Size]:
-        """So many looks at the lattices of all legs."""
+        """The size of that many passes over the lattices of all legs."""
         return lambda: self.plane.size(looks)
 
     # -------------------------------------------------------------------- first paths
@@ -156,13 +156,13 @@ class Searches:
         if isinstance(flown, Obstruction):
             self._straight = flown
             return
-        self._straight = Obstruction("zone", 0.0, 0.0, 0.0)  # what is dearer than the straight line, zones make dear
+        self._straight = Obstruction("zone", 0.0, 0.0, 0.0)  # if the path is not the best, zones make it dearer
         found = incumbent.exact(track, flown)
         if found is not None:
             incumbent.take(*found)
 
     def _has_outlines(self) -> bool:
-        """Zones may be what is in the way of the straight line, or what makes it dearer."""
+        """Whether zones may obstruct the straight track or make a path over it dearer."""
         air = self.problem.airspace
         if self._straight is None or not air.zones:
             return False
@@ -201,7 +201,7 @@ class Searches:
         return self.incumbent.best is None and self.plane.is_small
 
     def _search_small(self) -> None:
-        from gcsplan.planners.optimal.sources.local_roadmap import small_path  # most missions are longer
+        from gcsplan.planners.optimal.sources.local_roadmap import small_path  # most missions do not need it
 
         incumbent = self.incumbent
         incumbent.offer(small_path(self.problem, incumbent.best, incumbent.budget.goes_on))
@@ -227,7 +227,7 @@ class Searches:
         found = traverse(self.problem, self.plane.longest())
         if found is not None:
             incumbent.take_longer(found, fine=True)
-        # Where finer lines are better, yet finer ones may be, too; for length that is hardly worth the work.
+        # If finer lines are better, still finer ones may be, too; for length they are hardly worth the work.
         for level in (0, 1) if energy else (0,):
             if incumbent.best is None or incumbent.gap <= TWICE * incumbent.wanted or not incumbent.budget.goes_on():
                 break
@@ -247,13 +247,10 @@ class Searches:
             halve(plane)
 
     def _refine(self) -> None:
-        plane, incumbent = self.plane, self.incumbent
-        cut = 2 if incumbent.gap > FAR else 1
+        plane = self.plane
+        cut = 2 if self.incumbent.gap > FAR else 1
         if sum(leg.refine(plane.limit(leg), FINER, cut) for leg in plane.legs):
-            plane.try_below(plane.top_m, fine=True)
             halve(plane, far=True)
-            if incumbent.gap > TWICE * incumbent.wanted and incumbent.budget.goes_on() and follow(plane):
-                halve(plane, far=True)
 
     def _search_lattice_again(self) -> None:
         self._search_lattice(known=True)

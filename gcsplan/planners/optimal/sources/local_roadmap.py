@@ -24,28 +24,28 @@ from gcsplan.world.zones import Circle
 Ints = NDArray[np.intp]
 
 NODES, PLACES, LEVELS = 8000, (200, 1000), (7, 30)
-"""Nodes of a roadmap, about; its places and the altitudes over each, at least and at most."""
+"""About how many nodes a roadmap has; fewest and most places; fewest and most altitudes at each place."""
 NEIGHBOURS = 16
-"""Nearest places that each place is linked to."""
+"""Each place is linked to that many nearest places."""
 SPOKES = 12
 """Places around a circle."""
 MOST_RIMS, MOST_SLITS = 600, 60
-"""Places on rims, and slits, at most."""
+"""Most places on rims of zones, and most slits."""
 WIDEST, WIDEST_CELLS = 2.0, 30.0
-"""Widest margin around two terminals: parts of their distance, or cells of the terrain model where that is more."""
+"""Widest margin around two terminals: times their distance, or cells of the terrain model if that is more."""
 HAIR_M = 1e-3
-"""How far outside of what they pass places lie."""
+"""How far outside a zone places lie, beyond the clearance and the track error."""
 SLIT = 0.5
 """Slits between circles matter up to that part of the roadmap's spacing in width."""
 WORTH = 0.03
-"""What a first search must gain, as a part, for a second one closer to what it found."""
+"""Part of the cost that a first search must gain for a second one, nearer to the path that it found."""
 
 
 def small_path(problem: Problem, known: Floats | None, in_time: Callable[[], bool]) -> tuple[Floats, Bools] | None:
-    """(N, 3) a path whose legs the exact check passes, and (N,) its terminals; None where none cheaper was found.
+    """(N, 3) a path whose legs the exact check passes, and (N,) its terminals; None if no cheaper one was found.
 
-    ``known`` (M, 3): the best path so far, None where there is none. Deterministic but for ``in_time``, which ends it
-    early.
+    ``known`` (M, 3): the best path so far, None without one. ``in_time`` returns False when the search must end; apart
+    from that it is deterministic.
     """
     found: tuple[Floats, Bools] | None = None
     best = math.inf if known is None else cost_of(problem, known)

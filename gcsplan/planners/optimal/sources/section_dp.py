@@ -1,7 +1,8 @@
-"""A legal path in space drawn together: all its points at once to the best places of cross-sections along it.
+"""Cross-section descent: a legal path is drawn together by moving all its points at once.
 
-Between the sections every leg that joins places of two neighbours is put to the exact check, and the cheapest chain of
-them is found exactly. So points move together, over an edge or along a hillside, where each alone would be stuck.
+Each point gets candidate places on a cross-section of the path. The exact check judges every leg between places of two
+neighbouring sections, and the cheapest chain of legs is found by dynamic programming. So points move together over an
+edge or along a hillside, where a point alone would be stuck.
 """
 
 from __future__ import annotations
@@ -19,15 +20,15 @@ from gcsplan.planners.profile.track import divided
 Ints = NDArray[np.intp]
 
 FREE, UPRIGHT, FIXED = 0, 1, 2
-"""Kinds of points: may move, up and down alone, not at all."""
+"""Kinds of points: free to move, free to move up and down only, fixed."""
 HALVINGS, ROUNDS = 7, 6
-"""How often the moves are halved, and moves of one size at most."""
+"""How often the size of the moves is halved, and most rounds with moves of one size."""
 LITTLE = 1e-4
-"""Gain, as a part, below which moves are halved."""
+"""Part of the cost that a round must gain, or the moves are halved."""
 ASIDE, UP = (0.0, -1.0, 1.0), (0.0, -1.0, -0.25, 0.25, 1.0)
-"""Places that a point may be moved to, in moves aside and up."""
+"""Candidate places of a point, in moves to the side and up."""
 FAR_AHEAD = 24
-"""Points that may be left out in one piece, at most."""
+"""Most points that one leg may replace."""
 
 
 def drawn(
