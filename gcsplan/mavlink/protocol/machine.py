@@ -44,11 +44,6 @@ class Timers:
         if self.retries < 0:
             raise InputError(f"retries must not be negative, given {self.retries}")
 
-    @property
-    def patience_s(self) -> float:
-        """Seconds that all tries of one message take together."""
-        return self.response_s * (self.retries + 1)
-
 
 @dataclass(frozen=True, slots=True)
 class Progress:
