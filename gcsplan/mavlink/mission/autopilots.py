@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, float32
@@ -129,21 +128,6 @@ def altitude_of_cm(cm: int, autopilot: Autopilot) -> float:
     if _TABLE[autopilot].mav_autopilot == ARDUPILOTMEGA:
         return float32((cm + math.copysign(0.5, cm)) / 100.0)
     return float32(cm / 100.0)
-
-
-def encode_altitude(altitude_m: float, autopilot: Autopilot, toward: Literal["up", "down"]) -> float:
-    """Return the float32 to send for ``altitude_m`` rounded to whole centimetres ``toward`` up or down.
-
-    A lower limit rounds up, an upper limit down. A value within 1e-8 m of a whole centimetre counts as that centimetre.
-    Raises InputError for NaN, infinity, and altitudes beyond `ALTITUDE_LIMIT_M`.
-    """
-    if not math.isfinite(altitude_m):
-        raise InputError(f"an altitude must be a number of metres, given {altitude_m}")
-    cm = altitude_m * 100.0
-    nearest = round(cm)
-    if abs(cm - nearest) > 1e-6:
-        nearest = math.ceil(cm) if toward == "up" else math.floor(cm)
-    return altitude_of_cm(nearest, autopilot)
 
 
 def autopilot_name(mav_autopilot: int) -> str:
