@@ -168,10 +168,6 @@ class Link:
         if channel in mine:
             mine.remove(channel)
 
-    def knows(self, to: Address) -> bool:
-        """Whether an address to send to is known for ``to``."""
-        return self._peer(to) is not None
-
     def send(self, message: Any, to: Address, peer: Peer | None = None) -> bool:
         """Send a pymavlink message to ``peer``, by default where ``to`` was heard; False if no address is known.
 

@@ -104,7 +104,7 @@ def dead_link(link: Link, sysid: int, timeout_s: float) -> LinkError:
     if others:
         hints.append(f"systems heard there: {', '.join(map(str, others))}")
     if link.unsigned:
-        hints.append(f"{link.unsigned} frames were dropped for their signature: is the signing key the right one?")
+        hints.append(f"{link.unsigned} frames had no valid signature: is the signing key the right one?")
     elif link.garbage:
         hints.append(f"{link.garbage} frames did not check: is it MAVLink, is the baud rate right?")
     if not others:
