@@ -86,13 +86,12 @@ def rehearse_in_sitl(
 
     Raises UsageError if a vehicle has neither. See `sim.sitl` for the other arguments.
     """
-    from gcsplan.sim.sitl import Seat, rehearse_sitl, require_here
+    from gcsplan.sim.sitl import rehearse_sitl, require_here
     from gcsplan.sim.sitl_instances import SPEEDUP, sitl_instances
 
-    parts, given = parts_of(planned), dict(addresses or {})
+    parts, seats = parts_of(planned), dict(addresses or {})
     if not i_know:
-        require_here(list(given.values()))
-    seats = {name: Seat(name, url) for name, url in given.items()}
+        require_here(list(seats.values()))
     if binary is None:
         return rehearse_sitl(parts, planned.world, terms_of(planned), seats, i_know=i_know, report=report)
     without = [p for p in parts if p.vehicle.name not in seats]

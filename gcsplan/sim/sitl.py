@@ -35,7 +35,7 @@ from gcsplan.sim.trace import Trace
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.world import World
 
-__all__ = ["Seat", "rehearse_sitl", "require_here"]
+__all__ = ["rehearse_sitl", "require_here"]
 
 _GUIDED = 4  # ArduCopter's custom mode in which it can be armed and MISSION_START switches to AUTO
 _READY_S, _SILENT_S, _ARM_S, _ANSWER_S = 180.0, 30.0, 120.0, 3.0
@@ -51,15 +51,6 @@ LIFT_S = 1.6
 _ODD_LIFT_S = 0.7
 _LATE = 1.5
 _SPARE_S = 300.0
-
-
-@dataclass(frozen=True, slots=True)
-class Seat:
-    """The URL of one vehicle's autopilot; ``ours``: it was started for this rehearsal and may be left in the air."""
-
-    name: str
-    url: str
-    ours: bool = False
 
 
 @dataclass(slots=True)
@@ -89,14 +80,16 @@ def rehearse_sitl(
     parts: Sequence[Part],
     world: World,
     terms: Terms,
-    seats: Mapping[str, Seat],
+    seats: Mapping[str, str],
     *,
     i_know: bool = False,
     report: Callable[[str, str], None] | None = None,
 ) -> Rehearsal:
-    """Upload, arm, start, observe and judge one run. ``seats``: by vehicle name; ``report(vehicle, what)``: progress.
+    """Upload, arm, start, observe and judge one run.
 
-    Raises UsageError for a vehicle without a seat, an autopilot that is not ArduCopter, and (unless ``i_know``) a link
+    ``seats``: the URL of each vehicle's autopilot, by its name; ``report(vehicle, what)``: progress.
+
+    Raises UsageError for a vehicle without a URL, an autopilot that is not ArduCopter, and (unless ``i_know``) a link
     to another machine; VehicleRefused if a peer is no simulator, does not arm, or refuses its mission; LinkError if
     nobody answers.
     """
@@ -107,12 +100,12 @@ def rehearse_sitl(
         if part.vehicle.autopilot is not Autopilot.ARDUCOPTER:
             raise UsageError(f"--sitl flies ArduCopter; {part.vehicle.name} is {part.vehicle.autopilot}")
     if not i_know:
-        require_here([seats[p.vehicle.name].url for p in parts])
+        require_here([seats[p.vehicle.name] for p in parts])
     said = report or (lambda name, what: None)
     with ExitStack() as stack:
-        urls = list(dict.fromkeys(seats[p.vehicle.name].url for p in parts))
+        urls = list(dict.fromkeys(seats[p.vehicle.name] for p in parts))
         links = {url: stack.enter_context(Link(url, key=signing_key())) for url in urls}
-        channels = [links[seats[p.vehicle.name].url].channel(p.vehicle.sysid) for p in parts]
+        channels = [links[seats[p.vehicle.name]].channel(p.vehicle.sysid) for p in parts]
         states = _all([PumpJob(c, _ready(c, p, said, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
         for result in upload_fleet(
             [
@@ -128,10 +121,7 @@ def rehearse_sitl(
             if isinstance(result, GcsplanError):
                 raise result
             result.raise_for_outcome()
-        flights = [
-            PumpJob(c, _fly(c, p, s, seats[p.vehicle.name], world, said))
-            for c, p, s in zip(channels, parts, states, strict=True)
-        ]
+        flights = [PumpJob(c, _fly(c, p, s, world, said)) for c, p, s in zip(channels, parts, states, strict=True)]
         logs = _all(flights)
     tally = Tally(parts, world, terms)
     traces = [_trace(log, part, world) for log, part in zip(logs, parts, strict=True)]
@@ -182,7 +172,7 @@ def _ready(channel: Channel, part: Part, report: Callable[[str, str], None], *, 
 
 
 def _fly(
-    channel: Channel, part: Part, state: VehicleState, seat: Seat, world: World, report: Callable[[str, str], None]
+    channel: Channel, part: Part, state: VehicleState, world: World, report: Callable[[str, str], None]
 ) -> Steps[_Log]:
     """Arm, start, and record until the vehicle is down, or at its goal if it stays in the air."""
     to, name, log = state.address, part.vehicle.name, _Log()

@@ -13,7 +13,6 @@ from pathlib import Path
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.sim.outcome import Part
-from gcsplan.sim.sitl import Seat
 
 _BASE_PORT = 5760
 _FIRST_INSTANCE, _LAST_INSTANCE = 20, 900
@@ -50,8 +49,8 @@ def parameters_of(part: Part) -> dict[str, float]:
 
 
 @contextmanager
-def sitl_instances(binary: Path, parts: Sequence[Part], *, speedup: float = SPEEDUP) -> Iterator[dict[str, Seat]]:
-    """Start one instance for each part, each in its own directory; yield the seats by vehicle; stop all at the end.
+def sitl_instances(binary: Path, parts: Sequence[Part], *, speedup: float = SPEEDUP) -> Iterator[dict[str, str]]:
+    """Start one instance for each part, each in its own directory; yield the URLs by vehicle; stop all at the end.
 
     Raises UsageError for a file that cannot be executed, LinkError if an instance does not start.
     """
@@ -61,7 +60,7 @@ def sitl_instances(binary: Path, parts: Sequence[Part], *, speedup: float = SPEE
         raise UsageError(f"--speedup {speedup:g}: 0.1 to 100 times as fast as ours is wanted")
     with ExitStack() as stack:
         directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="gcsplan-sitl-")))
-        seats: dict[str, Seat] = {}
+        seats: dict[str, str] = {}
         number = _FIRST_INSTANCE
         for part in parts:
             number = _free(number)
@@ -86,7 +85,7 @@ def _url(number: int) -> str:
 
 
 @contextmanager
-def _instance(binary: Path, part: Part, number: int, speedup: float, directory: Path) -> Iterator[Seat]:
+def _instance(binary: Path, part: Part, number: int, speedup: float, directory: Path) -> Iterator[str]:
     name, home = part.vehicle.name, part.mission.home
     own = directory / name
     own.mkdir()
@@ -101,7 +100,7 @@ def _instance(binary: Path, part: Part, number: int, speedup: float, directory: 
         process = subprocess.Popen(command, cwd=own, stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT)
         try:
             _await(process, own / "output.txt", name)
-            yield Seat(name, _url(number), ours=True)
+            yield _url(number)
         finally:
             process.terminate()
             with suppress(subprocess.TimeoutExpired):

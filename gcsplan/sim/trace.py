@@ -102,7 +102,7 @@ def examine(trace: Trace, vehicle: Vehicle, world: World) -> Judged:
     for v in report.violations:
         if (v.kind, v.zone) not in worst or v.by > worst[v.kind, v.zone].by:
             worst[v.kind, v.zone] = v
-    found = [_finding(v, trace, legs, int(owner[v.leg]), world) for v in worst.values()]
+    found = [_finding(v, trace, int(owner[v.leg]), world) for v in worst.values()]
     return Judged(agl, place, tuple(found))
 
 
@@ -142,7 +142,7 @@ def _off(a: Floats, b: Floats, inner: Floats) -> tuple[Floats, Floats]:
     return np.hypot(apart[..., 0], apart[..., 1]).max(axis=1), np.abs(apart[..., 2]).max(axis=1)
 
 
-def _finding(v: Violation, trace: Trace, legs: Legs, sample: int, world: World) -> Finding:
+def _finding(v: Violation, trace: Trace, sample: int, world: World) -> Finding:
     lat, lon = _degrees(world, np.array([v.east_m, v.north_m]))
     name = world.airspace.zones[v.zone].name if v.zone >= 0 else ""
     what = WORDS.get(v.kind, v.kind) + (f" “{name}” or its clearance" if name else "")

@@ -179,7 +179,7 @@ def make_track(
         if s.column and not (wing and _slants(ends[i])):
             _column(line, ends[i], s, kinematics)
             line.stop(s.hold_s)
-        elif _stands(s, ends[i]):
+        elif _stands(ends[i]):
             line.stop(s.hold_s)
         else:
             last = _end_of_flight(stretches, i) if wing else _end_of_run(stretches, ends, i)
@@ -242,7 +242,7 @@ def _left_out(flight: Flight) -> list[str]:
     ]
 
 
-def _stands(s: Stretch, ends: Floats) -> bool:
+def _stands(ends: Floats) -> bool:
     return bool(np.linalg.norm(ends[1] - ends[0]) <= SAME_M)
 
 
@@ -257,7 +257,7 @@ def _end_of_run(stretches: Sequence[Stretch], ends: Floats, first: int) -> int:
         here, after = stretches[i], stretches[i + 1]
         if here.hold_s > 0.0 or after.column or after.kind != here.kind or after.terrain != here.terrain:
             break
-        if _stands(after, ends[i + 1]) and after.hold_s > 0.0:
+        if _stands(ends[i + 1]) and after.hold_s > 0.0:
             break
         i += 1
     return i
@@ -291,7 +291,7 @@ def _column(line: _Line, ends: Floats, s: Stretch, kinematics: Kinematics) -> No
 def _run(line: _Line, stretches: Sequence[Stretch], ends: Floats, kinematics: Kinematics, world: World) -> None:
     """Add legs that are flown without a stop, with rounded corners."""
     terrain = stretches[0].terrain
-    legs = [i for i, s in enumerate(stretches) if not _stands(s, ends[i])]
+    legs = [i for i, s in enumerate(stretches) if not _stands(ends[i])]
     if not legs:
         return
     corners = np.array([line.points[-1], *(ends[i, 1] for i in legs)])

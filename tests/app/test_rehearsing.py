@@ -26,7 +26,7 @@ from gcsplan.sim.mission_flight import fly
 from gcsplan.sim.outcome import Part, Terms
 from gcsplan.sim.rehearsal import _track
 from gcsplan.sim.server import SimServer
-from gcsplan.sim.sitl import Seat, rehearse_sitl, require_here
+from gcsplan.sim.sitl import rehearse_sitl, require_here
 from gcsplan.sim.sitl_instances import parameters_of, sitl_instances
 from gcsplan.sim.telemetry import Telemetry
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -171,7 +171,7 @@ SPEEDUP = 40.0
 @contextmanager
 def flying(
     parts: list[Part], planned: Plan, monkeypatch: pytest.MonkeyPatch, *, simulator: bool = True, arms: bool = True
-) -> Iterator[dict[str, Seat]]:
+) -> Iterator[dict[str, str]]:
     """Loopback vehicles that fly as our own simulator does, their clocks faster than ours: peers as an SITL is one."""
     flown = fly([_track(p, p.mission, planned.world, None) for p in parts], [0.0] * len(parts))
     traces = {p.vehicle.sysid: flown.trace(i) for i, p in enumerate(parts)}
@@ -222,7 +222,7 @@ def flying(
                 amsl_m=home.amsl_m,
             )  # fmt: skip
             server = stack.enter_context(SimServer([vehicle], "tcpin:127.0.0.1:0", speedup=SPEEDUP))
-            seats[p.vehicle.name] = Seat(p.vehicle.name, server.url_for_gcs)
+            seats[p.vehicle.name] = server.url_for_gcs
         yield seats
 
 
@@ -290,7 +290,7 @@ def test_vehicles_without_an_address_and_other_autopilots_are_refused(planned: P
         rehearse_sitl(parts, planned.world, Terms(), {})
     px4 = replace(parts[0], vehicle=replace(parts[0].vehicle, autopilot="px4"))
     with pytest.raises(UsageError, match="flies ArduCopter"):
-        rehearse_sitl([px4], planned.world, Terms(), {"uav1": Seat("uav1", "tcp:127.0.0.1:5760")})
+        rehearse_sitl([px4], planned.world, Terms(), {"uav1": "tcp:127.0.0.1:5760"})
 
 
 def test_a_mission_that_did_not_pass_is_not_sent_to_them(planned: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
