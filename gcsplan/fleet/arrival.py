@@ -26,7 +26,7 @@ from gcsplan.fleet.order import WITHIN_S, Clock, best_order, earliest_first, int
 
 __all__ = [
     "WITHIN_S", "Clock", "Craft", "Crew", "Hold", "Longer", "Mode", "NoSchedule", "Schedule", "Slot",
-    "least_interval_s", "schedule",
+    "schedule",
 ]  # fmt: skip
 
 Mode = Literal["sequence", "together", "none"]
@@ -124,19 +124,6 @@ def _why_later(craft: Sequence[Craft], first_s: float, step_s: float) -> str:
         f"the first arrives at {first_s:.1f} s instead of {craft[0].fast_s:.1f} s, so that {craft[last].name}, which "
         f"needs {craft[last].fast_s:.1f} s at its fastest, can follow"
     )
-
-
-def least_interval_s(
-    crews: Sequence[Crew],
-    order: Sequence[str] | None = None,
-    *,
-    hold: Hold = "ground",
-    clock: Clock = "fleet",
-    arrive_s: float | None = None,
-) -> float | None:
-    """The smallest interval with which this order can arrive in sequence (by time alone); None if none works."""
-    craft = _by_name([Craft(c) for c in crews], order)
-    return _least_interval(craft, hold, clock, arrive_s)
 
 
 def _least_interval(craft: Sequence[Craft], hold: Hold, clock: Clock, arrive_s: float | None) -> float | None:

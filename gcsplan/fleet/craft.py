@@ -13,9 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.order import WITHIN_S
-from gcsplan.fleet.timing import Course, Route, fly, speed_for
+from gcsplan.fleet.timing import Course, Route, speed_for
 from gcsplan.vehicle import Autopilot, Vehicle
 
 Hold = Literal["ground", "gate", "none"]
@@ -60,10 +59,6 @@ class Slot:
     energy_j: float
     route: Route
     notes: tuple[str, ...] = ()
-
-    def motion(self, vehicle: Vehicle) -> TimedPath:
-        """The whole flight of this slot in time (within `timing.motion_error_m`)."""
-        return fly(self.route, vehicle, self.speed_m_s, self.depart_s, self.hold_s)
 
 
 class Craft:

@@ -34,9 +34,7 @@ from gcsplan.fleet.goals import MANY, least_goals_m, least_interval_s, rounded_u
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Place, Rules, Separation, Where, in_metres, separation
 
-__all__ = [
-    "Again", "Change", "NotSeparated", "Replan", "Resolved", "least_goals_m", "least_interval_s", "motions", "resolve",
-]  # fmt: skip
+__all__ = ["Again", "Change", "NotSeparated", "Replan", "Resolved", "resolve"]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -93,12 +91,6 @@ class NotSeparated(NoMission):
     def time_s(self) -> float:
         """The time at which they are nearest, s."""
         return self.conflict.worst.time_s
-
-
-def motions(plan: Schedule, crews: Sequence[Crew]) -> tuple[TimedPath, ...]:
-    """The motions of a schedule's slots, in its order."""
-    vehicles = {c.name: c.vehicle for c in crews}
-    return tuple(motion_of(s, Crew(vehicles[s.name], s.route)) for s in plan.slots)
 
 
 def resolve(

@@ -22,7 +22,7 @@ from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column, legs
 from gcsplan.vehicle import Vehicle
 
-__all__ = ["POSITION_ERROR_M", "Course", "End", "Route", "fly", "motion_error_m", "speed_for", "time_to_goal_s"]
+__all__ = ["POSITION_ERROR_M", "Course", "End", "Route", "motion_error_m", "speed_for"]
 
 Ints = NDArray[np.intp]
 End = Literal["land", "loiter", "rtl", "none"]
@@ -134,14 +134,21 @@ class Course:
         self.after = _after(route, vehicle)
 
     def time_to_goal_s(self, speed_m_s: float, hold_s: float = 0.0) -> float:
-        """Seconds from leaving the ground to the arrival at a cruise speed, with ``hold_s`` more at the gate."""
+        """Seconds from leaving the ground to the arrival at a cruise speed, with ``hold_s`` more at the gate.
+
+        They never rise with the speed.
+        """
         first = 0.0 if self.takeoff is None else self.takeoff.time_s(speed_m_s)
         return first + self.gate_s + hold_s + sum(s.time_s(speed_m_s) + held for s, held in self.to_goal)
 
     def fly(
         self, speed_m_s: float, depart_s: float = 0.0, hold_s: float = 0.0, error_m: float = POSITION_ERROR_M
     ) -> TimedPath:
-        """The motion of the whole flight, within ``error_m`` of the true motion at every time; see `fly`."""
+        """The motion of the whole flight at a cruise speed, leaving at ``depart_s``, with ``hold_s`` more at the gate.
+
+        Accelerated and curved parts are cut into straight pieces of constant speed that are at most ``error_m`` from
+        the true motion at any time (`motion_error_m`). Pieces carry the route's item numbers.
+        """
         route = self.route
         start = route.points[0] if self.takeoff is None else self.takeoff.start[0]
         motion = _Motion(depart_s, start)
@@ -157,27 +164,6 @@ class Course:
         for stretch in self.after:
             motion.go(stretch, speed_m_s, error_m)
         return motion.path(route, arrive_s)
-
-
-def fly(
-    route: Route,
-    vehicle: Vehicle,
-    speed_m_s: float,
-    depart_s: float = 0.0,
-    hold_s: float = 0.0,
-    error_m: float = POSITION_ERROR_M,
-) -> TimedPath:
-    """The motion of a whole flight at a cruise speed, leaving at ``depart_s``, with ``hold_s`` at the gate.
-
-    Accelerated and curved parts are cut into straight pieces of constant speed that are at most ``error_m`` from the
-    true motion at any time (`motion_error_m`). Pieces carry the route's item numbers.
-    """
-    return Course(route, vehicle).fly(speed_m_s, depart_s, hold_s, error_m)
-
-
-def time_to_goal_s(route: Route, vehicle: Vehicle, speed_m_s: float) -> float:
-    """Seconds from leaving the ground to the arrival; never rises with the speed. For many speeds use `Course`."""
-    return Course(route, vehicle).time_to_goal_s(speed_m_s)
 
 
 def motion_error_m(vehicle: Vehicle, error_m: float = POSITION_ERROR_M) -> float:

@@ -14,15 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, least_interval_s, schedule
+from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, schedule
 from gcsplan.fleet.order import best_order, interval_range
-from gcsplan.fleet.timing import Route, fly, time_to_goal_s
+from gcsplan.fleet.timing import Route
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 from tests.mission_file.test_load import base, load, local, the_problem
 from tests.mission_file.test_load import vehicle as keys
 from tests.support.effort import draws
+from tests.support.flights import fly, time_to_goal_s
 
 INF = math.inf
 FREE = {
@@ -52,6 +53,15 @@ def arrivals(plan: Schedule) -> list[float]:
     return [s.arrive_s for s in plan.slots]
 
 
+def least_interval_s(crews: list[Crew], **more: Any) -> float | None:
+    """The smallest interval with which this order works, from the refusal of 0 s; 0 if that works."""
+    try:
+        schedule(crews, "sequence", interval_s=0.0, **more)
+    except NoSchedule as refusal:
+        return refusal.interval_s
+    return 0.0
+
+
 def require_sound(plan: Schedule, crews: list[Crew]) -> None:
     """Every slot is what flying it gives, and within its vehicle's means."""
     known = {c.name: c for c in crews}
@@ -65,7 +75,8 @@ def require_sound(plan: Schedule, crews: list[Crew]) -> None:
         assert slot.hold_s == int(slot.hold_s) >= 0
         flown = slot.depart_s + slot.hold_s + time_to_goal_s(slot.route, craft, slot.speed_m_s)
         assert slot.arrive_s == pytest.approx(flown, abs=1e-9)
-        assert slot.motion(craft).arrive_s == pytest.approx(flown, abs=1e-9)
+        motion = fly(slot.route, craft, slot.speed_m_s, slot.depart_s, slot.hold_s)
+        assert motion.arrive_s == pytest.approx(flown, abs=1e-9)
         assert slot.energy_j == slot.route.energy_j(craft, slot.hold_s)
 
 
@@ -421,14 +432,6 @@ def test_speeds_that_a_level_arducopter_does_not_reach_are_told() -> None:
     assert "ANGLE_MAX above 3000" in notes(12.0)
     assert "ANGLE_MAX above 4500" in notes(16.0)
     assert notes(16.0, autopilot=Autopilot.PX4) == ""
-
-
-def test_a_slot_can_be_flown_as_a_motion() -> None:
-    crews = [crew("a", 900), crew("b", 300)]
-    slot = schedule(crews, "together", hold="gate").of("b")
-    motion, again = slot.motion(crews[1].vehicle), fly(slot.route, crews[1].vehicle, slot.speed_m_s, 0.0, slot.hold_s)
-    assert np.array_equal(motion.points, again.points)
-    assert motion.begin_s == slot.depart_s
 
 
 # -- the mission file ---------------------------------------------------------------------------------------------

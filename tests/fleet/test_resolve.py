@@ -15,14 +15,16 @@ from hypothesis import strategies as st
 from gcsplan.errors import NoMission
 from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import Craft, Crew, Schedule, Slot, schedule
+from gcsplan.fleet.goals import least_interval_s
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.fleet.resolve import NotSeparated, Resolved, least_interval_s, motions, resolve
+from gcsplan.fleet.resolve import NotSeparated, Resolved, resolve
 from gcsplan.fleet.separation import Conflict, Rules, separation
 from gcsplan.fleet.timing import End, Route
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 from tests.fleet.test_separation import random_fleet
 from tests.support.effort import draws
+from tests.support.flights import motions
 
 RULES = Rules(30.0, error_m=0.25)
 Point = tuple[float, float]

@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 
 from gcsplan.arrays import Floats
 from gcsplan.fleet.speeds import CUT_M
-from gcsplan.fleet.timing import POSITION_ERROR_M, Course, Route, fly, motion_error_m, speed_for, time_to_goal_s
+from gcsplan.fleet.timing import POSITION_ERROR_M, Course, Route, motion_error_m, speed_for
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 from tests.support.effort import draws
+from tests.support.flights import fly, time_to_goal_s
 
 FREE = math.inf
 
