@@ -12,10 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.planners.border import enclosed, goes_on, within_m
-from gcsplan.planners.cures import floor_words, rounded_up, with_cures
+from gcsplan.planners.cures import floor_words, rounded_up
 from gcsplan.planners.lattice.lattice import levels_of, near_zone
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
-from gcsplan.planners.trials import Plan
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 
@@ -24,12 +23,11 @@ class NoPath(Refusal):
     """A search found no path over the loaded terrain; over more terrain there may be one."""
 
 
-def explain(problem: Problem, *, proved: bool | None = None, plan: Plan | None = None) -> Refusal:
+def explain(problem: Problem, *, proved: bool | None = None) -> Refusal:
     """The refusal for a problem whose terminals are legal and for which no path was found.
 
     ``proved``: whether it is proved that there is none; where the terrain goes on beyond the surface, `enclosed`
-    decides that instead. With ``plan``, the refusal says what would help, see `with_cures`; without it, the caller may
-    add that later.
+    decides that instead. The caller may add what would help, see `cures.with_cures`.
     """
     words = "no path was found"
     if goes_on(problem):
@@ -37,8 +35,7 @@ def explain(problem: Problem, *, proved: bool | None = None, plan: Plan | None =
         words = f"a path is not found within {within_m(problem) / 1000.0:.1f} km of the straight track"
     if proved:
         words = "there is no path within the limits, which is proved"
-    bare = NoPath(f"no mission: {words}", reason="infeasible" if proved else "not_found", untried=True)
-    return bare if plan is None else with_cures(problem, bare, plan)
+    return NoPath(f"no mission: {words}", reason="infeasible" if proved else "not_found", untried=True)
 
 
 def check_ends(problem: Problem) -> None:

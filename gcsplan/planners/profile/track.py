@@ -139,16 +139,13 @@ def make_track(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_
 def fly(
     problem: Problem,
     track: Track,
-    below: float = np.inf,
-    branches: int = BRANCHES,
     known: Sequence[tuple[float, float, float]] = (),
 ) -> Flown | Obstruction:
     """The cheapest legal profile over ``track``, with the cheaper side (over or under) of each band.
 
-    A best-first search over the sides of bands, at most ``branches`` of them; only bands that the string runs into are
-    branched on. With ``branches`` 0 all bands that are hit are passed on their nearer side at once, up to five times,
-    and the result is returned if it costs less than ``below``. The search ends at cost ``below``. If it finds nothing,
-    it returns what the first string ran into. ``known``: further doors (s_m, low_m, high_m) to pass.
+    A best-first search over the sides of bands, at most `BRANCHES` of them; only bands that the string runs into are
+    branched on. If it finds nothing, it returns what the first string ran into. ``known``: further doors
+    (s_m, low_m, high_m) to pass.
     """
     tube, limits = track.tube, problem.limits
     ends = (problem.start[2], problem.goal[2])
@@ -173,8 +170,6 @@ def fly(
     count = 0
     while open_set:
         cost, _, over, profile = heappop(open_set)
-        if cost >= below:
-            break
         hit = sections.hits(profile, over)
         if not hit:
             return Flown(profile, cost, over)
@@ -182,18 +177,7 @@ def fly(
         band = tube.bands[deepest.band]
         if first is None:
             first = Obstruction("zone", band.s0_m, band.s1_m, deepest.depth_m, band.zone)
-        if branches == 0:
-            nearer = list(over)
-            for h in hit:
-                nearer[h.band] = h.nearer_over
-            found = solve(tuple(nearer))
-            if not isinstance(found, Blocked) and cost_of(found) < below:
-                heappush(open_set, (cost_of(found), -1, tuple(nearer), found))
-            if count == 4:
-                break
-            count += 1
-            continue
-        if count >= branches:
+        if count >= BRANCHES:
             break
         for side in (True, False):
             choice = (*over[: deepest.band], side, *over[deepest.band + 1 :])
@@ -266,11 +250,10 @@ def lacking(problem: Problem, track: Track) -> Lacking | Closed:
 
 @dataclass(frozen=True, slots=True)
 class _Hit:
-    """A band that a profile runs into, how many metres deep, and whether its top is nearer than its bottom."""
+    """A band that a profile runs into, and how many metres deep."""
 
     band: int
     depth_m: float
-    nearer_over: bool
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -312,7 +295,7 @@ class _Sections:
                     i, j = self.spans[k]
                     up, down = float((self.tops[k] - z[i:j]).max()), float((z[i:j] - self.bottoms[k]).max())
                     if up > -KEEP_M and down > -KEEP_M:
-                        out.append(_Hit(k, min(up, down), up < down))
+                        out.append(_Hit(k, min(up, down)))
         return out
 
 
