@@ -23,8 +23,6 @@ MOST_STEPS = 200
 """Most searches of one plan, refused ones included."""
 AGAIN = 0.02
 """Part of the gap that a better path must have closed before a search runs once more."""
-NEARER = 0.45
-"""Part of the wanted gap down to which cheap searches that mostly help (``Search.nearer``) still run."""
 
 
 @dataclass(eq=False, slots=True)
@@ -43,7 +41,7 @@ class Search:
     run: Callable[[], object]
     again: bool = False
     nearer: bool = False
-    """Whether it is worth its cost even if the gap is already as small as wanted; see `NEARER`."""
+    """Whether it is worth its cost even if the gap is already as small as wanted; see `incumbent.NEARER`."""
     seen: float | None = field(default=None)
     """Cost of the best path when the search ran last; None: it has not run yet."""
 
@@ -64,7 +62,7 @@ def govern(incumbent: Incumbent, searches: list[Search], without: Collection[str
     left = [s for s in searches if s.name not in without]
     budget = incumbent.budget
     for _ in range(MOST_STEPS):
-        if incumbent.proved_infeasible or incumbent.gap <= NEARER * incumbent.wanted or not budget.goes_on():
+        if incumbent.proved_infeasible or incumbent.gap <= incumbent.nearer or not budget.goes_on():
             return
         chosen: Search | None = None
         best, size = -math.inf, (0.0, 0.0)

@@ -24,6 +24,8 @@ LITTLE, WORTH = 5e-6, 2e-5
 HOPE = 1.5
 """A path is simplified only if it would become the best by gaining this many times the most that simplifying gained for
 a path of its kind so far."""
+NEARER = 0.45
+"""Part of the wanted gap down to which cheap searches that mostly help still run, and which a bound tries first."""
 STEEP = 0.15
 """Rise of a path, as a part of its track's length, from which it counts as steep: one cap for the whole track says
 little then, since a zone that is passed low must be flown around, and one that is passed high need not."""
@@ -36,6 +38,7 @@ class Incumbent:
         self.problem, self.laps = problem, laps
         self.budget: Budget = problem.budget
         self.wanted = problem.gap_percent / 100.0
+        self.nearer = NEARER * self.wanted
         self.judge = Judge(problem)
         self.best: Floats | None = None
         self.pinned: Bools | None = None

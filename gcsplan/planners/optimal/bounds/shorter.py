@@ -25,9 +25,6 @@ CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """Parts of the extra length that climbing costs the longest tracks, tried in turn as that of shorter tracks."""
 PIECES = 4
 """Pieces into which the range of track lengths is cut; each piece has its own bound of the climb."""
-NEARER = 0.45
-"""Part of the wanted gap that is tried first, even if the gap is already as small as wanted; below it, there is nothing
-left to do."""
 
 
 def halve(plane: PlaneSearch, *, far: bool = False) -> None:
@@ -38,7 +35,7 @@ def halve(plane: PlaneSearch, *, far: bool = False) -> None:
     shorter: list[tuple[float, float]] = []  # lengths that were tried, and the bounds of all paths shorter than them
     part = FLAT if far else 0.5
     for k in range(CLOSER):
-        nearer = incumbent.cost / (1.0 + NEARER * incumbent.wanted)
+        nearer = incumbent.cost / (1.0 + incumbent.nearer)
         at_once = k == 0 and not far
         enough = low >= nearer if at_once else incumbent.done()
         least = max(2e-5 * low, LEFT * (incumbent.cost - low))
@@ -132,7 +129,7 @@ def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float]
 def raise_climb(plane: PlaneSearch) -> None:
     """Raise the lower bound of the energy by what short enough tracks must climb and descend, piece by piece."""
     p, legs = plane.problem, plane.legs
-    if plane.incumbent.gap <= NEARER * plane.incumbent.wanted or not plane.incumbent.budget.goes_on():
+    if plane.incumbent.gap <= plane.incumbent.nearer or not plane.incumbent.budget.goes_on():
         return
     limits = [plane.limit(leg) for leg in legs]
     known = [leg.bound(plane.top_m, leg.corridor(m), m, True) for leg, m in zip(legs, limits, strict=True)]
@@ -164,7 +161,8 @@ def bound_by_caps(plane: PlaneSearch) -> None:
             if plane.try_below(cap, fine=False):
                 plane.try_below(cap, fine=True)
 
-    near = NEARER * incumbent.wanted
     layers = [Layer(max(incumbent.known_m), plane.top_m, sum(leg.length_m for leg in plane.legs))]
-    found = search_caps(layers, cost_of, track_m, lambda: incumbent.cost, try_at, near, incumbent.budget.goes_on)
+    found = search_caps(
+        layers, cost_of, track_m, lambda: incumbent.cost, try_at, incumbent.nearer, incumbent.budget.goes_on
+    )
     incumbent.raise_bound(found)
