@@ -52,8 +52,9 @@ CLOSE = 0.01
 """A run has converged when its cost is within this part of its final cost."""
 
 CODE = (
-    "planners/**/*.py", "swarm/*.py", "world/*.py", "mission_file/*.py", "pipeline.py", "steps/planning.py",
-    "vehicle.py", "bench/papers_runs.py", "bench/papers_scenarios.py",
+    "*.py", "app/pipeline.py", "app/problems.py", "bench/papers_runs.py", "bench/papers_scenarios.py",
+    "mavlink/build/*.py", "mavlink/mission/mission.py", "mission_file/*.py", "native/*.py", "optimisers/*.py",
+    "planners/**/*.py", "world/*.py",
 )  # fmt: skip
 """Source files within the package that decide a run's result; a superfluous file is better than a missing one."""
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import inspect
 import json
 import math
 import re
 import sys
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,7 @@ from gcsplan.bench.papers_pictures import best_run, stepwise
 from gcsplan.bench.papers_printed import ENDS, PRINTED, Least, Number, faults, least_of
 from gcsplan.bench.papers_remarks import remarks, schedules
 from gcsplan.bench.papers_report import IMPOSSIBLE, report, scenario_table, write
-from gcsplan.bench.papers_runs import PaperRun, Store, seed_of, work
+from gcsplan.bench.papers_runs import PaperRun, Store, code_digest, seed_of, work
 from gcsplan.bench.papers_scenarios import SCENARIOS, choose, claims_of, mission_text, prepare, settings_of
 from gcsplan.bench.papers_statistics import (
     FEW,
@@ -46,10 +48,43 @@ PAIR = ("ssgwo", "gwo")
 # -- printed numbers ---------------------------------------------------------------------------------------------------
 
 
-def test_a_change_of_any_planner_makes_kept_runs_old() -> None:
-    root = Path(papers_runs.__file__).parents[1]
-    counted = {file for pattern in papers_runs.CODE for file in root.glob(pattern)}
-    assert set((root / "planners").rglob("*.py")) <= counted
+ROOT = Path(papers_runs.__file__).parents[1]
+
+
+def _counted() -> set[Path]:
+    return {file for pattern in papers_runs.CODE for file in ROOT.glob(pattern)}
+
+
+@pytest.mark.parametrize("package", ["planners", "optimisers", "world"])
+def test_a_change_of_any_planner_makes_kept_runs_old(package: str) -> None:
+    assert set((ROOT / package).rglob("*.py")) <= _counted()
+
+
+@pytest.mark.parametrize("pattern", papers_runs.CODE)
+def test_every_file_that_makes_kept_runs_old_is_there(pattern: str) -> None:
+    assert list(ROOT.glob(pattern))
+
+
+def test_a_change_of_anything_that_a_run_calls_makes_kept_runs_old(
+    finished: tuple[dict[str, Any], Path], missions: Path
+) -> None:
+    called: set[Path] = set()
+
+    def note(frame: FrameType, event: str, _: object) -> None:
+        if event == "call" and frame.f_code.co_flags & inspect.CO_OPTIMIZED:  # no body of a module or class
+            called.add(Path(frame.f_code.co_filename))
+
+    text = (missions / f"{SCENARIO}.yaml").read_text(encoding="utf-8")
+    job = PaperRun(SCENARIO, "gwo", text, 1, 0, code_digest())
+    before = sys.getprofile()
+    sys.setprofile(note)  # `finished` has imported and warmed everything, so this sees the run alone
+    try:
+        work(job)
+    finally:
+        sys.setprofile(before)
+    ours = {file for file in called if file.is_relative_to(ROOT)}
+    assert ROOT / "optimisers" / "wolves.py" in ours
+    assert ours <= _counted()
 
 
 def test_a_printed_number_is_below_another_only_after_rounding() -> None:
