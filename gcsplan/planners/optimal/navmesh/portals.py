@@ -15,8 +15,6 @@ from gcsplan.planners.optimal.navmesh.polyanya import search
 Ints = NDArray[np.int32]
 Place = tuple[float, float]
 
-MOST_CORNERS = 1 << 14
-"""Corners of a track, at most."""
 FIRST_NODES, NODES_OF_PIECE = 1 << 19, 8
 """Search nodes that memory is first allocated for: `FIRST_NODES`, or `NODES_OF_PIECE` for each piece if that is more.
 Untouched memory costs nothing; if there is too little, the search begins again with four times as much."""
@@ -86,7 +84,7 @@ class Portals:
                 np.empty((capacity, 3), np.int64),
             )
             first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
-            out = np.empty((MOST_CORNERS, 3))
+            out = np.empty((capacity + 2, 3))  # a track has no more corners than nodes, beside its two ends
             n = search(
                 self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span, sources,
                 np.array(start_pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32), limit_m,

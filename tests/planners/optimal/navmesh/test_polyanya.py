@@ -24,6 +24,7 @@ from gcsplan.planners.optimal.navmesh import polyanya, portals
 from gcsplan.planners.optimal.navmesh.grid import Plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import make_pieces, make_portals, sort_portals
+from gcsplan.planners.optimal.navmesh.portals import Portals
 from tests.support.effort import draws
 
 Place = tuple[float, float]
@@ -476,6 +477,29 @@ def test_no_search_circles_about_a_corner_along_edges_that_are_all_but_straight(
     optimal.plan(one.problem)
     assert len(given_up) > 5
     assert not any(given_up)
+
+
+def ring(count: int, radius_m: float = 1e5, width_m: float = 0.1) -> tuple[Portals, Floats]:
+    """Three quarters of a narrow ring in ``count`` quadrangles, and the corners (count + 1, 2) of its inner wall."""
+    angle = np.linspace(0.0, 1.5 * math.pi, count + 1)
+    way = np.column_stack([np.cos(angle), np.sin(angle)])
+    inner, outer = radius_m * way, (radius_m + width_m) * way
+    k = np.arange(1, count, dtype=np.int32)  # the portals between the pieces k - 1 and k
+    start = np.array([0, *range(1, 2 * count - 2, 2), 2 * count - 2], np.int32)
+    ends, names = np.hstack([outer[1:-1], inner[1:-1]]), np.column_stack([2 * k, 2 * k + 1]).astype(np.int64)
+    return Portals(start, ends, names, np.column_stack([k - 1, k]), np.repeat(k - 1, 2), 2 * count), inner
+
+
+def test_a_track_may_have_any_number_of_corners(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(portals, "FIRST_NODES", 1)
+    monkeypatch.setattr(portals, "NODES_OF_PIECE", 1)  # so that it runs out of room, and begins again
+    count = 17_000
+    mesh, inner = ring(count)
+    begin, end = (cast(Place, tuple(inner[k].tolist())) for k in (0, -1))
+    track, _ = mesh.shortest(begin, end, [0], [count - 1], 20 * count)
+    assert track is not None
+    assert np.allclose(track.points, inner)
+    assert track.length_m == pytest.approx(float(np.linalg.norm(np.diff(inner, axis=0), axis=1).sum()), rel=1e-9)
 
 
 def test_nothing_is_found_from_where_nothing_is_free() -> None:
