@@ -30,14 +30,12 @@ from gcsplan.mavlink.files.file_items import (
 )
 from gcsplan.mavlink.files.plan_fence import fence_items, fence_json, json_float, json_number, rally_items, rally_json
 from gcsplan.mavlink.files.plan_landing import LANDINGS, landing_entries
+from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, COPTERS, PLANES, PX4
 from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, RELATIVE, TERRAIN, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
-ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT
 FIXED_WING, QUADROTOR = 1, 2  # MAV_TYPE
-ROTARY_WINGS = frozenset({2, 3, 4, 13, 14, 15, 29, 35})  # MAV_TYPE: quad-, hexa-, octorotor, helicopter, …
-WINGED = frozenset({1, 19, 20, 21, 22, 23, 24, 25})  # fixed wing, and VTOLs, which ArduPlane flies
 ALTITUDE_MODE = {RELATIVE: 1, GLOBAL: 2, TERRAIN: 4}  # QGroundControl's AltMode; 0 is "mixed"
 MAX_PROBLEMS = 20
 
@@ -66,7 +64,7 @@ def write_plan(
         "groundStation": "gcsplan",
         "mission": {
             "cruiseSpeed": json_number(speed_m_s) if speed_m_s else 15,
-            "firmwareType": ARDUPILOT if mission.autopilot.is_ardupilot else PX4,
+            "firmwareType": ARDUPILOTMEGA if mission.autopilot.is_ardupilot else PX4,
             "globalPlanAltitudeMode": modes.pop() if len(modes) == 1 else 0,
             "hoverSpeed": json_number(speed_m_s) if speed_m_s else 5,
             "items": [_item(item, number) for number, item in enumerate(items, start=1)],
@@ -176,9 +174,9 @@ def _autopilot(mission: dict[str, Any], requested: Autopilot | None, where: str,
     firmware, kind = mission.get("firmwareType"), mission.get("vehicleType")
     if firmware == PX4:
         stated: Autopilot | None = Autopilot.PX4
-    elif firmware == ARDUPILOT and isinstance(kind, int) and kind in WINGED:
+    elif firmware == ARDUPILOTMEGA and isinstance(kind, int) and kind in PLANES:
         stated = Autopilot.ARDUPLANE
-    elif firmware == ARDUPILOT and (kind in (None, 0) or (isinstance(kind, int) and kind in ROTARY_WINGS)):
+    elif firmware == ARDUPILOTMEGA and (kind in (None, 0) or (isinstance(kind, int) and kind in COPTERS)):
         stated = Autopilot.ARDUCOPTER
         if kind in (None, 0) and requested is Autopilot.ARDUPLANE:
             stated = requested

@@ -26,8 +26,10 @@ GENERIC, ARDUPILOTMEGA, INVALID, PX4 = 0, 3, 8, 12
 _AUTOPILOT_NAMES = {GENERIC: "a generic autopilot", ARDUPILOTMEGA: "ArduPilot", INVALID: "no autopilot", PX4: "PX4"}
 
 # MAV_TYPE
-_COPTERS = frozenset({2, 3, 4, 13, 14, 15, 29, 35, 43})  # quad-, coaxial, heli-, hexa-, octo-, tri-, dodeca-, decarotor
-_PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25, 28})  # fixed wing, the VTOLs, parafoil
+COPTERS = frozenset({2, 3, 4, 13, 14, 15, 29, 35, 43})
+"""Quadrotor, coaxial, helicopter, hexa-, octo-, tri-, dodeca-, decarotor, generic multirotor."""
+PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25, 28})
+"""Fixed wing, the VTOLs, parafoil."""
 _TYPE_NAMES = {
     0: "generic", 1: "fixed wing", 2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 6: "ground station",
     10: "rover", 11: "boat", 12: "submarine", 13: "hexarotor", 14: "octorotor", 15: "tricopter", 19: "VTOL tailsitter",
@@ -64,7 +66,7 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
         Autopilot.ARDUCOPTER,
         "ArduCopter",
         ARDUPILOTMEGA,
-        _COPTERS,
+        COPTERS,
         max_items=650,  # measured; an item takes 15 bytes in the storage of a 16 KB board (StorageManager.cpp)
         atomic=False,  # MissionItemProtocol_Waypoints.cpp: COUNT truncates, items replace one by one
         holds_s=8.0,  # MissionItemProtocol.h: upload_timeout_ms
@@ -75,7 +77,7 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
         Autopilot.ARDUPLANE,
         "ArduPlane",
         ARDUPILOTMEGA,
-        _PLANES,
+        PLANES,
         max_items=650,  # ArduPlane's own layout holds 655; the smaller number is used for both
         atomic=False,
         holds_s=8.0,
@@ -86,7 +88,7 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
         Autopilot.PX4,
         "PX4",
         PX4,
-        _COPTERS | _PLANES,
+        COPTERS | PLANES,
         # navigation.h: NUM_MISSIONS_SUPPORTED 2000 on boards with an SD card, 65534 in simulation, 500 with missions
         # in RAM and 50 on the smallest boards; a board that holds fewer answers NO_SPACE.
         max_items=2000,

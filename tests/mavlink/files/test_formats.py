@@ -475,8 +475,11 @@ def test_fence_and_rally_points_are_written_from_their_wire_items() -> None:
 
 @pytest.mark.parametrize(
     ("firmware", "kind", "autopilot"),
-    [(3, 2, COPTER), (3, 13, COPTER), (3, 1, PLANE), (3, 20, PLANE), (12, 2, PX4), (12, 1, PX4), (3, None, COPTER)],
-)
+    [
+        (3, 2, COPTER), (3, 13, COPTER), (3, 43, COPTER), (3, 1, PLANE), (3, 20, PLANE), (3, 28, PLANE), (12, 2, PX4),
+        (12, 1, PX4), (3, None, COPTER),
+    ],
+)  # fmt: skip
 def test_the_plan_says_for_which_autopilot_it_is(firmware: int, kind: int | None, autopilot: Autopilot) -> None:
     text = json.dumps(plan_of(firmwareType=firmware, vehicleType=kind))
     assert read_plan(text, autopilot=None, where="f").autopilot is autopilot
