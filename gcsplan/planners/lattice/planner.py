@@ -49,7 +49,7 @@ WITHOUT = 3.0
 KICKS = 10
 KICK_PARTS = (0.02, 0.05)
 
-BOUND_NOTE = "the lower bound is the straight line from stop to stop: true, but not tight"
+BOUND_NOTE = "the lower bound is the straight line from terminal to terminal: true, but not tight"
 
 
 def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True, known: bool = False) -> Solution:

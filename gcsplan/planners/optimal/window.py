@@ -115,8 +115,8 @@ def held_to_border(problem: Problem, found: Solution, leaving: float) -> Solutio
     if near:
         return replace(found, lower_bound=leaving)
     note = (
-        f"the terrain was looked at within {within_m(problem) / 1000.0:.1f} km of the straight way: the lower bound is "
-        "that of paths which go farther"
+        f"the terrain was looked at within {within_m(problem) / 1000.0:.1f} km of the straight track: the lower bound "
+        "is that of paths which go farther"
     )
     stopped = "exhausted" if found.stopped_by == "gap" else found.stopped_by
     return replace(found, lower_bound=leaving, stopped_by=stopped, notes=(*found.notes, note))

@@ -168,16 +168,16 @@ def finish(problem: Problem, found: Found, begun: float) -> Solution:
         mended = repair(problem, found.scene, found.curve, found.terminals)
         if mended is None:
             raise Refusal(
-                f"no mission: the curve that {name} found breaks {summary_of(problem, wrong)}, and pushing it out and "
-                f"drawing its heights anew did not mend it: try another encoding (bspline, sections), seed or more "
-                f"iterations, or the planner optimal",
+                f"no mission: the curve that {name} found breaks {summary_of(problem, wrong)}, and pushing it sideways "
+                f"and giving it new altitudes does not repair it: try another encoding (bspline, sections), seed or "
+                f"more iterations, or the planner optimal",
                 reason="not_found",
                 place=(wrong[0].east_m, wrong[0].north_m) if wrong else None,
             )
         points = mended.points
-        how = "its heights were drawn anew"
+        how = "it was given new altitudes"
         if mended.pushed_m > 0.0:
-            how = f"it was pushed sideways by up to {mended.pushed_m:.0f} m and its heights were drawn anew"
+            how = f"it was pushed sideways by up to {mended.pushed_m:.0f} m and given new altitudes"
         notes = (f"the curve that {name} found breaks {summary_of(problem, wrong)}; {how}, and it passes the check",)
     return Solution(
         path=Path(points),
