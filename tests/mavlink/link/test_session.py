@@ -256,7 +256,7 @@ def test_the_wrong_number_is_told_with_the_numbers_that_are_there() -> None:
 
 
 def test_unsigned_frames_are_told_as_the_reason() -> None:
-    with air(vehicle(), key=SigningKey(bytes(32))) as link, pytest.raises(LinkError, match="signing key") as dead:
+    with air(vehicle(), key=SigningKey(bytes(32))) as link, pytest.raises(LinkError, match="valid signature") as dead:
         discover(link, 1, 0.5)
     assert "00000000" not in str(dead.value)
 
