@@ -33,7 +33,8 @@ PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25, 28})
 _TYPE_NAMES = {
     0: "generic", 1: "fixed wing", 2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 6: "ground station",
     10: "rover", 11: "boat", 12: "submarine", 13: "hexarotor", 14: "octorotor", 15: "tricopter", 19: "VTOL tailsitter",
-    20: "VTOL tailsitter", 21: "VTOL tiltrotor", 22: "VTOL with fixed rotors", 29: "dodecarotor", 35: "decarotor",
+    20: "VTOL tailsitter", 21: "VTOL tiltrotor", 22: "VTOL with fixed rotors", 23: "VTOL tailsitter",
+    24: "VTOL tiltwing", 25: "VTOL", 28: "parafoil", 29: "dodecarotor", 35: "decarotor", 43: "multirotor",
 }  # fmt: skip
 
 ALTITUDE_LIMIT_M = 83_000.0
