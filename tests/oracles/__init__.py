@@ -1,1 +1,1 @@
-"""Independent implementations that clever code is held to."""
+"""Independent second implementations that the package's results are compared with."""

@@ -1,9 +1,9 @@
-"""A second opinion on "safe", from the written file to the last metre: plain numpy and pyproj's geodesics alone.
+"""A second, independent check of "safe" for a written mission: plain numpy and pyproj's geodesics alone.
 
 It shares no code with the package. It reads a mission file's YAML, the sample DEM, and a written `.waypoints` or
-`.plan`; rounds as the autopilot stores; flies straight lines in degrees, along geodesics and in the autopilot's own
-flat plane; looks every metre, and around every point as far as the errors and clearances reach. Sampling can only miss:
-what it finds is a violation.
+`.plan`, and rounds numbers as the autopilot stores them. It flies each leg straight in degrees, along a geodesic, and
+straight in the autopilot's own flat plane, samples it about every metre, and samples the ground around each point as
+far as errors and clearances reach. Sampling can miss a violation, but every violation that it finds is one.
 """
 
 from __future__ import annotations
@@ -26,13 +26,16 @@ LINES: tuple[Line, ...] = ("degrees", "geodesic", "flat")
 GEOD = Geod(ellps="WGS84")
 A_M, E2 = 6378137.0, 0.0066943799901413165
 TERRAIN_ERROR_M = 30.0
-GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane: smaller changes of height are flown at once, not along the leg
+GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane flies smaller altitude changes at once, not spread along the leg
 HEIGHT_M, WIDTH_M, ANGLE_DEG = 2e-3, 1e-2, 0.35
-"""What is forgiven: between the projected plane and geodesics; the angle is that of the ground inside one cell."""
+"""Tolerances: m of altitude and m in the plane (projected plane against geodesics), and degrees of slope.
+
+The angle covers the ground inside one cell.
+"""
 
 
 class Ground:
-    """Heights of cell centres, bilinear between them; NaN outside."""
+    """A terrain model: heights at cell centres, bilinear between them, NaN outside."""
 
     def __init__(self, heights: Floats, west: float, north: float, dx: float, dy: float) -> None:
         self.z, self.west, self.north, self.dx, self.dy = heights, west, north, dx, dy
@@ -57,7 +60,7 @@ class Ground:
 
 
 def metres_per_degree(lat: Floats) -> tuple[Floats, Floats]:
-    """North and east, from the ellipsoid's two radii of curvature."""
+    """Metres per degree to the north and to the east, from the ellipsoid's two radii of curvature."""
     s = np.sin(np.radians(lat))
     w = np.sqrt(1 - E2 * s * s)
     return np.radians(A_M * (1 - E2) / w**3), np.radians(A_M / w * np.cos(np.radians(lat)))
@@ -92,7 +95,7 @@ class NoFly:
         floor, floor_agl = level("floor", -math.inf)
         ceiling, ceiling_agl = level("ceiling", math.inf)
         corners = np.zeros((0, 2))
-        if "polygon" in keys:  # edges straight in degrees, cut so short that it does not matter in what
+        if "polygon" in keys:  # edges are straight in degrees; in pieces of 100 m, any kind of line is the same
             ring = np.asarray(keys["polygon"], float)
             parts = []
             for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
@@ -104,7 +107,7 @@ class NoFly:
         return cls(keys.get("name", ""), centre, radius, corners, floor, ceiling, floor_agl, ceiling_agl)
 
     def rough_m(self, lat: Floats, lon: Floats) -> Floats:
-        """A lower bound of the distance, some per mille short."""
+        """A lower bound of the distance (m), a few per mille too short."""
         middle, reach = self.centre, self.radius_m
         north, east = metres_per_degree(np.asarray(lat[:1]))
         if middle is None:
@@ -114,7 +117,7 @@ class NoFly:
         return 0.995 * np.hypot((lat - middle[0]) * north, (lon - middle[1]) * east) - 1.01 * reach - 5.0
 
     def distance_m(self, lat: Floats, lon: Floats) -> Floats:
-        """Signed true distance to the outline, negative inside."""
+        """The true distance to the outline (m), negative inside."""
         if self.centre is not None:
             there = np.full(len(lat), self.centre[0]), np.full(len(lat), self.centre[1])
             return np.asarray(GEOD.inv(lon, lat, there[1], there[0])[2]) - self.radius_m
@@ -134,7 +137,7 @@ class NoFly:
 
 @dataclass
 class Rules:
-    """Limits and zones of one vehicle of a mission file (parsed YAML)."""
+    """Limits and zones of one vehicle, from a mission file's parsed YAML."""
 
     min_agl_m: float
     max_agl_m: float
@@ -180,7 +183,7 @@ class Row:
 
 
 def read_waypoints(text: str, autopilot: str) -> tuple[tuple[float, float], list[Row]]:
-    """Home and rows of a `.waypoints` text, as stored on board."""
+    """Home and items of a `.waypoints` text, rounded as the autopilot stores them."""
     lines = text.splitlines()
     assert lines[0] == "QGC WPL 110"
     rows = [line.split("\t") for line in lines[1:]]
@@ -200,7 +203,7 @@ def read_waypoints(text: str, autopilot: str) -> tuple[tuple[float, float], list
 
 
 def read_plan(text: str, autopilot: str) -> tuple[tuple[float, float], list[Row]]:
-    """The same of a `.plan`."""
+    """Home and items of a `.plan` text, rounded as the autopilot stores them."""
     document = json.loads(text)["mission"]
     rows = []
     for item in document["items"]:
@@ -213,12 +216,12 @@ def read_plan(text: str, autopilot: str) -> tuple[tuple[float, float], list[Row]
 
 
 def e7(degrees: float) -> float:
-    """Degrees as the wire carries them."""
+    """Degrees as MAVLink transmits them: rounded to 1e-7."""
     return round(degrees * 1e7) / 1e7
 
 
 def kept(metres: float, autopilot: str) -> float:
-    """ArduPilot: float32 times 100, cut to whole centimetres; PX4: float32."""
+    """The stored altitude: ArduPilot float32 times 100, truncated to whole centimetres; PX4 float32."""
     z = np.float32(metres)
     return float(z) if autopilot == "px4" else int(np.float32(z * np.float32(100))) / 100
 
@@ -228,7 +231,7 @@ def kept(metres: float, autopilot: str) -> float:
 
 @dataclass
 class Flown:
-    """One stretch: from and to (latitude, longitude, AMSL), or above ground where ``terrain``."""
+    """One stretch: start and end as (latitude, longitude, AMSL); with ``terrain`` it follows the ground in between."""
 
     row: int
     start: tuple[float, float, float]
@@ -240,7 +243,7 @@ class Flown:
 
 
 def fly(home: tuple[float, float], rows: list[Row], rules: Rules, ground: Ground, autopilot: str) -> list[Flown]:
-    """What the missions that we emit (take-off, way points, one end) make a vehicle fly."""
+    """The stretches that a vehicle flies, for missions as gcsplan writes them: take-off, way points, one end."""
 
     def height(lat: float, lon: float) -> float:
         return float(ground.at(np.array([lat]), np.array([lon]))[0])
@@ -265,7 +268,7 @@ def fly(home: tuple[float, float], rows: list[Row], rules: Rules, ground: Ground
             else:
                 legs.append(Flown(number, at, to, terrain=terrain))
             at = to
-            if plane and row.command == 17:  # its radius goes with the density of the air
+            if plane and row.command == 17:  # the circle's radius grows as air density falls
                 thin = (1.0 - 0.0065 * amsl / 288.15) ** -4.2559
                 legs.append(Flown(number, to, to, reach_m=60.0 * thin))
             continue
@@ -291,7 +294,7 @@ def fly(home: tuple[float, float], rows: list[Row], rules: Rules, ground: Ground
 def samples(
     leg: Flown, ground: Ground, home: tuple[float, float], line: Line, step_m: float
 ) -> tuple[Floats, Floats, Floats]:
-    """(S,) latitude, longitude, AMSL at most ``step_m`` apart."""
+    """Latitude, longitude and AMSL, each (S,), of points at most ``step_m`` apart along a stretch."""
     (lat0, lon0, z0), (lat1, lon1, z1) = leg.start, leg.end
     run = GEOD.inv(lon0, lat0, lon1, lat1)[2]
     count = max(2, math.ceil(max(run, abs(z1 - z0)) / step_m) + 1)
@@ -301,7 +304,7 @@ def samples(
             lon0, lat0, lon1, lat1, npts=count, initial_idx=0, terminus_idx=0, return_back_azimuth=True
         )
         lat, lon = np.asarray(points.lats), np.asarray(points.lons)
-    elif line == "flat":  # ArduPilot's: metres from home, east scaled at the middle latitude (Location.cpp)
+    elif line == "flat":  # ArduPilot's plane: metres from home, east scaled at the middle latitude (Location.cpp)
         lat = lat0 + t * (lat1 - lat0)
         shrink = np.cos(np.radians(0.5 * (lat + home[0])))
         east0, east1 = (lon0 - home[1]) * shrink[0], (lon1 - home[1]) * shrink[-1]
@@ -319,7 +322,11 @@ def samples(
 
 @dataclass
 class Opinion:
-    """Deepest breach by kind (positive breaks), where; and the lowest point of the flight."""
+    """The deepest breach of each kind (positive: the limit is broken), its row, and the least distances found.
+
+    ``lowest_m``: least height above ground (m); ``zone_m``: least distance (m) to a zone with flat floor and ceiling
+    where their altitudes meet.
+    """
 
     depth: dict[str, float] = field(default_factory=dict)
     row: dict[str, int] = field(default_factory=dict)
@@ -327,7 +334,7 @@ class Opinion:
     zone_m: float = math.inf
 
     def see(self, kind: str, row: int, depth: float) -> None:
-        if not depth <= self.depth.get(kind, -math.inf):  # NaN is seen too
+        if not depth <= self.depth.get(kind, -math.inf):  # true for NaN too
             self.depth[kind], self.row[kind] = depth, row
 
     def breaches(self, slack: float = 1.0) -> dict[str, float]:
@@ -347,7 +354,7 @@ def judge(
     home: tuple[float, float], rows: list[Row], rules: Rules, ground: Ground, autopilot: str,
     *, step_m: float = 1.0, lines: tuple[Line, ...] = LINES,
 ) -> Opinion:  # fmt: skip
-    """The second opinion on a mission that was read by `read_waypoints` or `read_plan`."""
+    """Check a mission that `read_waypoints` or `read_plan` has read, on each kind of line."""
     opinion = Opinion()
     for leg in fly(home, rows, rules, ground, autopilot):
         for k, line in enumerate(lines if leg.start[:2] != leg.end[:2] else lines[:1]):
@@ -365,7 +372,7 @@ def look(leg: Flown, lat: Floats, lon: Floats, z: Floats, rules: Rules, ground: 
         most, least = np.full(len(lat), -np.inf), np.full(len(lat), np.inf)
         for north, east in rings(reach, radii, spokes):
             g = ground.at(*moved(lat, lon, north, east))
-            most, least = np.maximum(most, g), np.minimum(least, g)  # NaN stays
+            most, least = np.maximum(most, g), np.minimum(least, g)  # both keep NaN: unknown ground
         return most, least
 
     most, least = extreme(near, 2, 12)
@@ -397,7 +404,7 @@ def beside(
     leg: Flown, zone: NoFly, lat: Floats, lon: Floats, low: Floats, high: Floats, reach: float, ground: Ground,
     opinion: Opinion,
 ) -> None:  # fmt: skip
-    """One zone: by its true distance where its levels are flat, else point by point around the track."""
+    """Judge one zone: by true distance if its floor and ceiling are flat, else at sampled points around the track."""
     gap = zone.distance_m(lat, lon)
     if not (zone.floor_agl or zone.ceiling_agl):
         meets = (high > zone.floor + HEIGHT_M) & (low < zone.ceiling - HEIGHT_M)

@@ -1,8 +1,8 @@
-"""Brute force that every clever check of legs is held against: plain numpy, sampled finely, sharing no code with it.
+"""A brute-force check of legs, to compare the exact check with: plain numpy, fine samples, no shared code.
 
-The oracle knows the surface as arrays of heights and a function from the plane to (col, row) of its own: for a DEM in
-degrees that goes through pyproj to latitude and longitude, sample by sample, so no polynomial and no straight line in
-the grid enters. Sampling can only miss: what it finds is a violation, what it does not find may still be one.
+The oracle has the surface as arrays of heights and its own function from the plane to (col, row). For a DEM in degrees
+that function transforms each sample to latitude and longitude by pyproj, so it needs no fitted polynomial and no
+straight line in the grid. Sampling can miss a violation, but every violation that it finds is one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ from gcsplan.world.zones import Circle, Zone
 
 @dataclass(frozen=True, eq=False)
 class Oracle:
-    """``to_grid(east, north) -> (col, row)``; heights (rows, cols), NaN unknown."""
+    """A sampled world: ``to_grid(east, north) -> (col, row)``; heights (rows, cols), NaN where unknown.
+
+    ``rings`` and ``spokes``: samples around each point; ``scale``: metres of the plane per true metre.
+    """
 
     ground: Floats
     top: Floats
@@ -32,7 +35,7 @@ class Oracle:
     spokes: int = 12
 
     def height(self, z: Floats, e: Floats, n: Floats) -> Floats:
-        """Bilinear height at points of the plane, NaN outside and wherever a corner with weight is unknown."""
+        """Bilinear height at points of the plane; NaN outside, and where a corner with non-zero weight is unknown."""
         c, r = self.to_grid(e, n)
         rows, cols = z.shape
         noise = 1e-9
@@ -68,7 +71,7 @@ class Oracle:
     def depths(
         self, start: Floats, end: Floats, column: bool, track: float, altitude: float, limits: Limits
     ) -> dict[str, float]:
-        """How deep each limit is broken (positive) or kept (negative), by kind; coverage 1 or 0."""
+        """By how much each limit is broken (positive) or kept (negative), by kind; coverage is 1 (unknown) or 0."""
         _, p = self.line(start, end)
         e, n, h = p.T
         near = track * self.scale
@@ -94,7 +97,7 @@ class Oracle:
         return found
 
     def levels(self, zone: Zone, e: Floats, n: Floats) -> tuple[Floats, Floats]:
-        """Floor and ceiling of a zone at points; over unknown ground it has no end."""
+        """Floor and ceiling (AMSL) of a zone at points; an AGL level is infinite over unknown ground."""
         ground = self.height(self.ground, e, n)
         out = []
         for level, none in ((zone.floor, -np.inf), (zone.ceiling, np.inf)):
@@ -107,7 +110,7 @@ class Oracle:
         return out[0], out[1]
 
     def shape_distance(self, zone: Zone, e: Floats, n: Floats) -> Floats:
-        """Signed distance from the shape's border, negative inside."""
+        """Distance from the shape's border, negative inside."""
         if isinstance(zone.shape, Circle):
             s = zone.shape
             return np.asarray(np.hypot(e - s.east_m, n - s.north_m) - s.radius_m * self.scale)
@@ -117,7 +120,7 @@ class Oracle:
         for (ax, ay), (bx, by) in zip(a, b, strict=True):
             w = np.clip(((e - ax) * (bx - ax) + (n - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2), 0, 1)
             best = np.minimum(best, np.hypot(ax + w * (bx - ax) - e, ay + w * (by - ay) - n))
-            # The angle that the edge is seen under: all of them add up to a full turn from inside.
+            # The angle that the edge subtends: seen from inside, all edges add up to a full turn.
             turn = np.arctan2(by - n, bx - e) - np.arctan2(ay - n, ax - e)
             winding += (turn + np.pi) % (2 * np.pi) - np.pi
         return np.where(np.abs(winding) > np.pi, -best, best)
@@ -126,9 +129,10 @@ class Oracle:
         self, k: int, start: Floats, end: Floats, track: float, altitude: float, limits: Limits,
         spokes: int = 16, rings: int = 4, grow_m: float = 0.0, lift_m: float = 0.0,
     ) -> bool:  # fmt: skip
-        """Whether a sampled point of zone ``k``, within reach of the leg, has the leg at its own heights.
+        """Whether the leg is between floor and ceiling of zone ``k`` at a sampled point of it within reach of the leg.
 
-        Negative ``grow_m`` and ``lift_m`` ask for a breach by more than them; positive ones forgive.
+        ``grow_m`` and ``lift_m`` (m) add to the reach and to the altitude error: with negative ones, only a breach
+        deeper than that counts.
         """
         zone = self.zones[k]
         _, p = self.line(start, end)
@@ -164,9 +168,9 @@ def deepest(
     oracle: Oracle, z: Floats, sign: float, start: Floats, end: Floats, need: float, reach: float, hint: float,
     rng: np.random.Generator,
 ) -> float:  # fmt: skip
-    """Largest sampled ``need − sign·(altitude − height)`` within ``reach`` of a leg; a lower bound of the truth.
+    """The largest sampled ``need − sign·(altitude − height)`` within ``reach`` of a leg: a lower bound of the maximum.
 
-    A coarse look along the whole leg and around the fraction ``hint``, then zooming in on the best places of it.
+    Samples the whole leg and the neighbourhood of its fraction ``hint`` coarsely, then refines around the best places.
     """
     length = max(float(np.linalg.norm((end - start)[:2])), 1e-9)
 

@@ -1,7 +1,7 @@
-"""True optima that planners are held to: discs in the plane exactly, profiles over a track by linear programme.
+"""True optima to compare planners with: exact tracks past discs, and altitude profiles by linear programme.
 
-Nothing here comes from the planners: the shortest way past discs runs over common tangents and arcs alone, and the
-linear programme sees a sampled floor and ceiling.
+No code comes from the planners. The shortest track past discs consists of common tangents and arcs; the linear
+programme works on a sampled floor and ceiling.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from scipy.sparse.csgraph import dijkstra
 from gcsplan.arrays import Floats
 
 TOUCH = 1e-9
-"""How far, in radii of the largest disc, a tangent may seem to enter a disc that it touches."""
+"""Tolerance, in radii of the largest disc (at least 1 m), by which a tangent may enter a disc that it touches."""
 NO_WAY = math.inf
 
 
 def shortest_past_discs(start: tuple[float, float], goal: tuple[float, float], discs: Floats) -> float:
-    """Length of the shortest way in the plane past the open ``discs`` (N, 3) x, y, radius; inf where there is none.
+    """Length of the shortest track past the open ``discs`` (N, 3) of x, y, radius; inf if there is none.
 
-    It consists of common tangents (start and goal are discs of radius 0) and arcs between them; discs may overlap.
-    An end inside a disc has no way.
+    The track consists of common tangents (start and goal are discs of radius 0) and arcs between them; discs may
+    overlap. The result is inf if an end lies inside a disc.
     """
     d = _without_nested(np.asarray(discs, dtype=np.float64).reshape(-1, 3))
     slack = TOUCH * max(1.0, float(d[:, 2].max(initial=0.0)))
@@ -36,7 +36,7 @@ def shortest_past_discs(start: tuple[float, float], goal: tuple[float, float], d
     all_discs = np.vstack([[*start, 0.0], [*goal, 0.0], d])
     at, of, ends, lengths = _tangents(all_discs, slack)
     rows, cols, weights = [ends[:, 0]], [ends[:, 1]], [lengths]
-    for disc in range(2):  # every tangent of an end meets the others there
+    for disc in range(2):  # all tangents of start (or goal) meet at that one point
         nodes = np.flatnonzero(of == disc)
         rows.append(nodes[:-1])
         cols.append(nodes[1:])
@@ -51,7 +51,7 @@ def shortest_past_discs(start: tuple[float, float], goal: tuple[float, float], d
     first, last = np.flatnonzero(of == 0), np.flatnonzero(of == 1)
     if not len(first) or not len(last):
         return NO_WAY
-    # Parallel arcs between the same two nodes: a sparse array would add them up.
+    # Two arcs may join the same two nodes: keep the shorter one, since a sparse array would add them up.
     r, c, w = np.concatenate(rows), np.concatenate(cols), np.concatenate(weights)
     low, high = np.minimum(r, c).astype(np.int32), np.maximum(r, c).astype(np.int32)
     order = np.lexsort((w, high, low))
@@ -63,7 +63,7 @@ def shortest_past_discs(start: tuple[float, float], goal: tuple[float, float], d
 
 
 def _without_nested(d: Floats) -> Floats:
-    """Discs that lie in no other."""
+    """The discs that lie inside no other disc."""
     keep = np.ones(len(d), bool)
     for i in range(len(d)):
         for j in range(len(d)):
@@ -74,7 +74,8 @@ def _without_nested(d: Floats) -> Floats:
 
 
 def _tangents(d: Floats, slack: float) -> tuple[Floats, NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Ends (E, 2) of all free common tangents, the disc of each end (E,), tangents as (T, 2) ends, lengths (T,)."""
+    """All free common tangents: their ends (E, 2), the disc of each end (E,), tangents as pairs of ends (T, 2), and
+    lengths (T,)."""
     i, j = np.triu_indices(len(d), 1)
     i, j, side, same = (
         a.ravel()
@@ -84,7 +85,7 @@ def _tangents(d: Floats, slack: float) -> tuple[Floats, NDArray[np.intp], NDArra
     )
     to = d[j, :2] - d[i, :2]
     apart = np.hypot(*to.T)
-    # The normal that both circles share makes this cosine with the line of centres; ``same`` -1 is the inner pair.
+    # Cosine between the common normal and the line of centres; ``same`` = -1 gives the inner tangents.
     cosine = (d[i, 2] - same * d[j, 2]) / np.maximum(apart, 1e-300)
     # Where one disc is a point, inner and outer tangents are the same.
     ok = (np.abs(cosine) <= 1.0) & ((same > 0.0) | ((d[i, 2] > 0.0) & (d[j, 2] > 0.0)))
@@ -114,7 +115,7 @@ def _tangents(d: Floats, slack: float) -> tuple[Floats, NDArray[np.intp], NDArra
 
 
 def _arcs(disc: int, at: Floats, of: NDArray[np.intp], d: Floats, slack: float) -> tuple[NDArray[np.intp], Floats]:
-    """Ends on a disc by angle, and the arc from each to the next; inf where another disc covers a part of it."""
+    """Tangent ends on a disc, sorted by angle, and the arc from each to the next; inf if another disc covers a part."""
     nodes = np.flatnonzero(of == disc)
     x, y, radius = d[disc]
     angle = np.arctan2(at[nodes, 1] - y, at[nodes, 0] - x)
@@ -126,7 +127,7 @@ def _arcs(disc: int, at: Floats, of: NDArray[np.intp], d: Floats, slack: float) 
         apart = math.dist(d[k, :2], (x, y))
         if k == disc or apart >= radius + d[k, 2] - slack:
             continue
-        # No end lies inside another disc, so an arc is covered where it holds the middle of what the other covers.
+        # No end lies inside another disc, so an arc is covered if it contains the middle of the part that disc covers.
         middle = math.atan2(d[k, 1] - y, d[k, 0] - x)
         free &= ~((middle - angle) % (2.0 * math.pi) < span)
     return nodes, np.where(free, radius * span, NO_WAY)
@@ -134,7 +135,7 @@ def _arcs(disc: int, at: Floats, of: NDArray[np.intp], d: Floats, slack: float) 
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Altitudes ``amsl_m`` (N,) at the samples, and the least total of climb and descent that the programme found."""
+    """Altitudes ``amsl_m`` (N,) at the samples, and the least sum of climb and descent (m)."""
 
     amsl_m: Floats
     vertical_m: float
@@ -143,7 +144,10 @@ class Profile:
 def profile_by_programme(
     s_m: Floats, low_m: Floats, high_m: Floats, climb_slope: float = math.inf, descent_slope: float = math.inf
 ) -> Profile | None:
-    """Least climb and descent from sample to sample between ``low_m`` and ``high_m`` (N,); None where none passes."""
+    """The profile between ``low_m`` and ``high_m`` (N,) with least climb plus descent; None if none is feasible.
+
+    ``s_m`` (N,) are distances along the track; slopes are metres per metre.
+    """
     n = len(s_m)
     run = np.diff(s_m)
     one, zero = eye_array(n - 1), csr_array((n - 1, n - 1))

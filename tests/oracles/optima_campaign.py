@@ -1,8 +1,8 @@
-"""Hold the default planner to independent optima on many small random missions.
+"""Compare the default planner with independent optima on many small random missions.
 
 As a module: ``python -m tests.oracles.optima_campaign --seeds 0 500 --families passes climbs --effort patient``. It
-prints every mission on which something is wrong, and at the end a table of figures by family. Families take turns, so
-that a campaign cut short by ``--minutes`` or by Ctrl-C has seen as much of each.
+prints every mission on which something is wrong, and at the end a table of figures by family. It runs every family on
+one seed before the next seed, so a campaign ended by ``--minutes`` or Ctrl-C has covered all families equally.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from tests.oracles.optima_witnesses import known
 from tests.oracles.optima_worlds import FAMILIES, Case, make
 
 SURE_M = 2e-3
-"""What brute force finds beyond this is a violation: the fitted map of a raster in degrees may be so far off."""
+"""Brute-force breaches (m) beyond this count: the fitted map of a raster in degrees may be off by that much."""
 TOUCH_M = 1e-5
-"""Metres by which a path may undercut a bound: a micrometre of touching is legal, at every point of a path."""
+"""Metres by which a path may be shorter than a bound: the exact check allows a micrometre at every point of a path."""
 
 ILLEGAL = ("exact check", "brute force", "ends elsewhere", "misses via")
-"""What complaints about the path itself begin with; all others are about what was said of it."""
+"""First words of faults of the path itself; all other faults concern its bound, its optimality or a refusal."""
 COLUMNS = (
     ("worlds", 7), ("solved", 7), ("missed", 7), ("unsound", 8), ("illegal", 8), ("path over best known %", 24),
     ("best known over bound %", 24), ("planning ms", 18), ("judging s", 10),
 )  # fmt: skip
-"""Heads and widths of the table."""
+"""Headings and widths of the table's columns."""
 
 
 @dataclass(eq=False)
 class Verdict:
-    """What came of one mission. ``wrong``: breaches of what must hold; ``missed``: the search found a path and the
-    planner none, without claiming that there is none. Costs are NaN where there are none."""
+    """The result of one mission. ``wrong``: faults; ``missed``: a path is known and the planner found none, without
+    proving that there is none. A cost that does not exist is NaN."""
 
     family: str
     seed: int
@@ -60,27 +60,27 @@ class Verdict:
 
     @property
     def is_illegal(self) -> bool:
-        """Whether the path breaks a limit, or does not lead where it should."""
+        """Whether the path breaks a limit or misses a terminal."""
         return any(text.startswith(ILLEGAL) for text in self.wrong)
 
     @property
     def is_unsound(self) -> bool:
-        """Whether anything else is wrong: a bound over a path, a path shorter than the optimum, a false refusal."""
+        """Whether there is any other fault: a bound above a path, a path shorter than the optimum, a false refusal."""
         return any(not text.startswith(ILLEGAL) for text in self.wrong)
 
     @property
     def short(self) -> float:
-        """The best that anybody found over the bound."""
+        """Best known cost / bound − 1."""
         return self.best / self.bound - 1.0
 
     @property
     def gap(self) -> float:
-        """Cost over bound, as the planner has it."""
+        """The planner's own cost / bound − 1."""
         return self.cost / self.bound - 1.0
 
     @property
     def excess(self) -> float:
-        """Cost over the best that anybody found."""
+        """The planner's cost / best known cost − 1."""
         return self.cost / self.best - 1.0
 
     def __str__(self) -> str:
@@ -94,9 +94,9 @@ class Verdict:
 def judge(
     family: str, seed: int, effort: Effort = QUICK, planner: Callable[[Problem], Solution] = plan, **changes: float
 ) -> Verdict:
-    """Plan one mission and hold the answer to the exact check, to brute force, and to the best that is known.
+    """Plan one mission and compare the result with the exact check, brute force, and the best known path.
 
-    Where a path is kept for the mission, only a patient ``effort`` searches for another one too.
+    If a legal path is stored for the mission, only a patient ``effort`` searches for another one as well.
     """
     case = make(family, seed)
     said: list[Progress] = []
@@ -133,7 +133,7 @@ def judge(
     if solution.lower_bound is None or not math.isfinite(solution.lower_bound):
         verdict.wrong.append(f"no lower bound: {solution.lower_bound}")
         return verdict
-    # What was said on the way was promised, too.
+    # Bounds reported as progress are promises too.
     verdict.bound = max([solution.lower_bound, *(x.lower_bound for x in said if x.lower_bound is not None)])
     if verdict.bound > verdict.cost + touch:
         verdict.wrong.append("the bound lies over the planner's own path")
@@ -146,7 +146,7 @@ def judge(
 
 
 def reverse(p: Problem) -> Problem:
-    """The same mission flown backwards: every path of the one, turned round, is a path of the other."""
+    """The same mission flown backwards: every path of one, reversed, is a path of the other."""
     limits = replace(p.limits, max_climb_deg=p.limits.max_descent_deg, max_descent_deg=p.limits.max_climb_deg)
     return replace(p, start=p.goal, goal=p.start, via=p.via[::-1], limits=limits)
 
@@ -163,7 +163,7 @@ def exact_past_discs(case: Case) -> float:
 
 
 def faults(case: Case, path: Path, step_m: float = 1.0) -> list[str]:
-    """What the exact check, and sampling every metre that knows nothing of it, have against a path."""
+    """Faults of a path, by the exact check and by independent brute force at steps of ``step_m``."""
     p = case.problem
     legs = Legs.of_path(path.points, p.limits)
     out = [f"exact check: {v.kind} by {v.by:.6f} on leg {v.leg}" for v in p.airspace.examine(legs, p.limits).violations]
@@ -211,7 +211,7 @@ def summary(verdicts: list[Verdict]) -> str:
 
 
 def table(verdicts: list[Verdict]) -> str:
-    """Figures by family, and of all together. Where there are three numbers they are p50, p90 and the most."""
+    """Figures by family and of all together. Three numbers in a cell are p50, p90 and maximum."""
     lines = [f"{'family':12}" + "".join(f"{head:>{width}}" for head, width in COLUMNS)]
     for family in [*dict.fromkeys(v.family for v in verdicts), "all"]:
         of = [v for v in verdicts if family in (v.family, "all")]

@@ -1,8 +1,8 @@
-"""Making a feasible path cheaper, whoever found it, without leaving what the exact check passes.
+"""Make any feasible path cheaper, using only legs that the exact check passes.
 
-A path is pulled tight (`pull`), and then improved in all its points at once (`polish`): each point tries a dozen
-places, and of all the legs between them that are clear dynamic programming takes the best combination. No code is
-shared with the planners.
+A path is pulled taut (`pull`), then all its points are improved together (`polish`): each point tries about twenty
+places, and dynamic programming picks the cheapest combination of clear legs between them. No code is shared with the
+planners.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from gcsplan.world.path import Path
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """``points`` of the plane in a lattice, altitude ``levels``, ``tries`` with the lattice's costs disturbed, rounds
-    of ``polish`` at each of its scales, how many of the ways are polished, and for how long at most each."""
+    """How hard to search: ``points`` in the plane and altitude ``levels`` of the lattice; ``tries``, all but the first
+    with disturbed costs; ``rounds`` of `polish` per scale; how many of the ``best`` paths to polish; seconds for each.
+    """
 
     points: int = 300
     levels: int = 4
@@ -39,14 +40,14 @@ PATIENT = Effort(900, 7, 8, 12, 3, 3.0)
 
 
 def clear(problem: Problem, start: Floats, end: Floats) -> NDArray[np.bool_]:
-    """Which legs the exact check passes."""
+    """Which legs (N,) the exact check passes."""
     n, limits = len(start), problem.limits
     errors = np.full(n, limits.track_error_m), np.full(n, limits.altitude_error_m)
     return problem.airspace.clear(Legs(start, end, np.zeros(n, np.bool_), *errors), limits)
 
 
 def is_feasible(problem: Problem, points: Floats) -> bool:
-    """Whether a path starts, ends and passes where it should, and every leg is clear."""
+    """Whether a path starts at the start, ends at the goal, passes all vias in order, and every leg is clear."""
     ends = np.array([problem.start, problem.goal])
     stops = [(v.east_m, v.north_m, v.amsl_m) for v in problem.via]
     at = 0
@@ -72,12 +73,12 @@ def leg_costs(problem: Problem, a: Floats, b: Floats) -> Floats:
 
 
 def cost_of(problem: Problem, points: Floats) -> float:
-    """Cost of a path, as the problem has it."""
+    """Cost of a path by the problem's objective."""
     return problem.cost(Path(points))
 
 
 def pinned(problem: Problem, points: Floats) -> Floats:
-    """(N, 3) which numbers of a path's points may not change: its ends, and its via points in their order."""
+    """Which coordinates (N, 3) of a path's points are fixed: those of its ends, and of its vias in order."""
     fixed = np.zeros(points.shape, bool)
     fixed[[0, -1]] = True
     at = 0
@@ -92,7 +93,7 @@ def pinned(problem: Problem, points: Floats) -> Floats:
 
 
 def pull(problem: Problem, points: Floats, pieces: int = 40) -> Floats:
-    """The cheapest way over points that lie on the path, its own and such in between; legs exactly clear."""
+    """The cheapest path of clear legs through points on the given path: its own and others at even steps between."""
     for _ in range(3):
         before = cost_of(problem, points)
         fine = _subdivide(points, float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) / pieces)
@@ -123,7 +124,7 @@ def _shortcut(problem: Problem, points: Floats, leg_cost: float = 1e-12) -> Floa
         table = np.full((len(part), len(part)), np.inf)
         table[i[ok], j[ok]] = cost[ok]
         for k in range(1, len(part)):
-            # A hair on every leg, so that points that gain nothing go.
+            # Every leg costs a little extra, so that points that gain nothing are dropped.
             total = best[:k] + table[:k, k] * (1.0 + 1e-12) + leg_cost
             back[k] = int(np.argmin(total))
             best[k] = total[back[k]]
@@ -135,7 +136,7 @@ def _shortcut(problem: Problem, points: Floats, leg_cost: float = 1e-12) -> Floa
 
 
 def simplify(problem: Problem, points: Floats, worth: float = 5e-6) -> Floats:
-    """The same path with fewer points, for not more than about ``worth`` of its cost for each that goes."""
+    """The path with fewer points: each one removed may raise the cost by about ``worth`` of it."""
     few = _shortcut(problem, points, worth * cost_of(problem, points))
     return few if is_feasible(problem, few) else points
 
@@ -143,7 +144,10 @@ def simplify(problem: Problem, points: Floats, worth: float = 5e-6) -> Floats:
 def polish(
     problem: Problem, points: Floats, rng: np.random.Generator, effort: Effort = QUICK, widest: float = 0.02
 ) -> Floats:
-    """Improve a feasible path from wide moves (``widest`` of its length) to fine ones; never worse, always clear."""
+    """Improve a feasible path, by wide moves first (``widest`` of its length), then finer ones.
+
+    The result never costs more and is always clear.
+    """
     until = time.perf_counter() + effort.polish_s
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     wide = widest * length
@@ -161,7 +165,7 @@ def polish(
 
 
 def _refined(points: Floats, length: float, most: int = 40) -> Floats:
-    """More points: on long legs, and on both sides of bends, the sharpest first."""
+    """The path with more points: on long legs, and on both sides of bends, the sharpest bends first."""
     points = _subdivide(points, length / 6.0)
     d = np.diff(points, axis=0)
     legs = np.linalg.norm(d, axis=1)
@@ -172,7 +176,7 @@ def _refined(points: Floats, length: float, most: int = 40) -> Floats:
     out = [points[0]]
     for k in range(1, len(points)):
         a, b = points[k - 1], points[k]
-        # Of a leg between two bends the middle third stays.
+        # A leg between two bends is split in thirds; its middle third stays straight.
         if k - 1 in sharp:
             out.append(a + (b - a) / 3.0)
         if k in sharp:
@@ -182,7 +186,7 @@ def _refined(points: Floats, length: float, most: int = 40) -> Floats:
 
 
 def _improve(problem: Problem, points: Floats, wide: float, rng: np.random.Generator) -> Floats:
-    """Every point tries places about ``wide`` away; the best of all clear combinations."""
+    """Move every point by about ``wide`` (m): the cheapest of all clear combinations of tried places."""
     air, limits = problem.airspace, problem.limits
     n = len(points)
     fixed = pinned(problem, points)
@@ -196,7 +200,7 @@ def _improve(problem: Problem, points: Floats, wide: float, rng: np.random.Gener
     flat = wide * (shifts[None, :, :1] * across[:, None] + shifts[None, :, 1:2] * along[:, None])
     rise = np.broadcast_to(tall * shifts[:, 2:], (n, len(shifts), 1))
     at = points[:, None] + np.concatenate([flat, rise], axis=-1)
-    # As low and as high as the place itself allows, too.
+    # Also try the lowest and the highest legal altitude over the first three places.
     floor = air.floor_amsl(at[:, :3, 0], at[:, :3, 1], limits)
     ceiling = np.minimum(air.ceiling_amsl(at[:, :3, 0], at[:, :3, 1], limits), 1e6)
     lowest, highest = at[:, :3].copy(), at[:, :3].copy()
@@ -208,7 +212,7 @@ def _improve(problem: Problem, points: Floats, wide: float, rng: np.random.Gener
     a = np.broadcast_to(at[:-1, :, None], (n - 1, m, m, 3)).reshape(-1, 3)
     b = np.broadcast_to(at[1:, None], (n - 1, m, m, 3)).reshape(-1, 3)
     cost = np.where(clear(problem, a, b), leg_costs(problem, a, b), np.inf).reshape(n - 1, m, m)
-    cost[:, 0, 0] = leg_costs(problem, points[:-1], points[1:])  # as it is, it was found clear
+    cost[:, 0, 0] = leg_costs(problem, points[:-1], points[1:])  # the path as given is clear already
     total = np.full(m, np.inf)
     total[0] = 0.0
     back = np.zeros((n, m), int)

@@ -1,8 +1,8 @@
-"""Feasible paths found by other means than the planners', as short as patience makes them.
+"""Search for short feasible paths by other means than the planners'.
 
-Whatever passes `Airspace.clear` from start to goal bounds the optimum from above, so no planner's lower bound may lie
-over its cost. Ways come from a lattice in space whose every edge is exactly checked (`routes`), and are made cheaper
-by `tests.oracles.optima_polish`. No code is shared with the planners.
+Any path from start to goal that passes `Airspace.clear` bounds the optimum from above, so no planner's lower bound may
+exceed its cost. Paths come from a lattice in space whose edges all pass the exact check (`routes`), and are made
+cheaper by `tests.oracles.optima_polish`. No code is shared with the planners.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from gcsplan.world.zones import Circle
 from tests.oracles.optima_polish import QUICK, Effort, cost_of, is_feasible, leg_costs, polish, pull
 
 NEAR = 1e-3
-"""How far, in metres, a lattice point lies outside of what it must not touch."""
+"""Distance (m) that lattice points keep from zones, beyond what is required."""
 MOST_LEVELS = 16
-"""Altitudes of a lattice where the climb is limited."""
+"""Altitudes added to a lattice at most where climb or descent is limited."""
 EVERY_NODE = 1500
-"""So many points of the plane are tried where fewer show no way."""
+"""Points of the plane in the second lattice, tried if a smaller one contains no path."""
 
 
 def best_path(problem: Problem, seed: int, effort: Effort = QUICK) -> Floats | None:
@@ -48,7 +48,7 @@ def best_path(problem: Problem, seed: int, effort: Effort = QUICK) -> Floats | N
 
 
 def routes(problem: Problem, rng: np.random.Generator, effort: Effort) -> list[Floats]:
-    """Feasible ways, pulled tight; the first by the cheapest way through the lattice, others where it is dearer."""
+    """Feasible paths, pulled taut: the first from the lattice's true costs, the others from disturbed costs."""
     lattice = Lattice.of(problem, rng, effort)
     out = []
     for k in range(effort.tries):
@@ -61,7 +61,7 @@ def routes(problem: Problem, rng: np.random.Generator, effort: Effort) -> list[F
 
 @dataclass(eq=False)
 class Lattice:
-    """Points in space, and legs between them that are clear. ``stops``: the points of start, each via and goal."""
+    """Points in space and clear legs between them. ``stops``: indices of the points of start, each via and goal."""
 
     problem: Problem
     points: Floats
@@ -72,7 +72,7 @@ class Lattice:
 
     @classmethod
     def of(cls, problem: Problem, rng: np.random.Generator, effort: Effort) -> Lattice:
-        """All nodes of the DEM, or as many of them as the effort allows, saddles, and the borders of zones."""
+        """Build the lattice from nodes of the DEM (all, or as many as the effort allows), saddles and zone borders."""
         air, limits = problem.airspace, problem.limits
         reach = (limits.track_error_m + limits.horizontal_clearance_m) * air.scale
         stops = [problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]]
@@ -109,7 +109,7 @@ class Lattice:
         return out
 
     def _keep_clear(self) -> None:
-        """Each leg both ways, where the exact check passes it."""
+        """Keep each leg, in each direction, that the exact check and the climb limits pass; set the costs."""
         limits = self.problem.limits
         p, q = self.points[self.start], self.points[self.end]
         rise, run = q[:, 2] - p[:, 2], np.hypot(*(q - p)[:, :2].T)
@@ -133,7 +133,7 @@ class Lattice:
         self.costs = np.concatenate([cost[one], cost[other]])
 
     def way(self, rng: np.random.Generator, noise: float) -> Floats | None:
-        """The cheapest way past all stops, costs disturbed smoothly over the plane by about ``noise``."""
+        """The cheapest path through all terminals, with costs disturbed smoothly over the plane by about ``noise``."""
         cost = self.costs
         if noise > 0.0:
             cost = cost * np.exp(noise * self._weather(rng)[self.start])
@@ -162,7 +162,7 @@ class Lattice:
         size = np.ptp(self.points[:, :2], axis=0).max()
         waves = rng.normal(0.0, 2.0 * math.pi * 2.0 / size, (6, 2))
         value = np.sin(self.points[:, :2] @ waves.T + rng.uniform(0.0, 2.0 * math.pi, 6)).sum(axis=1)
-        # And now and then a price on height, either way.
+        # Some draws also make high points dearer or cheaper.
         high = (self.points[:, 2] - self.points[:, 2].min()) / max(float(np.ptp(self.points[:, 2])), 1e-9)
         return np.asarray(value + rng.choice([0.0, 2.0, -2.0]) * high)
 
@@ -180,7 +180,7 @@ def _nodes(surface: Surface, most: int) -> Floats:
 
 
 def _saddles(surface: Surface, most: int) -> Floats:
-    """Saddles of the bilinear surface inside its cells: the passes that nodes alone do not show."""
+    """Saddles of the bilinear surface inside its cells: passes that the nodes alone miss."""
     z = surface.top_m
     a, b, c, d = z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]
     twist = a + d - b - c
@@ -210,14 +210,14 @@ def _borders(problem: Problem, reach: float, spokes: int) -> list[Floats]:
 
 
 def _spacing(plane: Floats) -> Floats:
-    """How far each point of the plane is from its fifth neighbour."""
+    """Distance (m) of each point of the plane to its fifth neighbour."""
     return np.asarray(KDTree(plane).query(plane, k=min(6, len(plane)))[0])[:, -1]
 
 
 def _levels(problem: Problem, low: Floats, high: Floats, rng: np.random.Generator, count: int, step_m: float) -> Floats:
-    """Altitudes that matter (ceiling, ends, tops and bottoms of zones), and others in between.
+    """Altitudes of the lattice: ceiling, ends, tops and bottoms of zones, and others in between.
 
-    Where the climb is limited, near enough to each other to be climbed to within ``step_m``.
+    If the climb is limited, levels are close enough to climb from one to the next within about ``step_m``.
     """
     limits, error = problem.limits, problem.limits.altitude_error_m
     bottom = float(low.min())

@@ -1,8 +1,7 @@
-"""Paths that patience found once, kept beside the tests: each bounds its mission's optimum from above.
+"""Good paths from earlier patient searches, stored with the tests: each bounds its mission's optimum from above.
 
-They prove nothing by being kept: `known` gives a path only if it passes the exact check on the mission as it is made
-today. ``python -m tests.oracles.optima_witnesses --seeds 0 50`` searches again, and keeps what is cheaper than what
-was kept.
+`known` returns a stored path only if it passes the exact check on the mission as it is made today.
+``python -m tests.oracles.optima_witnesses --seeds 0 50`` searches again and stores every cheaper path.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ FILE = DATA / "witnesses.npz"
 
 @cache
 def kept() -> Mapping[tuple[str, int], Floats]:
-    """All paths in the file, by family and seed."""
+    """All stored paths, by family and seed."""
     out = {}
     if FILE.exists():
         with np.load(FILE) as file:
@@ -41,13 +40,13 @@ def kept() -> Mapping[tuple[str, int], Floats]:
 
 
 def known(family: str, seed: int, case: Case) -> Floats | None:
-    """The path kept for a mission, if it is legal there."""
+    """The path stored for a mission if it is legal there, else None."""
     points = kept().get((family, seed))
     return points if points is not None and is_feasible(case.problem, points) else None
 
 
 def search(family: str, seed: int) -> Floats | None:
-    """The cheapest of what was kept, of a patient search, and of the planner's own path made cheaper."""
+    """The cheapest of three paths: the stored one, a patient search's, and the planner's own after polishing."""
     case = make(family, seed)
     p = case.problem
     found = [known(family, seed, case), best_path(p, seed, PATIENT)]
@@ -61,7 +60,7 @@ def search(family: str, seed: int) -> Floats | None:
 
 
 def write(paths: Mapping[tuple[str, int], Floats]) -> None:
-    """Keep paths."""
+    """Write all paths to the file."""
     out: dict[str, NDArray[np.generic]] = {}
     for family in FAMILIES:
         numbers = sorted(seed for name, seed in paths if name == family)

@@ -1,8 +1,8 @@
-"""Small random missions, by family and seed, on which planners are held to independent optima.
+"""Small random missions, by family and seed, for comparing planners with independent optima.
 
-Every family aims at one trap: discs whose optimum is known exactly; cylinders to pass over, under or around; ground
-whose pass is exactly as high as the ceiling; climb limits; bands over the ground; clearances and errors; rasters that
-are turned, in degrees, or have holes; via points.
+Each family has one difficulty: discs whose optimum is known exactly; cylinders to pass over, under or around; ground
+whose pass is exactly as high as the ceiling; climb limits; a maximum AGL; clearances and errors; rasters that are
+turned, in degrees, or have holes; via points.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ Kind = tuple[bool, bool]
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A mission; the true map of its raster, for brute force; discs (N, 3) where they alone decide, else None."""
+    """A mission. ``ground`` has the true map of its raster, for brute force; ``discs`` (N, 3) of x, y, radius are all
+    its obstacles, or None if there are others."""
 
     name: str
     problem: Problem
@@ -53,7 +54,7 @@ class Case:
 
 
 def smooth(rng: np.random.Generator, rows: int, cols: int, height_m: float, waves: int = 10) -> Floats:
-    """A smooth random ground from 0 to ``height_m``."""
+    """Smooth random ground (rows, cols) from 0 to ``height_m``."""
     y, x = np.mgrid[0:rows, 0:cols] / max(rows, cols)
     z = np.zeros((rows, cols))
     for _ in range(waves):
@@ -73,7 +74,7 @@ def plane_ground(heights: Floats, dx_m: float, dy_m: float) -> Ground:
 
 
 def hills(rng: np.random.Generator, height_m: float | None = None, whole: bool = False) -> Ground:
-    """18 to 35 nodes a side, 20 to 50 m apart; one in six is noise with towers."""
+    """Ground of 18 to 35 nodes a side, 20 to 50 m apart; one in six is noise with towers."""
     rows, cols = (int(n) for n in rng.integers(18, 36, 2))
     height_m = float(rng.uniform(30.0, 250.0)) if height_m is None else height_m
     z = smooth(rng, rows, cols, height_m)
@@ -84,7 +85,7 @@ def hills(rng: np.random.Generator, height_m: float | None = None, whole: bool =
 
 
 def pass_height(z: Floats, a: tuple[int, int], b: tuple[int, int]) -> float:
-    """Lowest ceiling under which the bilinear surface lets one go from node to node, exactly."""
+    """The exact height of the lowest pass between two nodes (row, column) of the bilinear surface."""
     rows, cols = z.shape
     index = np.arange(rows * cols).reshape(rows, cols)
     corners = [z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]]
@@ -102,7 +103,7 @@ def pass_height(z: Floats, a: tuple[int, int], b: tuple[int, int]) -> float:
     weight = np.maximum(height[i], height[j])
     least = float(weight.min())
     tree = minimum_spanning_tree(csr_array((weight - least + 1.0, (i, j)), shape=(len(height),) * 2)).tocoo()
-    # The tree's edges by height join the two ends at the pass.
+    # Adding the tree's edges in order of height, the two ends become connected at the pass.
     parent = np.arange(len(height))
 
     def root(k: int) -> int:
@@ -162,7 +163,7 @@ def mission(
     rng: np.random.Generator, name: str, ground: Ground, found: list[Zone], limits: Limits,
     surface: Surface | None = None, scale: float = 1.0, least: float = 0.45,
 ) -> Case | None:  # fmt: skip
-    """Legal ends far apart, a random objective; None where none are found soon."""
+    """A mission with legal ends far apart and a random objective; None if 60 draws find no such ends."""
     air = Airspace(surface or Surface(ground.heights, ground.heights, ground.grid), found, scale=scale)
     west, south, east, north = ground.box
     low, high = np.array([west, south]), np.array([east, north])
@@ -196,7 +197,7 @@ def angles(rng: np.random.Generator) -> dict[str, float]:
 
 
 def discs(rng: np.random.Generator) -> Case | None:
-    """Unlimited zones over flat ground, far from the border: the optimum is exact."""
+    """Zones without floor and ceiling over flat ground, far from the border: the optimum is known exactly."""
     ground = plane_ground(np.zeros((5, 5)), 1000.0, 1000.0)
     count = int(rng.integers(1, 16))
     d = np.column_stack([rng.uniform(1300.0, 2700.0, (count, 2)), rng.uniform(20.0, 220.0, count)])
@@ -215,7 +216,7 @@ def discs(rng: np.random.Generator) -> Case | None:
 
 
 def fences(rng: np.random.Generator) -> Case | None:
-    """A row of discs across the way, whose gaps are anything from wide to a millimetre, or not there at all."""
+    """A row of discs across the straight track, with gaps from 10 m to a millimetre, or overlaps."""
     ground = plane_ground(np.zeros((5, 5)), 1000.0, 1000.0)
     count = int(rng.integers(4, 14))
     radius = rng.uniform(5.0, 60.0, count)
@@ -231,7 +232,7 @@ def fences(rng: np.random.Generator) -> Case | None:
 
 
 def cylinders(rng: np.random.Generator) -> Case | None:
-    """Cylinders and prisms with levels over flat ground: over, under or around, whichever is best."""
+    """Cylinders and prisms with floors and ceilings over flat ground: the best path goes over, under or around."""
     ground = plane_ground(np.full((9, 9), float(rng.choice([0.0, 37.5]))), 150.0, 150.0)
 
     def levels() -> tuple[Level | None, Level | None]:
@@ -253,7 +254,7 @@ def cylinders(rng: np.random.Generator) -> Case | None:
 
 
 def mountains(rng: np.random.Generator) -> Case | None:
-    """Smooth ground under a ceiling that shuts much of it; zones of every kind."""
+    """Smooth ground, much of which rises above the highest legal altitude; zones of every kind."""
     ground = hills(rng)
     top = float(ground.heights.max())
 
@@ -267,7 +268,7 @@ def mountains(rng: np.random.Generator) -> Case | None:
 
 
 def passes(rng: np.random.Generator) -> Case | None:
-    """A ceiling that equals the pass between start and goal to the last bit, or lies a hair beside it."""
+    """A ceiling that equals the pass between start and goal to the last bit, or lies 1 mm or 0.5 m above it."""
     whole = bool(rng.random() < 0.7)
     ground = hills(rng, whole=whole)
     z = ground.heights
@@ -292,7 +293,7 @@ def passes(rng: np.random.Generator) -> Case | None:
 
 
 def climbs(rng: np.random.Generator) -> Case | None:
-    """Climb and descent limits that bind, over hills, now and then with zones to climb over."""
+    """Climb and descent limits that bind over hills, sometimes with zones to climb over."""
     ground = hills(rng, float(rng.uniform(40.0, 200.0)))
     top = float(ground.heights.max())
     found = zones(rng, ground, int(rng.choice([0, 3])), lambda: (None, level(rng, top)))
@@ -303,8 +304,8 @@ def climbs(rng: np.random.Generator) -> Case | None:
 
 
 def storeys(rng: np.random.Generator) -> Case | None:
-    """Zones in mid-air over hills, under which there is no way in some places, and over which there is none in others,
-    under climb and descent limits."""
+    """Zones in mid-air over hills, with climb and descent limits: in some places no path fits below a zone, in others
+    none above it."""
     ground = hills(rng, float(rng.uniform(60.0, 200.0)))
     top = float(ground.heights.max())
 
@@ -321,7 +322,7 @@ def storeys(rng: np.random.Generator) -> Case | None:
 
 
 def bands(rng: np.random.Generator) -> Case | None:
-    """A largest height over ground, with and without climb limits."""
+    """A maximum height above ground, with and without climb limits."""
     ground = hills(rng, float(rng.uniform(20.0, 150.0)))
     found = zones(rng, ground, int(rng.choice([0, 3])), lambda: (None, None))
     limits = Limits(
@@ -331,7 +332,7 @@ def bands(rng: np.random.Generator) -> Case | None:
 
 
 def clearances(rng: np.random.Generator) -> Case | None:
-    """Clearance from terrain and zones, errors of track and altitude, things on the ground, a stretched plane."""
+    """Clearance from terrain and zones, track and altitude errors, trees on the ground, a plane with scale over 1."""
     ground = hills(rng, float(rng.uniform(30.0, 150.0)))
     top = float(ground.heights.max())
     surface = Surface(ground.heights, ground.heights, ground.grid)
@@ -355,7 +356,7 @@ def clearances(rng: np.random.Generator) -> Case | None:
 
 
 def rasters(rng: np.random.Generator) -> Case | None:
-    """Rasters turned against the plane or in degrees, and holes in the data."""
+    """Rasters turned against the plane, in degrees, or with holes in the data."""
     rows, cols = (int(n) for n in rng.integers(18, 30, 2))
     z = smooth(rng, rows, cols, float(rng.uniform(30.0, 200.0)))
     kind = int(rng.integers(0, 3))
@@ -382,7 +383,7 @@ def rasters(rng: np.random.Generator) -> Case | None:
 
 
 def stops(rng: np.random.Generator) -> Case | None:
-    """One or two via points, with and without a height."""
+    """One or two via points, with and without an altitude."""
     case = rng.choice([mountains, cylinders, climbs])(rng)
     if case is None:
         return None
@@ -400,7 +401,7 @@ def stops(rng: np.random.Generator) -> Case | None:
 
 
 def borders(rng: np.random.Generator) -> Case | None:
-    """The map's border is a wall: zones that reach beyond it, ends beside it."""
+    """Zones that reach beyond the map's border, which no path may cross."""
     ground = plane_ground(np.zeros((12, 12)) if rng.random() < 0.5 else smooth(rng, 12, 12, 60.0), 60.0, 60.0)
     size = ground.box[2]
     reach = float(rng.uniform(0.5, 1.02)) * size
@@ -418,7 +419,7 @@ def borders(rng: np.random.Generator) -> Case | None:
 
 
 def pockets(rng: np.random.Generator) -> Case | None:
-    """A long way out of a pocket to ground that is near and high: who climbs on the way there gets over it."""
+    """A wall just before a ridge: the detour around the wall is long enough to climb over the ridge on the way."""
     size, step = 1200.0, 30.0
     n = round(size / step) + 1
     east, _ = np.meshgrid(np.linspace(0.0, size, n), np.linspace(size, 0.0, n))
@@ -456,7 +457,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case | None]] = {
 
 
 def make(family: str, seed: int) -> Case:
-    """The ``seed``-th mission of a family; few of them have nothing in the way."""
+    """Mission number ``seed`` of a family; few missions are solved by straight legs."""
     rng = np.random.default_rng([*family.encode(), seed])
     while True:
         case = FAMILIES[family](rng)
@@ -465,7 +466,7 @@ def make(family: str, seed: int) -> Case:
 
 
 def _open(p: Problem) -> bool:
-    """Whether one straight leg from stop to stop will do."""
+    """Whether straight legs from terminal to terminal are clear."""
     heights = np.array([p.start[2], *(np.nan if v.amsl_m is None else v.amsl_m for v in p.via), p.goal[2]])
     flat = np.array([p.start[:2], *((v.east_m, v.north_m) for v in p.via), p.goal[:2]])
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])

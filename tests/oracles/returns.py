@@ -1,4 +1,4 @@
-"""Brute force for the way home: dense points on a mission, dense samples along each return; shares no code with it."""
+"""A brute-force check of returns: dense samples along the return from a point of a mission; shares no code with it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CONE = {Autopilot.ARDUCOPTER: 3.0, Autopilot.PX4: 1.0}
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A world, a vehicle, a mission in it, and its corners in the plane: home, up, along, down."""
+    """A world, a vehicle, and its mission. ``corners`` (N, 3): home, top of the take-off, way points, landing."""
 
     world: World
     oracle: Oracle
@@ -36,7 +36,7 @@ class Case:
 
 
 def wide_ground(rng: np.random.Generator) -> Ground:
-    """Room enough for a circle over home."""
+    """Ground wide enough for a circle over home."""
     rows, cols = (int(n) for n in rng.integers(10, 16, 2))
     dx, dy = rng.uniform(60.0, 120.0, 2)
     north = (rows - 1) * dy
@@ -47,11 +47,11 @@ def wide_ground(rng: np.random.Generator) -> Ground:
 
 
 def random_case(rng: np.random.Generator, autopilot: Autopilot) -> Case | None:
-    """A small rough world and a mission of a few legs in it; None where home is unknown."""
+    """A small rough world with a mission of a few legs; None if the ground at home is unknown."""
     plane = autopilot is Autopilot.ARDUPLANE
     ground = wide_ground(rng) if plane else (in_plane, turned)[int(rng.integers(0, 2))](rng)
     flat = rng.random() < 0.5
-    if flat:  # enough for zones to be what is in the way
+    if flat:  # so flat that only zones are obstacles
         ground = replace(ground, heights=0.04 * np.nan_to_num(ground.heights, nan=20.0))
     limits = replace(random_limits(rng, ground), max_climb_deg=90.0, max_descent_deg=90.0)
     if rng.random() < 0.4:
@@ -68,7 +68,7 @@ def random_case(rng: np.random.Generator, autopilot: Autopilot) -> Case | None:
     )
     reach = limits.track_error_m + limits.horizontal_clearance_m + 1.0
     zones = [z for _ in range(4 if flat else 1) for z in random_zones(rng, ground, 4)]
-    if rng.random() < 0.8:  # not all of them shut in at home
+    if rng.random() < 0.8:  # mostly no zone near home, which would make every return unsafe
         zones = [z for z in zones if _away(z, en[0]) > reach]
     surface = surface_of(rng, ground)
     scale = float(rng.choice([1.0, 1.0005]))
@@ -99,14 +99,14 @@ def random_case(rng: np.random.Generator, autopilot: Autopilot) -> Case | None:
         down = float(surface.ground_at(*corners[-1, :2]))
         if not math.isnan(down):
             corners = np.vstack([corners, [*corners[-1, :2], down]])
-    if plane:  # its columns are not judged
+    if plane:  # a VTOL plane's landing column is not judged
         corners = corners[: len(up) + 1]
     oracle = oracle_of(surface, ground, zones, scale, step_m=max(0.4, 0.15 * ground.cell_m))
     return Case(world, oracle, vehicle, mission, corners, float(rng.uniform(2.0, 60.0 if flat else 160.0)))
 
 
 def _away(zone: Zone, place: Floats) -> float:
-    """How far a zone's surrounding circle lies from a place, about."""
+    """The approximate distance (m) from a place to a zone's surrounding circle."""
     if isinstance(zone.shape, Circle):
         middle, radius = np.array([zone.shape.east_m, zone.shape.north_m]), zone.shape.radius_m
     else:
@@ -116,14 +116,14 @@ def _away(zone: Zone, place: Floats) -> float:
 
 
 def _stored(z: float, autopilot: Autopilot) -> float:
-    """Whole centimetres, cut towards zero, on ArduPilot."""
+    """The stored altitude: on ArduPilot truncated to whole centimetres."""
     return z if autopilot is Autopilot.PX4 else math.trunc(float(np.float32(z) * np.float32(100.0))) / 100.0
 
 
 def breach(case: Case, at: Floats, *, legal: bool, more_m: float = 0.0, lift_m: float = 0.0) -> str:
-    """What the return from ``at`` (east, north, AMSL) meets, or nothing.
+    """What the return from ``at`` (east, north, AMSL) breaks; empty if nothing.
 
-    ``more_m``: how much farther than demanded is looked beside the way, ``lift_m`` likewise in height.
+    ``legal``: judge AGL and AMSL limits too; ``more_m``, ``lift_m``: metres added to track and altitude error.
     """
     limits, oracle, home = case.vehicle.limits, case.oracle, case.corners[0]
     if legal and (found := breach(case, at, legal=False, more_m=more_m, lift_m=lift_m)):
@@ -147,7 +147,7 @@ def breach(case: Case, at: Floats, *, legal: bool, more_m: float = 0.0, lift_m: 
 
 
 def _ways(case: Case, at: Floats, level: float, *, cone: bool) -> list[tuple[Floats, Floats, bool]]:
-    """Straight pieces (start, end, column) of ways that the autopilot may take from ``at``."""
+    """Straight pieces (start, end, column) of the returns that the autopilot may fly from ``at``."""
     home, away = case.corners[0], math.hypot(*(at[:2] - case.corners[0][:2]))
 
     def point(en: Floats, amsl: float) -> Floats:
@@ -167,7 +167,7 @@ def _ways(case: Case, at: Floats, level: float, *, cone: bool) -> list[tuple[Flo
     if near:
         return circle
     climb = case.vehicle.climb_m_s / case.vehicle.speed_max_m_s
-    if at[2] >= level:  # down at once, late, or all along
+    if at[2] >= level:  # it may descend at once, at the end, or all along
         lines = [(point(at, level), over), (point(at, at[2]), point(home, at[2])), (at, over)]
         return circle + [(a, b, False) for a, b in lines]
     part = min((level - at[2]) / climb / away, 1.0)
