@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Plan a fleet, rehearse it, upload it to all vehicles at once, and say when to start each of them.
+"""Plan a fleet, rehearse it, upload it to all vehicles at once, and print when to start each of them.
 
     python missions/upload_fleet.py missions/fleet-4.yaml sim
 
-WHERE is as of `gcsplan plan --upload`: a URL for all vehicles, `link` (the mission file's links), `sim`, or NAME=URL.
-Nothing goes out unless the rehearsal went well; if one vehicle does not take its mission, no vehicle keeps one.
+The second argument is that of `gcsplan plan --upload`: a URL for all vehicles, `link` (the links of the mission file),
+`sim`, or NAME=URL. Nothing is sent unless the rehearsal succeeds; if one vehicle refuses its mission, none keeps one.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from gcsplan.errors import GcsplanError
 
 
 def main(mission_file: str, where: str) -> int:
-    """Exit code: 0 if every mission is on board and verified."""
+    """Plan, rehearse, upload; return the exit code, 0 if every mission is on board and verified."""
     try:
         planned = plan(load_mission(mission_file))
         rehearsed = rehearse(planned)

@@ -1,7 +1,7 @@
-"""Examples are drawn the same way in every run, so that what fails once fails again; each may take its time.
+"""Settings of the whole suite: reproducible random examples without a time limit, and plans without a clock.
 
-So may a plan: here counted work alone ends it, so that its path is the same on a busy machine. A test of the clock
-uses the fixture `clock`.
+Hypothesis draws the same examples in every run, so a failure repeats. Plans end by counted work alone, so a path is
+the same on a busy machine. A test of the clock itself uses the fixture `clock`.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Workers read the tests at different places first, so that each file's assertions are rewritten once.
+    """Let each worker import the test files from a different place on, so that pytest rewrites each file only once.
 
-    Every worker collects all tests in the same order: without this, all of them would rewrite the same file at the same
-    time, which costs more than all imports. What one has rewritten the others find in the cache of byte code.
+    Workers collect all tests in the same order. Without this, all of them would rewrite the same file at the same time,
+    which costs more than all imports. A worker finds the files that others have rewritten in the byte code cache.
     """
     whole = session.config.args_source is pytest.Config.ArgsSource.TESTPATHS
     worker, workers = (os.environ.get(f"PYTEST_XDIST_WORKER{name}") for name in ("", "_COUNT"))
@@ -43,13 +43,16 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     files = sorted(path for folder in ("tests", "sitl_tests") for path in Path(top, folder).rglob("test_*.py"))
     first = len(files) * int(worker.removeprefix("gw")) // int(workers)
     for path in (*files[first:], *files[:first]):
-        with contextlib.suppress(Exception, pytest.skip.Exception):  # collecting it says what is wrong
+        with contextlib.suppress(Exception, pytest.skip.Exception):  # collection reports the error later
             importlib.import_module(".".join(path.relative_to(top).with_suffix("").parts))
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
-    """Parameters after the first are slow, where a test says so; what was run with a part of its draws is slow, too."""
+    """Mark tests as slow: with the mark ``first_quick`` all parameters but the first; in a full run all random tests.
+
+    The quick suite runs those random tests too, with a part of their draws.
+    """
     seen: set[str] = set()
     for item in items:
         test = item.nodeid.partition("[")[0]
@@ -64,7 +67,7 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def counted_work_alone() -> Iterator[None]:
-    """No plan of this process is stopped by the clock."""
+    """Let no plan of this process be stopped by the clock."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Budget, "deadline_s", math.inf)
         yield
@@ -72,5 +75,5 @@ def counted_work_alone() -> Iterator[None]:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The clock stops a plan, as everywhere but in tests."""
+    """Let the clock stop plans, as it does outside of tests."""
     monkeypatch.setattr(Budget, "deadline_s", _BY_THE_CLOCK)

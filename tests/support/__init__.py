@@ -1,1 +1,1 @@
-"""Worlds, bad links and other things that tests share."""
+"""Worlds, bad links and other helpers that tests share."""

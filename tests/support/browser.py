@@ -1,4 +1,4 @@
-"""A headless Chromium for tests, spoken to over two pipes: no port, no driver, no other package."""
+"""A headless Chromium for tests, controlled over two pipes: no port, no driver, no other package."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ os.dup2(ends[0], 3)
 os.dup2(ends[1], 4)
 os.execv(sys.argv[3], sys.argv[3:])
 """
-"""Chromium reads commands from descriptor 3 and answers on 4."""
+"""A program that makes the two pipes Chromium's file descriptors 3 (commands) and 4 (answers), then starts it."""
 
 
 def find() -> str | None:
-    """The browser's program: what GCSPLAN_CHROMIUM names, or the first of the usual names; None where there is none."""
+    """The browser's executable: GCSPLAN_CHROMIUM, or the first of the usual names found; None if there is none."""
     named = os.environ.get("GCSPLAN_CHROMIUM")
     return named or next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
 class Browser:
-    """One page of one browser. ``events`` holds everything it said of itself since the last `visit`."""
+    """One page of one browser. ``events`` holds the events it has sent since the last `visit`."""
 
     def __init__(self, program: str, home: Path) -> None:
         to_browser, self._write = os.pipe()
@@ -65,7 +65,7 @@ class Browser:
             raise
 
     def close(self) -> None:
-        """End the browser."""
+        """Stop the browser."""
         with contextlib.suppress(OSError, AssertionError):
             self._send("Browser.close", {})
         os.close(self._write)
@@ -77,7 +77,7 @@ class Browser:
         os.close(self._read)
 
     def ask(self, method: str, **params: Any) -> dict[str, Any]:
-        """Send a command and wait for its answer."""
+        """Send a command and return its result; events that arrive meanwhile are kept."""
         number = self._send(method, params)
         until = time.monotonic() + ANSWER_S
         while True:
@@ -112,11 +112,11 @@ class Browser:
         self.settle()
 
     def settle(self) -> None:
-        """Wait for two frames: what was asked for is drawn then."""
+        """Wait for two animation frames, after which all requested changes are drawn."""
         self.evaluate("new Promise((r) => requestAnimationFrame(() => requestAnimationFrame(() => r(1))))")
 
     def point(self, x: float, y: float) -> None:
-        """Move the mouse to a place of the window."""
+        """Move the mouse to a point of the window."""
         for part in (0.98, 1.0):
             self.ask("Input.dispatchMouseEvent", type="mouseMoved", x=x * part, y=y * part)
         self.settle()
@@ -126,7 +126,7 @@ class Browser:
         return base64.b64decode(self.ask("Page.captureScreenshot", format="png")["data"])
 
     def complaints(self) -> list[str]:
-        """Errors and warnings of the page since it was opened, and every address that it asked for beside itself."""
+        """Errors and warnings of the page since it was opened."""
         told = []
         for event in self.events:
             name, params = event.get("method"), event.get("params", {})
@@ -139,7 +139,7 @@ class Browser:
         return told
 
     def requests(self) -> list[str]:
-        """Every address that was asked for since the page was opened, but those that hold their own data."""
+        """Every URL that the page has requested since it was opened, except ``data:`` URLs."""
         sent = [e["params"]["request"]["url"] for e in self.events if e.get("method") == "Network.requestWillBeSent"]
         return [url for url in sent if not url.startswith("data:")]
 
@@ -165,7 +165,7 @@ class Browser:
 
 @contextlib.contextmanager
 def browser(program: str, home: Path) -> Iterator[Browser]:
-    """A browser that is closed at the end."""
+    """Start a browser; close it at the end of the context."""
     made = Browser(program, home)
     try:
         yield made

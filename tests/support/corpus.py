@@ -1,4 +1,4 @@
-"""Mission files as other people's programs write them, clean ones and ones with one thing wrong each; made, not kept.
+"""Mission files as other programs write them, generated on demand: clean ones, and ones with a single fault each.
 
 The world: ground at 400 m with a hill of 300 m in its middle, a tower in the east without height limits, and a wood in
 the west up to 80 m above ground. Places are metres east and north of the middle.
@@ -17,7 +17,7 @@ import rasterio
 from rasterio.transform import Affine
 
 LAT, LON = 47.0, 8.0
-NORTH_M, EAST_M = 111_177.0, 76_056.0  # metres in a degree here
+NORTH_M, EAST_M = 111_177.0, 76_056.0  # metres per degree at this place
 GROUND_M = 400.0
 HOME = (-4000.0, -2000.0)
 HALF_DEG = 0.06
@@ -33,7 +33,7 @@ DELAY, JUMP, SPEED, ROI, CAMERA, CONDITION = 93, 177, 178, 195, 206, 112
 
 @dataclass(frozen=True)
 class Item:
-    """One item; ``east_m`` None has no place; ``target`` is the item that a jump leads to, by its index."""
+    """One item. ``east_m`` None: it has no position; ``target``: index of the item that a jump leads to."""
 
     command: int
     east_m: float | None = None
@@ -45,13 +45,13 @@ class Item:
 
     @property
     def place(self) -> tuple[float, float]:
-        """Degrees; 0, 0 without a place."""
+        """Latitude and longitude; 0, 0 for an item without a position."""
         return (0.0, 0.0) if self.east_m is None else degrees(self.east_m, self.north_m)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A mission; ``kinds``: what is wrong with it (nothing: it is clean), ``at``: the indices of the items at fault."""
+    """A mission. ``kinds``: its expected findings (empty: it is clean); ``at``: indices of the items at fault."""
 
     name: str
     items: tuple[Item, ...]
@@ -61,12 +61,12 @@ class Case:
 
 
 def degrees(east_m: float, north_m: float) -> tuple[float, float]:
-    """Latitude and longitude."""
+    """Latitude and longitude of a place in metres."""
     return LAT + north_m / NORTH_M, LON + east_m / EAST_M
 
 
 def to(east: float, north: float, z: float = 120.0, command: int = WAYPOINT, **more: Any) -> Item:
-    """A way point, or what flies to a place."""
+    """An item at a place; a way point unless another command is named."""
     return Item(command, east, north, z, **more)
 
 
@@ -78,7 +78,7 @@ DOWN = to(-2000, 2000, 0.0, LAND)
 
 
 def write_world(folder: Path) -> tuple[str, str]:
-    """A DEM and a file of zones; their names."""
+    """Write the DEM and the file of zones; return their names."""
     n = 161
     axis = np.linspace(-HALF_DEG, HALF_DEG, n)
     east, north = np.meshgrid(axis * EAST_M, axis[::-1] * NORTH_M)
@@ -104,7 +104,7 @@ def write_world(folder: Path) -> tuple[str, str]:
 
 
 def cases() -> list[Case]:
-    """Clean missions, and each with one thing planted."""
+    """Clean missions, then missions with one planted fault each."""
     round_it = (UP, A, B, C, D, E, F, G, DOWN)
 
     def planted(name: str, items: tuple[Item, ...], kinds: str, *at: int, only: str = "") -> Case:
@@ -156,14 +156,14 @@ def cases() -> list[Case]:
         planted("jump_through_zone", (UP, A, B, C, D, E, jump(3, 1.0), F, G, DOWN), "zone", 3),
         planted("jump_for_ever", (UP, A, B, C, D, E, jump(3, -1.0), F, G, DOWN), "zone unreachable", 3, 7,
                 only="copter"),
-        planted("circle_into_zone", turns(400.0), "zone", 4, 5, only="copter"),  # the circle may be left anywhere
+        planted("circle_into_zone", turns(400.0), "zone", 4, 5, only="copter"),  # it may leave the circle at any point
         planted("curve_into_zone", spline(0.0), "zone", 4, only="copter"),
         planted("home_over_hill", (UP, A, B, C, D, to(4000, 2000), home), "min_agl terrain_clearance", 6),
         planted("low_take_off", (to(*HOME, 50.0, TAKEOFF), A, B, C, D, E, F, G, DOWN), "min_agl", 1),
     ]  # fmt: skip
 
 
-# -- the writers' manners ---------------------------------------------------------------------------------------------
+# -- writers: one for each program's file style -----------------------------------------------------------------------
 
 
 def _rows(items: tuple[Item, ...], first: int) -> list[tuple[int, Item, tuple[float, float, float, float]]]:
@@ -189,33 +189,33 @@ def _home_row(number: Callable[[float], str]) -> str:
 
 
 def qgroundcontrol(items: tuple[Item, ...]) -> str:
-    """TABs, LF, home in front, many decimals."""
+    """QGroundControl's style: TABs, LF, home first, many decimals."""
     return "\n".join(_text(items, _home_row("{:.15g}".format), "{:.15g}".format)) + "\n"
 
 
 def qgroundcontrol_120(items: tuple[Item, ...]) -> str:
-    """The header of old, without a home."""
+    """QGroundControl's style with the version 120 header, without a home."""
     return "\n".join(_text(items, None, "{:.12g}".format, "120")) + "\n"
 
 
 def mission_planner(items: tuple[Item, ...]) -> str:
-    """A blank home, comments, blank lines, eight decimals, CRLF."""
+    """Mission Planner's style: a home of zeros, comments, blank lines, eight decimals, CRLF."""
     lines = _text(items, "0\t1\t0\t0\t0\t0\t0\t0\t0.000000\t0.000000\t0.000000\t1", "{:.8f}".format)
     return "\r\n".join([lines[0], "# saved by hand", *lines[1:3], "", "# and on", *lines[3:], ""])
 
 
 def mavproxy(items: tuple[Item, ...]) -> str:
-    """Six decimals."""
+    """MAVProxy's style: six decimals."""
     return "\n".join(_text(items, _home_row("{:f}".format), "{:f}".format)) + "\n"
 
 
 def spaces_and_a_mark(items: tuple[Item, ...]) -> str:
-    """A byte order mark, spaces for TABs, CRLF: what an editor or a spreadsheet leaves."""
+    """A byte order mark, spaces for TABs, CRLF: the result of saving from an editor or a spreadsheet."""
     return "\ufeff" + qgroundcontrol(items).replace("\t", "  ").replace("\n", "\r\n")
 
 
 def plan(items: tuple[Item, ...], firmware: int = 3, *, survey: bool = False) -> str:
-    """QGroundControl's JSON: null for what is not given, altitudes twice; ``survey``: way points in a complex item."""
+    """QGroundControl's JSON: null for missing numbers, altitudes twice; ``survey``: way points in a complex item."""
     entries: list[dict[str, Any]] = []
     for number, item, params in _rows(items, 1):
         lat, lon = item.place
@@ -230,7 +230,7 @@ def plan(items: tuple[Item, ...], firmware: int = 3, *, survey: bool = False) ->
             for key in ("AMSLAltAboveTerrain", "Altitude", "AltitudeMode"):
                 del entry[key]
         entries.append(entry)
-    if survey:  # what lies between the first way point and the last three
+    if survey:  # the items between the first way point and the last three items
         inner = entries[2:-3]
         style = {"CameraCalc": {"version": 1}, "Items": inner, "version": 1, "Refly90Degrees": False}
         entries[2:-3] = [
@@ -266,14 +266,14 @@ PX4: dict[str, tuple[str, Callable[[tuple[Item, ...]], str]]] = {"px4": ("plan",
 
 
 def write(folder: Path, manners: dict[str, tuple[str, Callable[[tuple[Item, ...]], str]]]) -> dict[str, Case]:
-    """A file for each case in each manner that can say it; path to case."""
+    """Write a file for each case in each style that can express it; return path to case."""
     written: dict[str, Case] = {}
     for manner, (ending, text) in manners.items():
         for case in cases():
             if case.only not in ("", "px4" if manner == "px4" else "copter"):
                 continue
             if manner == "survey" and (len(case.items) < 8 or any(i.command == JUMP for i in case.items)):
-                continue  # too few to put some inside; and what is inside has no number of its own to jump to
+                continue  # too few items for a survey, or a jump: items inside a survey have no number to jump to
             file = folder / f"{manner}-{case.name}.{ending}"
             file.write_bytes(text(case.items).encode())
             written[str(file)] = case

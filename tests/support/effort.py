@@ -1,22 +1,22 @@
-"""How much random tests try: a part of their draws in the quick suite, all of them under ``-m slow``.
+"""The number of draws of random tests: a part of them in the quick suite, all of them under ``-m slow``.
 
-Tests of hypothesis run in both suites; so does a test with the mark ``draws``, which takes its number from here.
+Hypothesis tests run in both suites; so do tests with the mark ``draws``, which take their number of draws from here.
 """
 
 from __future__ import annotations
 
 PART, LEAST = 8, 6
-"""The quick suite takes every eighth draw, and six where there are so many."""
+"""The quick suite takes an eighth of the draws, but at least six (all of them if there are fewer)."""
 
 full = True
-"""Whether this run takes them all; `tests.conftest` says so before tests are collected."""
+"""Whether this run takes all draws; `tests.conftest` sets it before tests are collected."""
 
 
 def draws(count: int) -> int:
-    """How many of ``count`` draws this run takes."""
+    """The number of draws that this run takes out of ``count``."""
     return count if full else max(min(count, LEAST), count // PART)
 
 
 def worlds(count: int) -> int:
-    """How many of ``count`` random worlds, each of which takes long to make, this run takes: all or one."""
+    """The number of random worlds, which are slow to make, that this run takes out of ``count``: all or one."""
     return count if full else 1

@@ -1,4 +1,4 @@
-"""Uploads of the command line on links where answers come at once or never, so that nobody need wait long for one."""
+"""Short timeouts for command line uploads in tests, where answers come at once or never."""
 
 from __future__ import annotations
 
@@ -14,6 +14,6 @@ _OPTIONS = session.SessionOptions
 
 
 def be_impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Listen for rivals, of whom there are none, and wait for answers of vehicles in this process, but shortly."""
+    """Listen only 0.1 s for a second vehicle with the same system id, and wait 0.3 s for each response."""
     monkeypatch.setattr(uploads, "LISTEN_S", 0.1)
     monkeypatch.setattr(session, "SessionOptions", partial(_OPTIONS, timers=Timers(response_s=0.3)))

@@ -1,7 +1,7 @@
-"""A bad link in simulated time: packets between a machine and a vehicle are lost, doubled, held up and overtaken.
+"""A bad link in simulated time: packets between a machine and a vehicle are lost, duplicated, delayed and reordered.
 
-Everything comes from one seed; nothing sleeps. The two ends need ``receive(packet, now)``, ``deadline`` and
-``on_timer(now)``; the machine also ``start(now)``.
+All randomness comes from one seed; nothing sleeps. Both ends need ``receive(packet, now)``, ``deadline`` and
+``on_timer(now)``; the machine also needs ``start(now)``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from gcsplan.mavlink.protocol.messages import Packet
 
 @dataclass(frozen=True)
 class Weather:
-    """Probabilities for each packet, either way; delays in seconds. A held-up packet is overtaken by later ones."""
+    """Probabilities for each packet in either direction; delays in seconds. Later packets overtake held-up ones."""
 
     loss: float = 0.0
     duplicate: float = 0.0
@@ -39,7 +39,7 @@ class End(Protocol):
 
 
 class Machine(End, Protocol):
-    """The end that begins."""
+    """The end that starts the exchange."""
 
     def start(self, now: float) -> list[Packet]: ...
 

@@ -1,4 +1,4 @@
-"""Where files lie that tests read."""
+"""Folders of files that tests read."""
 
 from __future__ import annotations
 

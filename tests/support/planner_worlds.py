@@ -1,4 +1,4 @@
-"""Worlds for the planner's tests, and a judge by brute force that shares nothing with `Airspace`."""
+"""Worlds for the planner's tests, and a brute-force check of paths that shares no code with `Airspace`'s check."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def ground(
 
 @cache
 def jacksboro() -> Surface:
-    """The sample DEM in a plane about its middle; heights belong to the middles of cells."""
+    """The sample DEM in a plane around its middle; heights belong to cell centres."""
     data = get_sample_data("jacksboro_fault_dem.npz")
     z = data["elevation"].astype(float)
     dx, dy, west, north = (float(data[k]) for k in ("dx", "dy", "xmin", "ymin"))  # "ymin" is the northern edge
@@ -53,11 +53,14 @@ FIELD = Limits(
     max_climb_deg=15.0,
     max_descent_deg=15.0,
 )
-"""The limits of a real mission."""
+"""Limits as a real mission has them."""
 
 
 def random_mission(seed: int, limits: Limits = FIELD, zones: int = 10, objective: str = "length") -> Problem:
-    """Two places of the sample 5 to 16 km apart, zones of every kind between them, ends clear of the zones."""
+    """A mission between two places of the sample DEM, 5 to 16 km apart, with zones of every kind between them.
+
+    Start and goal are outside of the zones.
+    """
     rng = np.random.default_rng(seed)
     bare = Airspace(jacksboro())
     while True:
@@ -86,7 +89,7 @@ def random_mission(seed: int, limits: Limits = FIELD, zones: int = 10, objective
 
 
 def faults(problem: Problem, path: Path, step_m: float = 3.0, slack_m: float = 1e-3) -> list[str]:
-    """What is wrong with a path, found by samples along it and around it; circles only. Empty: nothing seen."""
+    """Faults of a path, found by samples along it and around it; zones must be circles. Empty if none is found."""
     air, limits = problem.airspace, problem.limits
     out = []
     if not np.allclose(path.points[0], problem.start) or not np.allclose(path.points[-1], problem.goal):
@@ -127,7 +130,7 @@ def faults(problem: Problem, path: Path, step_m: float = 3.0, slack_m: float = 1
 
 
 def _zone_faults(problem: Problem, p: Floats, slack_m: float) -> Sequence[str]:
-    """Zones with a point, within reach of the path, whose altitudes the path meets."""
+    """Zones that have a point within reach of the path, and the path between their floor and ceiling there."""
     air, limits = problem.airspace, problem.limits
     reach = (limits.track_error_m + limits.horizontal_clearance_m) * air.scale - slack_m
     turn = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)

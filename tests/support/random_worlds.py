@@ -1,4 +1,4 @@
-"""Random surfaces, zones and legs, rough and full of traps, for the tests of the exact check and of the tube."""
+"""Random surfaces, zones and legs with many special cases, for the tests of the exact check and of the tube."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ ToGrid = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """Heights, the map that gcsplan makes of them, and the true one; ``box`` in the plane; ``cell_m`` the size."""
+    """Heights (rows, cols), gcsplan's map from plane to grid, and the true map ``to_grid``.
+
+    ``box``: west, south, east, north in the plane; ``cell_m``: size of a cell.
+    """
 
     heights: Floats
     grid: GridMap
@@ -32,7 +35,7 @@ class Ground:
 
 
 def rough_heights(rng: np.random.Generator, rows: int, cols: int) -> Floats:
-    """Noise of random strength; perhaps with towers, voids, or whole metres."""
+    """Noise of random strength, sometimes with towers, with voids, or in whole metres."""
     z = rng.uniform(0.0, rng.choice([0.0, 5.0, 40.0, 150.0]), (rows, cols))
     if rng.random() < 0.4:
         z = np.where(rng.random(z.shape) < 0.1, z + rng.uniform(50.0, 200.0), z)
@@ -52,7 +55,7 @@ def in_plane(rng: np.random.Generator) -> Ground:
 
 
 def turned(rng: np.random.Generator) -> Ground:
-    """A grid turned against the plane."""
+    """A grid rotated against the plane's axes."""
     rows, cols = (int(n) for n in rng.integers(4, 16, 2))
     dx, dy = rng.uniform(5.0, 40.0, 2)
     a = rng.uniform(0.0, 2.0 * np.pi)
@@ -69,7 +72,7 @@ def turned(rng: np.random.Generator) -> Ground:
 
 
 def in_degrees(rng: np.random.Generator) -> Ground:
-    """A grid of seconds of arc, somewhere up to 70° from the equator; the true map goes through pyproj."""
+    """A grid with a step of 1, 3 or 30 arc seconds, up to 70° from the equator; the true map goes through pyproj."""
     lat, lon = rng.uniform(-70.0, 70.0), rng.uniform(-170.0, 170.0)
     rows, cols = (int(n) for n in rng.integers(20, 60, 2))
     step = rng.choice([1.0, 3.0, 30.0]) / 3600.0
@@ -83,7 +86,7 @@ def in_degrees(rng: np.random.Generator) -> Ground:
 
 @cache
 def jacksboro() -> Ground:
-    """The sample DEM; heights belong to the cells' centres."""
+    """The sample DEM; heights belong to cell centres."""
     with np.load(str(get_sample_data("jacksboro_fault_dem.npz", asfileobj=False))) as file:
         z = np.asarray(file["elevation"], float)
         west, north, dx, dy = (float(file[k]) for k in ("xmin", "ymin", "dx", "dy"))
@@ -94,7 +97,7 @@ def jacksboro() -> Ground:
 
 
 def geographic(lat_deg: float, lon_deg: float, step_deg: float, heights: Floats) -> Ground:
-    """Heights on degrees, in the middle of which the plane has its origin."""
+    """A grid in degrees of the given heights; the plane's origin is in its middle."""
     rows, cols = heights.shape
     frame = Frame(lat_deg, lon_deg)
     corner = lat_deg + step_deg * rows / 2, lon_deg - step_deg * cols / 2
@@ -137,14 +140,14 @@ def random_zones(rng: np.random.Generator, ground: Ground, most: int = 5) -> lis
             turn, radius = np.sort(rng.uniform(0.0, 2.0 * np.pi, corners)), size * rng.uniform(0.2, 1.0, corners)
             shape = Polygon(np.stack([e + radius * np.cos(turn), n + radius * np.sin(turn)], axis=-1))
         levels = level(), level()
-        if rng.random() < 0.8:  # else perhaps upside down: such a zone is empty
+        if rng.random() < 0.8:  # else the floor may lie above the ceiling: such a zone is empty
             levels = tuple(sorted(levels, key=lambda v: v.value_m if v else 0.0))  # type: ignore[assignment]
         out.append(Zone(f"zone {k}", shape, *levels))
     return out
 
 
 def random_limits(rng: np.random.Generator, ground: Ground) -> Limits:
-    """Limits of which some bind, some are missing, and some are zero; errors included."""
+    """Limits and errors, of which some bind, some are missing, and some are zero."""
     cell = ground.cell_m
     return Limits(
         min_agl_m=float(rng.uniform(0.0, 60.0)),
@@ -159,7 +162,7 @@ def random_limits(rng: np.random.Generator, ground: Ground) -> Limits:
 
 
 def random_leg(rng: np.random.Generator, ground: Ground, most_cells: float = 6.0) -> tuple[Floats, Floats]:
-    """Ends (east, north) of a leg: anywhere, along an edge of cells, from node to node, or straight up."""
+    """Ends (east, north) of a leg: anywhere, along a grid line, from node to node, or both at one place."""
     west, south, east, north = ground.box
     rows, cols = ground.heights.shape
     a = np.array([rng.uniform(west, east), rng.uniform(south, north)])
@@ -178,11 +181,11 @@ def random_leg(rng: np.random.Generator, ground: Ground, most_cells: float = 6.0
 
 
 def surface_of(rng: np.random.Generator, ground: Ground) -> Surface:
-    """The surface, with obstacles on it now and then."""
+    """The surface, in 40 % of draws with obstacles up to 10 m high."""
     top = ground.heights if rng.random() < 0.6 else ground.heights + rng.uniform(0.0, 10.0, ground.heights.shape)
     return Surface(ground.heights, top, ground.grid)
 
 
 def oracle_of(surface: Surface, ground: Ground, zones: list[Zone], scale: float, step_m: float = 0.5) -> Oracle:
-    """Brute force over the same world, by the true map."""
+    """The brute-force oracle of the same world, by the true map."""
     return Oracle(surface.ground_m, surface.top_m, ground.to_grid, tuple(zones), scale, step_m)

@@ -1,4 +1,4 @@
-"""The default planner's searches, run by hand: lattices of the legs, first paths, and everything that comes after."""
+"""Run the default planner's searches one by one: lattices of the legs, first paths, and all later searches."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from gcsplan.planners.problem import Problem
 
 
 def plane_of(problem: Problem) -> PlaneSearch:
-    """Lattices over a problem's legs, and an incumbent that knows nothing yet."""
+    """Lattices over a problem's legs, with an incumbent that has no path and no bound yet."""
     return PlaneSearch(Incumbent(problem))
 
 
 def looked(problem: Problem) -> PlaneSearch:
-    """The same after the search for a first path below the ceiling."""
+    """`plane_of` a problem, after the search for a first path below the ceiling."""
     plane = plane_of(problem)
     for _ in plane.first_looks():
         pass
@@ -23,7 +23,7 @@ def looked(problem: Problem) -> PlaneSearch:
 
 
 def improve(plane: PlaneSearch, without: tuple[str, ...] = ()) -> None:
-    """All searches, over these lattices."""
+    """Run all searches, except those named in ``without``, over these lattices."""
     searches = Searches(plane.incumbent)
     searches._plane = plane
     govern(plane.incumbent, searches.table(), without)

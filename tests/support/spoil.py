@@ -1,4 +1,4 @@
-"""Spoils trees and bytes at random, the way that people, programs and attackers do."""
+"""Corrupt trees and bytes at random, as people, programs and attackers do."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ODD: tuple[Any, ...] = (
 
 
 def places(tree: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Every place in a tree of lists and dicts."""
+    """The key path of every node in a tree of lists and dicts."""
     yield path
     entries = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
     for key, value in entries:
@@ -24,7 +24,7 @@ def places(tree: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def spoilt_tree(tree: Any, rng: random.Random) -> Any:
-    """One to three places replaced by something odd, scaled, moved about, or taken out."""
+    """A copy of the tree with one to three nodes replaced by something odd, scaled, removed or repeated."""
     tree = copy.deepcopy(tree)
     for _ in range(rng.choice((1, 1, 2, 3))):
         spots = [p for p in places(tree) if p]
@@ -46,7 +46,7 @@ def spoilt_tree(tree: Any, rng: random.Random) -> Any:
 
 
 def spoilt_bytes(data: bytes, rng: random.Random, words: tuple[bytes, ...] = ()) -> bytes:
-    """A few bits flipped, pieces doubled or lost, words put in."""
+    """The data with a few bits flipped, pieces repeated or lost, and words inserted."""
     out = bytearray(data)
     for _ in range(rng.choice((1, 2, 5))):
         i = rng.randrange(len(out) + 1)

@@ -1,4 +1,4 @@
-"""Playing an update rule batch by batch, with every random number that it drew laid open."""
+"""Run a swarm's update rule batch by batch and record every random number that it draws."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DRAWS = ("random", "uniform", "integers", "normal", "permutation")
 
 
 class Recorded:
-    """A generator that keeps what it gave, in order."""
+    """A random generator that records, in order, the numbers it has returned."""
 
     def __init__(self, seed: int) -> None:
         self._rng = np.random.default_rng(seed)
@@ -35,7 +35,7 @@ class Recorded:
 
 
 class Play:
-    """One run of a rule of the table. ``batches`` and ``costs`` are what it yielded and was sent so far."""
+    """One run of a rule of the registry. ``batches``: what it has yielded so far; ``costs``: what it was sent."""
 
     def __init__(
         self, name: str, cost: Callable[[Floats], Floats], first: Floats, *, T: int, seed: int = 0, **changes: Any
@@ -49,16 +49,16 @@ class Play:
         self._next = next(self._steps)
         self.batches: list[Floats] = []
         self.costs: list[Floats] = []
-        self.rng.drawn.clear()  # the first population was given
+        self.rng.drawn.clear()  # the first population is given, not drawn
         self._answer()
 
     def step(self) -> Floats:
-        """Let the rule yield once more; its population, a copy."""
+        """Let the rule yield once more; return a copy of its population."""
         self._answer_to_rule()
         return self.batches[-1]
 
     def draws(self) -> list[Any]:
-        """What was drawn since the last call."""
+        """The numbers drawn since the last call."""
         out = list(self.rng.drawn)
         self.rng.drawn.clear()
         return out
@@ -77,7 +77,7 @@ def clip(value: float) -> float:
 
 
 def bowl(x: Floats) -> Floats:
-    """An uneven bowl, its least value off the middle."""
+    """The cost of an uneven bowl, whose minimum is off the middle, at 0.37 in every coordinate."""
     weights = 1.0 + np.arange(x.shape[1])
     return np.asarray((weights * (x - 0.37) ** 2).sum(axis=1))
 

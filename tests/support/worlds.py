@@ -19,7 +19,7 @@ Height = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64
 
 
 def surface(height: Height | float, *, half_m: float = 12_000.0, step_m: float = 100.0) -> Surface:
-    """A grid in the plane, ``half_m`` around the origin, of ``height(east_m, north_m)``."""
+    """A square grid of ``height(east_m, north_m)``, ``half_m`` from the origin to each side."""
     n = 2 * round(half_m / step_m) + 1
     axis = np.linspace(-half_m, half_m, n)
     east, north = np.meshgrid(axis, axis[::-1])
@@ -30,12 +30,12 @@ def surface(height: Height | float, *, half_m: float = 12_000.0, step_m: float =
 def world(
     height: Height | float = 300.0, zones: Sequence[Zone] = (), *, lat_deg: float = 36.6, half_m: float = 12_000.0
 ) -> World:
-    """A world around ``lat_deg``, -84.3."""
+    """A world around latitude ``lat_deg`` and longitude -84.3."""
     return World(Frame(lat_deg, -84.3), Airspace(surface(height, half_m=half_m), zones, scale=1.0))
 
 
 def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER, **limits: float | None) -> Vehicle:
-    """A vehicle with min AGL 60 m and small errors unless said otherwise."""
+    """A vehicle with min AGL 60 m, track error 3 m and altitude error 5 m unless ``limits`` change them."""
     given: dict[str, float | None] = {"min_agl_m": 60.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
     return Vehicle(
         "uav1",
