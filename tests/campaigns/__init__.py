@@ -1,1 +1,1 @@
-"""Attacks that run as long as one likes: python -m tests.campaigns.NAME --seconds N."""
+"""Randomised attacks that run for a chosen time: python -m tests.campaigns.NAME --seconds N."""

@@ -1,7 +1,7 @@
-"""Simulated air: a ground station, vehicles at addresses, a bad radio between them, and a clock that only we move.
+"""A simulated radio network: a ground station, vehicles at addresses, a bad radio between them, a simulated clock.
 
-`Link`, `session` and everything above them run on it as they are: `Air` is their transport, their clock and their
-waiting. What stands at an address is a `Hub`, as behind a simulator's socket, or anything else that takes bytes.
+`Link`, `session` and everything above them run on it unchanged: `Air` is their transport, their clock and their wait.
+At an address there is a `Hub`, as behind a simulator's socket, or anything else that accepts bytes.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ _MOST_FRAMES = 400_000
 
 
 class Hang(AssertionError):
-    """Simulated time, or the number of frames, ran out."""
+    """The limit of simulated time or of frames was exceeded."""
 
 
 class Place(Protocol):
-    """What stands at an address."""
+    """Anything at an address that receives and sends bytes."""
 
     @property
     def deadline(self) -> float | None: ...
@@ -38,7 +38,7 @@ class Place(Protocol):
 
 @dataclass(frozen=True)
 class Radio:
-    """Probabilities for each datagram, either way; delays in seconds."""
+    """Probabilities for each datagram in either direction; delays in seconds."""
 
     loss: float = 0.0
     duplicate: float = 0.0
@@ -51,8 +51,8 @@ class Radio:
 class Air:
     """The ground station's transport.
 
-    ``written(address, data)`` is told every frame that leaves it, ``heard(by, address, message)`` every message that
-    it takes.
+    It calls ``written(address, data)`` for every frame that the station sends and ``heard(by, address, message)`` for
+    every message that the station accepts.
     """
 
     datagrams = True
@@ -68,14 +68,14 @@ class Air:
         self._rng = random.Random(seed)
         self._limit_s = self.now + limit_s
         self._places: dict[Peer, list[Place]] = {}
-        self._queue: list[tuple[float, int, Peer, object | None, bytes]] = []  # sent by a place, or by us: None
+        self._queue: list[tuple[float, int, Peer, object | None, bytes]] = []  # None: sent by us, not by a place
         self._acts: list[tuple[float, int, Callable[[], None]]] = []
         self._inbox: list[tuple[Peer, bytes, object]] = []
         self._senders: list[object] = []
         self._count = 0
 
     def clock(self) -> float:
-        """The time now."""
+        """The simulated time, seconds."""
         return self.now
 
     def wall_clock(self) -> float:
@@ -83,27 +83,27 @@ class Air:
         return EPOCH_S + self.now
 
     def link(self, signing: Signing | None = None) -> Link:
-        """A ground station's link on this air."""
+        """A ground station's link over this network."""
         return _Link(self, "udpin:127.0.0.1:0", clock=self.clock, transport=self, wait=self.wait, signing=signing)
 
-    # who is there, and what happens when
+    # places and events
 
     def at(self, address: Peer) -> list[Place]:
-        """What stands at ``address``: a list that may be changed."""
+        """The places at ``address``: the live list, which callers may change."""
         return self._places.setdefault(address, [])
 
     def later(self, after_s: float, act: Callable[[], None]) -> None:
-        """Do ``act`` in ``after_s`` seconds."""
+        """Call ``act`` after ``after_s`` seconds."""
         self._count += 1
         heapq.heappush(self._acts, (self.now + after_s, self._count, act))
 
     def put(self, address: Peer, place: Place) -> None:
-        """Let ``place`` stand at ``address`` from now on, beside what is there."""
+        """Add ``place`` at ``address``, beside those that are there already."""
         self.at(address).append(place)
         self._answer(address, place, place.on_timer(self.now))
 
     def say(self, address: Peer, data: bytes, by: object) -> None:
-        """Let ``address`` send ``data`` to the ground station."""
+        """Send ``data`` from ``address`` to the ground station; ``by`` is the true sender."""
         self._send(address, data, by)
 
     # the transport
@@ -118,10 +118,10 @@ class Air:
         self._send(peer, data, None)
 
     def close(self) -> None:
-        """Nothing to close."""
+        """Do nothing: there is nothing to close."""
 
     def wait(self, transports: Sequence[Any], timeout_s: float) -> None:
-        """Let time go on until the ground station hears something, or ``timeout_s`` is over."""
+        """Advance time until the ground station receives something or ``timeout_s`` is over; raise Hang at a limit."""
         until = self.now + max(0.0, timeout_s)
         while not self._inbox:
             due = self._next()
@@ -171,7 +171,7 @@ class Air:
 
 
 class _Link(Link):
-    """A link that tells its air which message of whom it has taken."""
+    """A link that reports each accepted message and its true sender to `Air.heard`."""
 
     def __init__(self, air: Air, url: str, **more: Any) -> None:
         self._air, self._by = air, None

@@ -1,4 +1,4 @@
-"""What flies about in the links' campaign: vehicles that are watched, forgers, and radios that replay."""
+"""The participants of the links campaign: observed vehicles, forgers, and recorders that replay."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ ODD = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-45, 2.0**31, -(2.0**31
 
 
 class OddParameters(Parameters):
-    """Values that no autopilot should send, of types that do not exist."""
+    """Parameters with values that no autopilot should send, some of types that do not exist."""
 
     def __init__(self, autopilot: Autopilot, sysid: int, rng: random.Random) -> None:
         super().__init__(autopilot, sysid)
         self._rng = rng
 
     def on_wire(self, name: str) -> tuple[float, int]:
-        """Something odd, mostly."""
+        """Value and type of a parameter; odd ones in 70 % of the calls."""
         if self._rng.random() < 0.3:
             return super().on_wire(name)
         return self._rng.choice(ODD), self._rng.choice((REAL32, 6, 1, 0, 255, 10))
 
 
 class Craft:
-    """A vehicle behind a hub: what is on board and when, and what the ground station has heard of it."""
+    """A vehicle behind a hub. Records what is on board when, and what the ground station has heard from it."""
 
     def __init__(self, vehicle: LoopbackVehicle, air: Air, signing: Signing | None = None) -> None:
         self.vehicle, self.air = vehicle, air
@@ -59,14 +59,14 @@ class Craft:
         self.equal: list[tuple[float, float]] = []
 
     def forget(self) -> None:
-        """Nothing was heard of it: another run of the ground station begins, which knows nothing of this one."""
+        """Forget what the ground station has heard: a new run of it begins, which knows nothing of the last one."""
         self.known_since, self.last_heard = math.inf, -math.inf
-        self.together = 0  # places heard while another stood at the same address
+        self.together = 0  # positions heard while another vehicle was at the same address
         self._beats_at: list[float] = []
         self.armed_told = self.far_told = math.inf
 
     def take(self, client: str, data: bytes, now: float) -> list[tuple[Any, bytes]]:
-        """Bytes of the ground station."""
+        """Receive bytes from the ground station; return the answers."""
         if self.silent:
             return []
         sent = self.hub.take(client, data, now)
@@ -75,7 +75,7 @@ class Craft:
         return sent
 
     def on_timer(self, now: float) -> list[tuple[Any, bytes]]:
-        """What is due."""
+        """What it sends at this time without being asked."""
         sent = self.hub.on_timer(now)
         self.deadline = self.hub.deadline
         self._look()
@@ -92,13 +92,13 @@ class Craft:
         self._equal_since = min(self._equal_since, now) if same else math.inf
 
     def was_equal(self, since: float, until: float) -> bool:
-        """Whether it held what was sent at some time between."""
+        """Whether the wanted items were on board at some time between ``since`` and ``until``."""
         self._look()
         spans = [*self.equal, (self._equal_since, math.inf)]
         return any(begin <= until and end >= since for begin, end in spans)
 
     def heard(self, message: Any) -> None:
-        """The ground station has taken this message of ours."""
+        """Record that the ground station has accepted this message of the vehicle."""
         kind, now = message.get_type(), self.air.now
         self.last_heard = now
         if kind == "HEARTBEAT":
@@ -110,10 +110,10 @@ class Craft:
             self.far_told = min(self.far_told, now) if far else math.inf
 
     def heard_between(self, since: float, until: float) -> bool:
-        """Whether two of its heartbeats were heard between."""
+        """Whether two of its heartbeats were heard between ``since`` and ``until``."""
         return sum(since <= at <= until for at in self._beats_at) >= 2
 
-    # what may happen to it
+    # events
 
     def carry(self, far: bool) -> None:
         """Move it by 33 km, or by a few metres."""
@@ -121,7 +121,7 @@ class Craft:
         self.vehicle.carry_to(Home(home.lat_e7 + d, home.lon_e7, home.amsl_m))
 
     def edit(self, rng: random.Random) -> None:
-        """A second ground station changes, drops or swaps items."""
+        """Change, drop or append items, as a second ground station would."""
         items = list(self.vehicle.items())
         if len(items) < 2:
             return
@@ -136,19 +136,19 @@ class Craft:
         self.vehicle.load(items)
 
     def arm(self) -> None:
-        """Somebody arms it."""
+        """Arm it."""
         self.vehicle.armed = True
 
     def disarm(self) -> None:
-        """And disarms it."""
+        """Disarm it."""
         self.vehicle.armed = False
 
     def go_silent(self) -> None:
-        """Out of reach."""
+        """Put it out of radio range."""
         self.silent = True
 
     def come_back(self) -> None:
-        """Within reach again."""
+        """Bring it back into radio range."""
         self.silent = False
 
 
@@ -157,7 +157,7 @@ SILENCE_S = 3.0
 
 @dataclass
 class Voice:
-    """What the ground station has heard of one component at one address, whoever it was that spoke."""
+    """What the ground station has heard in the name of one component at one address, whoever sent it."""
 
     last: float = -math.inf
     back_at: float = -math.inf
@@ -165,7 +165,7 @@ class Voice:
     places_at: list[float] = field(default_factory=list)
 
     def heard(self, kind: str, now: float) -> None:
-        """It said something."""
+        """Record a message of the given kind."""
         if now - self.last > SILENCE_S + 1e-6:
             self.back_at = now
         self.last = now
@@ -176,17 +176,20 @@ class Voice:
 
     @property
     def looked_at(self) -> bool:
-        """Whether a heartbeat, and a position if it ever told one, came since it spoke first or after a silence."""
+        """Whether a heartbeat, and a position if it ever sent one, came since its first message or its last silence."""
         return self.look_after(self.back_at) < math.inf
 
     def look_after(self, since: float) -> float:
-        """When a look that began at ``since`` can have been over: a heartbeat, and a position if it ever told one."""
+        """The earliest time at which a look begun at ``since`` could end: after a heartbeat, and a position if any."""
         needed = [self.beats_at, *([self.places_at] if self.places_at else [])]
         return max(min((at for at in heard if at >= since), default=math.inf) for heard in needed)
 
 
 class Forger:
-    """Says mission messages, parameters and telemetry in a vehicle's name, from ``address``."""
+    """Sends mission messages, parameters and telemetry in a vehicle's name from ``address``.
+
+    A ``polite`` one sends only status texts and parameters.
+    """
 
     def __init__(self, air: Air, address: Peer, victim: Address, rng: random.Random, *, polite: bool) -> None:
         self._air, self._address, self._rng, self._polite = air, address, rng, polite
@@ -194,7 +197,7 @@ class Forger:
         self._writer = FrameWriter(Address(victim.sysid, compid))
 
     def speak(self) -> None:
-        """One forged message."""
+        """Send one forged message."""
         kinds = (self._telemetry, self._parameter) if self._polite else (self._telemetry, self._parameter, self._list)
         self._air.say(self._address, self._writer.pack(self._rng.choice(kinds)()), self)
 
@@ -210,7 +213,7 @@ class Forger:
     def _telemetry(self) -> Any:
         rng = self._rng
         i32 = [rng.randrange(-(2**31), 2**31) for _ in range(3)]
-        if self._polite:  # from the vehicle's own address: what spoils no look
+        if self._polite:  # it uses the vehicle's own address, so it sends nothing that a look judges
             return dialect.MAVLink_statustext_message(rng.randrange(8), rng.randbytes(50))
         return rng.choice((
             dialect.MAVLink_global_position_int_message(rng.randrange(2**32), *i32, 0, 0, 0, 0, 0),
@@ -230,7 +233,7 @@ class Forger:
 
 
 class Recorder:
-    """Keeps what a vehicle says, and says it again later."""
+    """Records a vehicle's frames and replays them later."""
 
     MOST = 3000
 
@@ -239,12 +242,12 @@ class Recorder:
         self.frames: list[tuple[float, bytes]] = []
 
     def note(self, data: bytes) -> None:
-        """Record a frame."""
+        """Record a frame with its time."""
         if len(self.frames) < self.MOST:
             self.frames.append((self._air.now, data))
 
     def replay(self, address: Peer, after_s: float, most: int) -> None:
-        """Send the first ``most`` frames again with their timing, from ``after_s`` seconds ahead."""
+        """Send the first ``most`` frames again with their original timing, starting in ``after_s`` seconds."""
         if not self.frames:
             return
         began = self.frames[0][0]

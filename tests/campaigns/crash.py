@@ -1,19 +1,20 @@
-"""Kill and power loss at every step that changes an output directory: never files of two plans, never one lost.
+"""Kills and power losses at every change to an output directory: it must never mix two plans and never lose a file.
 
     python -m tests.campaigns.crash --seconds 120 [--seed 1]
 
-Each round makes a directory with a random past (plans, files of others, edited ones, retired ones) and a random step
-from one plan to the next, and then
+Each round makes a directory with a random past (plans, other people's files, edited and retired files) and a random
+step from one plan to the next, and then
 
 - kills the process with SIGKILL before each system call of the step that changes anything, and in the middle of each
-  write, again while it recovers, and once more;
-- loses power after each of them: of what no fsync had secured any part may be missing (`tests.campaigns.disk`);
+  write, sometimes again (up to three times) while the next runs recover;
+- simulates a loss of power after each operation: any part that no fsync has secured may be missing
+  (`tests.campaigns.disk`);
 - lets two processes write at once;
-- does the same to a single file of the user's choice that is written over an older one.
+- kills and cuts power while a single file of the user's choice is written over an older one.
 
-After each, whoever looks at the names alone must see files of one plan at most; whoever asks gcsplan must see a whole
-plan or be refused; nothing of anybody else's may be missing; and the next run must bring back exactly what was there
-before the step, or complete it. Ends with 1 and the seed of the round where anything of that failed.
+After each attack, the file names alone must show files of one plan at most; gcsplan must see a whole plan or refuse;
+other people's files must all be there; and the next run must restore exactly the state before the step, or complete
+the step. Exits with 1 and prints the round's seed if any of that fails.
 """
 
 from __future__ import annotations
@@ -52,12 +53,12 @@ Step = Callable[[Path], object]
 _CHANGES = {"os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.link", "os.symlink", "os.truncate", "shutil.rmtree"}
 _WRITING = os.O_CREAT | os.O_WRONLY | os.O_RDWR | os.O_TRUNC
 POWER_STATES = 4
-"""Drawn of those that a loss of power may leave at one point."""
+"""Disk states drawn for each point of power loss."""
 
 
 @dataclass(frozen=True)
 class World:
-    """A directory's past and the step that is attacked."""
+    """A directory before and after a step, the step that is attacked, and the contents of other people's files."""
 
     before: Tree
     after: Tree
@@ -69,7 +70,7 @@ class World:
 
 
 def plan_files(rng: random.Random, tag: str) -> dict[str, bytes]:
-    """Outputs of a plan; every file says which plan it belongs to."""
+    """Outputs of a plan; each file's content names the plan."""
     vehicles = [f"uav{k}" for k in range(1, rng.choice((2, 3, 4)))]
     names = [f"{v}.{kind}" for v in vehicles for kind in ("plan", "waypoints")]
     names += rng.sample(["mission.kml", "summary.json", "profile.csv", "report.html", "upload.json"], rng.randrange(4))
@@ -77,7 +78,7 @@ def plan_files(rng: random.Random, tag: str) -> dict[str, bytes]:
 
 
 def past(root: Path, rng: random.Random) -> None:
-    """Some earlier runs, and what people did in between."""
+    """Make a directory with the results of earlier runs and of people's changes in between."""
     for k in range(rng.randrange(4)):
         kind = rng.random()
         if kind < 0.6:
@@ -97,7 +98,7 @@ def past(root: Path, rng: random.Random) -> None:
 
 
 def next_step(rng: random.Random) -> Step:
-    """What a run does with the directory."""
+    """A random step that a run does in the directory: write outputs, retire them, or add one."""
     files = plan_files(rng, "new")
     kind = rng.random()
     if kind < 0.6:
@@ -108,7 +109,7 @@ def next_step(rng: random.Random) -> Step:
 
 
 def world(place: Path, rng: random.Random) -> World:
-    """A random one; ``place`` is where it may be tried out."""
+    """A random world; the step is tried out once in ``place``."""
     root = place / "out"
     past(root, rng)
     step, before = next_step(rng), tree_of(root)
@@ -119,14 +120,14 @@ def world(place: Path, rng: random.Random) -> World:
 
 
 def tree_of(root: Path) -> Tree:
-    """Every path under ``root`` with its content; None for directories."""
+    """Every path under ``root``, with its content; None for a directory."""
     if not root.is_dir():
         return {}
     return {p.relative_to(root).as_posix(): None if p.is_dir() else p.read_bytes() for p in sorted(root.rglob("*"))}
 
 
 def put(root: Path, tree: Tree) -> None:
-    """Make ``root`` anew."""
+    """Replace ``root`` by the given tree."""
     shutil.rmtree(root, ignore_errors=True)
     root.mkdir()
     for name, content in sorted(tree.items()):
@@ -137,12 +138,12 @@ def put(root: Path, tree: Tree) -> None:
 
 
 def strangers(tree: Tree) -> Counter[bytes]:
-    """Contents that are not gcsplan's, each as often as it is there."""
+    """Contents of other people's files, with the number of copies of each."""
     return Counter(c for c in tree.values() if c is not None and c.startswith(b"mine"))
 
 
 def without_stage(tree: Tree) -> Tree:
-    """What is there for people."""
+    """The tree without gcsplan's staging area."""
     return {name: c for name, c in tree.items() if name.partition("/")[0] != STAGE}
 
 
@@ -150,7 +151,7 @@ def without_stage(tree: Tree) -> Tree:
 
 
 def mixtures(tree: Tree) -> list[str]:
-    """Directories that show files of more than one plan to whoever looks at the names alone."""
+    """Faults: directories that contain files of more than one plan."""
     seen: dict[str, set[bytes]] = {}
     for name, content in without_stage(tree).items():
         if content is not None and content.startswith(b"plan "):
@@ -159,7 +160,7 @@ def mixtures(tree: Tree) -> list[str]:
 
 
 def faults(root: Path, of: World) -> list[str]:
-    """What is wrong with a directory that a run left in whatever state, and with what the next runs make of it."""
+    """Faults of a directory after an attack, and of what the next runs make of it."""
     tree = tree_of(root)
     found = mixtures(tree)
     known = {*of.before.values(), *of.after.values()}
@@ -179,7 +180,7 @@ def faults(root: Path, of: World) -> list[str]:
         if without_stage(settled) not in (of.before, of.after):
             found.append("the next run did not bring it back")
         of.step(root)
-    except Exception as error:  # whatever it is, it is a fault
+    except Exception as error:  # any error here is a fault
         return [*found, f"the next run failed: {type(error).__name__}: {error}"]
     if tree_of(root) != of.after:
         found.append("the step, taken again, did not end where it should")
@@ -190,7 +191,7 @@ def faults(root: Path, of: World) -> list[str]:
 
 
 def in_child(work: Callable[[], object]) -> int:
-    """Run ``work`` in a forked process: its exit code, or minus the signal that ended it."""
+    """Run ``work`` in a forked process; return its exit code, or minus the number of the signal that ended it."""
     child = os.fork()
     if child == 0:
         code = 70
@@ -202,7 +203,7 @@ def in_child(work: Callable[[], object]) -> int:
 
 
 def killed_before(change: int, work: Callable[[], object]) -> Callable[[], object]:
-    """``work`` that dies before its change number ``change`` (from 0); of a write, half is written first."""
+    """``work``, killed before its change number ``change`` (from 0); if that is a write, half is written first."""
     count = 0
 
     def tick(event: str, arguments: tuple[Any, ...]) -> None:
@@ -222,7 +223,7 @@ def killed_before(change: int, work: Callable[[], object]) -> Callable[[], objec
 
     def run() -> None:
         sys.addaudithook(tick)
-        os.write = write  # no event tells of it
+        os.write = write  # os.write raises no audit event
         work()
 
     real = os.write
@@ -230,7 +231,7 @@ def killed_before(change: int, work: Callable[[], object]) -> Callable[[], objec
 
 
 def kills(root: Path, of: World, rng: random.Random) -> Iterator[list[str]]:
-    """Killed at every change, and some of those again while the next run recovers; what is wrong after each."""
+    """Kill the step at every change, half of the times also the next runs while they recover; yield faults of each."""
     for change in range(10_000):
         put(root, of.before)
         ended = in_child(killed_before(change, lambda: of.step(root)))
@@ -248,7 +249,7 @@ def kills(root: Path, of: World, rng: random.Random) -> Iterator[list[str]]:
 
 
 def operations(root: Path, of: World) -> list[Operation]:
-    """What the step asks of the disk."""
+    """The disk operations of the step, recorded in a forked process."""
     put(root, of.before)
     reading, writing = os.pipe()
     recorder = Recorder(root)
@@ -273,7 +274,7 @@ def operations(root: Path, of: World) -> list[Operation]:
 
 
 def power_losses(root: Path, of: World, rng: random.Random, log: list[Operation]) -> Iterator[list[str]]:
-    """Power lost after every operation; what is wrong after each."""
+    """Cut the power after every operation; yield the faults of each."""
     for done in range(len(log) + 1):
         for tree in states(of.before, log[:done], rng, POWER_STATES):
             put(root, tree)
@@ -282,7 +283,7 @@ def power_losses(root: Path, of: World, rng: random.Random, log: list[Operation]
 
 
 def together(root: Path, of: World, rng: random.Random) -> list[str]:
-    """Two processes write at once: one whole plan, and nothing left over."""
+    """Faults after two processes wrote at once: there must be one whole plan and nothing left over."""
     put(root, of.before)
     plans = [plan_files(rng, tag) for tag in ("one", "two")]
     children = []
@@ -306,7 +307,7 @@ def together(root: Path, of: World, rng: random.Random) -> list[str]:
 
 
 def single_files(root: Path, rng: random.Random) -> Iterator[list[str]]:
-    """A file of the user's choice, written over an older one: killed and without power; what is wrong after each."""
+    """Kill and cut the power while one file is written over an older one; yield the faults of each attack."""
     old, new = b"mine, old", b"new " + b"x" * rng.randrange(200)
     before: Tree = {"notes.txt": b"mine", "x.plan": old}
     of = World(before, before | {"x.plan": new}, lambda out: write_whole(out / "x.plan", new), Counter())
@@ -334,7 +335,7 @@ def single_files(root: Path, rng: random.Random) -> Iterator[list[str]]:
 
 
 def attack(seed: int, place: Path) -> tuple[Counter[str], list[str]]:
-    """One round: how many attacks of each kind, and every fault that they found."""
+    """Run one round; return the number of attacks of each kind, and every fault found."""
     rng = random.Random(seed)
     of, root = world(place, rng), place / "out"
     count, found = Counter[str](), []

@@ -1,9 +1,9 @@
-"""A disk that loses power: what may be on it afterwards, by what was asked of it and what was made fast.
+"""A model of a disk that loses power: which trees may be on it afterwards, by the operations and fsyncs before.
 
-The model is weaker than any journalling file system: of the changes to names (create, rename, remove, make a directory)
-that no fsync of a directory they touch has made fast, any subset may have reached the disk, in the order they came but
-with any of them missing; a rename is one change, that is there or not. The content of a file that was not made fast may
-be missing, cut short, or zeros.
+The model promises less than any journalling file system. Changes to names (create, rename, remove, make a directory)
+are durable only after an fsync of a directory they touch; of the others any subset may have reached the disk, in their
+order. A rename is one change: it is there or not. The content of a file without fsync may be missing, cut short, or
+zeros.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ Tree: TypeAlias = "dict[str, bytes | None]"
 """Path to content, None for a directory."""
 
 Operation: TypeAlias = "tuple[str, ...]"
-"""What was done, and to which paths; of a write the content too, as Latin-1."""
+"""The kind of operation and its paths; for a write also the content, as Latin-1."""
 
 
 @contextmanager
 def workshop() -> Iterator[Path]:
-    """A directory to work in, in memory where there is one: what is attacked is no disk."""
+    """A temporary directory, in memory if possible: power losses are simulated, so no real disk is needed."""
     memory = Path("/dev/shm")
     with tempfile.TemporaryDirectory(dir=memory if os.access(memory, os.W_OK) else None) as place:
         yield Path(place)
 
 
 class Recorder:
-    """Notes what this process, from `install` on, asks of the disk under ``root``."""
+    """Records this process's disk operations under ``root``, from `install` on."""
 
     def __init__(self, root: Path) -> None:
         self.root = os.path.realpath(root)
@@ -41,7 +41,7 @@ class Recorder:
         self._on = True
 
     def install(self) -> None:
-        """Audit events tell of names; writes and fences are noted on their way. There is no way back."""
+        """Start recording: names by audit events, writes and fsyncs by wrapping them. It cannot be undone."""
         write, fsync = os.write, os.fsync
 
         def noted_write(handle: int, data: Any) -> int:
@@ -56,7 +56,7 @@ class Recorder:
         sys.addaudithook(self._heard)
 
     def stop(self) -> None:
-        """What comes now is not the step's."""
+        """Stop recording: later operations do not belong to the step."""
         self._on = False
 
     def _heard(self, event: str, arguments: tuple[Any, ...]) -> None:
@@ -80,7 +80,7 @@ class Recorder:
 
 
 def states(before: Tree, log: list[Operation], rng: random.Random, many: int) -> Iterator[Tree]:
-    """Some of the trees that may be on the disk when power is lost after ``log``: all of it done, and random ones."""
+    """``many`` trees that may be on the disk if power is lost after ``log``: first with all of it done, then random."""
     fast = _fast(log)
     yield _tree(before, log, [True] * len(log), rng, spoil=False)
     for _ in range(many - 1):
@@ -89,7 +89,7 @@ def states(before: Tree, log: list[Operation], rng: random.Random, many: int) ->
 
 
 def _fast(log: list[Operation]) -> list[bool]:
-    """For each operation, whether a later fsync has made it fast."""
+    """For each operation, whether a later fsync has made it durable."""
     synced: set[str] = set()
     fast = [False] * len(log)
     for i in range(len(log) - 1, -1, -1):
@@ -97,7 +97,7 @@ def _fast(log: list[Operation]) -> list[bool]:
         if what == "fsync":
             synced.add(rest[0])
         elif what == "write":
-            fast[i] = rest[0] in synced  # nothing is written to after it was renamed
+            fast[i] = rest[0] in synced  # no file is written to after its rename
         else:
             fast[i] = any((os.path.dirname(path) or ".") in synced for path in rest)
     return fast
@@ -124,6 +124,6 @@ def _tree(before: Tree, log: list[Operation], kept: list[bool], rng: random.Rand
             target_folder = os.path.dirname(target)
             if path in tree and (not target_folder or target_folder in tree):
                 tree[target] = tree.pop(path)
-        elif what == "remove" or not any(name.startswith(f"{path}/") for name in tree):  # rmdir: of an empty one
+        elif what == "remove" or not any(name.startswith(f"{path}/") for name in tree):  # rmdir only if empty
             tree.pop(path, None)
     return tree

@@ -1,12 +1,12 @@
-"""Hostile files: mission files, zones, missions of others and terrain, spoilt at random, through the command line.
+"""Hostile files: randomly corrupted mission files, zones, other programs' missions and terrain, by the command line.
 
     python -m tests.campaigns.files --seconds 120 [--seed 1] [--inputs N] [--keep DIR]
 
-Each input is one run of ``gcsplan check --json`` in a folder of its own, with one file (or more) spoilt in the way of
-people, programs and attackers. What it owes: an exit code of the contract, one JSON document, no traceback, no warning,
-nothing on standard error but messages, nothing left in the folder, an answer within `PATIENCE_S`, and no more than
-`MEMORY_MB` in all. Inputs run in a process beside this one, so that a crash of a library is seen as what it is. Ends
-with 1 and the seed where anything of that failed; ``--seed S --inputs 1 --keep DIR`` shows that input again.
+Each input is one run of ``gcsplan check --json`` with one or more files corrupted as people, programs and attackers
+do. The run must end with one of the exit codes in `CODES`, print one JSON document, no traceback and no warning, write
+only messages to standard error, leave no new file, and need at most `PATIENCE_S` and `MEMORY_MB`. Inputs run in a
+separate process, so that a crash of a library is recognised. Exits with 1 and prints the seed if any of that fails;
+``--seed S --inputs 1 --keep DIR`` repeats that input.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from tests.support.paths import REPOSITORY
 
 CODES = {0, 2, 3, 4}
 PATIENCE_S = 10.0
-"""Of the processor; the clock may show ten times as much on a busy machine before a run is taken to hang."""
+"""Most processor seconds of a run; by the clock, a run counts as hanging after ten times as much (busy machines)."""
 
 MEMORY_MB = 600.0
 MAX_FOUND = 20
 
 
 def attack(seed: int) -> tuple[str, int, list[str]]:
-    """Run the input of that seed in the current folder: its kind, the exit code, and what is wrong."""
+    """Run the input of that seed in the current folder; return its kind, the exit code, and the faults."""
     rng = random.Random(seed)
     kind = rng.choices(list(KINDS), [weight for weight, _ in KINDS.values()])[0]
     arguments = KINDS[kind][1](rng)
@@ -58,7 +58,7 @@ def attack(seed: int) -> tuple[str, int, list[str]]:
             cli.main()
         except SystemExit as ended:
             code = ended.code
-        except BaseException as error:  # nothing may come through
+        except BaseException as error:  # no exception may escape
             code = f"{type(error).__name__}: {error}"
     took = time.process_time() - began
     found = civil(code, out.getvalue(), err.getvalue())
@@ -70,7 +70,7 @@ def attack(seed: int) -> tuple[str, int, list[str]]:
 
 
 def civil(code: object, out: str, err: str) -> list[str]:
-    """What is wrong with how a run ended."""
+    """Faults of how a run ended: its exit code, standard output and standard error."""
     found = [] if code in CODES else [f"ended with {code}: {err[-400:]}"]
     try:
         document = json.loads(out)
@@ -85,13 +85,13 @@ def civil(code: object, out: str, err: str) -> list[str]:
 
 
 def work(seed: int) -> None:
-    """Run inputs for ever, one line of JSON for each on the real standard output."""
+    """Run inputs for ever; write JSON lines on the real standard output when each begins and ends."""
     say = os.fdopen(os.dup(1), "w")
-    said = tempfile.TemporaryFile()  # noqa: SIM115  # as long as the process
+    said = tempfile.TemporaryFile()  # noqa: SIM115  # stays open as long as the process
     os.dup2(said.fileno(), 1)
-    os.dup2(said.fileno(), 2)  # libraries write there past Python
+    os.dup2(said.fileno(), 2)  # libraries write there without Python
     write_clean()
-    cli.app = typer.main.get_command(cli.app)  # type: ignore[assignment]  # made once: it takes longer than a check
+    cli.app = typer.main.get_command(cli.app)  # type: ignore[assignment]  # made once: making it takes longer than a check
     while True:
         print(json.dumps(["begins", seed]), file=say, flush=True)
         kind, code, found = attack(seed)
@@ -108,7 +108,7 @@ def work(seed: int) -> None:
 
 
 def campaign(seconds: float, seed: int, inputs: int, keep: str | None) -> int:
-    """Start the process that runs the inputs, watch it, start it again where it dies, and tell what came of it."""
+    """Run inputs in a `Worker`, restart it when it dies, print faults and a summary; return the exit code."""
     count: Counter[str] = Counter()
     found: list[str] = []
     memory_mb, until = 0.0, time.monotonic() + seconds
@@ -135,7 +135,7 @@ def campaign(seconds: float, seed: int, inputs: int, keep: str | None) -> int:
 
 
 class Worker:
-    """A process that runs one input after the other, and what it says of them."""
+    """A process that runs one input after the other, and its answers."""
 
     def __init__(self, folder: Path, seed: int) -> None:
         command = [sys.executable, "-m", "tests.campaigns.files", "--work", "--seed", str(seed)]
@@ -155,7 +155,7 @@ class Worker:
             self.process.stdout.close()
 
     def answer(self) -> tuple[str, int, list[str], float] | None:
-        """Kind, exit code, faults and memory of the next input; None where there is no answer."""
+        """Kind, exit code, faults and memory (MB) of the next input; None if the process does not answer."""
         while True:
             line = self._line(10.0 * PATIENCE_S)
             if not line:

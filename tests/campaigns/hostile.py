@@ -1,7 +1,7 @@
-"""Hostile inputs for `tests.campaigns.files`: what is clean, and what is made of it by chance.
+"""Hostile inputs for `tests.campaigns.files`: clean files, and random corruptions of them.
 
 Every kind writes its files into the current folder and returns the arguments of ``gcsplan check``; the same random
-numbers give the same files. Clean ones are written once, by `write_clean`.
+numbers give the same files. `write_clean` writes the clean files once.
 """
 
 from __future__ import annotations
@@ -94,12 +94,12 @@ SYSTEMS = (
     "EPSG:27700", "EPSG:2193", "EPSG:4326+5773", "+proj=gnom +lat_0=-36 +lon_0=95", "+proj=longlat +pm=paris",
     "+proj=ortho +lat_0=36 +lon_0=-84", "+proj=tmerc +lat_0=0 +lon_0=5.62",
 )  # fmt: skip
-"""Coordinate systems that the grids are not in; some have no place for this world."""
+"""Coordinate systems that are wrong for the grids; some do not cover this place."""
 HEADER = b"ncols 60\nnrows 60\nxllcorner -84.41\nyllcorner 36.57\ncellsize 0.001\nNODATA_value -9999\n"
 
 
 def write_clean() -> None:
-    """What all inputs begin with, into ``clean/``; the corpus comes to where this world is."""
+    """Write the clean files that all inputs start from into ``clean/``, and move the corpus to this place."""
     corpus.LAT, corpus.LON = 36.6, -84.38
     clean = Path("clean")
     clean.mkdir(exist_ok=True)
@@ -119,7 +119,7 @@ def write_clean() -> None:
 
 
 def geojson() -> dict[str, Any]:
-    """Zones of each kind."""
+    """A GeoJSON document with zones of each kind."""
     ring = [[-84.37, 36.62], [-84.36, 36.62], [-84.36, 36.63], [-84.37, 36.62]]
     zone = {"type": "Feature", "properties": {"name": "a", "ceiling_agl_m": 90}}
     point = {
@@ -136,11 +136,11 @@ def _tree(text: str) -> Any:
     return yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
 
 
-# -- spoiling ---------------------------------------------------------------------------------------------------------
+# -- corruptions ------------------------------------------------------------------------------------------------------
 
 
 def bombed(data: bytes, rng: random.Random) -> bytes:
-    """Now and then the whole of it: very deep, very long, of another encoding, or nothing but noise."""
+    """The data; in 7 % of draws cut short, nested very deep, very long, in another encoding, or pure noise instead."""
     kind = rng.random()
     if kind < 0.93:
         return data
@@ -164,11 +164,11 @@ PLAUSIBLE: tuple[Any, ...] = (
     0, 1, -1, 2, 3, 5, 10, 16, 17, 18, 19, 20, 21, 22, 30, 31, 82, 84, 85, 93, 112, 114, 177, 178, 189, 195, 206, 0.5,
     40, 60, 90, 5.62, 95.62, 120, 180, 360, 500, 1000, 36.6, -84.38, 36.605, -84.37, 36.61, 1e-3, 1e-7, 1e4, 1e5,
 )  # fmt: skip
-"""Numbers that pass for good ones in some place or other: commands, frames, heights, places, counts."""
+"""Numbers that are plausible in some field: commands, frames, heights, places, counts."""
 
 
 def nudged(tree: Any, rng: random.Random) -> Any:
-    """One to four numbers replaced by others that may be meant: the file stays one, and is judged."""
+    """A copy of the tree with one to four numbers replaced by plausible ones: it stays valid enough to be judged."""
     tree = copy.deepcopy(tree)
     spots = [p for p in places(tree) if p and type(functools.reduce(lambda t, k: t[k], p, tree)) in (int, float)]
     for _ in range(rng.choice((1, 1, 2, 4))):
@@ -182,7 +182,7 @@ def nudged(tree: Any, rng: random.Random) -> Any:
 
 
 def spoilt_json(tree: Any, rng: random.Random) -> bytes:
-    """A tree nudged, spoilt as a tree, as text, or both."""
+    """The JSON of a tree that is nudged, or corrupted as a tree, as text, or both."""
     if rng.random() < 0.4:
         return json.dumps(nudged(tree, rng)).encode()
     if rng.random() < 0.75:
@@ -196,8 +196,8 @@ def spoilt_json(tree: Any, rng: random.Random) -> bytes:
 
 
 def mission_file(rng: random.Random) -> list[str]:
-    """A mission file: keys, values and text."""
-    base = rng.choices((MISSION, RICH, LOCAL), (6, 6, 1))[0]  # a world of peaks takes long to lay out
+    """A mission file with corrupted keys, values or text."""
+    base = rng.choices((MISSION, RICH, LOCAL), (6, 6, 1))[0]  # LOCAL is rare: a world of peaks is slow to make
     if rng.random() < 0.7:
         spoilt = nudged if rng.random() < 0.5 else spoilt_tree
         data = yaml.dump(spoilt(_tree(base), rng), Dumper=getattr(yaml, "CSafeDumper", yaml.SafeDumper)).encode()
@@ -220,7 +220,7 @@ _WRITERS: tuple[Callable[[tuple[corpus.Item, ...]], str], ...] = (
 
 
 def waypoints(rng: random.Random) -> list[str]:
-    """A .waypoints file: of its lines, of its numbers, and of its bytes."""
+    """A .waypoints file with corrupted lines, numbers or bytes."""
     text = "\n".join(ROWS) + "\n" if rng.random() < 0.5 else rng.choice(_WRITERS)(rng.choice(_items()))
     lines, mild = text.split("\n"), rng.random() < 0.6
     for _ in range(rng.choice((0, 1, 1, 2, 6))):
@@ -274,7 +274,7 @@ def _plans() -> list[Any]:
 
 
 def plan(rng: random.Random) -> list[str]:
-    """A .plan file: simple and complex items, fences, rally points."""
+    """A corrupted .plan file with simple and complex items, fences or rally points."""
     plans = _plans()
     tree = plans[0] if rng.random() < 0.3 else rng.choice(plans)
     written("uav1.plan", bombed(spoilt_json(tree, rng), rng))
@@ -282,7 +282,7 @@ def plan(rng: random.Random) -> list[str]:
 
 
 def _among(rng: random.Random, file: str) -> list[str]:
-    """Arguments that check a file in the world of a mission file, or of options."""
+    """Arguments that check a file against the world of a mission file or of command line options."""
     kind = rng.random()
     if kind < 0.6:
         return ["clean/m.yaml", f"uav1={file}"]
@@ -295,7 +295,7 @@ OPTIONS = ("--dem", "clean/west.asc", "--vertical-datum", "EGM96", "--crs", "EPS
 
 
 def zones(rng: random.Random) -> list[str]:
-    """A file of zones."""
+    """A corrupted KML or GeoJSON file of zones."""
     if rng.random() < 0.5:
         name, data = "z.kml", spoilt_bytes(KML.encode(), rng, XML_WORDS)
     else:
@@ -308,7 +308,7 @@ def zones(rng: random.Random) -> list[str]:
 
 
 def terrain(rng: random.Random) -> list[str]:
-    """A DEM: its header, its cells, or a claim of more than there is."""
+    """A DEM with corrupted header or cells, of a wrong size, or one that claims to be larger than it is."""
     kind = rng.random()
     if kind < 0.45:
         rows = Path("clean/west.asc").read_bytes()[len(HEADER) :]
@@ -356,14 +356,14 @@ def boasting(rng: random.Random) -> bytes:
         with rasterio.open(name, "w", **options):
             pass
         return Path(name).read_bytes()
-    except Exception:  # some claims not even GDAL writes
+    except Exception:  # GDAL refuses to write some of them
         return b"II*\0" + rng.randbytes(100)
     finally:
         Path(name).unlink(missing_ok=True)
 
 
 def names(rng: random.Random) -> list[str]:
-    """What is no file, or not the one that was meant."""
+    """Names that are no file, or a file of the wrong kind."""
     shutil.copy("clean/m.yaml", "m.yaml")
     strange = rng.choice(
         ("clean", "/dev/null", "nowhere", "", "\x00", "a\nb", "uav1=", "=", "uav1=uav1=x", "x" * 5000, "clean/m.yaml",
@@ -383,7 +383,7 @@ def names(rng: random.Random) -> list[str]:
 
 
 def odd_options(rng: random.Random) -> list[str]:
-    """Numbers on the command line."""
+    """Odd values of command line options."""
     option = rng.choice(("--min-agl", "--max-agl", "--max-amsl", "--clearance", "--track-error", "--altitude-error",
                          "--max-climb", "--speed", "--climb-rate", "--rtl-altitude", "--obstacle-height", "--home",
                          "--crs", "--vertical-datum", "--autopilot"))  # fmt: skip
@@ -402,4 +402,4 @@ KINDS: dict[str, tuple[float, Callable[[random.Random], list[str]]]] = {
     "names": (0.3, names),
     "options": (0.4, odd_options),
 }
-"""Name to how often, and how one is made."""
+"""Kinds of input by name: relative frequency, and the function that makes one."""

@@ -1,4 +1,4 @@
-"""Random worlds, missions of every kind in them, and knobs that bring them to a limit."""
+"""Random worlds, missions of every kind in them, and knobs: parameters that bring a mission to a limit."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 LOITER_TO_ALT = 31
 
 FAMILIES = ("copter", "px4", "vtol", "terrain", "return", "spline", "circle", "jump", "wing", "battery", "fleet")
-"""What is flown: straight legs of each autopilot, terrain frame, a return, curves, circles, arcs, rounds, fleets."""
+"""Kinds of mission: straight legs of each autopilot, terrain frame, a return, curves, circles, arcs, jumps, fleets."""
 
 WING_RADIUS_M, WING_SPEED_M_S = 40.0, 14.0
 
 
 @dataclass(frozen=True)
 class Case:
-    """One mission in one world. ``limits`` are the vehicle's."""
+    """One mission in one world; ``limits`` are those of the vehicle."""
 
     family: str
     ground: Ground
@@ -72,7 +72,7 @@ def airspace_of(surface: Surface, zones: tuple[Zone, ...]) -> Airspace:
 
 
 def make_ground(rng: np.random.Generator, size_m: float) -> Ground:
-    """Rough ground about ``size_m`` across, its grid perhaps turned against the plane; the origin is its middle."""
+    """Rough ground about ``size_m`` wide; half of the grids are rotated against the plane; the origin is the middle."""
     cell = float(rng.uniform(8.0, 60.0) if size_m < 1000.0 else rng.uniform(60.0, 90.0))
     n = int(min(max(size_m / cell, 6), 60))
     z = rng.uniform(0.0, rng.choice([0.0, 3.0, 15.0, 40.0]), (n, n))
@@ -102,7 +102,7 @@ def make_ground(rng: np.random.Generator, size_m: float) -> Ground:
 
 
 def make_case(rng: np.random.Generator, family: str) -> Case | None:
-    """A mission whose limits are loose, without the zones that it breaks; None where it is not safe even so."""
+    """A safe mission with loose limits; zones that make it unsafe are left out. None if it is unsafe without zones."""
     size = 5000.0 if family == "wing" else float(rng.uniform(300.0, 900.0))
     ground = make_ground(rng, size)
     top = ground.heights
@@ -134,7 +134,7 @@ def make_case(rng: np.random.Generator, family: str) -> Case | None:
 
 
 def corner_zones(rng: np.random.Generator, case: Case) -> list[Zone]:
-    """Small circles on the inside of corners, where a vehicle that turns early comes by."""
+    """Small circles on the inside of corners, where a vehicle that turns early passes."""
     places = [case.frame.to_plane(i.lat_deg, i.lon_deg) for i in case.mission.items if i.command == cmd.WAYPOINT]
     found = []
     for a, b, c in zip(places, places[1:], places[2:], strict=False):
@@ -205,7 +205,7 @@ def make_mission(
 
 
 def _wing_points(rng: np.random.Generator, box: Floats) -> Floats:
-    """Legs long enough for their arcs: a walk that turns by up to 100°."""
+    """Points of a random walk that turns by up to 1.7 rad (97°), with legs long enough for their arcs."""
     heading = float(rng.uniform(0.0, 2.0 * np.pi))
     points = [np.array([*(rng.uniform(box[0], box[1]) * 0.3), 0.0])]
     for step in (600.0, *rng.uniform(240.0, 330.0, int(rng.integers(1, 4)))):
@@ -225,13 +225,13 @@ def _wing_items(points: Floats, item: Callable[..., MissionItem], ground: Ground
     return [*items, item(cmd.LOITER_UNLIM, points[-1], m.RELATIVE, 0.0, 0.0, WING_RADIUS_M)]
 
 
-# -- knobs: (name, how a case looks at a value, where it is loose, where it is tight) --------------------------------
+# -- knobs: (name, function from case and value to a changed case, loose value, tight value) --------------------------
 
 Knob = tuple[str, Callable[[Case, float], Case], float, float]
 
 
 def knobs(rng: np.random.Generator, case: Case) -> list[Knob]:
-    """Knobs that may be turned until something breaks, in random order."""
+    """The knobs that apply to a case, in random order."""
 
     def limit(name: str) -> Callable[[Case, float], Case]:
         return lambda c, v: c.limited(**{name: v})

@@ -1,10 +1,10 @@
-"""Fleets whose conflicts are resolved to just the separation that is asked: sampled, and flown in simulated time.
+"""Planned fleets whose conflicts are resolved to just the requested separation: sampled, and flown in simulated time.
 
 Two or three vehicles cross flat ground or hills, with or without zones in the middle, in sequence or together, waiting
-on the ground, at gates in the air or not at all, each early or late within its window. What the planner calls separated
-is sampled every 10 ms with every vehicle as early or late as it may be, and the stored missions are flown by the
-simulated autopilots, departures moved likewise.
-A resolved conflict is left just at the limit, so there is nothing to halve.
+on the ground, at gates in the air or not at all, each early or late within its window. Planned motions are sampled
+every 10 ms, each pair shifted in time by up to both windows; the stored missions are also flown by the simulated
+autopilots with departures up to a window early or late. The planner resolves a conflict to exactly the limit, so this
+family needs no bisection.
 """
 
 from __future__ import annotations
@@ -29,7 +29,10 @@ SHIFTS = 9
 
 
 def fleet_at_limit(rng: np.random.Generator) -> tuple[float, str] | None:
-    """How far a planned fleet comes below its separation, metres; None where none can be planned."""
+    """By how much (m) a random planned fleet falls below its separation, and how it was found; None if no plan exists.
+
+    Negative if the separation is kept.
+    """
     asked, separation_m = _asked(rng), float(rng.uniform(5.0, 60.0))
     text = yaml.safe_dump(asked | {"arrival": asked["arrival"] | {"separation_m": separation_m}})
     try:
@@ -77,7 +80,7 @@ def _asked(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _ground(rng: np.random.Generator) -> dict[str, Any]:
-    """Flat ground, or hills that tracks climb over: speeds along them, and so times, differ from those over a plane."""
+    """Terrain keys: flat, or hills that paths climb over, which changes speeds along the track and so the times."""
     if rng.random() < 0.4:
         return {"flat_m": 0}
     return {
@@ -92,7 +95,7 @@ def _ground(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _nearest_m(done: Plan, window_s: float) -> float:
-    """The least distance of any two in the air, each up to the window early or late."""
+    """The least distance (m) of any two vehicles in the air, each up to the window early or late."""
     assert done.fleet is not None
     least = math.inf
     for a, b in combinations(done.fleet.motions, 2):
@@ -105,7 +108,7 @@ def _nearest_m(done: Plan, window_s: float) -> float:
 
 
 def _flown_short_m(done: Plan, window_s: float, separation_m: float, rng: np.random.Generator) -> float:
-    """By how much the simulated flight comes below the separation."""
+    """By how much (m) the simulated flight falls below the separation."""
     early = float(min(p.depart_s for p in parts_of(done)))
     parts = [
         replace(p, depart_s=p.depart_s + (float(rng.choice([-1.0, 1.0])) * window_s if early >= window_s else 0.0))

@@ -1,8 +1,9 @@
-"""What a case's mission makes a vehicle fly, and how deep that breaks a limit: point by point, 0.25 m apart.
+"""An independent check of a case's mission: the lines that the vehicle may fly, judged at points 0.25 m apart.
 
-It shares no code with the check but the door to degrees. Items are read from their wire numbers, legs are flown
-straight in the plane or in degrees, corners are cut as each autopilot may, and every point is held against the surface
-and the zones as far around it as errors and clearance reach. Sampling can only miss: what it finds is a violation.
+It shares no code with the check except the conversion to and from degrees. It reads items from their wire numbers,
+flies legs straight in the plane or in degrees, cuts corners as each autopilot may, and compares every point with the
+surface and the zones around it, as far as errors and clearance reach. Sampling can miss a violation, but every
+violation that it finds is one.
 """
 
 from __future__ import annotations
@@ -22,16 +23,16 @@ from tests.oracles.legs import Oracle
 
 STEP_M = 0.25
 ALLOWED = 0.05
-"""Metres, or degrees, by which nothing that was called safe may be unsafe."""
+"""Tolerance (m, or degrees): a mission called safe may break a limit by no more than this."""
 
 TAKE_OFFS, LANDS, CIRCLES = (22, 84), (21, 85), (17, 18)
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Points (N, 3) that are flown one after the other. ``track_m``, ``altitude_m``: what it may be off besides.
+    """Points (N, 3), flown one after the other. ``track_m``, ``altitude_m``: how far the vehicle may be off them.
 
-    ``column``: exempt from min AGL, angles and terrain clearance; ``angles``: whether its slopes are held to limits.
+    ``column``: exempt from min AGL, angles and terrain clearance; ``angles``: whether climb limits apply.
     """
 
     points: Floats
@@ -42,20 +43,20 @@ class Line:
 
 
 def stored_m(item: MissionItem, autopilot: Autopilot) -> float:
-    """ArduPilot: float32 times 100, cut to whole centimetres; PX4: float32."""
+    """The stored altitude: ArduPilot float32 times 100, truncated to whole centimetres; PX4 float32."""
     z = np.float32(item.z)
     return float(z) if autopilot is Autopilot.PX4 else int(np.float32(z * np.float32(100.0))) / 100.0
 
 
 def _beside(points: Floats, a: Floats, b: Floats) -> Floats:
-    """(N,) how far points are from the leg from ``a`` to ``b``, seen from above."""
+    """Horizontal distances (N,) of points from the leg from ``a`` to ``b``."""
     way = (b - a)[:2]
     t = np.clip((points[:, :2] - a[:2]) @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
     return np.asarray(np.hypot(*(points[:, :2] - a[:2] - t[:, None] * way).T))
 
 
 class Flight:
-    """The mission as it is flown: `lines` gives every line that the vehicle may fly."""
+    """The mission as flown: `lines` yields the lines that the vehicle may fly."""
 
     def __init__(self, case: Case, rng: np.random.Generator) -> None:
         self.case, self.rng = case, rng
@@ -72,7 +73,7 @@ class Flight:
         return np.asarray(self.case.frame.to_plane(x / 1e7, y / 1e7))
 
     def climbs_m(self, item: MissionItem) -> float:
-        """A take-off's height above home: a metre at least on ArduCopter, MIS_TAKEOFF_ALT on PX4."""
+        """A take-off's height (m) above home: at least 1 m on ArduCopter, at least MIS_TAKEOFF_ALT (2.5 m) on PX4."""
         least = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}.get(self.autopilot, -math.inf)
         return max(stored_m(item, self.autopilot), least)
 
@@ -80,7 +81,7 @@ class Flight:
         return float(self.oracle.height(self.case.surface.ground_m, en[:1], en[1:2])[0])
 
     def target(self, item: MissionItem, here: Floats) -> Floats:
-        """Where an item leads from ``here``; to ArduCopter an altitude of 0 is none: it keeps its own."""
+        """The place an item leads to from ``here``; ArduCopter keeps its altitude if the item's altitude is 0."""
         en = self.place(item.x, item.y)
         if self.autopilot is Autopilot.ARDUCOPTER and stored_m(item, self.autopilot) == 0.0:
             kept = here[2] - self.ground(here) + self.ground(en) if item.frame == 10 else here[2]
@@ -89,7 +90,7 @@ class Flight:
         return np.array([*en, base + stored_m(item, self.autopilot)])
 
     def straight(self, a: Floats, b: Floats, terrain: bool = False) -> Floats:
-        """Points from ``a`` to ``b``; altitude even along the way, above ground in the terrain frame."""
+        """Points from ``a`` to ``b`` at an even slope; with ``terrain`` the height above ground changes evenly."""
         count = max(2, math.ceil(float(np.linalg.norm(b - a)) / STEP_M) + 1)
         t = np.linspace(0.0, 1.0, count)[:, None]
         points = a + t * (b - a)
@@ -110,7 +111,7 @@ class Flight:
             return
         track, high = self.case.limits.track_error_m, self.case.limits.altitude_error_m
         here = np.array([*self.home, self.datum])
-        begun, before = here, None  # where it truly is, and the item that it left
+        begun, before = here, None  # where the vehicle truly is, and the way point before `here`
         stops, circle = True, 0.0
         for item, after in self.in_order():
             if item.command in TAKE_OFFS:
@@ -147,7 +148,7 @@ class Flight:
                     begun = to
 
     def in_order(self) -> Iterator[tuple[MissionItem, MissionItem | None]]:
-        """Items as flown, jumps unrolled (a few rounds of each), and the item that is flown to after each."""
+        """Items in the order flown, with at most three rounds of each jump; with each, the next item flown to."""
         items, first = self.case.mission.items, self.case.mission.first_seq
         flown, index, left = [], 0, {}
         while index < len(items) and len(flown) < 60:
@@ -163,7 +164,7 @@ class Flight:
             yield item, next((i for i in flown[k + 1 :] if i.command in (16, 17, 18, 82)), None)
 
     def edge(self, item: MissionItem, here: Floats, to: Floats) -> Floats:
-        """Where a copter meets the circle that it is to fly, at the circle's altitude."""
+        """Where ArduCopter reaches the circle that it is to fly, at the circle's altitude."""
         radius, way = self.radius(item, to[2]), to - here
         far = math.hypot(way[0], way[1])
         if item.command != 18 or self.autopilot is not Autopilot.ARDUCOPTER or far <= radius:
@@ -195,9 +196,9 @@ class Flight:
         return middle + radius * np.array([math.cos(a), math.sin(a), 0.0])
 
     def home_again(self, here: Floats, meant: Floats) -> Iterator[Line]:
-        """A copter's or PX4's return: up, straight home, down; within the cone it may climb less.
+        """A copter's or PX4's return: up, straight home, down; ArduCopter may climb less within its cone.
 
-        ``meant`` is where the mission has it begin, ``here`` where it does.
+        ``meant``: the nominal beginning of the return; ``here``: the true one.
         """
         track, high = self.case.limits.track_error_m, self.case.limits.altitude_error_m
         off = math.dist(here[:2], meant[:2])
@@ -213,7 +214,7 @@ class Flight:
     # -- corners -----------------------------------------------------------------------------------------------------
 
     def accepts_m(self, item: MissionItem, here: Floats, to: Floats, after: MissionItem | None) -> float:
-        """How far before its way point a PX4 or a VTOL of ArduPlane turns."""
+        """The distance (m) before a way point at which PX4 or an ArduPlane VTOL turns to the next leg."""
         if item.command != 16:
             return 0.0 if self.autopilot is Autopilot.ARDUPLANE else 10.0
         if self.autopilot is Autopilot.PX4 or item.params[1] > 0:
@@ -226,20 +227,20 @@ class Flight:
         return min(90.0, 0.75 * 17.0 / math.pi * self.case.vehicle.speed_max_m_s) * min(1.0, turn / (0.5 * math.pi))
 
     def turn(self, item: MissionItem, begun: Floats, here: Floats, to: Floats, after: MissionItem | None) -> Floats:
-        """Where it is when it turns to the next leg, having flown straight from where it turned before."""
+        """Where the vehicle turns to the next leg, having flown straight from its last turn at ``begun``."""
         if self.autopilot is Autopilot.ARDUCOPTER or self.case.family == "terrain":
             return to
         radius, way = self.accepts_m(item, here, to, after), to - begun
         far = math.hypot(way[0], way[1])
         part = max(0.0, 1.0 - radius / far) if far > 1e-6 else 0.0
         if self.autopilot is Autopilot.PX4 and abs(way[2]) * (1.0 - part) > 0.8:
-            part = 1.0 - 0.8 / abs(way[2])  # nor before it is within NAV_MC_ALT_RAD
+            part = 1.0 - 0.8 / abs(way[2])  # it must also be within NAV_MC_ALT_RAD (0.8 m)
         return np.asarray(begun + part * way)
 
     def cut(
         self, item: MissionItem, begun: Floats, here: Floats, to: Floats, after: MissionItem | None
     ) -> Iterator[Line]:
-        """The leg as it is flown from where the one before was left; a copter's corner at its end."""
+        """The leg as flown from where the vehicle left the leg before; for ArduCopter, the corner at its end."""
         limits = self.case.limits
         track, high = limits.track_error_m, limits.altitude_error_m
         if self.autopilot is Autopilot.ARDUCOPTER:
@@ -261,7 +262,7 @@ class Flight:
         part = float(self.rng.choice([1.0, 1.0, self.rng.uniform(0.05, 1.0)]))
         joins = here + part * (to - here)
         points = np.concatenate([self.straight(begun, joins), self.straight(joins, to)])
-        # The errors hold corners that stay within them, an acceptance radius that is rounded too.
+        # Corners within the errors are covered by them; the millimetre covers a rounded acceptance radius.
         off = float(np.minimum(_beside(points, begun, here), _beside(points, here, to)).max())
         held, held_high = off <= track + 1e-3, abs(begun[2] - here[2]) <= high + 1e-3
         yield Line(points, 0.0 if held else track, 0.0 if held_high else high, angles=False)
@@ -288,7 +289,7 @@ class Flight:
 
 
 def arcs(points: Floats, radius: float) -> Floats:
-    """The line through ``points`` with arcs that touch both legs, altitude even from arc's middle to arc's middle."""
+    """The line through ``points`` with corners rounded by tangent arcs; even slope from arc middle to arc middle."""
     way = np.diff(points[:, :2], axis=0)
     unit = way / np.hypot(*way.T)[:, None]
     turn = np.array([math.atan2(u[0] * v[1] - u[1] * v[0], float(u @ v)) for u, v in pairwise(unit)])
@@ -311,7 +312,7 @@ def arcs(points: Floats, radius: float) -> Floats:
 
 
 def _half(start: Floats, heading: Floats, turn: float, radius: float) -> Floats:
-    """The first half of an arc that leaves ``start`` with a heading (2,) and turns by ``turn``, left positive."""
+    """The first half of an arc from ``start`` with heading vector (2,) that turns by ``turn`` (rad, left positive)."""
     side = math.copysign(1.0, turn)
     centre = start + side * radius * np.array([-heading[1], heading[0]])
     a = np.linspace(0.0, 0.5 * turn, max(2, math.ceil(0.5 * radius * abs(turn) / STEP_M)))
@@ -325,7 +326,7 @@ def _half(start: Floats, heading: Floats, turn: float, radius: float) -> Floats:
 
 
 def worst(case: Case, rng: np.random.Generator) -> tuple[float, str]:
-    """How deep the mission of ``case`` breaks a limit, metres or degrees, at most; negative where it keeps them all."""
+    """The deepest breach of a limit (m or degrees) by the mission of ``case``, and its kind; negative if none."""
     flight = Flight(case, rng)
     found = (-math.inf, "")
     for line in flight.lines():
@@ -362,7 +363,7 @@ def _depths(oracle: Oracle, case: Case, line: Line) -> Iterator[tuple[float, str
 
 
 def breached(oracle: Oracle, k: int, line: Line, reach: float, error: float) -> bool:
-    """Whether a point of zone ``k`` within ``reach`` of the line has it within ``error`` of its own heights."""
+    """Whether a point of zone ``k`` within ``reach`` of the line has the line within ``error`` of its altitudes."""
     zone, (e, n, h) = oracle.zones[k], line.points.T
     gap = oracle.shape_distance(zone, e, n)
     close = gap < reach
@@ -387,7 +388,7 @@ def breached(oracle: Oracle, k: int, line: Line, reach: float, error: float) -> 
 
 
 def battery_needed_j(case: Case) -> float:
-    """Energy of the whole mission, every round flown one after the other."""
+    """Energy (J) of the whole mission, with every round of its jumps."""
     flight, energy = Flight(case, np.random.default_rng(0)), case.vehicle.energy
     items, first = case.mission.items, case.mission.first_seq
     here, spent, index, left = np.array([*flight.home, flight.datum]), 0.0, 0, {}

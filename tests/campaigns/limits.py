@@ -1,7 +1,8 @@
-"""Missions at the limit: each margin bisected to where the check says safe for the last time, and flown there.
+"""Missions at the limit: each margin is bisected to the tightest value that the check calls safe, and judged there.
 
-Random worlds (slopes, towers, canopies, turned grids, zones of every kind), missions of every family, and knobs that
-bring them to a limit one after the other. What the check calls safe there is flown in brute force, 0.25 m apart.
+Random worlds (slopes, towers, canopies, rotated grids, zones of every kind), missions of every family, and knobs that
+bring them to one limit after the other. Brute force at points 0.25 m apart judges the missions that the check calls
+safe.
 
     python -m tests.campaigns.limits --seconds 120 [--seed N] [--families copter wing …]
 """
@@ -25,15 +26,15 @@ from tests.campaigns.limit_oracle import ALLOWED, battery_needed_j, read_again, 
 
 HALVINGS = 15
 KNOBS = 4
-"""Turned one after the other in each world, so that several limits are near at once."""
+"""Knobs turned one after the other in each world, so that several limits are near at once."""
 
 FLEETS = 5
-"""A fleet takes seconds: one in so many worlds."""
+"""One world in this many has a fleet, because planning a fleet takes seconds."""
 
 
 @dataclass
 class Tally:
-    """What a campaign found."""
+    """Counts and findings of a campaign."""
 
     judged: Counter[str] = field(default_factory=Counter)
     turned: Counter[str] = field(default_factory=Counter)
@@ -60,7 +61,7 @@ class Tally:
 
 
 def attack(seed: int, family: str, tally: Tally, turns: int = KNOBS) -> None:
-    """One world: its knobs turned to the limit, each time judged by brute force."""
+    """Attack one world: turn its knobs to the limit and judge it by brute force after each."""
     rng = np.random.default_rng([seed, FAMILIES.index(family)])
     if family == "fleet":
         if seed % FLEETS == 0 and (found := fleet_at_limit(rng)) is not None:
@@ -86,7 +87,7 @@ def _judged(case: Case, rng: np.random.Generator) -> tuple[float, str]:
         usable = (1.0 - case.vehicle.energy.reserve) * (case.vehicle.energy.battery_j or 0.0)
         needed = battery_needed_j(case)
         return (needed / usable - 1.0) * 100.0, "battery, percent"
-    if rng.random() < 0.1:  # a file says the same
+    if rng.random() < 0.1:  # the mission read back from a file must be safe too
         plan = bool(rng.random() < 0.5)
         again = read_again(case, write_plan(case.mission) if plan else write_waypoints(case.mission), plan)
         if again.verdict().safe is not True:
@@ -95,7 +96,7 @@ def _judged(case: Case, rng: np.random.Generator) -> tuple[float, str]:
 
 
 def at_limit(case: Case, knob: Knob, tally: Tally) -> Case | None:
-    """The case with the knob as tight as the check calls safe; None where it is so all the way, or nowhere."""
+    """The case with the knob as tight as the check still calls safe; None if all of its range is safe, or none."""
     _, change, loose, tight = knob
 
     def safe(value: float) -> bool:
@@ -113,7 +114,7 @@ def at_limit(case: Case, knob: Knob, tally: Tally) -> Case | None:
 def run(
     seconds: float, seed: int, families: Sequence[str] = FAMILIES, most: int | None = None, turns: int = KNOBS
 ) -> Tally:
-    """Attack for so long, or through so many worlds of each family, with so many knobs turned in each."""
+    """Attack for ``seconds``, or ``most`` worlds of each family, with ``turns`` knobs turned in each."""
     tally, begun, world = Tally(), time.monotonic(), seed
     while time.monotonic() - begun < seconds and (most is None or world - seed < most):
         for family in families:
@@ -126,7 +127,7 @@ def run(
 
 
 def main() -> int:
-    """Run the campaign from the command line; 1 where something unsafe was called safe."""
+    """Run the campaign from the command line; return 1 if something unsafe was called safe."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=120.0)
     parser.add_argument("--seed", type=int, default=1, help="of the first world")

@@ -1,16 +1,17 @@
 """Uploads among adversaries, in simulated time: ``python -m tests.campaigns.links --seconds 120``.
 
-Each run is one fleet upload through everything from `uploads.run_jobs` down to the frames, on a bad radio, while a
-seeded mixture of these happens: vehicles that lose, spoil, refuse or forget what they get, are armed, carried off,
-switched off, rebooted, edited by a second ground station or replaced by another one; twins with the same number at
-another address or behind the same one; forged mission messages, hostile parameters and telemetry; signatures, and
-recordings that are played again. Held against what the vehicles really hold, and got:
+Each run is one fleet upload through all code from `uploads.run_jobs` down to the frames, on a bad radio, with a seeded
+mixture of trouble: vehicles that lose, corrupt, refuse or forget what they receive, are armed, moved, switched off,
+rebooted, edited by a second ground station or replaced by another one; twins with the same system id at another
+address or at the same one; forged mission messages, hostile parameters and telemetry; signatures, and replayed
+recordings. The results are compared with what the vehicles really received and hold:
 
-- *false verified*: said to be verified, and at no time of the read-back on board;
-- *misdelivered*: an announcement, an item or a clearing to a vehicle that is not the one that was checked, or that
-  the ground station has heard to be elsewhere, or (announcements, clearings) armed;
-- *untold*: exit 0 though the vehicle was armed or carried off before the read-back ended, or a rival was heard;
-- *hang*: longer than the user's patience allows; *crash*: exit 70, or an exception.
+- *false verified*: reported as verified, but at no time of the read-back on board;
+- *misdelivered*: an announcement, an item or a clearing was sent to a vehicle that is not the checked one, or that had
+  reported to be elsewhere or (announcements, clearings) armed;
+- *untold*: exit 0 though the vehicle had reported to be armed or moved before the look after the read-back ended, or a
+  rival was heard;
+- *hang*: longer than the timeouts allow; *crash*: exit 70, or an exception.
 """
 
 from __future__ import annotations
@@ -48,13 +49,13 @@ WRITES = (COUNT, ITEM, CLEAR)
 LAST_LOOK_S = 10.0
 FIND_S, STANDBY_S, PARAMETERS_S = 10.0, 30.0, 4.0
 LOOKED_S = 2.0
-"""Before anything is written the vehicle has been heard within 1.5 s, and what it said is judged every 0.1 s."""
+"""Most seconds from a vehicle's last message to a write: gcsplan requires 1.5 s, and judges messages every 0.1 s."""
 ALIKE_FRAMES = 4
-"""So many positions of each of two vehicles at one address, and it is known that they are two."""
+"""After more positions than this of each of two vehicles at one address, gcsplan must know that there are two."""
 
 
 def mission_of(sysid: int, autopilot: Autopilot, count: int, home: Home) -> Mission:
-    """``count`` way points away from ``home``."""
+    """A mission of ``count`` way points that lead away from ``home``."""
     z = altitude_of_cm(6500, autopilot)
     items = tuple(
         MissionItem(16, 3, (0.0,) * 4, home.lat_e7 + 1000 * n + sysid, home.lon_e7 + 777 * n, z + n)
@@ -65,14 +66,17 @@ def mission_of(sysid: int, autopilot: Autopilot, count: int, home: Home) -> Miss
 
 @dataclass
 class Seat:
-    """One vehicle that something is sent to, who else may be taken for it, and what the ground station wrote."""
+    """One vehicle that a mission is sent to, the others with its system id, and what the ground station wrote.
+
+    ``checked``: the craft that the ground station found first; ``pinned``, ``to``: where its first write went.
+    """
 
     craft: Craft
     address: Peer
     mission: Mission
     others: list[Craft] = field(default_factory=list)
     began: float = 0.0
-    asked_at: float = 0.0  # for the list, last
+    asked_at: float = 0.0  # time of the last request of the list
     acked_at: float = 0.0
     wrote: int = 0
     checked: Craft | None = None
@@ -107,7 +111,7 @@ class Run:
         for sysid in range(1, rng.choice((1, 1, 1, 2, 3)) + 1):
             self._seat(sysid)
 
-    # the cast
+    # vehicles and trouble
 
     def _signing(self) -> Signing | None:
         return Signing(self.key, clock=self.air.wall_clock) if self.key else None
@@ -161,7 +165,7 @@ class Run:
         return Misbehaviour(**some)
 
     def _when(self) -> float:
-        """Before it is found, while it is looked at, in the middle of the transfer, or later."""
+        """A random time (s): before the vehicle is found, during the first look, during the transfer, or later."""
         rng = self.rng
         return rng.choice(
             (rng.uniform(0.0, 2.0), rng.uniform(1.5, 4.0), rng.uniform(2.0, 12.0), rng.uniform(5.0, 60.0))
@@ -221,7 +225,7 @@ class Run:
         return one
 
     def _twin(self, seat: Seat) -> None:
-        """Another vehicle with the same number, at an address of its own or behind the same one."""
+        """Add another vehicle with the same system id, at an address of its own or at the same one."""
         air, rng = self.air, self.rng
         address = seat.address if rng.random() < 0.3 else f"twin of {seat.craft.vehicle.sysid}"
 
@@ -233,7 +237,7 @@ class Run:
         self._do(f"a twin at {address} of", seat, comes)
 
     def _swap(self, seat: Seat) -> None:
-        """It falls silent, and another one speaks from its address."""
+        """Remove the vehicle, then let another one send from its address."""
         air, rng = self.air, self.rng
 
         def goes() -> None:
@@ -261,7 +265,7 @@ class Run:
             air.later(at + n * rng.choice((0.01, 0.1, 0.5)), forger.speak)
         self.happened.append(f"forger at {address} from {at:.2f} s, polite {polite}")
 
-    # what is written and heard
+    # frames written and heard
 
     def _written(self, peer: Peer, data: bytes) -> None:
         kind = data[7] | data[8] << 8 | data[9] << 16
@@ -297,7 +301,7 @@ class Run:
         for one in there:
             if one.armed_told < now and kind != ITEM and not self.options.allow_armed:
                 said.append("one that was heard to be armed")
-            # A component that is no autopilot may say what it likes: it takes a heartbeat to be one.
+            # Positions of a component count only after its heartbeat, which identifies it as an autopilot.
             if one.far_told < now and one.known_since < now and not self.options.ignore_position:
                 said.append("one that was heard to be 33 km away")
             if one is not seat.checked and seat.checked in there:
@@ -307,7 +311,7 @@ class Run:
         self.found += [f"misdelivered at {now - 1000.0:.2f} s: {what} to {words}" for words in said]
 
     def _found(self, seat: Seat, there: list[Craft]) -> Craft | None:
-        """Who was checked: of those at the address the one that was heard last; of two that still speak, ours."""
+        """The craft that was checked: ours if it was heard recently, else the one at the address heard last."""
         heard = [one for one in there if one.known_since < self.air.now]
         if seat.craft in heard and self.air.now - seat.craft.last_heard <= SILENCE_S:
             return seat.craft
@@ -332,7 +336,7 @@ class Run:
     # the run
 
     def go(self) -> tuple[list[uploads.JobResult], list[str]]:
-        """Upload; the results and what was found."""
+        """Run the upload; return the results and the findings."""
         if self.key and self.rng.random() < 0.5:
             self._play_again()
         began = self.air.now
@@ -380,7 +384,7 @@ class Run:
             uploads._open = opened
 
     def _play_again(self) -> None:
-        """Record a first, good upload; then the vehicle is gone or empty, and the recording speaks in its place."""
+        """Record a first, good upload; then empty the vehicle, remove it or not, and replay the recording."""
         rng, air = self.rng, self.air
         seat = self.seats[1]
         with self._links():
@@ -406,7 +410,7 @@ class Run:
             self.found += [f"untold: {d.vehicle} {words}, and exit 0" for words in self._untold(seat, here)]
 
     def _untold(self, seat: Seat, here: list[Craft]) -> Iterator[str]:
-        """What the ground station has heard and should have said."""
+        """Facts that the ground station has heard and should have reported."""
         checked, until = seat.checked, seat.acked_at
         voice = self.voices.get((seat.to, seat.pinned), Voice()) if seat.to else Voice()
         looked_at = voice.look_after(until)
@@ -420,7 +424,7 @@ class Run:
         if checked is None:
             return
         for o in (seat.craft, *seat.others):
-            # Heard while the one that was checked was there: a rival, wherever it stands.
+            # Heard while the checked vehicle was there: a rival, at whatever address.
             apart = (o.vehicle.compid, o.address) != (checked.vehicle.compid, checked.address)
             since = max(seat.began, checked.there_since) + 0.1
             if o is not checked and apart and o.heard_between(since, min(until, checked.left_at)):
@@ -428,7 +432,7 @@ class Run:
 
 
 def one(seed: int) -> tuple[Counter[str], list[str]]:
-    """Run ``seed``: what came of it, and what was found, each with what had happened."""
+    """Run ``seed``; return counts of its results, and each finding with the events of the run."""
     run = Run(seed)
     results, found = run.go()
     counts = Counter(
@@ -443,7 +447,7 @@ def one(seed: int) -> tuple[Counter[str], list[str]]:
 
 
 def campaign(seeds: range | Iterator[int], until: float = float("inf")) -> tuple[Counter[str], list[str]]:
-    """All ``seeds``, or as many as go until ``until`` (time.monotonic)."""
+    """Run all ``seeds`` until ``until`` (time.monotonic) or 50 findings; return counts and findings."""
     counts: Counter[str] = Counter()
     found: list[str] = []
     logging.disable(logging.ERROR)
@@ -460,7 +464,7 @@ def campaign(seeds: range | Iterator[int], until: float = float("inf")) -> tuple
 
 
 def main() -> int:
-    """The command line."""
+    """Run the campaign from the command line; return 1 on findings, or if no upload was verified."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=float("inf"), help="how long [default: until --runs are done]")
     parser.add_argument("--runs", type=int, default=10_000, help="at most so many runs [default: 10000]")

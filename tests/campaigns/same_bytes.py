@@ -1,10 +1,10 @@
-"""The same missions, planned by another commit and by this tree: are all files the same, to the byte?
+"""Plan the same missions with another commit and with this tree, and compare all files byte by byte.
 
     python -m tests.campaigns.same_bytes COMMIT [--sets gallery papers terrain everyday] [--count 60]
 
-For changes that move or rename code and must change nothing that anybody reads. Compared are the exit code and every
-`.waypoints`, `.plan`, CSV, JSON and GeoJSON of ``gcsplan plan``; messages and pictures are left aside. Ends with 1 and
-the names of missions that differ.
+For changes that move or rename code and must not change any output. It compares the exit code and every `.waypoints`,
+`.plan`, CSV, JSON and GeoJSON of ``gcsplan plan``, but not messages and pictures. Prints the missions that differ and
+exits with 1 if there are any.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SETS = ("gallery", "papers", "terrain", "everyday")
 COMPARED = (".waypoints", ".plan", ".csv", ".json", ".geojson")
 SEED = 77
 MOST_S = 3600.0
-"""Neither tree may take longer over all missions."""
+"""Seconds that each tree may take for all missions."""
 
 PLAN = """
 import contextlib, importlib, io, sys
@@ -62,7 +62,7 @@ def missions(sets: list[str], count: int) -> Iterator[tuple[str, str]]:
 
 
 def planned(tree: Path, folder: Path, out: str) -> dict[str, str]:
-    """What each mission's plan ended with, by the code of ``tree``; its files are in ``folder/out``."""
+    """Plan all missions with the code of ``tree``, into ``folder/out``; return the exit code of each."""
     (folder / out).mkdir()
     env = os.environ | {"PYTHONPATH": str(tree)}
     with (folder / f"{out}.log").open("w", encoding="utf-8") as log:
@@ -76,13 +76,13 @@ def planned(tree: Path, folder: Path, out: str) -> dict[str, str]:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """The compared files below a folder."""
+    """The files below a folder that are compared, by name."""
     found = (p for p in sorted(folder.rglob("*")) if p.suffix in COMPARED and p.is_file())
     return {str(p.relative_to(folder)): p.read_bytes() for p in found}
 
 
 def main() -> int:
-    """The command; how many missions differ, up to 1."""
+    """Run the comparison from the command line; return 1 if any mission differs."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("commit")
     parser.add_argument("--sets", nargs="+", default=list(SETS), choices=SETS)

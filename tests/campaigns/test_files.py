@@ -1,4 +1,4 @@
-"""The campaign of hostile files, short, and what it calls a fault."""
+"""A short run of the campaign `files`, and what it counts as a fault."""
 
 from __future__ import annotations
 

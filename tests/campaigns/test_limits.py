@@ -1,4 +1,4 @@
-"""A short run of the campaign `limits`, and that it finds what it is for."""
+"""A short run of the campaign `limits`, and tests that it finds planted errors of the check."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
         (
             500156,
             "circle",
-        ),  # a leg off a circle smaller than the track error was judged as begun in the circle's middle
-        (600078, "return"),  # a PX4 begins its return lower than the mission has it, and flies all of it there
-        (700239, "spline"),  # its angle was that of a curve on a sphere
-        (600111, "spline"),  # the steepest place of a curve that all but turns back lies between eight looks
-        (600036, "wing"),  # of two arcs that overlap, what lies back from one to the next counted as climbed on
+        ),  # a leg from a circle smaller than the track error was judged as if it began in the circle's middle
+        (600078, "return"),  # PX4 begins its return below the mission's altitude and flies all of it that low
+        (700239, "spline"),  # its climb angle was that of a curve on a sphere
+        (600111, "spline"),  # the steepest point of a curve that almost turns back lay between the eight samples
+        (600036, "wing"),  # where two arcs overlap, the piece back from one to the next counted as climbing distance
     ],
 )
 def test_what_the_campaign_found_once_is_cured(seed: int, family: str) -> None:
@@ -50,7 +50,7 @@ def test_no_family_is_unsafe_at_the_limit() -> None:
 
 def test_corners_that_nobody_judges_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def sharp(*_: object) -> None:
-        """No corner is ever cut."""
+        """Replace `round_corners`: no corner is cut."""
 
     monkeypatch.setattr(judging, "round_corners", sharp)
     assert run(FOREVER_S, 3, ("vtol",), most=1, turns=2).unsafe
@@ -59,7 +59,7 @@ def test_corners_that_nobody_judges_are_found(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.slow
 @pytest.mark.parametrize("less", ["track_error_m", "altitude_error_m"])
 def test_errors_that_are_taken_too_small_are_found(monkeypatch: pytest.MonkeyPatch, less: str) -> None:
-    """The campaign itself can fail: with a fifth of a metre less than it is, an error lets something through."""
+    """If the check takes an error 0.2 m too small, the campaign finds a mission that is wrongly called safe."""
 
     def short(error_m: float) -> Callable[..., PlaneLegs]:
         def legs(stretches, limits, world, terrain_error_m):  # type: ignore[no-untyped-def]

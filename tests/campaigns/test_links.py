@@ -1,4 +1,4 @@
-"""A short run of the campaign of links with fixed seeds; the long ones are `python -m tests.campaigns.links`."""
+"""Short runs of the campaign `links` with fixed seeds; for long ones run `python -m tests.campaigns.links`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def test_nothing_is_found_among_adversaries() -> None:
     counts, found = campaign(range(1, 26))
     assert found == []
     assert counts["runs"] == 25
-    # It is no campaign if nothing gets through, or nothing goes wrong.
+    # The campaign tests nothing unless some uploads succeed and some fail.
     assert counts["verified"] > 5
     assert counts["exit 5"] > 8
     assert counts["exit 6"] > 3
@@ -28,8 +28,8 @@ def test_the_campaign_finds_an_upload_that_does_not_look_again(monkeypatch: pyte
 
 
 def test_seeds_that_found_something_once_find_nothing() -> None:
-    """Twins of another component at one address (the first six), a twin that came between an upload and the clearing of
-    ``--atomic`` (301591), and what the campaign took for faults and was none."""
+    """Twins with another component id at one address (first six seeds), a twin that came between an upload and the
+    rollback of ``--atomic`` (301591), and false alarms of the campaign itself (the rest)."""
     for seed in (100101, 100267, 106543, 107754, 107983, 109498, 301591, 102170, 103594, 104195):
         assert campaign(range(seed, seed + 1))[1] == []
 
@@ -44,7 +44,7 @@ def test_the_campaign_finds_an_upload_that_answers_before_it_judges(monkeypatch:
 
 
 def silent_for_four_seconds() -> list[str]:
-    run = Run(1238)  # a good but slow radio, forty items, and nothing else that happens
+    run = Run(1238)  # a good but slow radio, forty items, and no other events
     craft = run.seats[1].craft
     run.air.later(8.0, craft.go_silent)
     run.air.later(12.0, craft.come_back)
@@ -69,7 +69,7 @@ def test_the_campaign_finds_an_upload_that_does_not_look_after_the_read_back(mon
 
 
 def test_the_campaign_finds_an_upload_that_never_ends_well(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A gate that refuses everything finds nothing, and is no success: the command line says so."""
+    """With a gate that refuses every upload there are no findings, but the command line still exits with 1."""
     monkeypatch.setattr(Recheck, "gate", lambda self, now: Changed("armed", "always"))
     monkeypatch.setattr("sys.argv", ["links", "--runs", "2"])
     assert main() == 1

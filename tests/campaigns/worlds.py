@@ -1,9 +1,9 @@
 """Missions whose best path leaves the first window of the terrain: long ridges, walls of zones, edges of DEMs, tiles.
 
 ``python -m tests.campaigns.worlds --seconds 600 --seed 0`` plans one random mission after the other, prints each on
-which something is wrong, and ends with figures by family. Wrong is a proof where there is a path, a bound over a path
-that is known, and a path that is illegal. The paths that are known are found without the planner: over rasters by
-Dijkstra's algorithm on the nodes of the whole DEM, pulled straight; on flat ground by a visibility graph.
+which something is wrong, and ends with figures by family. Faults are: a proof of infeasibility although a path is
+known, a bound above the cost of a known path, and an illegal path. Known paths are found without the planner: over
+rasters by Dijkstra's algorithm on the nodes of the whole DEM, pulled taut; on flat ground by a visibility graph.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ from gcsplan.world.frame import Frame, centre_of
 from gcsplan.world.path import Path as Track
 
 CAP_M, HIGH_M, LOW_M = 300.0, 600.0, 100.0
-"""The ceiling, the ridges, and the ground beside them."""
+"""AMSL (m) of the ceiling, of the ridges, and of the ground beside them."""
 WEST_M, NORTH_M = 600_000.0, 4_060_000.0
-"""Where the DEMs lie, in UTM zone 16."""
+"""The DEMs' north-western node, in UTM zone 16."""
 MOST_BYTES = 6 * 2**30
 STEP_M = 5.0
-"""Along a path, where ground is looked up."""
+"""Step along a path at which the ground below it is looked up."""
 TO_UTM = Transformer.from_crs("EPSG:4326", "EPSG:32616", always_xy=True)
 
 
 @dataclass(eq=False)
 class Case:
-    """A mission file's text, what it is planned over, and the cost of a path that is known; inf: none is."""
+    """A mission file's document, the cost of a known path (inf: none), and a check that names a path's fault."""
 
     document: dict[str, object]
     known: Callable[[Problem], float]
@@ -58,7 +58,7 @@ class Case:
 
 @dataclass(eq=False)
 class Outcome:
-    """What came of one mission; ``wrong`` what must not be."""
+    """The result of one mission; ``wrong``: its faults."""
 
     family: str
     seed: int
@@ -83,22 +83,22 @@ class Outcome:
 
 
 def ridge(rng: np.random.Generator, folder: Path) -> Case:
-    """A ridge over the ceiling across the whole DEM, with a gap far away or none, and spurs."""
+    """A ridge above the ceiling across the whole DEM, with a gap far away or none, and spurs."""
     return _over_raster(rng, folder, _ridge(rng), tiles=1)
 
 
 def tiles(rng: np.random.Generator, folder: Path) -> Case:
-    """The same over several tiles, of which one may be missing."""
+    """A ridge over four tiles, of which one may be missing."""
     return _over_raster(rng, folder, _ridge(rng), tiles=2)
 
 
 def edge(rng: np.random.Generator, folder: Path) -> Case:
-    """Start and goal near the DEM's edge, the way round at its far side."""
+    """A ridge with start and goal near the DEM's edge, and the gap towards its far side."""
     return _over_raster(rng, folder, _ridge(rng, at=float(rng.uniform(0.06, 0.12))), tiles=1)
 
 
 def _ridge(rng: np.random.Generator, at: float | None = None) -> tuple[Floats, float, Floats, Floats]:
-    """Heights (n, n), metres of a cell, and start and goal as column and row."""
+    """Heights (n, n), size of a cell (m), and start and goal as (column, row)."""
     n, cell_m = int(rng.integers(240, 340)), float(rng.uniform(80.0, 120.0))
     ground = LOW_M + 25.0 * gaussian_filter(rng.standard_normal((n, n)), 12.0) * 12.0
     ground = np.clip(ground, LOW_M - 40.0, LOW_M + 60.0)
@@ -113,7 +113,7 @@ def _ridge(rng: np.random.Generator, at: float | None = None) -> tuple[Floats, f
         far = float(rng.uniform(0.3, 0.55)) * n
         gap = middle + side * far if kind < 3 else (1.0 + side) * 0.5 * (n - 1)
         wall &= np.abs(col - gap) > float(rng.uniform(4.0, 10.0))
-    for _ in range(int(rng.integers(3))):  # spurs across the way
+    for _ in range(int(rng.integers(3))):  # spurs across the track
         c = float(rng.uniform(0.0, n))
         wall |= (np.abs(col - c) < 3.0) & (np.abs(row - line) < float(rng.uniform(0.1, 0.3)) * n)
     ground[wall] = HIGH_M
@@ -196,14 +196,16 @@ def frame_of(document: dict[str, object]) -> Frame:
 
 
 def _around(ground: Floats, cell_m: float, start: Floats, goal: Floats) -> Floats | None:
-    """(N, 2) rows and columns of a track over open nodes, pulled straight; None where there is none. Nothing beside it
-    comes near the ceiling, or is unknown, for a cell."""
+    """Rows and columns (N, 2) of a taut track over open nodes; None if there is none.
+
+    No node within a cell of it is unknown or higher than 200 m.
+    """
     free = binary_erosion(np.nan_to_num(ground, nan=HIGH_M) < LOW_M + 100.0, np.ones((3, 3)), border_value=0)
     ends = [tuple(round(float(v)) for v in x[::-1]) for x in (start, goal)]
     track = _dijkstra(free, ends[0], ends[1])
     if track is None:
         return None
-    for parts in (1, 3, 5, 7):  # between points that lie elsewhere each time
+    for parts in (1, 3, 5, 7):  # each step length gives other points to pull the track between
         finer = [a + (b - a) * t for a, b in pairwise(track) for t in np.linspace(0, 1, _pieces(a, b, parts))[:-1]]
         track = _pulled(free, np.array([*finer, track[-1]]))
     return np.array([start[::-1], *track[1:-1], goal[::-1]])
@@ -214,7 +216,7 @@ def _pieces(a: Floats, b: Floats, parts: int) -> int:
 
 
 def _pulled(free: Bools, track: Floats) -> Floats:
-    """A track without the points that are not needed to see from one to the next."""
+    """The track with fewer points: each still sees the next one."""
     kept = [0]
     while kept[-1] < len(track) - 1:
         at = kept[-1]
@@ -226,7 +228,7 @@ def _pulled(free: Bools, track: Floats) -> Floats:
 
 
 def _flown(problem: Problem, ground: Floats, cell_m: float, track: Floats, frame: Frame) -> float:
-    """The cost of flying a track as low as a path without a dip may: at the upper hull of what is below it."""
+    """The cost of flying a track at the upper convex hull of the lowest legal altitudes along it."""
     high = maximum_filter(np.nan_to_num(ground, nan=LOW_M), 5)
     parts = [a + (b - a) * np.linspace(0, 1, _pieces(a, b, 1))[:-1, None] for a, b in pairwise(track)]
     at = np.vstack([*parts, track[-1:]])
@@ -246,7 +248,7 @@ def _flown(problem: Problem, ground: Floats, cell_m: float, track: Floats, frame
 
 
 def _dijkstra(free: Bools, start: tuple[int, int], goal: tuple[int, int]) -> Floats | None:
-    """(N, 2) rows and columns of the shortest track of steps to eight neighbours."""
+    """Rows and columns (N, 2) of the shortest track by steps to the eight neighbours; None if there is none."""
     if not (free[start] and free[goal]):
         return None
     cost, parent = np.full(free.shape, math.inf), {}
@@ -272,7 +274,7 @@ def _dijkstra(free: Bools, start: tuple[int, int], goal: tuple[int, int]) -> Flo
 
 
 def _sees(free: Bools, a: Floats, b: Floats) -> bool:
-    """Whether all nodes around a line are free."""
+    """Whether all nodes around the line from ``a`` to ``b`` are free."""
     t = np.linspace(0.0, 1.0, max(2, int(4.0 * math.dist(a, b))))[:, None]
     at = a + t * (b - a)
     r, c = np.floor(at).astype(int).T
@@ -281,7 +283,7 @@ def _sees(free: Bools, a: Floats, b: Floats) -> bool:
 
 
 def _below_ground(ground: Floats, cell_m: float, points: Floats, frame: Frame) -> str:
-    """What a path breaks of min AGL and ceiling, looked up every few metres in the whole DEM; empty: nothing."""
+    """The fault of a path in min AGL or ceiling, sampled every 5 m over the whole DEM; empty if there is none."""
     for a, b in pairwise(points):
         t = np.linspace(0.0, 1.0, max(2, math.ceil(math.dist(a, b) / STEP_M)))[:, None]
         at = a + t * (b - a)
@@ -306,7 +308,7 @@ def _below_ground(ground: Floats, cell_m: float, points: Floats, frame: Frame) -
 
 
 def flat(rng: np.random.Generator, folder: Path) -> Case:
-    """A wall of zones between start and goal, longer than the first window, straight or as a hook."""
+    """A wall of zones between start and goal, longer than the first window, straight or with a hook at its end."""
     off_m, half_m = float(rng.uniform(400.0, 1500.0)), float(rng.uniform(3000.0, 14_000.0))
     shift, thick = float(rng.uniform(-0.7, 0.7)) * half_m, float(rng.uniform(40.0, 200.0))
     walls = [(shift - half_m, -thick, shift + half_m, thick)]
@@ -352,7 +354,7 @@ def judge(
     planner: Callable[[Problem], Solution] = plan,
     **changes: float,
 ) -> Outcome:
-    """Plan one mission, and hold the answer to what is known of it; ``changes``: of the problem, a budget or two."""
+    """Plan one mission and compare the result with the known path; ``changes`` replace fields of the problem."""
     rng = np.random.default_rng([seed, *family.encode()])
     with tempfile.TemporaryDirectory() as name:
         case = FAMILIES[family](rng, Path(name))
@@ -390,7 +392,7 @@ def judge(
 
 
 def _counting(problem: Problem, windows: list[float]) -> Problem:
-    """The same problem, which writes down how often it is asked over more terrain."""
+    """The same problem, which appends the margin (m) of each larger terrain window to ``windows``."""
 
     def counted(of: Problem) -> Problem:
         inner = of.widen
