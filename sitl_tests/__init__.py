@@ -1,6 +1,6 @@
-"""gcsplan against peers that others wrote, over loopback: MAVSDK, pymavlink, SITL; and a lossy relay.
+"""Tests of gcsplan with programs of other projects over loopback: MAVSDK, pymavlink, MAVProxy, SITL; and a lossy relay.
 
-pymavlink decides between MAVLink 1 and 2 when it is imported: here it is always 2."""
+pymavlink chooses between MAVLink 1 and 2 when it is imported; here it is always 2."""
 
 import os
 

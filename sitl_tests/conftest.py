@@ -1,8 +1,8 @@
-"""The real autopilot has one console: whatever talks to it runs in one worker.
+"""Distribution of tests over workers: all tests of the real autopilot run in one, because it has a single console.
 
-So do the quick tests of a file, which share what they import, read and work out first; slow ones, and those of other
-people's programs, are few and long, and go where there is room. (`xdist_group` would say the same, but pytest-xdist
-3.8 does not see it under pytest 9.2.)
+The quick tests of a file in `tests/` share a worker too, because they share imports and set-up. Slow tests, and those
+of other programs, are few and long and go to any free worker. (The mark `xdist_group` would do the same, but
+pytest-xdist 3.8 ignores it under pytest 9.2.)
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import pytest
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """The scheduler that pyproject.toml asks for, with one group more."""
+    """The scheduler that pyproject.toml chooses, with the groups of the module docstring."""
     from xdist.scheduler import LoadGroupScheduling
 
     quick = config.getoption("markexpr") == "not slow"

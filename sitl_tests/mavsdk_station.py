@@ -4,7 +4,7 @@
 
 Standard input is a JSON list of steps, each ``[name, argument …]``: ``["upload", mission_type, [row, …]]``,
 ``["download", mission_type]``, ``["clear"]``, ``["import_plan", path]``, ``["import_waypoints", path]``. The answer is
-one JSON line: a list with, for each step, "SUCCESS", rows, the three lists of an import, or {"failed": …}.
+one JSON line, a list with one entry per step: "SUCCESS", rows, the three lists of an import, or {"failed": …}.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from mavsdk import ComponentType, Configuration, ConnectionResult, Mavsdk
 from mavsdk.plugins.mission_raw.mission_raw import MissionItem, MissionRaw, MissionRawError
 from wire_json import numbers_of, row_of
 
-_out = os.fdopen(os.dup(1), "w")  # MAVSDK writes its log to standard output: that goes to standard error from here on
+_out = os.fdopen(os.dup(1), "w")  # MAVSDK logs to standard output: from here on that is standard error
 os.dup2(2, 1)
 
 HEARTBEAT_WITHIN_S = 15.0
 
 
 def carry_out(raw: MissionRaw, step: list[Any]) -> Any:
-    """One step's answer."""
+    """Carry out one step; return its answer."""
     name, arguments = step[0], step[1:]
     uploads: list[Callable[[Any], Any]] = [raw.upload_mission, raw.upload_geofence, raw.upload_rally_points]
     downloads: list[Callable[[], Any]] = [raw.download_mission, raw.download_geofence, raw.download_rallypoints]

@@ -1,8 +1,8 @@
-"""A vehicle made of MAVSDK's mission_raw_server, to be run in a process of its own: it can hang, and then dies alone.
+"""A vehicle that uses MAVSDK's mission_raw_server, in a process of its own, so that the tests can kill it if it hangs.
 
     python mavsdk_vehicle.py udpin://127.0.0.1:PORT [SYSID]
 
-Says {"ready": true} and then one JSON line for each list it was given: {"result": …, "items": [row, …]}.
+Prints {"ready": true}, and then one JSON line for each mission that it receives: {"result": …, "items": [row, …]}.
 Ends when its standard input is closed.
 """
 
@@ -19,13 +19,13 @@ from mavsdk import Configuration, ConnectionResult, Mavsdk
 from mavsdk.plugins.mission_raw_server.mission_raw_server import MissionRawServer
 from wire_json import row_of
 
-_out = os.fdopen(os.dup(1), "w")  # MAVSDK writes its log to standard output: that goes to standard error from here on
+_out = os.fdopen(os.dup(1), "w")  # MAVSDK logs to standard output: from here on that is standard error
 os.dup2(2, 1)
 _saying = threading.Lock()
 
 
 def say(document: dict[str, Any]) -> None:
-    """One line, whole: MAVSDK calls from threads of its own."""
+    """Write one JSON line, under a lock because MAVSDK calls from its own threads."""
     with _saying:
         _out.write(json.dumps(document) + "\n")
         _out.flush()

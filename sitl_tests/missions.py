@@ -1,4 +1,4 @@
-"""Missions for the tests: every kind of number that gcsplan emits, for each autopilot."""
+"""Missions for the tests, with every kind of number that gcsplan writes, for each autopilot."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ HOME = Home.at(36.6000123, -84.3799877, 371.25)
 
 
 def a_mission(autopilot: Autopilot, n: int, *, sysid: int = 1) -> Mission:
-    """``n`` items in all, home not counted: take-off, a speed, way points in two frames, a delay, land."""
+    """A mission of ``n`` items without home: take-off, a speed, way points in two frames, a delay, a landing."""
     half_cm = 0.005 if autopilot.is_ardupilot else 0.0
     heading = 90.25 if autopilot is Autopilot.PX4 else 0.0
 

@@ -1,4 +1,4 @@
-"""MAVSDK in processes of its own, every wait bounded: `MavsdkVehicle`, and `mavsdk_station` for one conversation."""
+"""MAVSDK in separate processes, with bounded waits: `MavsdkVehicle`, and `mavsdk_station` for one conversation."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _ports = itertools.cycle(range(20_000 + 1_000 * _worker, 21_000 + 1_000 * _worke
 
 
 def free_port(kind: socket.SocketKind) -> int:
-    """A port of 127.0.0.1 that nobody listens on, for a program that takes a moment to open it.
+    """A free port of 127.0.0.1 for a program that takes a moment to open it.
 
-    It is none of those that the system gives to sockets that ask for any, and each worker has ports of its own: until
-    the program has opened it no other test takes it.
+    It is outside of the range of ports that the system assigns, and each worker has its own range, so no other test
+    takes the port before the program has opened it.
     """
     for port in itertools.islice(_ports, 1_000):
         with socket.socket(socket.AF_INET, kind) as one, contextlib.suppress(OSError):
@@ -43,7 +43,7 @@ def free_port(kind: socket.SocketKind) -> int:
 
 
 def row_for(seq: int, item: MissionItem, mission_type: int = 0, *, current: int = 0) -> Row:
-    """A row as the processes take it."""
+    """An item as a row for the MAVSDK processes."""
     floats = [float(p).hex() for p in item.params]
     return [
         seq, item.frame, item.command, current, int(item.autocontinue), *floats, item.x, item.y, float(item.z).hex(),
@@ -52,13 +52,13 @@ def row_for(seq: int, item: MissionItem, mission_type: int = 0, *, current: int 
 
 
 def item_of(row: Row) -> MissionItem:
-    """The item of a row, its seq, current flag and mission type left out."""
+    """The item of a row, without seq, current flag and mission type."""
     _, frame, command, _, autocontinue, p1, p2, p3, p4, x, y, z, _ = numbers_of(row)
     return MissionItem(command, frame, (p1, p2, p3, p4), x, y, z, bool(autocontinue))
 
 
 class MavsdkVehicle:
-    """A vehicle made of MAVSDK's mission_raw_server that listens on a free port."""
+    """A vehicle that uses MAVSDK's mission_raw_server and listens on a free port."""
 
     def __init__(self, sysid: int = 1) -> None:
         self.port = free_port(socket.SOCK_DGRAM)
@@ -101,7 +101,7 @@ class MavsdkVehicle:
             raise AssertionError(f"the MAVSDK vehicle said nothing within {within_s} s") from None
 
     def received(self, within_s: float = 10.0) -> list[Row]:
-        """The rows of the next whole list that was uploaded to it."""
+        """The rows of the next list that is uploaded to it completely; AssertionError after ``within_s``."""
         end = time.monotonic() + within_s
         while True:
             document = self._next(max(0.0, end - time.monotonic()))
@@ -111,7 +111,7 @@ class MavsdkVehicle:
 
 
 def mavsdk_station(url: str, steps: list[list[Any]]) -> list[Any]:
-    """Let MAVSDK talk to the vehicle at ``url`` (udpout:HOST:PORT); the answer to each step."""
+    """Let MAVSDK carry out steps with the vehicle at ``url`` (udpout:HOST:PORT); return the answer to each step."""
     theirs = url.replace("udpout:", "udpout://")
     done = subprocess.run(
         [sys.executable, str(_HERE / "mavsdk_station.py"), theirs],

@@ -1,4 +1,4 @@
-"""A bad radio in between: UDP datagrams are lost, doubled and held up, both ways, from a seed."""
+"""A bad radio as a UDP relay: datagrams in both directions are lost, duplicated and held up, by a seed."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _MOST_CLIENTS = 16
 
 
 class LossyRelay:
-    """Ground stations talk to `address`, the vehicle listens at ``target``; both on 127.0.0.1.
+    """Relays between ground stations, which send to `address`, and the vehicle at ``target``; both on 127.0.0.1.
 
-    ``loss``, ``duplicate``, ``held_up``: probabilities for each datagram and direction; one that is held up waits up
-    to ``hold_s`` and is overtaken meanwhile. Which ones are hit depends on the seed and on the order they come in.
+    ``loss``, ``duplicate``, ``held_up``: probabilities for each datagram and direction; a held-up datagram waits up to
+    ``hold_s``, and others overtake it. The seed and the order of arrival decide which datagrams are affected.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class LossyRelay:
         self._rng = random.Random(seed)
         self._front = self._bound()
         self.address: tuple[str, int] = self._front.getsockname()
-        self._backs: dict[tuple[str, int], socket.socket] = {}  # one for each ground station, so that answers find it
+        self._backs: dict[tuple[str, int], socket.socket] = {}  # one per ground station, to return answers to it
         self._waiting: list[tuple[float, int, socket.socket, tuple[str, int], bytes]] = []
         self._wake, self._woken = socket.socketpair()
         self._thread = threading.Thread(target=self._run, name="lossy-relay", daemon=True)
@@ -52,7 +52,7 @@ class LossyRelay:
 
     @property
     def url(self) -> str:
-        """What a ground station connects to."""
+        """The URL that a ground station connects to."""
         return f"udpout:127.0.0.1:{self.address[1]}"
 
     def __enter__(self) -> LossyRelay:
@@ -114,4 +114,4 @@ class LossyRelay:
         try:
             out.sendto(data, to)
         except OSError:
-            return  # as lost as any other
+            return  # counts as a lost datagram

@@ -1,6 +1,6 @@
-"""A real autopilot: somebody's running SITL, or an `arducopter` binary that is started here and ended again.
+"""A real autopilot for tests: a SITL that is running already, or an `arducopter` binary that is started and stopped.
 
-``GCSPLAN_SITL=tcp:127.0.0.1:5760`` (any link URL), or ``GCSPLAN_SITL=/path/to/arducopter``.
+Set ``GCSPLAN_SITL=tcp:127.0.0.1:5760`` (any link URL), or ``GCSPLAN_SITL=/path/to/arducopter``.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ _START_S, _READY_S, _STOP_S = 20.0, 120.0, 10.0
 
 
 def wanted() -> str:
-    """What the environment names, or nothing."""
+    """The value of GCSPLAN_SITL, or an empty string."""
     return os.environ.get(VARIABLE, "").strip()
 
 
 @contextmanager
 def running(where: str, directory: Path) -> Iterator[Link]:
-    """A link to the autopilot that ``where`` names. One for all tests: SITL ends when its console's link closes."""
+    """Open a link to the autopilot that ``where`` names. Tests share it: SITL ends when its console's link closes."""
     if not os.path.isfile(where):
         with Link(where) as link:
             yield link
@@ -71,7 +71,7 @@ def _connected(url: str, process: subprocess.Popen[bytes]) -> Link:
 
 
 def ready(link: Link, sysid: int) -> VehicleState:
-    """Wait until the autopilot knows where it is and has a home."""
+    """Wait until the autopilot has a position and a home; return its state."""
     end = time.monotonic() + _READY_S
     while True:
         state = discover(link, sysid, 20.0, listen_s=0.0, standby_s=60.0)

@@ -1,4 +1,4 @@
-"""The command line against real peers: a mission file becomes a mission on board of vehicles that others wrote."""
+"""The command line with MAVSDK vehicles: it plans a mission file and uploads the missions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MISSION = """
 
 
 def gcsplan(*words: str, cwd: Path) -> tuple[int, dict[str, Any], str]:
-    """Exit code, the JSON document, and what was said to people."""
+    """Run gcsplan with ``--json``; return exit code, the JSON document, and the text on standard error."""
     program = "import sys; from gcsplan.cli.main import main; sys.exit(main())"
     done = subprocess.run(
         [sys.executable, "-c", program, *words, "--json"],

@@ -1,4 +1,4 @@
-"""Fences made of zones, on peers that others wrote: MAVSDK as a vehicle and as a reader of plans, a real ArduCopter."""
+"""Fences made from zones, with MAVSDK as a vehicle and as a reader of plans, and with a real ArduCopter."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def a_fence(autopilot: Autopilot) -> Fence:
 def test_a_fence_arrives_at_a_mavsdk_vehicle_and_reads_back(
     autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(steps, "_ASK_AGAIN_S", 0.05)  # it never says what it can, nor where it is
+    monkeypatch.setattr(steps, "_ASK_AGAIN_S", 0.05)  # it never sends its capabilities or its position
     fence = a_fence(autopilot)
     with MavsdkVehicle(sysid=4) as vehicle, Link(vehicle.url) as link:
         result = upload_items(link, 4, fence.items, autopilot, FENCE, options=QUICK)

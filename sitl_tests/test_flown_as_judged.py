@@ -1,4 +1,4 @@
-"""Splines and jumps: a real ArduCopter flies the curve, and the items in the order, that the check judges."""
+"""Splines and jumps: a real ArduCopter flies the curves that the check judges, and the items in the judged order."""
 
 from __future__ import annotations
 
@@ -77,11 +77,11 @@ def test_a_real_arducopter_flies_splines_and_jumps_as_they_are_judged(monkeypatc
     curve = trace.points[1:][trace.seq == 3][:, :2] - straight[0, :2]
     side = straight[1, :2] - straight[0, :2]
     bulge = np.abs(curve[:, 0] * side[1] - curve[:, 1] * side[0]) / np.hypot(*side)
-    assert bulge.max() > 5 * TRACK_ERROR_M  # a straight leg would not have held it
+    assert bulge.max() > 5 * TRACK_ERROR_M  # a straight leg would be too far off
 
 
 def _plane(where: Any, places: list[Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """(N, 3) metres of places (latitude, longitude, AMSL) or of items."""
+    """Metres (N, 3) of places (latitude, longitude, AMSL) or of items."""
     rows = [(p.lat_deg, p.lon_deg, p.z) if isinstance(p, MissionItem) else p for p in places]
     plane = where.frame.to_plane([r[0] for r in rows], [r[1] for r in rows])
     return np.column_stack([plane, [r[2] for r in rows]])

@@ -1,6 +1,6 @@
-"""Over real sockets and a bad radio: what is called verified is on board.
+"""Uploads over real sockets and a bad radio: a mission reported as verified is on board.
 
-The vehicles' clocks run fast, and ours waits shorter in turn, so that many losses take little time.
+The vehicles' clocks run 30 times as fast, and our timeouts are shorter, so that many losses take little time.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.slow
 
 COPTER, PX4 = Autopilot.ARDUCOPTER, Autopilot.PX4
 SPEEDUP = 30.0
-# A verdict is not what these tests are about: the missions are sent as they are.
+# These tests do not concern the check: missions are sent unchecked.
 OPTIONS = SessionOptions(unchecked=True, listen_s=0.0, timers=Timers(response_s=0.3, item_s=0.03, silence_s=3.0))
 
 
@@ -51,7 +51,7 @@ def test_doubled_and_overtaken_datagrams_do_no_harm(autopilot: Autopilot) -> Non
     vehicle, mission = a_vehicle(autopilot), a_mission(autopilot, 50)
     with (
         SimServer([vehicle], "udpin:127.0.0.1:0", speedup=SPEEDUP) as server,
-        # More than this PX4's download does not bear: a request that comes late ends it.
+        # A PX4's download does not survive worse: a request that comes late ends it.
         LossyRelay(server.address, loss=0.05, duplicate=0.05, held_up=0.05, hold_s=0.02, seed=4) as relay,
         Link(relay.url) as link,
     ):
@@ -88,7 +88,7 @@ def test_a_fence_goes_up_over_a_bad_link() -> None:
 
 
 def test_a_link_that_loses_everything_ends_unknown_or_dead_and_never_verified() -> None:
-    # Up to the tenth item all is well, then the vehicle is heard no more.
+    # The vehicle falls silent after 25 packets, in the middle of the upload.
     vehicle, mission = a_vehicle(COPTER, "silent_after=25"), a_mission(COPTER, 50)
     options = SessionOptions(
         unchecked=True, listen_s=0.0, attempts=2, timers=Timers(response_s=0.1, item_s=0.05, silence_s=0.5, retries=2)

@@ -1,4 +1,4 @@
-"""MAVSDK on the other end of a radio that loses up to six datagrams of ten: what is called verified is on board."""
+"""MAVSDK behind a radio that loses up to six datagrams of ten: a mission reported as verified is on board."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OPTIONS = SessionOptions(unchecked=True, listen_s=0.1, timeout_s=TIMEOUT_S, disc
 
 @pytest.mark.parametrize(("loss", "seed"), [(0.1, 1), (0.3, 2), (0.6, 3), (0.6, 4)])
 def test_a_mavsdk_vehicle_that_is_called_verified_holds_the_mission(loss: float, seed: int) -> None:
-    """It gives up after five losses in a row and falls silent with a part: then the outcome is unknown, and bounded."""
+    """MAVSDK gives up after five losses in a row with a part on board: the outcome is then unknown, within a bound."""
     mission = a_mission(PX4, 20)
     with (
         MavsdkVehicle() as vehicle,
@@ -48,7 +48,7 @@ def test_a_mavsdk_vehicle_that_is_called_verified_holds_the_mission(loss: float,
 
 @pytest.mark.parametrize(("loss", "seed"), [(0.1, 5), (0.6, 6)])
 def test_our_vehicle_holds_what_mavsdk_calls_a_success(loss: float, seed: int) -> None:
-    """The other way round: under loss our loopback vehicle never says accepted with something else on board."""
+    """Our loopback vehicle under loss: it never answers "accepted" with another mission on board."""
     board = a_vehicle(PX4)
     sent = list(a_mission(PX4, 15).wire_items())
     rows = [row_for(n, item, current=int(n == 0)) for n, item in enumerate(sent)]
@@ -61,5 +61,5 @@ def test_our_vehicle_holds_what_mavsdk_calls_a_success(loss: float, seed: int) -
     if answer == "SUCCESS":
         assert [(i.command, i.x, i.y) for i in board.items()] == [(i.command, i.x, i.y) for i in sent]
     else:
-        assert board.items() == () or len(board.items()) == len(sent)  # PX4 swaps at the end, or not at all
+        assert board.items() == () or len(board.items()) == len(sent)  # PX4 swaps missions at the end, or not at all
     assert loss > 0.2 or answer == "SUCCESS"

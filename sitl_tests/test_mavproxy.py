@@ -1,4 +1,4 @@
-"""MAVProxy, where it is installed (pip install MAVProxy), as a router on a bad radio."""
+"""MAVProxy, if installed (pip install MAVProxy), as a router behind a bad radio."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COPTER, PX4 = Autopilot.ARDUCOPTER, Autopilot.PX4
 
 @contextmanager
 def mavproxy(master: str, folder: Path, *more: str) -> Iterator[subprocess.Popen[bytes]]:
-    """MAVProxy at work in ``folder``; ended with the context."""
+    """Run MAVProxy in ``folder`` until the context ends."""
     script = next(
         p for base in map(Path, sys.path) for p in (base / "bin" / "mavproxy.py", base / "mavproxy.py") if p.is_file()
     )

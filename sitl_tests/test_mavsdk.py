@@ -1,4 +1,4 @@
-"""MAVSDK 4.1 on the other end: as a vehicle, as a ground station, and as a reader of our files."""
+"""MAVSDK 4.1 as a vehicle, as a ground station, and as a reader of our files."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def some_rally_points(n: int) -> list[MissionItem]:
 
 @pytest.fixture
 def asked_in_haste(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Little time for a vehicle to say what it can and where it is: one of MAVSDK's never does."""
+    """Wait only briefly for a vehicle's capabilities and position: MAVSDK's vehicle never sends them."""
     monkeypatch.setattr(steps, "_ASK_AGAIN_S", 0.05)
 
 
@@ -123,7 +123,7 @@ def test_mavsdk_takes_our_vehicle_for_one_and_its_missions_survive(autopilot: Au
     assert answers[0::2] == ["SUCCESS"] * 3
     for mission_type, back in zip((MISSION, FENCE, RALLY), answers[1::2], strict=True):
         assert wires(back) == [item.wire for item in vehicle.items(mission_type)]
-    if autopilot is PX4:  # keeps what it is sent, but for naming its frames in the other way
+    if autopilot is PX4:  # it keeps items as sent, except that it uses the _INT numbers of the frames
         assert wires(answers[1]) == [
             as_mavsdk_reads(MissionItem(i.command, i.frame, (*i.params[:3], b.params[3]), i.x, i.y, i.z), {0: 5, 3: 6})
             for i, b in zip(sent, vehicle.items(), strict=True)
@@ -169,7 +169,7 @@ def test_mavsdk_imports_our_plan_exactly(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("autopilot", "homes"), [(COPTER, 2), (PLANE, 2), (PX4, 1)])
 def test_mavsdk_imports_our_waypoints_after_its_leading_homes(autopilot: Autopilot, homes: int, tmp_path: Path) -> None:
-    # For PX4 it keeps our home row as an item, for ArduPilot it puts one more in front: both are known.
+    # For PX4 MAVSDK keeps our home row as an item, for ArduPilot it adds another home before it; both are known.
     mission = a_mission(autopilot, 50)
     file = tmp_path / "uav1.waypoints"
     file.write_bytes(write_waypoints(mission).encode())

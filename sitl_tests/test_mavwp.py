@@ -1,4 +1,4 @@
-"""pymavlink's own reader of way point files (MAVProxy's) reads ours."""
+"""pymavlink's reader of way point files, which MAVProxy uses, reads our files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pyte
 
 @pytest.fixture(autouse=True)
 def closed_files() -> Iterator[None]:
-    """mavwp leaves its files open: they are closed before another test could be blamed for it."""
+    """Close the files that mavwp leaves open, so that their warnings do not fail another test."""
     yield
     gc.collect()
 

@@ -1,6 +1,6 @@
-"""A rehearsal with real ArduCopters: they arm, fly their missions, and arrive when the plan says.
+"""A rehearsal with real ArduCopters: they arm, fly their missions, and arrive at the planned times.
 
-Wants the path of an arducopter binary: each instance has to stand where its mission starts.
+Needs the path of an arducopter binary, because each instance must start where its mission starts.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ altitude_frame: relative
 """
 
 WITHIN_S = 2.0
-"""How far an arrival may be from the plan."""
+"""Most seconds that an arrival may differ from the plan."""
 
 
 @pytest.fixture(scope="module")

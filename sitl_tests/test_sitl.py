@@ -1,4 +1,4 @@
-"""A real ArduCopter: it keeps what we say that it keeps, and our loopback vehicle is its twin."""
+"""A real ArduCopter stores items as our autopilot profile says, and our loopback vehicle behaves the same."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ KINDS = (MISSION, FENCE, RALLY)
 
 @dataclass
 class Real:
-    """The autopilot under test, and a way to talk to it word by word as any ground station."""
+    """The autopilot under test, with single messages to and from any ground station."""
 
     link: Link
     home: Home
@@ -67,7 +67,7 @@ class Real:
         self.link.transport.write(writer.pack(wire.encode(message, Address(SYSID, 1))), peer)
 
     def hear(self, count: int, within_s: float, quiet_s: float) -> list[Packet]:
-        """Mission packets: ``count`` of them within ``within_s``, and what else comes in ``quiet_s`` after that."""
+        """Mission packets: up to ``count`` within ``within_s``, and all that arrive in the ``quiet_s`` after those."""
         heard: list[Packet] = []
         end = time.monotonic() + (within_s if count else quiet_s)
         while time.monotonic() < end:
@@ -86,7 +86,7 @@ class Real:
         return LoopbackVehicle(SYSID, COPTER, lat_deg=home.lat_e7 / 1e7, lon_deg=home.lon_e7 / 1e7, amsl_m=home.amsl_m)
 
     def upload(self, items: list[MissionItem], mission_type: int = MISSION) -> int:
-        """A plain upload; the code of its last ACK."""
+        """Upload without our own session code; return the code of the last ACK."""
         self.say(Count(len(items), mission_type))
         end = time.monotonic() + 60.0
         while time.monotonic() < end:
@@ -99,7 +99,7 @@ class Real:
 
 
 def upload_to_twin(twin: LoopbackVehicle, items: list[MissionItem], mission_type: int = MISSION) -> int:
-    """The same upload to a loopback vehicle."""
+    """The same upload to a loopback vehicle; return the code of its ACK."""
     todo: MissionMessage = Count(len(items), mission_type)
     while True:
         (answer,) = twin.receive(Packet(GCS, Address(SYSID, 1), todo), 0.0)
@@ -118,7 +118,7 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Real]:
 
 
 def every_command(home: Home) -> Mission:
-    """Everything that gcsplan emits for ArduCopter, in the frames and with the numbers that it emits."""
+    """A mission with every command that gcsplan writes for ArduCopter, in its frames and with its kinds of numbers."""
 
     def at(command: int, n: int, z: float, frame: int = 3, *params: float) -> MissionItem:
         p = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
@@ -244,7 +244,7 @@ def an_item(rng: random.Random, kind: int, home: Home) -> MissionItem:
 
 
 def some_message(rng: random.Random, home: Home, uploading: list[int]) -> MissionMessage:
-    """Anything that a ground station may say, sensible or not, about the lists that are going up above all."""
+    """A random mission message of a ground station, sensible or not, mostly about lists that are being uploaded."""
     kind, seq = rng.choice([MISSION, FENCE, RALLY, *uploading * 3]), rng.randint(0, 4)
     return rng.choice([
         Count(rng.randint(0, 4), kind), Item(seq, an_item(rng, kind, home), kind), Request(seq, kind),
@@ -253,7 +253,7 @@ def some_message(rng: random.Random, home: Home, uploading: list[int]) -> Missio
 
 
 def comparable(packet: Packet) -> tuple[Any, ...]:
-    """Where it goes and what it says; of home only that it is told, for the real one drifts by centimetres."""
+    """Target and content of a packet, for comparison; home's numbers are left out, as the real one drifts by cm."""
     message = packet.message
     if isinstance(message, Item):
         home = message.mission_type == MISSION and message.seq == 0
@@ -263,17 +263,17 @@ def comparable(packet: Packet) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_whatever_is_said_our_vehicle_answers_the_same(real: Real, seed: int) -> None:
-    """The loopback vehicle beside the real one, word by word, while two ground stations talk at random."""
+    """Compare every answer of the loopback vehicle with the real one's, for random messages of two ground stations."""
     rng = random.Random(seed)
     for kind in KINDS:
         for source in (GCS, OTHER_GCS):
-            real.say(ClearAll(kind), source)  # whoever is uploading, that ends it
+            real.say(ClearAll(kind), source)  # ends any upload that is under way
     real.hear(0, 0.0, 0.3)
     twin = real.twin()
     asking: dict[int, Packet] = {}  # the request that each list is waiting for
     for _ in range(100):
         source, message = rng.choice((GCS, GCS, OTHER_GCS)), some_message(rng, real.home, sorted(asking))
-        if asking and rng.random() < 0.5:  # go on with an upload, or none would ever get far
+        if asking and rng.random() < 0.5:  # continue an upload, or none would get far
             kind, request = rng.choice(sorted(asking.items()))
             assert isinstance(request.message, Request)
             source, message = request.target, Item(request.message.seq, an_item(rng, kind, real.home), kind)
@@ -281,7 +281,7 @@ def test_whatever_is_said_our_vehicle_answers_the_same(real: Real, seed: int) ->
         expected = [comparable(p) for p in answers]
         real.say(message, source)
         got = [comparable(p) for p in real.hear(len(expected), 1.0, 0.01)]
-        for again in map(comparable, asking.values()):  # it may ask again meanwhile; the twin's clock stands still
+        for again in map(comparable, asking.values()):  # the real one may repeat a request; the twin's clock stops
             while got.count(again) > expected.count(again):
                 got.remove(again)
         assert got == expected, (source, message)

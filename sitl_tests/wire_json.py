@@ -1,6 +1,6 @@
-"""Mission items as JSON lines between the tests and the processes that hold MAVSDK: floats as hexadecimal, bit by bit.
+"""Mission items as JSON between the tests and the MAVSDK processes, floats as hexadecimal so that no bit is lost.
 
-Imported by scripts that run alone, so nothing of gcsplan is needed here.
+Scripts that run on their own import this module, so it uses nothing of gcsplan.
 """
 
 from __future__ import annotations
