@@ -88,7 +88,7 @@ def test_a_fence_goes_up_over_a_bad_link() -> None:
 
 
 def test_a_link_that_loses_everything_ends_unknown_or_dead_and_never_verified() -> None:
-    # The vehicle falls silent after 25 packets, in the middle of the upload.
+    # The vehicle falls silent after 25 received messages, in the middle of the upload.
     vehicle, mission = a_vehicle(COPTER, "silent_after=25"), a_mission(COPTER, 50)
     options = SessionOptions(
         unchecked=True, listen_s=0.0, attempts=2, timers=Timers(response_s=0.1, item_s=0.05, silence_s=0.5, retries=2)

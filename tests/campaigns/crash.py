@@ -359,7 +359,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=120.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--rounds", type=int, default=10**9, help="no more than so many")
+    parser.add_argument("--rounds", type=int, default=10**9, help="at most this many rounds")
     given = parser.parse_args()
     until, count, rounds = time.monotonic() + given.seconds, Counter[str](), 0
     with workshop() as place:

@@ -198,8 +198,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seconds", type=float, default=120.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--inputs", type=int, default=10**9, help="no more than so many")
-    parser.add_argument("--keep", metavar="DIR", help="work there, and leave the files of the last input")
+    parser.add_argument("--inputs", type=int, default=10**9, help="at most this many inputs")
+    parser.add_argument("--keep", metavar="DIR", help="work in DIR, and leave the files of the last input")
     parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.work:

@@ -130,7 +130,7 @@ def main() -> int:
     """Run the campaign from the command line; return 1 if something unsafe was called safe."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=120.0)
-    parser.add_argument("--seed", type=int, default=1, help="of the first world")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the first world")
     parser.add_argument("--families", nargs="+", default=list(FAMILIES), choices=FAMILIES)
     given = parser.parse_args()
     tally = run(given.seconds, given.seed, given.families)

@@ -467,7 +467,7 @@ def main() -> int:
     """Run the campaign from the command line; return 1 on findings, or if no upload was verified."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=float("inf"), help="how long [default: until --runs are done]")
-    parser.add_argument("--runs", type=int, default=10_000, help="at most so many runs [default: 10000]")
+    parser.add_argument("--runs", type=int, default=10_000, help="at most this many runs [default: 10000]")
     parser.add_argument("--seed", type=int, default=1, help="the first seed [default: 1]")
     given = parser.parse_args()
     began = time.monotonic()

@@ -245,9 +245,11 @@ def main() -> None:
     parser.add_argument("--families", nargs="+", default=list(FAMILIES), choices=list(FAMILIES))
     parser.add_argument("--effort", choices=("quick", "patient"), default="quick")
     parser.add_argument("--missed", action="store_true", help="print missed missions too")
-    parser.add_argument("--excess", type=float, default=math.inf, help="print missions with so many percent to gain")
-    parser.add_argument("--budget", type=float, help="the planner's budget_s, for machines that are busy otherwise")
-    parser.add_argument("--minutes", type=float, default=math.inf, help="begin no mission later than that")
+    parser.add_argument(
+        "--excess", type=float, default=math.inf, help="print missions this many percent over the best known"
+    )
+    parser.add_argument("--budget", type=float, help="the planner's budget_s, to set on a busy machine")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="start no mission after this many minutes")
     given = parser.parse_args()
     changes = {} if given.budget is None else {"budget_s": given.budget}
     verdicts: list[Verdict] = []
