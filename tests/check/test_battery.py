@@ -1,4 +1,4 @@
-"""The battery on the way out and for the way back: closed forms on flat ground, sampling everywhere else."""
+"""The battery for the mission and for the return from each point: closed forms on flat ground, sampling elsewhere."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_the_point_of_no_return_on_a_straight_way_out() -> None:
     assert found.point_of_no_return is not None
     assert float(FLAT.frame.to_plane(*found.point_of_no_return[:2])[0]) == pytest.approx(x, rel=1e-4)
     assert found.short == ((pytest.approx(x, rel=1e-5), pytest.approx(5000.0, rel=1e-5)),)
-    # The most is needed at the far end, landed there: up again to the altitude of the return.
+    # A return needs most after landing at the far end: it must climb again to its altitude.
     ends = 80 * R1 + 5000 * R2 + 80 * R1
     assert found.most_j == pytest.approx(ends + 5000 * R2 + 2 * 15 * R1, rel=1e-5)
     assert "point of no return at km 2.30" in found.describe()
@@ -84,7 +84,7 @@ def test_legs_add_up_to_the_verdict_and_holds_count_at_their_place() -> None:
     assert found.legs[-1].used_percent == pytest.approx(verdict.battery_used_percent)
     hold = next(row for row in found.legs if row.kind == "loiter")
     assert hold.energy_j == pytest.approx(60.0 * HOVER)
-    # Usable just short of the end of the hold: it is the hold that goes beyond it, at its own place.
+    # Usable energy ends just before the hold does: the hold is what exceeds it, at its own place.
     before = next(row for row in found.legs if row.seq == 3)
     need = before.spent_j + before.return_j + 30.0 * HOVER
     tight = craft(need / 0.8)
@@ -98,7 +98,7 @@ def test_a_way_that_leads_back_may_be_short_in_the_middle_alone() -> None:
     verdict = judge(out(FLAT, (3000.0, 0.0, 80.0), (0.0, 0.0, 80.0)), v, FLAT)
     found = home_of(verdict, v)
     (part,) = found.short
-    # On the way back spent and return add up to the same as at the turn.
+    # On the leg back, energy spent plus energy of the return stays what it was at the turn.
     assert part[0] == pytest.approx((0.9 * (160 * R1 + 2 * 3000 * R2) - 160 * R1) / (2 * R2), rel=1e-4)
     assert part[1] == pytest.approx(6000.0, rel=1e-5)
 
@@ -154,7 +154,7 @@ def test_what_is_short_is_what_sampling_finds(
     verdict = judge(out(FLAT, *places), v, FLAT)
     h = verdict.mission.home
     place = (h.lat_e7 / 1e7, h.lon_e7 / 1e7, h.amsl_m)
-    autopilot = Autopilot.ARDUCOPTER if climbs_first else Autopilot.ARDUPLANE  # a plane returns lower than it is
+    autopilot = Autopilot.ARDUCOPTER if climbs_first else Autopilot.ARDUPLANE  # a plane may return below its altitude
     found = battery_home(verdict, replace(v, autopilot=autopilot), place, 300.0 + level)
     assert found is not None
     spent = along = most = 0.0

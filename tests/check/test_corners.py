@@ -1,4 +1,4 @@
-"""Corners that autopilots cut: legs are judged as wide as the vehicle may fly beside them."""
+"""Corners that autopilots cut: legs are judged as wide as the vehicle may be off them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def mission(autopilot: Autopilot, *items: MissionItem) -> Mission:
 def around(
     autopilot: Autopilot, radius_m: float, *, hold_s: float = 0.0, corner: tuple[float, float] = (1000, 0)
 ) -> Mission:
-    """East, then north round a corner, with an acceptance radius there."""
+    """A mission east, then north, with the given acceptance radius at the corner."""
     return mission(
         autopilot, at(cmd.WAYPOINT, *corner, 100, hold_s, radius_m), at(cmd.WAYPOINT, 1000, 1000, 100, 0, 1.0)
     )
@@ -63,7 +63,7 @@ def verdict(flown: Mission, where: World, craft: Vehicle | None = None, tuning: 
 
 @pytest.mark.parametrize("autopilot", [PX4, PLANE])
 def test_an_acceptance_radius_that_cuts_through_a_zone_is_unsafe(autopilot: Autopilot) -> None:
-    # The zone of 100 m stands clear of both legs; 255 m before the corner it turns, straight through it.
+    # The zone of 100 m is clear of both legs; a vehicle that turns 255 m before the corner flies through it.
     zone = inside(880.0, 130.0, 100.0)
     tight, wide = (verdict(around(autopilot, r), zone) for r in (2.0, 255.0))
     assert tight.safe is True, tight.describe()
@@ -73,7 +73,7 @@ def test_an_acceptance_radius_that_cuts_through_a_zone_is_unsafe(autopilot: Auto
 
 def test_px4_takes_its_own_parameter_where_the_item_gives_no_radius() -> None:
     craft = vehicle(PX4, horizontal_clearance_m=0.0)
-    near = inside(991.0, 9.0, 4.0)  # 5 m from both legs; a turn begun 10 m before the corner passes it by at 2 m
+    near = inside(991.0, 9.0, 4.0)  # 5 m from both legs; a turn 10 m before the corner passes it at 2 m
     for radius in (0.0, -3.0, math.nan, math.inf):
         one = verdict(around(PX4, radius), near, craft)
         assert one.safe is False, radius
@@ -104,7 +104,7 @@ def test_arducopter_cuts_within_its_own_radius_and_stops_at_a_hold() -> None:
     assert verdict(around(COPTER, 0.0), near, sharp).safe is False
     assert verdict(around(COPTER, 0.0, hold_s=3.0), near, sharp).safe is True
     assert verdict(around(COPTER, 0.0), near, sharp, Tuning.of({"WPNAV_RADIUS": 10.0})).safe is True
-    held = vehicle(COPTER, horizontal_clearance_m=0.0, track_error_m=2.0)  # holds the corner, by its definition
+    held = vehicle(COPTER, horizontal_clearance_m=0.0, track_error_m=2.0)  # its corner stays within 2 m of track error
     assert verdict(around(COPTER, 0.0), inside(996.0, 4.0, 1.9), held).safe is True
     ideal = replace(sharp, corner_accel_m_s2=math.inf)
     assert verdict(around(COPTER, 0.0), near, ideal).safe is True
@@ -116,7 +116,7 @@ def test_a_hold_of_px4_begins_within_the_radius_too() -> None:
 
 
 def test_a_leg_that_is_left_before_its_end_is_judged_in_height_too() -> None:
-    # Down into a dip over 400 m: who turns 200 m before the end of the descent is 25 m higher beside the next leg.
+    # A descent over 400 m: a vehicle that turns 200 m before its end joins the next leg 25 m too high.
     items = (
         at(cmd.WAYPOINT, 600, 0, 150, 0, 2.0),
         at(cmd.WAYPOINT, 1000, 0, 100, 0, 200.0),
@@ -142,12 +142,12 @@ def test_a_landing_of_px4_begins_beside_its_place() -> None:
 
 @pytest.mark.parametrize("autopilot", [COPTER, PLANE])
 def test_a_circle_may_be_left_anywhere(autopilot: Autopilot) -> None:
-    # The leg from the circle's northern edge to the east passes the zone, the one from its middle does not.
+    # The leg east from the circle's northern edge meets the zone; the leg from the circle's middle does not.
     circle = at(cmd.LOITER_TURNS, 0, 1000, 100, 2.0, 0, 200.0)
     one = mission(autopilot, circle, at(cmd.WAYPOINT, 1500, 1000, 100, 0, 2.0))
     beside = inside(450.0, 1140.0, 30.0)
     assert verdict(one, beside).safe is False
-    assert verdict(one, inside(1000.0, 1060.0, 5.0)).safe is False  # 67 m beside the leg when two thirds are flown
+    assert verdict(one, inside(1000.0, 1060.0, 5.0)).safe is False  # two thirds along, it may be 67 m beside the leg
     assert verdict(one, inside(450.0, 1400.0, 30.0)).safe is True
 
 
@@ -158,7 +158,7 @@ def test_a_return_begins_where_the_vehicle_is_and_not_where_its_way_point_is(aut
     )  # fmt: skip
     flown = Mission(autopilot, HOME, (at(cmd.TAKEOFF, 0, 0, 100), *items, MissionItem(cmd.RTL, m.NO_POSITION)), "uav1")
     craft = vehicle(autopilot, horizontal_clearance_m=0.0)
-    post = Zone("post", Circle(70.0, 1000.0, 10.0), Level(150.0, "agl"))  # beside the middle of the way home
+    post = Zone("post", Circle(70.0, 1000.0, 10.0), Level(150.0, "agl"))  # beside the middle of the return
     where = World(FLAT.frame, Airspace(FLAT.airspace.surface, [post]))
     assert judge(flown, craft, where, rtl_rel_home_m=160.0).safe is False
     assert judge(flown, craft, where, rtl_rel_home_m=120.0).safe is True
@@ -175,7 +175,7 @@ def test_a_landing_behind_a_circle_is_on_the_circle_where_it_gives_no_place() ->
 
 @pytest.mark.parametrize("autopilot", [PX4, PLANE])
 def test_a_radius_longer_than_the_leg_skips_way_points(autopilot: Autopilot) -> None:
-    # From the first of three near points it may fly straight on: along the hypotenuse.
+    # It may turn before the first of three close points and fly straight to the last way point, along the hypotenuse.
     near = [at(cmd.WAYPOINT, 1000 + 20 * k, 20.0 * (k % 2), 100, 0, 100.0) for k in range(3)]
     one = mission(autopilot, *near, at(cmd.WAYPOINT, 1040, 1000, 100, 0, 2.0))
     assert verdict(one, inside(985.0, 400.0, 15.0)).safe is False
@@ -185,7 +185,7 @@ def test_a_radius_longer_than_the_leg_skips_way_points(autopilot: Autopilot) -> 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("autopilot", [PX4, PLANE])
 def test_no_straight_line_from_where_it_turns_leaves_what_is_judged(autopilot: Autopilot, seed: int) -> None:
-    """Zones as wide as they may be for the check; the vehicle flies straight from each turn to the next."""
+    """Zones are as wide as the check allows; the vehicle flies straight from each turn to the next."""
     rng = np.random.default_rng([7, seed])
     craft = vehicle(autopilot, horizontal_clearance_m=0.0, track_error_m=0.0, altitude_error_m=0.0)
     for _ in range(5):
@@ -224,7 +224,7 @@ def test_a_plan_keeps_what_its_corners_take_beyond_the_track_error(autopilot: Au
 
 @pytest.mark.parametrize(("limit_deg", "safe"), [(51.0, True), (49.0, False), (46.0, False)])
 def test_a_leg_shorter_than_its_arcs_climbs_over_what_is_flown(limit_deg: float, safe: bool) -> None:
-    # Arcs of 0.5 m each on a leg of 0.8 m, which the check allows for rounding: 50 degrees, not 44 over both arcs.
+    # Two arcs of 0.5 m on a leg of 0.8 m, an overlap that the check allows for rounding: 50 degrees, not 44.
     turn = 2.0 * math.atan(0.5 / 40.0)
     places = [np.array([0.0, 0.0]), np.array([600.0, 0.0])]
     for k, metres in enumerate((0.8, 700.0), 1):

@@ -1,4 +1,4 @@
-"""What an autopilot does with a mission, item by item."""
+"""The flight that an autopilot makes of a mission, item by item."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_an_arduplane_return_is_judged_over_the_whole_band_of_altitudes() -> Non
     )  # fmt: skip
     back, circle = flight.stretches[-2:]
     assert (back.start[2], back.end[2], back.band_m) == (400, 400, 20)
-    assert 60 < circle.reach_m < 75  # it widens with altitude
+    assert 60 < circle.reach_m < 75  # the circle grows with altitude
     assert math.isinf(circle.hold_s)
 
 
@@ -176,7 +176,7 @@ def test_a_hold_counts_on_copter_and_not_on_plane() -> None:
     assert plane.stretches[-1].hold_s == 0
 
 
-SLOPE = 20_000.0  # metres of ground for a degree of latitude
+SLOPE = 20_000.0  # metres that the ground rises per degree of latitude
 
 
 def fly_over_a_slope(
@@ -214,7 +214,7 @@ def test_copter_and_px4_change_height_along_the_leg() -> None:
 
 
 def test_arduplanes_glide_slope_minimum_counts_above_ground_in_terrain_frame() -> None:
-    level = at(cmd.WAYPOINT, 0.01, 0, 65, m.TERRAIN)  # 200 m higher above sea, the same above ground
+    level = at(cmd.WAYPOINT, 0.01, 0, 65, m.TERRAIN)  # 200 m higher in AMSL, the same height above ground
     flight = fly_over_a_slope(VTOL_TAKEOFF, level, autopilot=Autopilot.ARDUPLANE)
     (band,) = flight.instead
     assert band.terrain
@@ -269,7 +269,7 @@ def test_a_landing_elsewhere_in_terrain_frame_keeps_its_height_above_ground() ->
 
 def test_a_landing_elsewhere_is_judged_both_level_and_along_the_ground() -> None:
     flight = fly_over_a_slope(TAKEOFF, at(cmd.LAND, -0.01, 0, 0))
-    over, down = flight.instead  # ArduCopter before 4.6, with terrain data
+    over, down = flight.instead  # ArduCopter before 4.6 with terrain data
     assert over.terrain
     assert over.end[2] == pytest.approx(GROUND_M - 200 + 65)
     assert down.column
@@ -278,7 +278,7 @@ def test_a_landing_elsewhere_is_judged_both_level_and_along_the_ground() -> None
 
 
 def test_rtl_from_near_home_climbs_less_than_its_altitude() -> None:
-    near = at(cmd.WAYPOINT, 0.0002, 0, 40)  # 22.194 m off
+    near = at(cmd.WAYPOINT, 0.0002, 0, 40)  # 22.194 m from home
     copter = fly(TAKEOFF, near, MissionItem(cmd.RTL, 2), rtl_rel_home_m=120)
     (band,) = copter.instead
     assert band.start[2] - band.band_m == pytest.approx(GROUND_M + 3 * 22.194, abs=0.05)  # RTL_CONE_SLOPE 3
@@ -292,7 +292,7 @@ def test_copter_reaches_a_circles_altitude_at_its_edge() -> None:
     turns = MissionItem(cmd.LOITER_TURNS, m.RELATIVE, (1, 0, 200, 0), m.degrees_e7(36.61), m.degrees_e7(-84.3), 165)
     edge = fly(TAKEOFF, turns).stretches[1]
     assert edge.end[2] == GROUND_M + 165
-    assert (36.61 - edge.end[0]) * 110_971 == pytest.approx(200, rel=1e-4)  # metres of a degree at 36.6° N
+    assert (36.61 - edge.end[0]) * 110_971 == pytest.approx(200, rel=1e-4)  # metres per degree at 36.6° N
 
 
 def test_a_circles_radius_holds_for_the_next_one_without() -> None:
@@ -338,7 +338,7 @@ def test_a_spline_is_flown_as_a_curve_and_judged_from_a_standstill_too() -> None
     curve = [s for s in flight.stretches if s.seq == 3]
     assert curve[0].start == flight.stretches[1].end
     assert curve[-1].end[:2] == (spline.lat_deg, spline.lon_deg)
-    assert max(s.end[0] for s in curve) > 36.6105  # it leaves northward
+    assert max(s.end[0] for s in curve) > 36.6105  # the curve leaves northward
     assert max(s.end[0] for s in flight.instead) < 36.612
     assert all(0 < s.reach_m == s.band_m < 0.3 for s in curve)
 

@@ -1,4 +1,4 @@
-"""A mission in, one verdict out: limits, errors, frames, battery, and what cannot be judged."""
+"""The verdict on a mission: limits, errors, frames, battery, and what cannot be judged."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_a_zone_its_clearance_and_its_name_are_in_the_finding() -> None:
     mast = Zone("mast", Circle(1500, 100, 60), None, Level(100, "agl"))
     craft = vehicle(horizontal_clearance_m=30)
     verdict = verdict_of(world(zones=[mast]), [[0.0, 0, 366], [3000, 0, 366]], craft)
-    assert verdict.safe is True  # 40 m from its edge: 30 and 3 are wanted
+    assert verdict.safe is True  # 40 m from its edge; 30 m and 3 m are required
     verdict = verdict_of(world(zones=[mast]), [[0.0, 10, 366], [3000, 10, 366]], craft)
     assert {f.zone for f in verdict.findings} == {"mast"}
     assert "mast" in verdict.findings[0].message
@@ -111,7 +111,7 @@ def test_leaving_the_terrain_model_is_a_violation() -> None:
 
 def test_what_ardupilot_stores_is_judged_not_what_was_meant() -> None:
     mission, craft = mission_over(world(), HIGH_ENOUGH)
-    # 65.008 m is cut to 65.00 on board: legal with 65 wanted; 64.9999 becomes 64.99: not legal.
+    # 65.008 m is stored as 65.00 m, which is legal if 65 m are required; 64.9999 m is stored as 64.99 m: not legal.
     flat = replace(craft, limits=replace(craft.limits, track_error_m=0.0))
 
     def flying_at(z: float) -> Verdict:
@@ -156,7 +156,7 @@ def test_terrain_following_is_judged_as_interpolated_with_the_terrain_error() ->
     steep = verdict_of(hill, points, vehicle(max_climb_deg=10), altitude_frame="terrain")
     assert "climb" in {f.kind for f in steep.findings}
     low = verdict_of(hill, [[0.0, 0, 390], [3000, 0, 390]], altitude_frame="terrain")
-    assert "min_agl" in {f.kind for f in low.findings}  # 90 m less 30 m and 5 m is not 60 m
+    assert "min_agl" in {f.kind for f in low.findings}  # 90 m less 30 m and 5 m is below 60 m
 
 
 def test_a_mission_longer_than_the_autopilot_takes_is_a_violation() -> None:
@@ -185,7 +185,7 @@ def test_a_jump_back_is_judged_and_each_of_its_rounds_counts() -> None:
         assert verdict.length_m == pytest.approx(once.length_m + rounds * 1600.0, rel=1e-5)
         assert verdict.time_s == pytest.approx(once.time_s + rounds * 1600.0 / 15.0, rel=1e-5)
         assert verdict.energy_j == pytest.approx(once.energy_j + rounds * 1600.0 * 100.0, rel=1e-5)
-    assert max(leg.times for leg in with_jump(30).legs) > 20  # rounds alike are judged once
+    assert max(leg.times for leg in with_jump(30).legs) > 20  # equal rounds are judged once
 
 
 @pytest.mark.parametrize("autopilot", list(Autopilot))
@@ -195,7 +195,7 @@ def test_every_autopilot_is_judged(autopilot: Autopilot) -> None:
 
 
 def test_what_arduplane_may_fly_at_once_is_judged_too() -> None:
-    # 74 to 66 m: legal along the leg, but flown at once it is too low over the mound at its beginning.
+    # From 74 to 66 m: legal along the leg, but if it descends at once it is too low over the mound at the start.
     mound = world(lambda e, n: 300 + 6 * np.exp(-((e - 500) ** 2 + n**2) / 4e4))
     points = [[0.0, 0, 374], [3000, 0, 366]]
     verdict = verdict_of(mound, points, vehicle(Autopilot.ARDUPLANE), end="loiter")
@@ -224,7 +224,7 @@ def test_a_way_point_beyond_all_reason_is_a_finding_and_not_a_crash(
 
 
 def test_terrain_following_is_as_steep_as_its_steepest_metre_and_not_as_the_chord_of_a_cell() -> None:
-    # Over a twisted cell the ground under a diagonal is a parabola: level from edge to edge, steep at both.
+    # In a twisted cell the ground under a diagonal is a parabola: equally high at both edges, and steep there.
     twisted = world(lambda e, n: 300 + np.where((np.abs(e) < 60) & (np.abs(n) < 60) & (e != n), 30.0, 0.0))
     points = [[-300.0, -280, 450], [300.0, 320, 450]]
     surface = twisted.airspace.surface
@@ -262,11 +262,11 @@ def test_who_moves_by_what_a_violation_tells_keeps_the_limit(frame: str) -> None
             up = [replace(i, z=i.z + m_) if i.command in (cmd.WAYPOINT, cmd.TAKEOFF) else i for i in mission.items]
             return replace(mission, items=tuple(up))
 
-        # A centimetre is cut away in storage.
+        # Storage truncates to centimetres.
         left = {f.kind for f in judge(raised(by + 0.01), craft, where).findings}
         assert not left & {"min_agl", "terrain_clearance"}, left
         less = {f.kind for f in judge(raised(0.98 * by - 0.1), craft, where).findings}
-        assert less & {"min_agl", "terrain_clearance"}  # and it is not told twice too much
+        assert less & {"min_agl", "terrain_clearance"}  # and the reported lift is not much too large
 
 
 def test_terrain_following_over_small_cells_is_judged_in_a_fraction_of_a_second() -> None:
@@ -279,5 +279,5 @@ def test_terrain_following_over_small_cells_is_judged_in_a_fraction_of_a_second(
     judge(mission, craft, where)
     begun = time.process_time()
     verdict = judge(mission, craft, where)
-    assert time.process_time() - begun < 1.0  # 0.1 s alone; 2 to 3 s when slopes were found by cutting
+    assert time.process_time() - begun < 1.0  # 0.1 s when idle; 2 to 3 s when slopes were found by bisection
     assert verdict.length_m > 16_000

@@ -1,4 +1,4 @@
-"""In which order items are flown: jumps, against an interpreter that follows every single round."""
+"""The order in which items are flown: jumps, compared with an interpreter that follows every single round."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def fly(*items: MissionItem, autopilot: Autopilot = Autopilot.ARDUCOPTER) -> Fli
 
 
 def legs(flight: Flight) -> Counter[tuple[float, float]]:
-    """How often each leg is flown, by the latitudes of its ends."""
+    """The number of times each leg is flown, by the latitudes of its ends."""
     count: Counter[tuple[float, float]] = Counter()
     for s in flight.stretches:
         if s.kind == "cruise":
@@ -83,7 +83,7 @@ def jumpy(draw: st.DrawFn) -> tuple[MissionItem, ...]:
 @settings(max_examples=draws(120))
 @given(jumpy())
 def test_every_leg_is_flown_as_often_as_one_by_one(items: tuple[MissionItem, ...]) -> None:
-    # Relative to the wire, where the take-off is item 1.
+    # Targets of jumps are wire numbers, where the take-off is item 1.
     assert legs(fly(*items)) == flown_one_by_one((TAKEOFF, *items), 1)
 
 
@@ -146,5 +146,5 @@ def test_a_splines_chords_hold_the_whole_curve(seed: int) -> None:
     a, d = points[:-1, None], np.diff(points, axis=0)[:, None]
     along = np.clip(((curve - a) * d).sum(-1) / (d**2).sum(-1), 0, 1)
     off = np.linalg.norm(curve - a - along[..., None] * d, axis=-1).min(axis=0)
-    assert off.max() <= bulge_m + 0.5  # a flat earth serves the curve as well as the oracle, to within this
+    assert off.max() <= bulge_m + 0.5  # curve and oracle both use a flat earth: 0.5 m covers the difference
     assert bulge_m < 0.3

@@ -1,4 +1,4 @@
-"""The curve of a spline way point: its steepest places, in metres of the ellipsoid."""
+"""The curve of a spline way point: its steepest slopes, in metres of the ellipsoid."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ LOOKS = 200_000
 
 @pytest.mark.parametrize("seed", range(40))
 def test_no_place_of_a_curve_is_steeper_than_is_said(seed: int) -> None:
-    """Held to a curve looked at in 200,000 places; curves that all but turn back peak within a thousandth of it."""
+    """Compared with 200,000 samples of the curve; curves that almost turn back peak within a thousandth of it."""
     rng = np.random.default_rng(seed)
     leaves, square, cube = rng.normal(0.0, [[30.0, 30.0, 10.0]] * 3)
-    if seed % 2:  # all but stands still, seen from above, in one place
+    if seed % 2:  # the horizontal speed almost vanishes at one point
         t0, v = rng.uniform(0.2, 0.8), rng.normal(0.0, 30.0, 2)
         cube[:2] = v / 3.0
         square[:2] = -v * t0 + rng.normal(0.0, 0.5, 2)
@@ -31,14 +31,14 @@ def test_no_place_of_a_curve_is_steeper_than_is_said(seed: int) -> None:
         assert mine.max() <= up + 1e-9 * max(1.0, abs(up))
         assert mine.min() >= down - 1e-9 * max(1.0, abs(down))
     ups, downs = zip(*_slopes(leaves, square, cube, pieces), strict=True)
-    assert max(ups) <= slope.max() + 1e-3 * abs(slope.max()) + 1e-3  # and nothing is made up
+    assert max(ups) <= slope.max() + 1e-3 * abs(slope.max()) + 1e-3  # and the bound is tight
     assert min(downs) >= slope.min() - 1e-3 * abs(slope.min()) - 1e-3
 
 
 @pytest.mark.parametrize("stands", ["at_start", "at_end", "on_the_way"])
 @pytest.mark.parametrize("seed", range(20))
 def test_where_a_curve_stands_still_it_is_as_steep_as_it_leaves_and_arrives(stands: str, seed: int) -> None:
-    """A spline behind a hold has no speed where it begins: its slope there is what it tends to."""
+    """A spline after a hold begins with speed zero: its slope there is the limit of the slope."""
     rng = np.random.default_rng(seed)
     way, other = rng.normal(0.0, [[100.0, 100.0, 20.0]] * 2)
     leaves, arrives = (np.zeros(3), other) if stands == "at_start" else (other, np.zeros(3))

@@ -1,4 +1,4 @@
-"""What is never flown, what is refused on upload, and params that make another flight of a command."""
+"""Items that are never flown, items that are refused on upload, and params that change how a command is flown."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_what_stands_behind_a_hold_without_end_is_a_finding(autopilot: Autopilot
     wait = verdict.mission.first_seq + 2
     assert (finding.kind, finding.seq) == ("unreachable", wait + 1)
     assert f"item {wait} holds without end: items {wait + 1} to {wait + 2} are never reached" in finding.message
-    assert max(leg.seq for leg in verdict.legs) == wait  # nothing behind it counts as flown
+    assert max(leg.seq for leg in verdict.legs) == wait  # no item after it counts as flown
 
 
 def test_a_hold_without_end_that_ends_the_mission_is_none() -> None:
@@ -61,7 +61,7 @@ def test_a_hold_without_end_that_ends_the_mission_is_none() -> None:
     used = 120.0 * 100 + 100.0 * 1500
     assert verdict.until_reserve_s == pytest.approx((0.8e6 - used) / 400.0, rel=1e-3)
     assert any("the battery comes to its reserve after" in n for n in verdict.notes)
-    short = replace(craft, energy=replace(craft.energy, battery_j=190_000.0))  # it does not get there
+    short = replace(craft, energy=replace(craft.energy, battery_j=190_000.0))  # too little to reach the end
     assert [f.kind for f in flown(COPTER, A, WAIT, craft=short).findings] == ["battery"]
     unknown = replace(craft, energy=replace(craft.energy, hover_w=0.0))
     assert any("is not known, for hover_w is 0" in n for n in flown(COPTER, A, WAIT, craft=unknown).notes)
@@ -100,7 +100,7 @@ def test_what_stands_behind_a_loop_without_end_is_a_finding_and_how_long_it_last
 def test_px4_goes_on_with_nothing_behind_an_item_without_autocontinue() -> None:
     stops = replace(A, autocontinue=False)
     assert [f.kind for f in flown(PX4, stops, B, DOWN).findings] == ["unreachable"]
-    assert flown(COPTER, stops, B, DOWN).safe is True  # ArduPilot does not look at it
+    assert flown(COPTER, stops, B, DOWN).safe is True  # ArduPilot ignores it
     assert flown(PX4, A, B, replace(DOWN, autocontinue=False)).safe is True
 
 

@@ -19,13 +19,13 @@ from tests.support.random_worlds import jacksboro, random_zones
 
 
 def world(heights: ArrayLike, zones: Sequence[Zone] = (), *, cell_m: float = 100.0, scale: float = 1.0) -> Airspace:
-    """Heights from north to south; the south-western node at (0, 0)."""
+    """An airspace over rows of heights from north to south, with the south-western node at (0, 0)."""
     z = np.asarray(heights, float)
     return Airspace(Surface(z, z, GridMap.affine(0.0, (len(z) - 1) * cell_m, cell_m, cell_m)), zones, scale=scale)
 
 
 def flat(zones: Sequence[Zone] = (), *, scale: float = 1.0) -> Airspace:
-    """Ground at 0 m, from (-1000, -1000) to (3000, 3000)."""
+    """An airspace over ground at 0 m from (-1000, -1000) to (3000, 3000)."""
     z = np.zeros((41, 41))
     return Airspace(Surface(z, z, GridMap.affine(-1000.0, 3000.0, 100.0, 100.0)), zones, scale=scale)
 
@@ -37,7 +37,7 @@ def leg(start: ArrayLike, end: ArrayLike, *, column: bool = False, track: float 
 
 
 def judged(airspace: Airspace, legs: Legs, limits: Limits) -> LegReport:
-    """`examine`, after making sure that `clear` agrees with it."""
+    """The report of `examine`, after an assertion that `clear` agrees with it."""
     report = airspace.examine(legs, limits)
     broken = {v.leg for v in report.violations}
     assert airspace.clear(legs, limits).tolist() == [i not in broken for i in range(len(legs))]
@@ -45,7 +45,7 @@ def judged(airspace: Airspace, legs: Legs, limits: Limits) -> LegReport:
 
 
 def only(airspace: Airspace, legs: Legs, limits: Limits) -> Violation:
-    """The one violation there is."""
+    """The violation of a leg that has exactly one."""
     (violation,) = judged(airspace, legs, limits).violations
     assert violation.by > 0.0
     return violation
@@ -68,7 +68,8 @@ def test_min_agl_at_the_limit_is_legal_and_a_millimetre_below_is_not() -> None:
 
 
 def test_the_hill_between_two_ends_is_seen_where_it_is_highest() -> None:
-    """A saddle, 100·u·(1 − v) + 100·v·(1 − u): along one diagonal 200·t·(1 − t), along the other 100 m less that."""
+    """The ground is a saddle, 100·u·(1 − v) + 100·v·(1 − u): 200·t·(1 − t) along one diagonal, 100 m less that along
+    the other."""
     airspace = world([[100, 0], [0, 100]])
     over = judged(airspace, leg([0, 0, 150], [100, 100, 150]), Limits(0.0))
     assert (over.min_agl_m[0], over.min_agl_at[0], over.max_agl_m[0]) == pytest.approx((100.0, 0.5, 150.0))
@@ -78,7 +79,7 @@ def test_the_hill_between_two_ends_is_seen_where_it_is_highest() -> None:
 
 
 def test_the_quadratic_of_a_cell_is_met_exactly() -> None:
-    """Height u·v·100 from the south-west: along the diagonal 100·t², along the other 100·t·(1 − t)."""
+    """The ground is 100·u·v from the south-west: 100·t² along that diagonal, 100·t·(1 − t) along the other."""
     airspace = world([[0, 100], [0, 0]])
     up = judged(airspace, leg([0, 0, 130], [100, 100, 130]), Limits(0.0))
     assert (up.min_agl_m[0], up.min_agl_at[0], up.max_agl_m[0]) == pytest.approx((30.0, 1.0, 130.0))
@@ -111,13 +112,13 @@ def test_errors_of_the_leg_widen_and_those_of_the_limits_do_not() -> None:
 
 @pytest.mark.parametrize("scale", [1.0, 1.001])
 def test_on_a_slope_the_track_error_costs_its_rise(scale: float) -> None:
-    """Ground rising half a metre a metre to the east: within 8 m of the line it is 4 m higher than under it."""
+    """The ground rises 0.5 m per metre to the east: within 8 m of the line it is up to 4 m higher than below it."""
     airspace = world(np.tile(np.arange(0, 1050, 50.0), (21, 1)), scale=scale)
     need = 0.5 * 1000.0 + 60.0 + 0.5 * 8.0 * scale
     assert not kinds(airspace, leg([1000, 100, need + 0.006], [1000, 1900, need + 0.006], track=8.0), Limits(60.0))
     v = only(airspace, leg([1000, 100, need - 0.001], [1000, 1900, need - 0.001], track=8.0), Limits(60.0))
     assert v.by == pytest.approx(0.001, abs=0.006)
-    # From above it is the downhill side.
+    # For max AGL the downhill side counts.
     roof = 0.5 * 1000.0 + 120.0 - 0.5 * 8.0 * scale
     limits = Limits(0.0, max_agl_m=120.0)
     assert not kinds(airspace, leg([1000, 100, roof - 0.006], [1000, 1900, roof - 0.006], track=8.0), limits)
@@ -125,7 +126,7 @@ def test_on_a_slope_the_track_error_costs_its_rise(scale: float) -> None:
 
 
 def test_beside_a_cliff_the_horizontal_clearance_binds() -> None:
-    """A wall of 200 m whose foot is at 1000 m east and top at 1100 m: at 100 m height it stands at 1050 m."""
+    """A cliff of 200 m rises from 1000 m to 1100 m east: it is 100 m high at 1050 m east."""
     airspace = world(np.where(np.arange(21) > 10, 200.0, 0.0)[None, :].repeat(21, axis=0))
     limits = Limits(20.0, horizontal_clearance_m=30.0)
     assert not kinds(airspace, leg([1019.99, 100, 100], [1019.99, 1900, 100]), Limits(20.0, horizontal_clearance_m=30))
@@ -140,7 +141,7 @@ def test_beside_a_cliff_the_horizontal_clearance_binds() -> None:
 
 
 def test_a_tower_beside_the_line_is_seen_between_nodes() -> None:
-    """One node of 300 m: its tent is 150 m high 50 m away from it along the axis, and 75 m on the diagonal."""
+    """One node is 300 m high: 50 m away from it the surface is 150 m high along an axis, and 75 m on the diagonal."""
     heights = np.zeros((21, 21))
     heights[10, 10] = 300.0
     airspace = world(heights)
@@ -183,7 +184,7 @@ def test_columns_are_exempt_from_the_ground_and_from_nothing_else() -> None:
     column = leg([1000, 1000, 0], [1000, 1000, 101], column=True, track=1.0)
     assert kinds(world(tower), column, limits) == {"max_agl", "max_amsl"}
     assert kinds(world(tower, [zone]), column, limits) == {"max_agl", "max_amsl", "zone"}
-    # Clearance from a zone is kept by columns too; under its floor there is nothing to keep.
+    # Columns must keep the clearance from a zone too, but not below its floor.
     beside = Zone("z", Circle(1000, 1175, 100), Level(50, "amsl"), None)
     low = Limits(60.0, horizontal_clearance_m=80.0)
     assert kinds(flat([beside]), leg([1000, 1000, 0], [1000, 1000, 65], column=True), low) == {"zone"}
@@ -206,7 +207,7 @@ def test_unknown_ground_is_never_ground() -> None:
     assert [v.kind for v in through.violations] == ["coverage"]
     assert 900 <= through.violations[0].north_m <= 1100
     assert through.violations[0].value == 0.0
-    assert not np.isnan(through.min_agl_m[0])  # it is known on the rest of the leg
+    assert not np.isnan(through.min_agl_m[0])  # the ground is known on the rest of the leg
     near = only(airspace, leg([885, 100, high], [885, 1900, high]), limits)
     assert (near.kind, near.value, near.limit) == ("coverage", pytest.approx(15.0, abs=0.01), 20.0)
     assert not kinds(airspace, leg([879.9, 100, high], [879.9, 1900, high]), limits)
@@ -267,7 +268,7 @@ def test_over_the_ceiling_and_under_the_floor_are_legal_up_to_touching() -> None
     for level, legal in ((205.0, True), (204.9, False), (150.0, False), (95.1, False), (95.0, True)):
         legs = leg([100, 1000, level], [1900, 1000, level], altitude=5.0)
         assert kinds(airspace, legs, limits) == (set() if legal else {"zone"}), level
-    # A climb that is over the ceiling where it comes within reach: at 670 m of 1000 m it is 100 m above the start.
+    # The climb is above the ceiling where it comes within reach: at 670 m of 1000 m, 100 m above the start.
     over = leg([0, 1000, 200 - 150 * 0.67 + 0.01], [1000, 1000, 350 - 150 * 0.67 + 0.01])
     assert not kinds(airspace, over, limits)
     assert kinds(airspace, leg([0, 1000, 99.4], [1000, 1000, 249.4]), limits) == {"zone"}
@@ -276,20 +277,20 @@ def test_over_the_ceiling_and_under_the_floor_are_legal_up_to_touching() -> None
 
 
 def test_levels_over_ground_follow_it_point_by_point() -> None:
-    """Ground rising 0.1 m a metre to the east: a ceiling of 50 m AGL is at 120 m AMSL in the west, 180 in the east."""
+    """The ground rises 0.1 m per metre to the east: 50 m AGL is 120 m AMSL in the zone's west and 180 m in its east."""
     heights = np.tile(np.arange(0, 210, 10.0), (21, 1))
     zone = Zone("z", Circle(1000, 1000, 300), None, Level(50, "agl"))
     airspace, limits = world(heights, [zone]), Limits(0.0)
-    # Parallel to the ground, just over the ceiling everywhere, though far below its highest place.
+    # Parallel to the ground, just above the ceiling everywhere, though far below the ceiling's highest point.
     assert not kinds(airspace, leg([500, 1000, 100.01], [1500, 1000, 200.01]), limits)
     assert kinds(airspace, leg([500, 1000, 99.99], [1500, 1000, 199.99]), limits) == {"zone"}
-    # With clearance the ground within reach counts, but of the shape alone: its eastern tip is 130 m high.
+    # With clearance the ground within reach counts, but only inside the shape: at its eastern tip it is 130 m high.
     level = leg([500, 1000, 180.01], [1400, 1000, 180.01])
     assert not kinds(airspace, level, Limits(0.0, horizontal_clearance_m=30.0))
     low = leg([1310, 700, 179.5], [1310, 1300, 179.5])
     assert kinds(airspace, low, Limits(0.0, horizontal_clearance_m=20.0)) == {"zone"}
     assert not kinds(airspace, low, Limits(0.0, horizontal_clearance_m=9.9))
-    # Floors alike: under 50 m AGL is free.
+    # The same for floors: below 50 m AGL is free.
     raised = world(heights, [Zone("z", Circle(1000, 1000, 300), Level(50, "agl"), None)])
     assert not kinds(raised, leg([500, 1000, 99.99], [1500, 1000, 199.99]), limits)
     assert kinds(raised, leg([500, 1000, 100.01], [1500, 1000, 200.01]), limits) == {"zone"}
@@ -305,7 +306,7 @@ def test_over_unknown_ground_a_zone_above_ground_has_no_end() -> None:
 
 
 def test_a_zone_whose_floor_is_above_its_ceiling_is_empty() -> None:
-    """100 m AGL up to 600 m AMSL: over ground above 500 m nothing is left of it."""
+    """A zone from 100 m AGL to 600 m AMSL is empty over ground above 500 m."""
     zone = Zone("z", Circle(1000, 1000, 300), Level(100, "agl"), Level(600, "amsl"))
     assert not kinds(world(np.full((21, 21), 550.0), [zone]), leg([100, 1000, 620], [1900, 1000, 620]), Limits(0.0))
     high = leg([100, 1000, 620], [1900, 1000, 620], altitude=30.0)
@@ -335,9 +336,9 @@ def test_a_notch_in_a_polygon_is_free_and_clearance_closes_it() -> None:
 def test_without_clearance_a_polygon_may_be_touched() -> None:
     airspace, limits = flat([Zone("u", NOTCH)]), Limits(0.0)
     for a, b in (
-        ((300, 500), (1700, 500)),  # along an edge, and beyond it on both sides
-        ((900, 1500), (1100, 1500)),  # over the mouth of the notch
-        ((100, 900), (900, 1700)),  # a corner: (500, 1500) lies on it
+        ((300, 500), (1700, 500)),  # along an edge and beyond both of its ends
+        ((900, 1500), (1100, 1500)),  # across the notch's opening
+        ((100, 900), (900, 1700)),  # through the corner (500, 1500)
         ((900, 900), (900, 1500)),  # inside the notch, along its wall
         ((1000, 1900), (1000, 900)),  # down to its bottom
     ):
@@ -365,7 +366,7 @@ def test_thousands_of_zones_are_found_through_the_lattice_as_one_by_one() -> Non
     limits = Limits(0.0, horizontal_clearance_m=30.0)
     clear = Airspace(surface, zones).clear(legs, limits)
     single = np.ones(2000, np.bool_)
-    for k in range(0, len(zones), 20):  # up to twenty zones are not put into a lattice
+    for k in range(0, len(zones), 20):  # up to twenty zones are not sorted into a lattice
         single &= Airspace(surface, zones[k : k + 20]).clear(legs, limits)
     assert clear.tolist() == single.tolist()
     assert 0.05 < clear.mean() < 0.95
@@ -411,7 +412,7 @@ def test_several_threads_may_share_an_airspace() -> None:
 
 
 def test_a_leg_of_fifty_kilometres_is_cut_until_it_is_straight_in_the_grid() -> None:
-    """East to west across the whole sample; what a leg of its own finds in each kilometre is found in the whole."""
+    """A leg from east to west across the whole sample finds what short legs find kilometre by kilometre."""
     ground = jacksboro()
     surface = Surface(ground.heights, ground.heights, ground.grid)
     airspace = Airspace(surface)

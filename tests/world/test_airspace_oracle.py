@@ -1,4 +1,4 @@
-"""The exact check against brute force: never more optimistic, and boundedly pessimistic."""
+"""The exact check against brute force: never more optimistic, and pessimistic only within bounds."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tests.support.random_worlds import (
 
 pytestmark = pytest.mark.slow
 
-SURE_M = 1e-3  # what brute force finds beyond this is a violation
+SURE_M = 1e-3  # brute-force breaches beyond this count
 TERRAIN = ("min_agl", "terrain_clearance", "max_agl")
 
 
@@ -44,7 +44,7 @@ def by_key(report: LegReport, leg: int) -> dict[tuple[str, int], Violation]:
 def nearly_touching(
     rng: np.random.Generator, oracle: Oracle, start: Floats, end: Floats, column: bool, limits: Limits
 ) -> float:
-    """How much to lift a leg so that one of its demands is just met, or missed by little, or by much."""
+    """Metres to lift a leg so that it just meets one of its limits, or misses it by little or by much."""
     depths = oracle.depths(start, end, column, limits.track_error_m, limits.altitude_error_m, limits)
     kinds = [k for k in TERRAIN if np.isfinite(depths.get(k, np.nan))]
     if not kinds:
@@ -109,7 +109,7 @@ def check_terrain(
         if kind not in depths:
             assert violation is None, (where, kind)
             continue
-        # Over unknown ground brute force may know a place on an edge that the check, to be safe, does not.
+        # Beside unknown ground brute force knows heights on a cell's edge that the check treats as unknown, to be safe.
         excused = uncovered and kind in TERRAIN
         if depths[kind] > SURE_M and not excused:
             assert violation is not None, (where, kind, depths[kind])
@@ -119,7 +119,7 @@ def check_terrain(
             reach = track * scale + (limits.horizontal_clearance_m * scale if kind == "terrain_clearance" else 0.0)
             z, sign = (oracle.ground, -1.0) if kind == "max_agl" else (oracle.top, 1.0)
             true = deepest(oracle, z, sign, start, end, need + altitude, reach, violation.fraction, rng)
-            # Measured: a centimetre or two at most of the cases; zooming in misses a summit now and then.
+            # Measured: 1 or 2 cm in most cases; the search for the deepest point sometimes misses a summit.
             assert violation.by - max(true, depths[kind]) <= 0.05 + 0.15 * violation.by, (where, violation, true)
 
 
@@ -144,7 +144,7 @@ def check_zones(
 @pytest.mark.parametrize("lat_deg", [36.6, -64.0])
 @pytest.mark.parametrize("kind", ["min_agl", "max_agl"])
 def test_long_east_west_legs_are_judged_over_the_degrees_of_the_dem(lat_deg: float, kind: str) -> None:
-    """5 km due east: the plane's straight line and the grid's lie a third of a metre apart and more."""
+    """5 km due east, a straight line in the plane and one in the grid differ by a third of a metre and more."""
     rng = np.random.default_rng(7)
     ground = geographic(lat_deg, 10.0, 3.0 / 3600.0, rng.uniform(0.0, 120.0, (60, 160)))
     surface = surface_of(rng, ground)
@@ -168,7 +168,7 @@ def test_long_east_west_legs_are_judged_over_the_degrees_of_the_dem(lat_deg: flo
 
 
 def test_a_leg_flown_straight_in_degrees_is_covered_by_its_bow() -> None:
-    """An autopilot that interpolates degrees strays by `Frame.bow_m`; added to the track error, nothing is missed."""
+    """A leg interpolated in degrees is off by up to `Frame.bow_m`; added to the track error, no breach is missed."""
     rng = np.random.default_rng(8)
     ground = geographic(60.0, 10.0, 3.0 / 3600.0, rng.uniform(0.0, 120.0, (60, 160)))
     frame = Frame(60.0, 10.0)

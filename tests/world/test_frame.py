@@ -1,4 +1,4 @@
-"""The door between degrees and metres, against the geodesic and against the projection's own factors."""
+"""Conversion between degrees and metres, against geodesics and against the projection's own scale factors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ azimuths = st.floats(0.0, 360.0)
 
 
 def away(lat: float, lon: float, azimuth: float, distance_m: float) -> tuple[float, float]:
-    """Latitude, longitude of the place that lies so far off along the geodesic."""
+    """Latitude and longitude of the place at a distance (m) along a geodesic."""
     lon2, lat2, _ = WGS84.fwd(lon, lat, azimuth, distance_m)
     return float(lat2), float(lon2)
 
@@ -67,7 +67,7 @@ def test_a_distance_in_the_plane_is_the_real_one_times_at_most_the_scale(
 ) -> None:
     frame = Frame(lat, lon)
     planar = float(np.linalg.norm(frame.to_plane(*away(lat, lon, azimuth, far_m))))
-    # The straight line in the plane is not longer than the geodesic's image, and the scale is nowhere below 1.
+    # The straight line in the plane is no longer than the geodesic's image, and the scale is at least 1 everywhere.
     assert far_m * (1 - 1e-9) - 1e-7 <= planar <= far_m * frame.scale_at(far_m) + 1e-7
 
 
@@ -119,7 +119,7 @@ def test_an_origin_near_a_pole_or_none_at_all_is_refused(lat: float, lon: float)
 
 
 def sampled_bow(frame: Frame, a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
-    """How far the two lines are apart: at the same fraction, and sideways; over 401 points."""
+    """The greatest distance (m) of the two lines over 401 points: at equal fractions, and sideways."""
     t = np.linspace(0.0, 1.0, 401)
     span = (b[1] - a[1] + 180.0) % 360.0 - 180.0
     curved = frame.to_plane(a[0] + t * (b[0] - a[0]), a[1] + t * span)
@@ -132,7 +132,7 @@ def sampled_bow(frame: Frame, a: tuple[float, float], b: tuple[float, float]) ->
 
 @settings(max_examples=draws(120))
 @given(latitudes, longitudes, azimuths, st.floats(0.0, FARTHEST_M), azimuths, st.floats(10.0, 200_000.0))
-@example(0.0, 0.0, 270.0, 100_000.0, 90.0, 200_000.0)  # nothing in the middle, 1.7 m at the quarters
+@example(0.0, 0.0, 270.0, 100_000.0, 90.0, 200_000.0)  # 0 m in the middle, 1.7 m at the quarters
 @example(0.0, 0.0, 0.0, 0.0, 0.0, 50_000.0)
 def test_the_bow_bounds_the_distance_between_both_straight_lines_and_hardly_more(
     lat: float, lon: float, azimuth: float, far_m: float, course: float, length_m: float
@@ -158,7 +158,7 @@ def test_the_bow_is_that_of_every_leg_and_knows_the_antimeridian() -> None:
     assert bows[0] == pytest.approx(bows[1])
     assert bows[0] == pytest.approx(1.02 * sampled_bow(frame, (60.0, 179.98), (60.0, -179.98))[0], rel=1e-3)
     assert bows[2] == 0.0
-    assert bows[3] < 0.03  # along a meridian both lines are the same, flown at a slightly different pace
+    assert bows[3] < 0.03  # along a meridian both lines are the same, but fractions differ a little
 
 
 # -- the middle of a mission --------------------------------------------------------------------------------------

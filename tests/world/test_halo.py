@@ -1,4 +1,4 @@
-"""What lies around each cell: against a look at every cell by itself, and a tile at a time against all at once."""
+"""Local extrema around each cell: against every cell computed by itself, and tile by tile against all at once."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def rough(rng: np.random.Generator, shape: tuple[int, int], unknown: float) -> F
 
 
 def by_hand(field: Field, z: Floats, halo: Halo) -> tuple[Floats, Floats, Floats]:
-    """Slope, highest and lowest of every cell, in plain numpy and in doubles."""
+    """Slope, highest and lowest height around every cell, in plain numpy and double precision."""
     corners = np.stack([z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]])
     across = np.maximum(abs(corners[1] - corners[0]), abs(corners[3] - corners[2])) / field.step_x
     down = np.maximum(abs(corners[2] - corners[0]), abs(corners[3] - corners[1])) / field.step_y
@@ -117,7 +117,7 @@ def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkey
     monkeypatch.setattr(_halo, "LARGE", 1000)
     assert clear.any()
     assert not clear.all()
-    # One leg alone, so that nothing is known of what lies beside its own tiles.
+    # One leg at a time in a new airspace, so that only its own tiles have been examined.
     for k in range(0, 300, 10):
         assert Airspace(surface).clear(legs_of(start[k : k + 1], end[k : k + 1]), limits)[0] == clear[k]
     part = Airspace(surface)
@@ -132,7 +132,7 @@ def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkey
 
 
 def test_what_was_not_looked_at_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No kernel takes it for flat ground, should it ever come there."""
+    """A kernel that reaches a tile that was not examined must not treat it as flat ground."""
     monkeypatch.setattr(_halo, "LARGE", 100)
     monkeypatch.setattr(Surroundings, "_tiles", lambda self, start, end: np.zeros(self._seen.shape, np.bool_))
     z = np.full((50, 50), 100.0)

@@ -1,4 +1,4 @@
-"""The ground's own grid, against the exact projection; the bilinear surface, against itself done by hand."""
+"""The fitted map from plane to grid, against the exact projection; the bilinear surface, against a plain version."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FLAT = GridMap.affine(0.0, 0.0, 1.0, 1.0)  # column = east, row = south
 
 
 class Exact:
-    """Plane to the nodes of a raster in ``epsg`` by pyproj alone; a cell is ``cell`` units of the raster wide."""
+    """The map from plane to nodes of a raster in ``epsg``, by pyproj alone; ``cell``: cell size in raster units."""
 
     def __init__(self, frame: Frame, epsg: int, cell: float) -> None:
         self.transformer = Transformer.from_crs(frame.crs, epsg, always_xy=True)
@@ -31,7 +31,7 @@ class Exact:
         return (x - self.x0) / self.cell, (self.y0 - y) / self.cell
 
 
-# Raster, its cell, and where it is at home: degrees, Mercator, two UTM zones, Albers, Lambert azimuthal.
+# EPSG code, cell size, and valid latitudes and longitudes: degrees, Mercator, two UTM zones, Albers, Lambert azimuthal.
 RASTERS = [
     (4326, 1 / 1200, (-60.0, 60.0), (-179.0, 179.0)),
     (3857, 30.0, (-60.0, 60.0), (-179.0, 179.0)),
@@ -85,7 +85,7 @@ def test_rows_go_south_and_columns_go_east() -> None:
     assert jacobian[0, 0] > 0
     assert jacobian[1, 1] < 0
     assert np.abs(fitted(0.0, 0.0)).max() < 1e-9
-    # 3 arc-seconds: 92.5 m along the meridian, times the cosine of the latitude along the parallel.
+    # 3 arc seconds: 92.5 m along the meridian; along the parallel times the cosine of the latitude.
     dx, dy = fitted.metres_per_cell(0.0, 0.0)
     assert dy == pytest.approx(92.47, abs=0.05)
     assert dx == pytest.approx(dy * math.cos(math.radians(36.6)), rel=0.01)
@@ -115,7 +115,7 @@ def test_an_affine_grid_is_exact() -> None:
 
 
 def by_hand(z: Floats, col: float, row: float) -> float:
-    """The bilinear height, as it stands in a school book; NaN outside and where an unknown node has a weight."""
+    """The textbook bilinear height; NaN outside, and where an unknown node has non-zero weight."""
     rows, cols = z.shape
     if not (0 <= col <= cols - 1 and 0 <= row <= rows - 1):
         return math.nan
@@ -147,7 +147,7 @@ def test_heights_are_those_worked_out_by_hand_unknown_nodes_included(data: st.Da
 def test_an_unknown_node_is_unknown_up_to_its_neighbours_and_no_farther() -> None:
     z = np.array([[1.0, 2.0, 3.0], [4.0, np.nan, 6.0], [7.0, 8.0, 9.0]])
     surface = Surface(z, z, FLAT)
-    assert float(surface.ground_at(0.0, -1.0)) == 4.0  # on the edge of the cell, the unknown node weighs nothing
+    assert float(surface.ground_at(0.0, -1.0)) == 4.0  # on the cell's edge the unknown node has weight 0
     assert float(surface.ground_at(0.5, 0.0)) == 1.5
     assert float(surface.ground_at(2.0, -1.5)) == 7.5
     assert np.isnan(surface.ground_at(1e-9, -1.0))

@@ -1,4 +1,4 @@
-"""Terrain: every raster held against bilinear interpolation in its own coordinates, done here by hand."""
+"""Terrain: every raster compared with bilinear interpolation in its own coordinates, written out here."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def tif(path: Path, heights: Any, transform: Any, crs: Any = "EPSG:4326", **more
 
 
 def degrees_tif(path: Path, heights: Any = None, *, west: float = -84.6, north: float = 36.6, **more: Any) -> str:
-    """0.2° by 0.2° around the frame in cells of 0.002°, heights at cell centres."""
+    """A GeoTIFF of 0.2° by 0.2° around the frame, in cells of 0.002°, with heights at cell centres."""
     return tif(path, hills(100, 100) if heights is None else heights, from_origin(west, north, 0.002, 0.002), **more)
 
 
@@ -126,7 +126,7 @@ def test_the_sample_has_its_heights_at_cell_centres_with_row_0_in_the_north() ->
     rng = np.random.default_rng(2)
     i, j = rng.integers(0, 403, 500), rng.integers(0, 344, 500)
     plane = frame.to_plane(north - (j + 0.5) * dy, west + (i + 0.5) * dx)
-    # Within a centimetre of the node: at the border of the grid half of them would be outside.
+    # 1 cm inward from the nodes: exactly at the grid's border, half of them would be outside.
     col, row = surface.grid(plane[:, 0], plane[:, 1]).T
     assert np.abs(col - i).max() < 1e-6
     assert np.abs(row - j).max() < 1e-6
@@ -265,7 +265,7 @@ def test_the_antimeridian_is_no_edge(tmp_path: Path, lon_deg: float, layout: str
 def test_only_the_part_that_the_box_needs_is_read(tmp_path: Path) -> None:
     path = degrees_tif(tmp_path / "a.tif", hills(1000, 1000), west=-85.5, north=37.5)
     rows, cols = load(path, box=(-100.0, -100.0, 100.0, 100.0)).ground_m.shape
-    # 3 km around and three cells: 6.2 km of 222 m and 179 m.
+    # 3 km on each side and three cells: 6.2 km in cells of 222 m and 179 m.
     assert 28 + 6 <= rows <= 38
     assert 34 + 6 <= cols <= 46
 
@@ -374,7 +374,7 @@ def test_a_datum_that_contradicts_the_raster_is_refused(tmp_path: Path) -> None:
 
 
 def gtx(path: Path, height: Any, *, south: float = 36.0, west: float = -85.0) -> str:
-    """A geoid grid of 5 × 5 posts, 0.25° apart: south-west corner, spacing, size, then rows from the south."""
+    """A GTX geoid grid of 5 × 5 posts, 0.25° apart: south-west corner, spacing, size, then rows from the south."""
     rows = np.broadcast_to(np.asarray(height, dtype=">f4"), (5, 5))
     path.write_bytes(struct.pack(">4d2i", south, west, 0.25, 0.25, 5, 5) + rows.tobytes())
     return str(path)
@@ -382,7 +382,7 @@ def gtx(path: Path, height: Any, *, south: float = 36.0, west: float = -85.0) ->
 
 @pytest.mark.parametrize(("crs", "said"), [("EPSG:4326", "WGS84"), ("EPSG:4979", None), ("EPSG:32616", "ellipsoidal")])
 def test_ellipsoidal_heights_lose_the_geoid_that_the_grid_gives(tmp_path: Path, crs: str, said: str | None) -> None:
-    # The geoid is a plane in degrees, so that the grid's own interpolation is exact everywhere.
+    # The geoid is linear in degrees, so the grid's own interpolation is exact everywhere.
     lat, lon = np.meshgrid(36.0 + 0.25 * np.arange(5), -85.0 + 0.25 * np.arange(5), indexing="ij")
     grid = gtx(tmp_path / "geoid with a space.gtx", -33.0 + 4.0 * (lat - 36.5) + 2.0 * (lon + 84.5))
     if crs == "EPSG:32616":
@@ -430,7 +430,7 @@ def test_a_broken_geoid_grid_is_refused(tmp_path: Path) -> None:
 
 
 def geoid_tif(path: Path, posts: NDArray[Any], west: float, north: float, step: float, **more: Any) -> str:
-    """A geoid grid whose first post (in the north-west) is at ``west``, ``north``."""
+    """A GeoTIFF geoid grid whose first post (north-west) is at ``west``, ``north``."""
     bands = posts[None] if posts.ndim == 2 else posts
     with rasterio.open(
         path, "w", driver="GTiff", width=bands.shape[2], height=bands.shape[1], count=len(bands), dtype="float32",
@@ -505,7 +505,7 @@ def test_a_geoid_grid_of_impossible_steps_is_refused(tmp_path: Path, step: float
 
 
 def test_a_geoid_grid_with_strips_of_no_rows_is_no_danger(tmp_path: Path) -> None:
-    """PROJ divides by that number, and the process is gone."""
+    """PROJ divides by the number of rows per strip, which would end the process."""
     path = Path(geoid_tif(tmp_path / "g.tif", np.full((60, 60), -30.0), -85.0, 37.0, 0.02, compress="deflate"))
     data = bytearray(path.read_bytes())
     at = data.index(struct.pack("<HHI", 278, 3, 1))
@@ -541,7 +541,7 @@ def test_rasters_that_are_not_north_up_are_refused_with_the_cure(tmp_path: Path)
     [(1e-310, -84.6), (5e-324, 0.0), (1e-16, -84.6), (1e-12, 7e5), (1e12, 7e5), (1e307, 7e5), (30, 1e300)],
 )
 def test_a_grid_that_is_none_on_earth_is_refused(tmp_path: Path, kind: str, cell: float, west: float) -> None:
-    """Where a cell's number drowns in rounding or overflows, so would every node's place."""
+    """If cell numbers overflow or are lost in rounding, the places of all nodes would be wrong too."""
     keys: dict[str, Any] = {"crs": "EPSG:32616" if abs(west) > 180.0 else "EPSG:4326"}
     path = tmp_path / ("a.asc" if kind == "asc" else "a.tif")
     if kind == "asc":
@@ -617,7 +617,7 @@ def test_a_window_that_would_not_fit_into_memory_is_refused_before_it_is_read(
 def test_a_file_in_one_huge_block_is_refused(tmp_path: Path) -> None:
     path = tif(tmp_path / "a.tif", hills(20, 20).astype("uint8"), from_origin(-84.6, 36.6, 1e-5, 1e-5))
     data = bytearray(Path(path).read_bytes())
-    # ImageWidth, ImageLength and RowsPerStrip (tags 256, 257, 278) of a little-endian TIFF, claimed to be 60,000.
+    # Set ImageWidth, ImageLength and RowsPerStrip (tags 256, 257, 278) of a little-endian TIFF to 60,000.
     for tag in (256, 257, 278):
         at = data.index(struct.pack("<HHI", tag, 3, 1))
         data[at + 8 : at + 10] = struct.pack("<H", 60_000)
@@ -626,7 +626,7 @@ def test_a_file_in_one_huge_block_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_grid_that_lacks_rows_is_refused_at_once(tmp_path: Path) -> None:
-    """GDAL takes twice as long for every missing row before the one that it is asked for."""
+    """GDAL's time to read a row doubles with every missing row before it."""
     head = "ncols 60\nnrows 601\nxllcorner -84.41\nyllcorner 36.57\ncellsize 0.001\n"
     (tmp_path / "a.asc").write_text(head + "\n".join(" ".join("400" for _ in range(60)) for _ in range(60)))
     read = open_raster(tmp_path / "a.asc", where="m", crs="EPSG:4326").read
@@ -663,7 +663,7 @@ def test_a_small_file_that_unpacks_into_a_large_block_is_refused(
 
 
 def test_a_block_is_no_larger_than_what_a_check_may_hold_of_it(tmp_path: Path) -> None:
-    """A check holds 460 MB of its own when terrain is read again for a file that goes beyond it, of 600 MB promised."""
+    """A check may use 600 MB and itself holds 460 MB when it reads terrain again for a file that goes beyond it."""
     for rows, fits in ((4096, True), (8192, False)):
         path = tmp_path / f"{rows}.tif"
         with rasterio.open(
@@ -806,7 +806,7 @@ def test_a_lone_tree_stands_in_the_cells_that_it_meets_and_nowhere_else(tmp_path
     canopy = tif(tmp_path / "c.tif", trees, from_origin(-84.6, 36.6, 0.0002, 0.0002))
     surface = load(degrees_tif(tmp_path / "a.tif"), canopy=canopy)
     raised = surface.top_m - surface.ground_m
-    # Its pixel lies in one DEM cell: four nodes rise.
+    # The canopy pixel lies in one DEM cell, so four nodes rise.
     assert np.count_nonzero(raised) == 4
     assert surface.top_at(0.0, 0.0) - surface.ground_at(0.0, 0.0) == pytest.approx(30.0, abs=1e-6)
 
@@ -833,7 +833,7 @@ def test_unknown_canopy_is_unknown_unless_its_height_is_given(tmp_path: Path) ->
 
 
 def judged(path: Path, **keys: Any) -> None:
-    """A file is read or refused: no other exception, and warnings are errors in these tests."""
+    """Read a file; an InputError is allowed, any other exception is not, and warnings are errors in these tests."""
     try:
         surface = load(path, **keys)
     except InputError:

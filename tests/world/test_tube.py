@@ -1,4 +1,4 @@
-"""The tube: what fits into it passes the check, and it is hardly narrower than it must be."""
+"""The tube: profiles inside it pass the check, and it is hardly narrower than necessary."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ from tests.support.random_worlds import (
 
 
 def flat(zones: tuple[Zone, ...] = ()) -> Airspace:
-    """Ground at 100 m, from (-1000, -1000) to (3000, 3000)."""
+    """An airspace over ground at 100 m from (-1000, -1000) to (3000, 3000)."""
     z = np.full((41, 41), 100.0)
     return Airspace(Surface(z, z, GridMap.affine(-1000.0, 3000.0, 100.0, 100.0)), zones)
 
 
 def at(s_m: Floats, values: Floats, s: float) -> Floats:
-    """Values of a piecewise linear function at ``s``, of every piece that holds it (two at a breakpoint)."""
+    """Values of a piecewise linear function at ``s``, one for every piece that contains it (two at a breakpoint)."""
     low, high = s_m[:-1], s_m[1:]
     k = np.nonzero((low <= s) & (s <= high))[0]
     w = (s - low[k]) / np.maximum(high[k] - low[k], 1e-12)
     with np.errstate(invalid="ignore"):
         inner = values[k, 0] + w * (values[k, 1] - values[k, 0])
-    # Beside an infinite end every inner value is infinite.
+    # If one end of a piece is infinite, all values inside it are.
     return np.where(np.isfinite(values[k]).all(axis=1), inner, values[k].sum(axis=1))
 
 
@@ -54,9 +54,9 @@ def keeps(s_m: Floats, values: Floats, profile_s: Floats, profile: Floats, sign:
 
 
 def hug(tube: Tube, stations: Floats, sign: float, past_zones: bool) -> Floats | None:
-    """A profile over ``stations`` as near to the floor (sign 1) or the ceiling (-1) as straight legs can be.
+    """A profile over ``stations``, as near to the floor (sign 1) or the ceiling (-1) as straight legs allow.
 
-    None where there is no way past a zone on that side.
+    None if it cannot pass a zone on that side.
     """
     walls = [(tube.s_m, sign * (tube.floor_m if sign > 0 else tube.ceiling_m))]
     if past_zones:
@@ -124,7 +124,7 @@ def test_over_level_ground_the_tube_is_as_wide_as_the_limits_say() -> None:
     assert np.unique(tube.floor_m).tolist() == [160.0]
     assert np.unique(tube.ceiling_m).tolist() == [215.0]
     assert tube.bands == ()
-    # With errors: 5 m off both, and the centimetre that the check's resolution may cost.
+    # With errors: both limits move by 5 m, and by the 1 cm of the check's resolution.
     wide = Limits(60.0, 120.0, None, 30.0, 3.0, 5.0)
     tube = flat().tube([[0, 0], [2000, 0]], wide)
     assert tube.floor_m.min() == pytest.approx(165.0, abs=0.011)
@@ -134,7 +134,7 @@ def test_over_level_ground_the_tube_is_as_wide_as_the_limits_say() -> None:
 
 @pytest.mark.slow
 def test_the_floor_over_mountains_is_within_decimetres_of_what_the_check_demands() -> None:
-    """Ten kilometres of the sample with 3 m of track error and 30 m of clearance; measured 0.1 m (median), 1.2 m."""
+    """10 km of the sample, track error 3 m, clearance 30 m; measured difference 0.1 m (median) and 1.2 m (most)."""
     rng = np.random.default_rng(2)
     ground = jacksboro()
     surface = Surface(ground.heights, ground.heights, ground.grid)
@@ -159,7 +159,7 @@ def test_the_floor_over_mountains_is_within_decimetres_of_what_the_check_demands
 
 def test_over_unknown_ground_there_is_no_floor() -> None:
     heights = np.full((41, 41), 100.0)
-    heights[20, 20] = np.nan  # unknown from 900 to 1100 m, both ways
+    heights[20, 20] = np.nan  # unknown from 900 to 1100 m in both axes
     airspace = Airspace(Surface(heights, heights, GridMap.affine(-1000.0, 3000.0, 100.0, 100.0)))
     limits = Limits(60.0, 120.0, track_error_m=20.0)
     tube = airspace.tube([[0, 1000], [2000, 1000]], limits)
@@ -189,7 +189,7 @@ def test_a_band_stands_where_the_track_is_within_reach_of_a_zone() -> None:
 
 
 def test_a_band_over_ground_follows_it() -> None:
-    """Ground rising 0.1 m a metre: the ceiling of 50 m AGL rises with it; 3 m of reach are worth 0.3 m."""
+    """The ground rises 0.1 m per metre, and a ceiling of 50 m AGL with it; 3 m of reach add 0.3 m."""
     heights = np.tile(np.arange(-100.0, 301.0, 10.0), (41, 1))
     zone = Zone("z", Circle(1000, 0, 300), None, Level(50, "agl"))
     airspace = Airspace(Surface(heights, heights, GridMap.affine(-1000.0, 3000.0, 100.0, 100.0)), [zone])
@@ -200,7 +200,7 @@ def test_a_band_over_ground_follows_it() -> None:
     middle = np.stack([band.s_m[:-1], band.s_m[1:]], axis=-1)
     inside = (middle > 710.0) & (middle < 1290.0)
     assert band.top_m[inside] == pytest.approx(0.1 * middle[inside] + 50.3, abs=0.03)
-    # Beyond the shape no ground under it is higher than its own highest cell.
+    # Beyond the shape only ground inside it counts, up to the highest cell.
     assert band.top_m.max() <= 50.0 + 140.0
 
 
@@ -216,7 +216,7 @@ def test_the_arms_of_a_polygon_make_two_spans_and_its_inside_one() -> None:
     assert np.array(through) == pytest.approx(np.array([[480, 1520]]))
     within = [(b.s0_m, b.s1_m) for b in airspace.tube([[600, -300], [700, -300]], Limits(60.0)).bands]
     assert np.array(within) == pytest.approx(np.array([[0, 100]]))
-    # Slantwise past the corner (500, 500): nearest at 20 m on the line x + y = 1000 − 20·√2.
+    # Diagonally past the corner (500, 500), 20 m from it: on the line x + y = 1000 − 20·√2.
     shift = 20.0 * math.sqrt(2.0)
     graze = airspace.tube([[400 - shift, 600], [600 - shift, 400]], Limits(60.0, horizontal_clearance_m=19.9)).bands
     assert [b.zone for b in graze] == [0]

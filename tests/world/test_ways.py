@@ -1,4 +1,4 @@
-"""Many ways at once: a level that they are said to be clear at passes the exact check, and hardly a lower one does."""
+"""Many tracks at once: the level reported as clear passes the exact check, and hardly any lower level does."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_distances_of_hulls_are_those_of_their_points_mixed() -> None:
         assert (exact <= apart + 1e-9).all()
         outside = exact > 0.0
         assert (exact[outside] >= apart[outside] - 12.0).all()
-        for m in range(6):  # a hull inside of the polygon, or around it, meets it
+        for m in range(6):  # a hull inside the polygon, or around it, overlaps it
             held = hulls.to_polygon(regions[m : m + 1] * 0.0 + filled[0], corners)
             assert held[0] < 0.0
         around = 1e3 * np.array([[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]]])

@@ -1,4 +1,4 @@
-"""The rules of returns: what each autopilot flies from where, written out by hand; the sweep reads the same numbers."""
+"""The rules of returns: the pieces that each autopilot flies, by hand; and the sweep agrees with single returns."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HOME: Place = (36.6, -84.3, 300.0)
 
 
 def away(metres: float, amsl_m: float) -> Place:
-    """A place north of home, by the ellipsoid."""
+    """The place that many metres north of home on the ellipsoid."""
     degrees = metres / flat_m(HOME, (36.601, -84.3, 0.0)) * 0.001
     place = (36.6 + degrees, -84.3, amsl_m)
     assert flat_m(HOME, place) == pytest.approx(metres, rel=1e-5)
@@ -30,7 +30,7 @@ def away(metres: float, amsl_m: float) -> Place:
 
 
 def spans(pieces: list[Piece]) -> list[tuple[float, float]]:
-    """Lowest and highest altitude of the way home, of each piece that leads there."""
+    """Lowest and highest altitude of each piece that leads home."""
     return [
         (p.start[2] - p.band_m, p.start[2] + p.band_m)
         for p in pieces
@@ -41,10 +41,10 @@ def spans(pieces: list[Piece]) -> list[tuple[float, float]]:
 @pytest.mark.parametrize(
     ("autopilot", "metres", "amsl_m", "expected"),
     [
-        (COPTER, 1000.0, 310.0, [(360.0, 360.0)]),  # outside of the cone, which is 60 m high 20 m from home
-        (COPTER, 10.0, 310.0, [(330.0, 360.0), (360.0, 360.0)]),  # 10 m away the cone is at 30 m
+        (COPTER, 1000.0, 310.0, [(360.0, 360.0)]),  # outside of the cone, which reaches 60 m at 20 m from home
+        (COPTER, 10.0, 310.0, [(330.0, 360.0), (360.0, 360.0)]),  # 10 m from home the cone is 30 m high
         (COPTER, 10.0, 345.0, [(345.0, 360.0), (360.0, 360.0)]),  # in the cone, above its surface
-        (COPTER, 10.0, 400.0, [(400.0, 400.0)]),  # it never descends before it is home
+        (COPTER, 10.0, 400.0, [(400.0, 400.0)]),  # it never descends before it is over home
         (PX4, 1000.0, 310.0, [(360.0, 360.0)]),
         (PX4, 50.0, 310.0, [(310.0, 360.0), (360.0, 360.0)]),  # versions differ: any altitude from its own up
         (PX4, 50.0, 400.0, [(400.0, 400.0)]),

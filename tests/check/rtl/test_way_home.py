@@ -1,4 +1,4 @@
-"""The way home: known worlds with known answers, brute force on random ones, rally points where there is no way."""
+"""Returns from every point of a mission: known worlds, random ones by brute force, rally points where none is safe."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 def mission(
     w: World, places: Sequence[tuple[float, float, float]], autopilot: Autopilot = COPTER, *, land: bool = True
 ) -> Mission:
-    """Up at the origin to the first height, along (east, north, above home), down at the last."""
+    """A mission: take-off at the origin to the first height, along (east, north, above home), landing at the last."""
     plane = autopilot is PLANE
     lat, lon = w.frame.to_degrees(0.0, 0.0)
     home = Home.at(float(lat), float(lon), w.ground_amsl(float(lat), float(lon)))
@@ -57,23 +57,23 @@ def judged(w: World, m: Mission, v: Vehicle | None = None, rtl: float | None = N
 
 
 def ridge(east: Floats, north: Floats) -> Floats:
-    """100 m high, from 900 to 1100 m east flat on top, 100 m of slope on either side; ground at 300 m."""
+    """Ground at 300 m with a ridge of 100 m: flat on top from 900 to 1100 m east, slopes 200 m wide on both sides."""
     return 300.0 + 100.0 * np.clip((300.0 - np.abs(east - 1000.0)) / 200.0, 0.0, 1.0) + 0.0 * north
 
 
 BARE = {"min_agl_m": 20.0, "track_error_m": 0.0, "altitude_error_m": 5.0}
 OVER: list[tuple[float, float, float]] = [(0, 0, 150), (2000, 0, 150), (2000, 0, 40), (3000, 0, 40)]
-"""Over the ridge at 150 m, down behind it, and on along the ground."""
+"""Points over the ridge at 150 m, down behind it to 40 m, and on at 40 m."""
 
 
 def test_over_flat_ground_any_altitude_is_safe() -> None:
     home = judged(world(), mission(world(), [(0, 0, 80), (3000, 0, 80)]), rtl=15.0)
     assert home.safe is True
     assert home.unsafe == ()
-    assert home.lowest_rel_home_m == pytest.approx(5.0, abs=0.2)  # the altitude error; landing columns begin below it
+    assert home.lowest_rel_home_m == pytest.approx(5.0, abs=0.2)  # the altitude error; landing columns start below it
     assert home.highest_rel_home_m is None
     assert home.rally == ()
-    # With min AGL 60 and 5 m of error, from the landing column at the goal the return must be at 65.
+    # Min AGL 60 m and 5 m of error: from the landing column at the goal the return must be at 65 m.
     assert home.lowest_legal_rel_home_m == pytest.approx(65.0, abs=0.2)
     assert [s.from_seq for s in home.irregular] == [4]
     assert "clear, but not within all limits: 0.00 km, first on the way to item 4" in home.describe()
@@ -85,10 +85,10 @@ def test_behind_a_ridge_the_return_must_clear_it() -> None:
     assert home.safe is False
     assert home.lowest_rel_home_m == pytest.approx(105.0, abs=0.6)
     assert home.lowest_legal_rel_home_m == pytest.approx(125.0, abs=0.6)
-    assert home.rally == ()  # an altitude cures it
+    assert home.rally == ()  # another return altitude is enough
     assert home.advised_rel_home_m == home.lowest_rel_home_m
     (stretch,) = home.unsafe
-    # Coming down at 2000 m it is below 105 m from two fifths of that column on; all of the rest is low.
+    # On the descent at 2000 m it falls below 105 m after two fifths; everything after that is low.
     assert stretch.from_m == pytest.approx(2000.0, abs=3.0)
     assert stretch.start[2] == pytest.approx(405.0, abs=6.0)
     assert stretch.to_m == pytest.approx(3000.0, abs=1.0)
@@ -131,7 +131,7 @@ def test_a_zone_over_the_way_bounds_the_return_from_above() -> None:
     assert home.highest_rel_home_m == pytest.approx(115.0, abs=0.01)
     high = judged(w, m, v, 130.0)
     assert [s.zone for s in high.unsafe] == ["shelf"]
-    # Under the zone, even the climb is shut in; before it, within reach of it, nothing is in the way.
+    # Below the zone even the climb is blocked; short of it, though within its reach, nothing is in the way.
     assert high.unsafe[0].from_m == pytest.approx(800.0, abs=5.0)
 
 
@@ -168,7 +168,7 @@ def test_a_wall_without_a_top_leaves_no_altitude_and_rally_points_mend_it() -> N
 
 
 def test_a_mission_that_hugs_a_zone_is_not_called_shut_in() -> None:
-    # The shortest way around a tower touches its clearance; what lies behind it is in its shadow, what lies before not.
+    # The shortest track around a tower touches its clearance: returns from behind it are blocked, from before it not.
     turn, reach = math.asin(230.03 / 1500.0), math.sqrt(1500.0**2 - 230.03**2)
     touch = [(0.0, 0.0, 80.0), (reach * math.cos(turn), reach * math.sin(turn), 80.0), (1500.0, 1500.0, 80.0)]
     corner = Zone("tower", Circle(1500.0, 0.0, 200.0))
@@ -186,7 +186,7 @@ def test_a_mission_that_hugs_a_zone_is_not_called_shut_in() -> None:
     m = mission(w, [(0.0, 0.0, 80.0), *along])
     assert judge(m, v, w).findings == ()
     (stretch,) = judged(w, m, v, 60.0, rally=False).unsafe
-    # Home is at the south-west corner: from 231 m north the way is shut as soon as it meets the block's western side.
+    # At 231 m north, returns to the origin are blocked if they begin east of the block's western side.
     assert stretch.from_m == pytest.approx(231.0 + 900.0 + 0.0, abs=60.0)
 
 
@@ -203,9 +203,9 @@ def test_each_autopilot_gets_rally_points_at_the_altitude_that_it_understands() 
         assert home.advised_rel_home_m is not None
         for point in home.rally:
             on_ground = point.ground_amsl_m - home.home[2]
-            if autopilot is PX4:  # it returns at RTL_RETURN_ALT above the point
+            if autopilot is PX4:  # PX4 returns at RTL_RETURN_ALT above the point
                 assert point.rel_home_m == pytest.approx(on_ground, abs=0.01)
-            else:  # it returns at the point's own altitude, or at RTL_ALT if that is more
+            else:  # ArduPilot returns at the point's own altitude, or at RTL_ALT if that is higher
                 assert point.rel_home_m >= max(home.advised_rel_home_m, on_ground + 5.0) - 0.01
 
 
@@ -226,7 +226,7 @@ def test_what_rally_points_leave_unsafe_is_what_brute_force_finds() -> None:
 
 
 def test_within_the_cone_less_is_climbed_and_both_are_judged() -> None:
-    # A knob beside home, 40 m high and 60 m away: with the cone a copter passes 10 m behind it at 3 · 70 = 210 m.
+    # A knob 60 m high, 100 m east of home; returns from 180 m east must pass above it.
     def knob(east: Floats, north: Floats) -> Floats:
         return np.where((np.abs(east - 100.0) < 1.0) & (np.abs(north) < 1.0), 360.0, 300.0)
 
@@ -234,15 +234,15 @@ def test_within_the_cone_less_is_climbed_and_both_are_judged() -> None:
     low = mission(w, [(0, 0, 30), (0, 300, 30), (180, 0, 30)])
     steep = judged(w, low, vehicle(**BARE), 100.0)
     gentle = judged(w, mission(w, [(0, 0, 30), (0, 300, 30), (180, 0, 30)], PX4), vehicle(PX4, **BARE), 250.0)
-    assert steep.unsafe == ()  # 3 · 180 m is more than 100 m
-    assert gentle.unsafe == ()  # 180 m is enough over 60
+    assert steep.unsafe == ()  # the cone, 3 · 180 m high, is above 100 m
+    assert gentle.unsafe == ()  # PX4 climbs at least 180 m, above the knob's 60 m
     near = Zone("post", Circle(30.0, 0.0, 5.0), ceiling=Level(50.0, "agl"))
     w = world(300.0, [near])
     m = mission(w, [(0, 0, 20), (0, 200, 20), (45, 0, 20)])
     px4 = mission(w, [(0, 0, 20), (0, 200, 20), (45, 0, 20)], PX4)
     assert judged(w, m, vehicle(**BARE), 100.0).unsafe == ()  # from 45 m away it climbs to 100 m first
     sharp = replace(vehicle(PX4, **BARE), corner_accel_m_s2=math.inf)
-    assert [s.zone for s in judged(w, px4, sharp, 100.0).unsafe] == ["post"]  # 45 m is too low
+    assert [s.zone for s in judged(w, px4, sharp, 100.0).unsafe] == ["post"]  # PX4's 45 m is below the post's 50 m
 
 
 def test_a_plane_climbs_on_its_way_and_may_meet_what_an_altitude_would_clear() -> None:
@@ -253,7 +253,7 @@ def test_a_plane_climbs_on_its_way_and_may_meet_what_an_altitude_would_clear() -
     assert judged(w, mission(w, far, PLANE, land=False), vehicle(PLANE, **limits), 120.0).unsafe == ()
     close = judged(w, mission(w, near, PLANE, land=False), vehicle(PLANE, **limits), 120.0)
     assert close.unsafe
-    assert close.unsafe[-1].lowest_rel_home_m is None  # it cannot climb 75 m in 250
+    assert close.unsafe[-1].lowest_rel_home_m is None  # it cannot climb 75 m within 250 m
     copter = judged(w, mission(w, near, land=False), vehicle(**limits), 120.0)
     assert copter.unsafe == ()
 
@@ -396,7 +396,7 @@ def test_never_kinder_than_brute_force_in_rough_random_worlds(autopilot: Autopil
                         assert not found, (seed, "lowest", i, f, grade, found)
     assert worlds >= 2
     assert 0.1 < unsafe / looked < 0.9
-    assert strict <= 0.2 * looked  # on ground as rough as this the bounds beside a line cost that much
+    assert strict <= 0.2 * looked  # on ground as rough as this, the bounds beside a line are that pessimistic
 
 
 @pytest.mark.slow
@@ -435,7 +435,7 @@ def test_the_lowest_level_goes_up_from_top_to_top() -> None:
         np.array([-1, 0, 1, -1, -1, 2], dtype=np.intp),
     )  # fmt: skip
     each = obstacles.lowest(0.0)
-    assert each.tolist() == [40.0, 50.0, math.inf]  # over the ground it is in the zone; the third has a lid at 25
+    assert each.tolist() == [40.0, 50.0, math.inf]  # just above ground it is in the zone; the third is capped at 25
     assert obstacles.together(0.0) == math.inf
     two = np.array([True, True, False])
     assert obstacles.together(0.0, two) == 50.0
