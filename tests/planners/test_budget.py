@@ -1,4 +1,4 @@
-"""Budgets: counted work decides, the clock is a last stop, and memory is asked for before it is taken."""
+"""Budgets: counted work decides, the clock is a last stop, and memory is reserved before it is used."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_search_that_does_not_fit_is_refused_before_it_runs_and_recorded() -> 
 
     incumbent = Incumbent(p)
     govern(incumbent, [search("a", 0.1, 0.1, 1.0), search("b", 1.0, 0.1, 200.0), search("c", 1.0, 0.2, 1.0)])
-    assert ran == ["c", "a"]  # by what they promise for their cost
+    assert ran == ["c", "a"]  # in order of promised gain per cost
     assert [(s.name, s.refused) for s in incumbent.steps] == [("b", True), ("c", False), ("a", False)]
 
 
@@ -68,7 +68,7 @@ def test_a_clock_that_runs_faster_changes_nothing(kind: str, monkeypatch: pytest
 
 
 def plan_on_a_clock(p: Problem, rate: float, monkeypatch: pytest.MonkeyPatch) -> Solution:
-    """On a clock that runs at so many times the processor's time: what else the machine does changes nothing."""
+    """Plan on a clock that runs at ``rate`` times the processor's time, so the machine's other load does not matter."""
     begun, used = time.perf_counter(), time.thread_time()
     with monkeypatch.context() as patch:
         patch.setattr("gcsplan.planners.budget.time.perf_counter", lambda: begun + rate * (time.thread_time() - used))

@@ -1,4 +1,4 @@
-"""What a refusal says would help: set to the value, or without the zone, the mission has a path."""
+"""Cures that a refusal names: with the named limit, or without the named zone, the mission has a path."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ZONE = re.compile(
 
 
 def hills(seed: int) -> Callable[[Floats, Floats], Floats]:
-    """Two ridges across the way, each with a pass of its own."""
+    """Ground with two ridges across the track, each with its own pass."""
     rng = np.random.default_rng(seed)
     crests, passes, places = rng.uniform(250, 400, 2), rng.uniform(80, 160, 2), rng.uniform(300, 1700, 2)
 
@@ -98,7 +98,7 @@ MISSIONS_REFUSED = refused_missions()
 
 
 def cured(problem: Problem, message: str) -> list[Problem]:
-    """The problems that a message says there are paths for."""
+    """The problems with the cures that a message names."""
     out = []
     limits = LIMIT.findall(message)
     for group in (
@@ -118,7 +118,7 @@ def cured(problem: Problem, message: str) -> list[Problem]:
 def refusal_of(problem: Problem) -> Refusal:
     with pytest.raises(Refusal) as caught:
         plan(problem)
-    return with_cures(replace(problem, budget_s=30.0), caught.value, plan)  # so that a busy machine tries as much
+    return with_cures(replace(problem, budget_s=30.0), caught.value, plan)  # enough even on a busy machine
 
 
 SLOW = {"ridges with errors 5", "cliff", "cliff, long way", "two ceilings", *(f"ridges {k}" for k in (2, 3, 4))}
@@ -172,7 +172,7 @@ def test_a_ceiling_is_reported_close_to_the_lowest_that_does() -> None:
 
 @dataclass
 class SlowPlan:
-    """A planner that takes so long for every problem, and finds a path for those that ``opens``."""
+    """A planner that takes ``seconds`` for every problem, and finds a path if ``opens`` returns True for it."""
 
     seconds: float
     opens: Callable[[Problem], bool]

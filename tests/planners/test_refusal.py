@@ -1,4 +1,4 @@
-"""No path: which limit, zone or place binds, in words and numbers that help."""
+"""Refusals: the message names the limit, zone or place that prevents a path, and numbers that help."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LOW = Limits(min_agl_m=10.0)
 
 
 def ridge(east: Floats, north: Floats) -> Floats:
-    """A ridge from border to border: 300 m high, with a pass of 180 m about north 1500."""
+    """Ground with a ridge from border to border, 300 m high, with a pass at 180 m around 1500 m north."""
     crest = 300.0 - 120.0 * np.exp(-(((north - 1500.0) / 150.0) ** 2))
     return crest * np.exp(-(((east - 1000.0) / 150.0) ** 2))
 
@@ -36,7 +36,7 @@ def refused(
     p = replace(Problem(Airspace(surface, zones), limits, start, goal), **more)  # type: ignore[arg-type]
     with pytest.raises(Refusal) as caught:
         plan(p)
-    return with_cures(replace(p, budget_s=30.0), caught.value, plan)  # so that a busy machine tries as much
+    return with_cures(replace(p, budget_s=30.0), caught.value, plan)  # enough even on a busy machine
 
 
 def test_ceiling_under_the_lowest_pass_names_the_pass_and_the_limit_that_would_do() -> None:

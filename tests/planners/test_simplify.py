@@ -1,4 +1,4 @@
-"""Paths made shorter and simpler: never illegal, never dearer than was allowed, stops and ends where they were."""
+"""Polishing and simplifying paths: the result is legal, costs no more than allowed, and keeps its terminals."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def clear(problem: Problem, points: Floats) -> bool:
 
 
 def zigzag(seed: int, objective: Objective = "length") -> tuple[Problem, Floats, Bools]:
-    """A world of hills and zones, and a crooked legal path through it with some points that must stay."""
+    """A world of hills and zones, a crooked legal path through it, and which of its points must stay."""
     rng = np.random.default_rng(seed)
     bumps = np.column_stack(
         [rng.uniform(200.0, 1800.0, (8, 2)), rng.uniform(80.0, 250.0, 8), rng.uniform(40.0, 200.0, 8)]
@@ -59,7 +59,7 @@ def zigzag(seed: int, objective: Objective = "length") -> tuple[Problem, Floats,
     problem = Problem(air, LIMITS, (100.0, 1000.0, 850.0), (1900.0, 1000.0, 800.0), objective=objective)
     points = [np.array(problem.start)]
     while points[-1][0] < 1780.0:
-        # The next point ahead that the exact check passes from the last.
+        # Draw a next point until the exact check passes the leg to it.
         for _ in range(400):
             step = float(rng.uniform(40.0, 160.0))
             new = points[-1] + np.array([step, float(rng.normal(0.0, 1.2 * step)), float(rng.normal(0.0, 0.4 * step))])
@@ -82,7 +82,7 @@ def zigzag(seed: int, objective: Objective = "length") -> tuple[Problem, Floats,
 
 
 def has_all(points: Floats, pinned: Bools, before: Floats, pinned_before: Bools) -> bool:
-    """Whether the points that must stay are still there, in their order, and are still said to."""
+    """Whether the points that must stay are still there, in order, and still marked so."""
     return np.array_equal(points[pinned], before[pinned_before])
 
 
@@ -165,7 +165,7 @@ def test_a_polished_path_past_one_wall_is_nearly_the_shortest() -> None:
     shortest = 2.0 * 600.0 * math.sin(angle) + 200.0 * (math.pi - 2.0 * angle)
     assert shortest * (1.0 - 1e-9) <= problem.cost(Path(points)) < problem.cost(Path(before))
     assert problem.cost(Path(points)) < 1.15 * shortest
-    # And in steps: fewer points, polished again, is not worse.
+    # Fewer points, polished again, cost no more.
     few, still = fewer(problem, points, pinned, 1e-3 * shortest)
     again, _ = polished(problem, few, still)
     assert problem.cost(Path(again)) <= problem.cost(Path(few)) * (1.0 + 1e-12)

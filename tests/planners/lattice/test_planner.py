@@ -1,4 +1,4 @@
-"""The band between min and max AGL with the climb limit, and climbs on the spot: paths that hold by brute force."""
+"""Planning between min and max AGL with a climb limit, and climbs on the spot; brute force checks the paths."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STEEP = Limits(10.0, max_climb_deg=15.0, max_descent_deg=15.0)
 
 
 def band_mission(seed: int, degrees: float, zones: tuple[Zone, ...] = (), objective: str = "length") -> Problem:
-    """Two places of the sample in the middle of the band, 4 to 9 km apart."""
+    """A mission between two places of the sample DEM, 4 to 9 km apart, in the middle between min and max AGL."""
     limits = replace(BAND, max_climb_deg=degrees, max_descent_deg=degrees)
     air = Airspace(jacksboro(), zones)
     rng = np.random.default_rng(seed)
@@ -161,7 +161,7 @@ def pit_problem(**changes: object) -> Problem:
 
 
 def extended(p: Problem) -> Floats:
-    """Way points over the straight track from start to goal, with laps."""
+    """Points of a path over the straight track from start to goal, with laps."""
     stops = np.array([p.start[:2], p.goal[:2]])
     found = extend(p, stops, np.ones(2, bool), np.full(2, np.nan))
     assert found is not None
@@ -174,7 +174,7 @@ def test_laps_lead_out_of_a_pit() -> None:
     p = pit_problem()
     points = extended(p)
     assert faults(p, Path(points)) == []
-    # No longer than the climb takes, and what the way out of the pit adds to it.
+    # No longer than the climb and the track out of the pit require, plus 10 %.
     assert Path(points).length_m < 1.1 * (200.0 / math.sin(math.radians(15.0)) + 900.0)
 
 
@@ -205,7 +205,7 @@ def test_laps_are_circles_no_tighter_than_the_turn_radius() -> None:
     closed = np.vstack([np.zeros(2), lap, np.zeros(2)])
     d = np.diff(closed, axis=0)
     turn = np.abs((np.diff(np.arctan2(d[:, 1], d[:, 0])) + math.pi) % (2.0 * math.pi) - math.pi)
-    # The arc of the radius takes radius * tan(turn / 2) of each leg.
+    # An arc takes radius * tan(turn / 2) of each of its two legs.
     assert (40.0 * np.tan(0.5 * turn.max()) * 2.0 <= np.hypot(d[:, 0], d[:, 1])).all()
 
 
@@ -215,7 +215,7 @@ def test_laps_too_wide_for_the_pit_are_not_flown() -> None:
     assert extend(p, stops, np.ones(2, bool), np.full(2, np.nan)) is None
     track = sampled_track(p, stops, np.ones(2, bool), np.full(2, np.nan))
     needed = climb_needed_deg(p, track)
-    # Over the pit's rim, 320 m away and 200 m up.
+    # The pit's rim is 320 m away and 200 m higher.
     assert needed == pytest.approx(math.degrees(math.atan(200.0 / 320.0)), abs=0.3)
 
 
@@ -235,7 +235,7 @@ def test_pits_narrower_than_the_search_sees_are_left_and_entered_in_laps() -> No
     p = Problem(air, replace(STEEP, max_climb_deg=10.0), (1000.0, 4000.0, 10.0), (7000.0, 4000.0, 10.0))
     solution = plan(p)
     assert faults(p, solution.path) == []
-    # Both climbs take length; neither takes more than twice what it must.
+    # Both climbs add length, neither more than twice the necessary one.
     assert solution.path.length_m < 6000.0 + 2.0 * 150.0 / math.sin(math.radians(10.0))
 
 

@@ -1,4 +1,4 @@
-"""Search over reachable altitudes, held against every simple path of small lattices; tubes cut and joined."""
+"""The search over reachable altitudes, compared with every simple path of small lattices; tubes cut and joined."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from tests.support.planner_worlds import Floats, ground
 STEP_M = 10.0
 SIDE = 3
 NODES = SIDE * SIDE
-Doors = list[tuple[float, float, float]]  # run since the last door, low, high
+Doors = list[tuple[float, float, float]]  # distance from the last door, lowest and highest altitude
 
 
 def small_lattice(seed: int) -> Lattice:
-    """Three by three nodes, rough ground, a wandering ceiling, some edges with forbidden bands."""
+    """A lattice of 3 × 3 nodes with rough ground, a varying ceiling, and forbidden bands on some edges."""
     rng = np.random.default_rng(seed)
     n = 2 * SIDE - 1
     floor = rng.uniform(0.0, 12.0, (n, n))
@@ -54,16 +54,16 @@ def small_lattice(seed: int) -> Lattice:
 
 
 def link(node: int) -> Links:
-    """A terminal 1 m from a node, with nothing in between."""
+    """The link from a terminal to a node 1 m away, without limits in between."""
     shape = (1, LINK_DOORS)
     return Links(np.array([node]), np.array([1.0]), np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
-Gap = tuple[Floats, Floats]  # low and high at each door
+Gap = tuple[Floats, Floats]  # lowest and highest altitude at each door
 
 
 def edges_from(lattice: Lattice, node: int) -> list[tuple[int, float, Doors, list[Gap]]]:
-    """(to, length, doors, gaps) of every edge, written out from the lattice's own description."""
+    """(to, length, doors, gaps) of every edge from a node, derived from the lattice's own description."""
     x, y = node % SIDE, node // SIDE
     out = []
     for k, sign in product(range(8), (1, -1)):
@@ -75,7 +75,7 @@ def edges_from(lattice: Lattice, node: int) -> list[tuple[int, float, Doors, lis
         fractions = (0.0, 0.5, 1.0) if k < 4 else (0.0, 0.25, 0.5, 0.75, 1.0)
         doors, grounds = [], []
         for f, g in zip(fractions, (0.0, *fractions), strict=False):
-            # Half-lattice places are whole numbers, or lie in the middle of two side by side.
+            # Places on the half lattice have whole coordinates, or lie midway between two such neighbours.
             px, py = 2 * x + 2 * dx * f, 2 * y + 2 * dy * f
             corners = [(i, j) for i in {math.floor(px), math.ceil(px)} for j in {math.floor(py), math.ceil(py)}]
             low = sum(lattice.floor_m[j, i] for i, j in corners) / len(corners)
@@ -84,7 +84,7 @@ def edges_from(lattice: Lattice, node: int) -> list[tuple[int, float, Doors, lis
             grounds.append(sum(lattice.ground_m[j, i] for i, j in corners) / len(corners))
         edge = (node if sign > 0 else to) * 8 + k
         span = slice(lattice.band_at[edge], lattice.band_at[edge + 1])
-        under = np.array(grounds[::sign])  # bands are in order where the edge begins
+        under = np.array(grounds[::sign])  # bands are ordered from the edge's beginning
         bands = [
             (low + agl[0] * under, high + agl[1] * under)
             for low, high, agl in zip(
@@ -99,7 +99,7 @@ def edges_from(lattice: Lattice, node: int) -> list[tuple[int, float, Doors, lis
 
 
 def legal(parts: list[tuple[Doors, Gap]], z0: float, z1: float, slope: float) -> bool:
-    """Is there a profile through all doors, edge after edge, each within its gap?"""
+    """Whether a profile exists through all doors, edge after edge, within the gap of each."""
     s, low, high = [0.0], [z0], [z0]
     at = 1.0
     for doors, (under, over) in parts:
@@ -119,7 +119,7 @@ def legal(parts: list[tuple[Doors, Gap]], z0: float, z1: float, slope: float) ->
 
 
 def cheapest(lattice: Lattice, z0: float, z1: float, slope: float) -> float:
-    """Length of the shortest legal simple path from node 0 to the last, by trying all of them, shortest first."""
+    """Length of the shortest legal simple path from node 0 to the last, found by trying all, shortest first."""
     around = [edges_from(lattice, k) for k in range(NODES)]
     paths: list[tuple[float, list[tuple[Doors, list[Gap]]]]] = []
 
@@ -180,7 +180,7 @@ def test_finds_the_cheapest_way_that_a_profile_exists_for(block: int) -> None:
             continue
         solved += 1
         label = found.labels[0]
-        # A way may pass a node twice to gain height, which a simple path cannot: it is never dearer.
+        # The search may pass a node twice to gain height, a simple path cannot: the search is never dearer.
         assert label.cost <= best + 1e-9, seed
         assert is_legal_way(lattice, label.places, z0, z1, slope), seed
         nodes = label.places[1:-1]

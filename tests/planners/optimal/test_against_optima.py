@@ -1,7 +1,7 @@
-"""The default planner's paths and lower bounds, held to optima that are found by other means.
+"""The default planner's paths and lower bounds, compared with optima that are found by other means.
 
-A bound is a promise about every path, so one path that costs less breaks it: whatever the exact check passes will do.
-On discs and in tunnels the optimum itself is known.
+A lower bound holds for every path, so any path that passes the exact check and costs less disproves it. On discs and
+in tunnels the optimum itself is known.
 """
 
 from __future__ import annotations
@@ -33,15 +33,17 @@ pytestmark = pytest.mark.slow
 
 
 WORLDS = dict.fromkeys(FAMILIES, 12) | {"clearances": 6, "passes": 6, "stops": 6, "pockets": 4}
-"""How many missions of each family a run judges. `tests.oracles.optima_campaign` judges more: for as many as 46
-of each family a path is kept, and for all others one is searched for."""
+"""Missions of each family that a run judges. `tests.oracles.optima_campaign` judges more: for up to 46 of each family
+a path is stored, for all others it searches for one."""
 BACKWARDS = 2
-"""How many missions of some families are planned both ways."""
+"""Missions of each of some families that are planned forwards and backwards."""
 BRIEF = Effort(300, 3, 1, 1, 1, 0.04)
-"""What is spent on making the planner's own path cheaper, for each mission whose witness is kept."""
+"""Effort of polishing the planner's own path, for each mission with a stored path."""
 MOST_MISSED = {"passes": 1.0, "stops": 0.5}
-"""Largest part of a family's missions on which the planner may find nothing where the search does; 0.1 of others. A
-pass that is as high as the ceiling to the last bit leaves a path no room at all: it may be missed, not called shut."""
+"""Largest part of a family's missions that the planner may miss although a path is known; 0.1 for other families.
+
+A pass that equals the ceiling to the last bit leaves a path no clearance: the planner may miss it, but must not call
+it infeasible."""
 
 
 # --- the oracles themselves ---------------------------------------------------------------------------------------
@@ -72,10 +74,10 @@ def test_shortest_past_discs_is_no_longer_than_past_polygons_around_and_no_short
 
 
 def _past_polygons(discs: Floats, around: bool, corners: int) -> float:
-    """Shortest way from (0, 0) to (10, 10) over the corners of regular polygons around or in discs, by visibility.
+    """Shortest track from (0, 0) to (10, 10) over corners of regular polygons around or in discs, by visibility.
 
-    Legs keep out of the polygons' inner circles. These are the discs themselves where the polygons lie ``around``
-    them, so that the way is legal, and longer than the shortest; else it is shorter than that, but for the corners.
+    Legs stay outside of the polygons' inner circles. With ``around`` those are the discs themselves: the track is
+    legal, so no shorter than the optimum. Otherwise it is no longer than the optimum, except for the corners' effect.
     """
     turn = np.arange(corners) * (2.0 * math.pi / corners)
     points = [np.array([[0.0, 0.0], [10.0, 10.0]])]
@@ -112,7 +114,7 @@ def test_pass_height_is_where_a_fine_flood_joins_the_ends(seed: int) -> None:
         parts, _ = label(at <= level, np.ones((3, 3)))
         return bool(parts[40, 40] and parts[40, 40] == parts[480, 480])
 
-    # Steps of a fortieth cell see a narrow pass a little higher than it is, and cut a corner a little lower.
+    # Samples 1/40 cell apart show a narrow pass a little too high, and diagonal steps a corner a little too low.
     spread = float(np.ptp(z)) * 0.02
     assert joined(found + spread)
     assert not joined(found - spread)
@@ -169,7 +171,7 @@ def test_bound_holds_however_soon_the_planner_is_stopped(budget_s: float) -> Non
 
 
 def tunnel(seed: int, climb_deg: float, band: bool) -> tuple[Problem, Floats]:
-    """Hills between two walls a hand apart, so that the track is given and only the profile is free; and the track."""
+    """A mission over hills between two walls 0.1 m apart, which leave only the altitudes free; and its track (N, 2)."""
     rng = np.random.default_rng(seed)
     ground = hills(rng, float(rng.uniform(20.0, 120.0)))
     east, north = ground.box[2:]
@@ -191,7 +193,7 @@ def tunnel(seed: int, climb_deg: float, band: bool) -> tuple[Problem, Floats]:
     problem = Problem(
         air, limits, start, goal, objective="energy", vertical_j_per_m=float(rng.choice([40.0, 120.0]))
     )  # fmt: skip
-    # Every metre, and wherever the track crosses a line of the raster: in between the ground is a parabola.
+    # Every metre, and where the track crosses a line of the raster: in between the ground is a parabola.
     cells = np.array(ground.box[2:]) / (np.array(ground.heights.shape[::-1]) - 1.0)
     lines = [np.arange(1, 40) * cells[k] for k in range(2)]
     at = np.concatenate([(x - a[k]) / (b[k] - a[k]) for k, x in enumerate(lines)])
@@ -210,7 +212,7 @@ def test_profile_in_a_tunnel_is_the_linear_programmes(seed: int, band: bool) -> 
     high = low + ((limits.max_agl_m or 1e4) - limits.min_agl_m)
     low[0], low[-1] = high[0], high[-1] = problem.start[2], problem.goal[2]
     slope = min(limits.max_climb_slope, 1e3)
-    # What lies between two samples is left out by the first, and more than made up for by the second programme.
+    # The first programme ignores the ground between samples (least cost); the second more than allows for it.
     least = profile_by_programme(s, low, high, 1.002 * slope + 1e-3, 1.002 * slope + 1e-3)
     inner = np.zeros(len(s))
     inner[1:-1] = 0.04
@@ -223,7 +225,7 @@ def test_profile_in_a_tunnel_is_the_linear_programmes(seed: int, band: bool) -> 
     cost = problem.cost(solution.path)
     assert least is not None
     flat = problem.horizontal_j_per_m * float(s[-1])
-    # The walls leave a decimetre, over which the ground may fall by a little.
+    # The walls leave 0.1 m, across which the ground may fall a little.
     slack = problem.vertical_j_per_m * 1.0
     assert cost >= flat + problem.vertical_j_per_m * least.vertical_m - slack
     assert solution.lower_bound is not None
@@ -236,7 +238,7 @@ def test_profile_in_a_tunnel_is_the_linear_programmes(seed: int, band: bool) -> 
 
 
 def test_bound_holds_for_a_path_that_touches_its_limits() -> None:
-    """A ceiling that equals the ground's pass: the only way leads over one point, touching."""
+    """A ceiling that equals the ground's pass: the only path touches the limits at one point."""
     z = np.full((21, 21), 50.0)
     z[:, 10] = 100.0
     z[16, 10] = 80.0
@@ -249,7 +251,7 @@ def test_bound_holds_for_a_path_that_touches_its_limits() -> None:
     best = best_path(problem, 0, PATIENT)
     assert best is not None
     assert np.abs(best[:, 0] - 500.0).min() < 1.0
-    # No room at all: it may be missed, but neither be called shut nor be undercut by a bound.
+    # No clearance at all: the planner may miss the path, but must not prove it infeasible or exceed it by a bound.
     try:
         bound, reason = plan(problem).lower_bound, "not_found"
     except NoMission as refusal:
@@ -257,7 +259,7 @@ def test_bound_holds_for_a_path_that_touches_its_limits() -> None:
     assert reason == "not_found"
     assert bound is not None
     assert bound <= cost_of(problem, best) + 1e-5
-    # With a foot of room the pass is found, and what just touched is still a path.
+    # With 0.3 m more the pass is found, and the touching path is still legal.
     solution = plan(replace(problem, limits=replace(limits, max_amsl_m=90.3)))
     assert solution.lower_bound is not None
     assert solution.lower_bound <= cost_of(problem, best) + 1e-5
@@ -265,7 +267,8 @@ def test_bound_holds_for_a_path_that_touches_its_limits() -> None:
 
 
 def test_bound_lets_height_be_won_on_the_way_out_of_a_pocket() -> None:
-    """Behind a wall, 200 m from the start as the crow flies, a ridge that only the 400 m of track there lead over."""
+    """A ridge behind a wall, 200 m from the start in a straight line; only the 400 m track around the wall is long
+    enough for the climb."""
     n = 41
     east, _ = np.meshgrid(np.linspace(0.0, 1200.0, n), np.linspace(1200.0, 0.0, n))
     z = np.where((east >= 450.0) & (east <= 510.0), 45.0, 0.0)
@@ -283,7 +286,7 @@ def test_bound_lets_height_be_won_on_the_way_out_of_a_pocket() -> None:
 
 @pytest.mark.parametrize("seed", [89, 90, 91])
 def test_bound_holds_along_the_edges_of_holes_in_a_turned_raster(seed: int) -> None:
-    """Where a raster is turned, nothing is quite in line: a wall that one flies along is seen from a hair beside it."""
+    """In a rotated raster rounding leaves nothing exactly in line: a track along a wall lies slightly beside it."""
     rng = np.random.default_rng(seed)
     side, step_m = int(rng.integers(6, 14)), float(rng.choice([30.0, 29.7, 33.3, 27.123]))
     turn = rng.uniform(0.0, 2.0 * math.pi)

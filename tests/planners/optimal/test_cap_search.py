@@ -1,5 +1,5 @@
-"""The search over altitude caps, the floors that no short track avoids, and the bound of whole problems, held to
-fine lists of caps and to many random paths."""
+"""The search over altitude caps, the altitudes that no short track avoids, and the bound of whole problems, compared
+with fine lists of caps and with many random paths."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ HORIZONTAL, VERTICAL = 100.0, 120.0
 
 
 class Caps:
-    """A made-up problem: tracks that get shorter, in steps and slopes, the higher their cap is."""
+    """An artificial problem: the higher the cap, the shorter the track, by steps and evenly."""
 
     def __init__(self, seed: int, *, blind: float = 0.0) -> None:
         rng = np.random.default_rng(seed)
@@ -44,7 +44,7 @@ class Caps:
         self.drop = rng.exponential(300.0, len(self.at))
         self.slope = float(rng.uniform(0.0, 1.5)) * (rng.random() < 0.5)
         self.base = 5_000.0 + self.drop.sum() + self.slope * (self.top - self.low)
-        # How much too short the first, quick look may say that tracks are, and how much longer paths are than tracks.
+        # By which part the first, quick length is too short, and by how much paths are longer than tracks.
         self.blind, self.worse = blind, 1.0 + 0.01 * float(rng.random()) * (rng.random() < 0.5)
         self.best = math.inf
         self.asked: list[tuple[float, int]] = []
@@ -98,7 +98,7 @@ def test_the_bound_meets_the_best_path_where_tracks_and_paths_are_as_long() -> N
         caps = Caps(seed, blind=0.05)
         caps.worse = 1.0
         bound = caps.search(1e-3)
-        # What is left is a layer of less than a cap's worth, or the gap that was asked for.
+        # The remaining gap is the requested one, or the cost of a layer too thin to split.
         met += caps.best - bound <= 1e-3 * caps.best + VERTICAL * 2.0 * 0.25
         assert bound >= caps.least() * 0.98
     assert met >= 54
@@ -141,7 +141,7 @@ def hills(seed: int, limits: Limits, zones: int = 0, **more: object) -> Problem:
         out = np.full_like(e, 200.0)
         for x, y, wide, tall in bumps:
             out = out + tall * np.exp(-((e - x) ** 2 + (n - y) ** 2) / (2.0 * wide**2))
-        # A ridge from edge to edge that every track must cross.
+        # A ridge from edge to edge, which every track must cross.
         return np.asarray(out + 90.0 * np.exp(-(((e - 1000.0 - 0.2 * (n - 1000.0)) / 130.0) ** 2)))
 
     found = [
@@ -164,7 +164,7 @@ BARE = Limits(min_agl_m=40.0, track_error_m=2.0, altitude_error_m=3.0)
 
 
 def tracks(problem: Problem, rng: np.random.Generator, count: int, bend: float) -> list[Floats]:
-    """Random bent tracks (N, 2) from stop to stop; ``bend``: how far off the straight line, as a part of it."""
+    """Random bent tracks (N, 2) through all terminals; ``bend``: offset from the straight line as a part of it."""
     stops = np.array([problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]])
     out = []
     for _ in range(count):
@@ -179,7 +179,7 @@ def tracks(problem: Problem, rng: np.random.Generator, count: int, bend: float) 
 
 
 def flown(problem: Problem, track: Floats) -> Path | None:
-    """The shortest legal path in space over a track, put to the exact check."""
+    """The shortest legal path over a track; None unless the exact check passes it."""
     heights = {(v.east_m, v.north_m): v.amsl_m for v in problem.via}
     pinned = np.array([k in (0, len(track) - 1) or (p[0], p[1]) in heights for k, p in enumerate(map(tuple, track))])
     pin = np.array([math.nan if (z := heights.get((p[0], p[1]))) is None else z for p in map(tuple, track)])
@@ -214,7 +214,7 @@ def test_floors_are_never_above_the_ground_that_a_short_track_sees(seed: int) ->
             s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
             if s[-1] > limit:
                 continue
-            # A longer track is squeezed, evenly here.
+            # A longer track is compressed to the shortest length, here evenly.
             on = at * s[-1] / least
             e, n = np.interp(on, s, track[:, 0]), np.interp(on, s, track[:, 1])
             seen = problem.airspace.surface.top_at(e, n) + BARE.min_agl_m + BARE.altitude_error_m
@@ -227,7 +227,7 @@ def test_floors_are_never_above_the_ground_that_a_short_track_sees(seed: int) ->
 
 
 def intervals(problem: Problem, seed: int, count: int) -> list[Zone]:
-    """Zones one after the other on the straight way, each to be passed over alone, under alone, or both."""
+    """Zones one after the other on the straight track; each can be passed only above, only below, or both."""
     rng = np.random.default_rng([seed, 7])
     a, b = np.array(problem.start[:2]), np.array(problem.goal[:2])
     out = []

@@ -26,13 +26,13 @@ LOW = Limits(min_agl_m=10.0)
 
 
 def wall(east: Floats, north: Floats) -> Floats:
-    """A wall 200 m high across the map, with one gap about north 1500."""
+    """Ground with a wall 200 m high across the map, with one gap around 1500 m north."""
     gap = np.abs(north - 1500.0) < 100.0
     return np.where((np.abs(east - 1000.0) < 50.0) & ~gap, 200.0, 0.0)
 
 
 def ridge(east: Floats, north: Floats) -> Floats:
-    """A ridge across the map, 100 m high in the south, falling to 40 m in the north."""
+    """Ground with a ridge across the map, 100 m high in the south, falling to 40 m in the north."""
     return np.maximum(0.0, (100.0 - 0.03 * north) - 0.2 * np.abs(east - 1000.0))
 
 
@@ -52,7 +52,7 @@ def problem(
 
 
 def solve(p: Problem) -> Solution:
-    """Plan, and have the answer judged by the exact check and by brute force."""
+    """Plan; assert that the exact check and brute force pass the path."""
     s = plan(p)
     assert p.airspace.examine(Legs.of_path(s.path.points, p.limits), p.limits).violations == ()
     assert faults(p, s.path) == []
@@ -62,7 +62,7 @@ def solve(p: Problem) -> Solution:
 
 
 def tangent_length(half_m: float, radius_m: float) -> float:
-    """Shortest way past the middle of a disc, from ``half_m`` before it to ``half_m`` after it."""
+    """Length of the shortest track past a disc, from ``half_m`` before its centre to ``half_m`` after it."""
     angle = math.acos(radius_m / half_m)
     return 2.0 * math.sqrt(half_m**2 - radius_m**2) + radius_m * (math.pi - 2.0 * angle)
 
@@ -108,7 +108,7 @@ def test_wall_is_passed_through_its_gap() -> None:
 def test_ridge_under_a_ceiling_is_passed_where_it_is_low_enough() -> None:
     s = solve(problem(ground(ridge), limits=replace(LOW, max_amsl_m=80.0)))
     crossing = np.interp(1000.0, s.path.points[:, 0], s.path.points[:, 1])
-    # Ground 70 m high lies at north 1000 on the crest.
+    # The crest is 70 m high at 1000 m north.
     assert crossing == pytest.approx(1000.0, abs=30.0)
     s = solve(problem(ground(ridge), limits=replace(LOW, max_amsl_m=65.0)))
     crossing = np.interp(1000.0, s.path.points[:, 0], s.path.points[:, 1])
@@ -230,7 +230,7 @@ SSGWO = [
     (250.0, 200.0, 40.0, 18.0), (600.0, 700.0, 30.0, 18.0), (130.0, 120.0, 30.0, 16.0), (300.0, 280.0, 40.0, 17.0),
     (350.0, 600.0, 40.0, 19.0), (480.0, 400.0, 60.0, 18.0), (700.0, 650.0, 40.0, 17.0), (720.0, 760.0, 50.0, 19.0),
 ]  # fmt: skip
-"""SSGWO paper, Table 3: east, north, radius, height."""
+"""SSGWO paper, Table 3: east, north, radius, height (m)."""
 
 
 @pytest.mark.parametrize(("unlimited", "optimum_m"), [(False, 1132.432), (True, 1140.392)])
@@ -285,7 +285,7 @@ def test_jacksboro_mission_winds_through_the_gaps_that_its_ceiling_and_zones_lea
     assert "min_agl" in {v.kind for v in p.airspace.examine(straight, p.limits).violations}
     assert faults(p, s.path, step_m=10.0) == []
     assert s.path.length_m < 27_200.0
-    # Where a zone is lifted that matters, the way gets shorter.
+    # Without the zones the path is shorter, so they matter.
     bare = replace(p, airspace=Airspace(p.airspace.surface, scale=p.airspace.scale), gap_percent=1.0)
     assert plan(bare).path.length_m < s.path.length_m - 500.0
 
@@ -305,7 +305,7 @@ def test_worlds_as_high_as_wide_are_solved_no_worse_than_by_swarms(name: str, mo
 
 
 def needles(east: Floats, north: Floats) -> Floats:
-    """Nine needles 90 m high, 30 m apart."""
+    """Ground with nine needles 90 m high, 30 m apart."""
     z = np.zeros_like(east)
     for x in (30.0, 60.0, 90.0):
         for y in (30.0, 60.0, 90.0):

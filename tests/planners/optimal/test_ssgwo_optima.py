@@ -1,4 +1,4 @@
-"""The SSGWO paper's cylinders: the default planner reaches their true optima, and the oracles know them.
+"""The SSGWO paper's cylinders: the default planner and the oracles find their true optima.
 
 Tables 3, 5 and 7 of the paper over flat ground, zero clearance, from (0, 0, 0) to (800, 800, 15): in plan view, with
 cylinders of unlimited height, and with overflight. The paper's own best are 1132, 1167 and 1129 m, the last of which
@@ -26,8 +26,8 @@ from tests.support.planner_worlds import faults, ground
 
 pytestmark = pytest.mark.slow
 
-# East, north, radius, top. The middles that Table 7 prints would have its cylinders float half a metre or a metre over
-# the ground: here they stand on it, as high as printed ("7"), or up to where they would reach ("7 raised").
+# East, north, radius, top (m). With the centres that Table 7 prints, its cylinders would float 0.5 m or 1 m above the
+# ground. Here they stand on it, with the printed height ("7") or with the printed top ("7 raised").
 TABLES = {
     "3": (
         (250, 200, 40, 18), (600, 700, 30, 18), (130, 120, 30, 16), (300, 280, 40, 17), (350, 600, 40, 19),
@@ -51,7 +51,7 @@ OVERFLIGHT_M = {"3": 1132.45, "5": 1132.30, "7": 1131.83, "7 raised": 1131.86}
 PLAN_VIEW_M = {"3": 1140.392, "5": 1136.249, "7": 1133.588}
 START, GOAL = (0.0, 0.0, 0.0), (800.0, 800.0, 15.0)
 FINE_PERCENT = 0.002
-"""The gap that is asked for: finer than what the optima are held to."""
+"""The requested gap, smaller than the tolerance of the comparison with the optima."""
 
 
 def problem(table: str, unlimited: bool) -> Problem:

@@ -1,4 +1,4 @@
-"""Planning beyond the first window of the terrain: what leaves it, what is proved, and where it is judged."""
+"""Planning beyond the first window of the terrain: paths that leave it, proofs, and the check over wider windows."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ ROW_4 = {
     ],
     "planner": {"budget_s": 600},
 }  # fmt: skip
-"""Start and goal 5.8 km apart on two sides of a ridge, and a way round it within the same DEM."""
+"""Start and goal 5.8 km apart on two sides of a ridge, which can be passed within the same DEM."""
 
 
 def source_of(document: dict[str, object], **limits: float) -> MissionFile:
@@ -77,7 +77,7 @@ def test_a_way_round_the_ridge_that_leaves_the_first_window_is_found_and_judged_
     assert vehicle.gap_percent is not None
     assert vehicle.gap_percent < 0.3
     points = vehicle.solution.path.points
-    assert np.isnan(source.surface.ground_at(points[:, 0], points[:, 1])).any()  # beyond what was loaded first
+    assert np.isnan(source.surface.ground_at(points[:, 0], points[:, 1])).any()  # beyond the first window
     assert np.isfinite(done.world.airspace.surface.ground_at(points[:, 0], points[:, 1])).all()
     assert done.source.level > 0
 
@@ -213,7 +213,7 @@ def test_over_empty_flat_ground_no_path_is_better_beyond_the_window() -> None:
     ends = ((-1000.0, 0.0, 60.0), (1000.0, 0.0, 60.0))
     assert not goes_on(Problem(flat(3000.0, (disc, far)), LOW, *ends))
     assert goes_on(Problem(flat(3000.0, (box(-50.0, -4000.0, 50.0, 100.0),)), LOW, *ends))
-    assert goes_on(Problem(flat(3000.0, (box(-50.0, -2980.0, 50.0, 100.0),)), LOW, *ends))  # no room beside it
+    assert goes_on(Problem(flat(3000.0, (box(-50.0, -2980.0, 50.0, 100.0),)), LOW, *ends))  # no space beside the wall
     assert not goes_on(Problem(flat(3000.0, (box(-50.0, -4000.0, 50.0, 100.0),), NO_SIDES), LOW, *ends))
 
 
@@ -226,7 +226,7 @@ def test_what_is_shut_in_by_zones_is_so_whatever_lies_beyond() -> None:
     assert goes_on(shut)
     assert enclosed(shut)
     assert not enclosed(replace(shut, airspace=flat(3000.0, (*walls[1:], across))))
-    # A slit of two reaches is closed, a wider one open.
+    # A slit as wide as two reaches is closed; a wider one is open.
     narrow = (*walls[:3], box(500.0, -450.1, 600.0, 600.0), across)
     assert enclosed(replace(shut, airspace=flat(3000.0, narrow)))
     wide = (*walls[:3], box(500.0, -449.9, 600.0, 600.0), across)
@@ -272,7 +272,7 @@ def frame_walls(half_m: float) -> list[Zone]:
 
 
 def shortest(problem: Problem, half_m: float) -> float:
-    """Metres of the shortest track within a square; inf without one."""
+    """Length (m) of the shortest track within a square; inf if there is none."""
     plane = Plane.of([*problem.airspace.zones, *frame_walls(half_m)], 25.0)
     try:
         return math.hypot(plane.shortest([problem.start[:2], problem.goal[:2]]), 0.0)
@@ -285,7 +285,7 @@ def half_of(problem: Problem) -> float:
 
 
 def by_graph(problem: Problem) -> Solution:
-    """A planner that knows the window alone: exact there, and sure of itself."""
+    """A planner that is exact within its window and ignores everything outside of it."""
     length = shortest(problem, half_of(problem))
     if math.isinf(length):
         proved = not goes_on(problem) or enclosed(problem)
@@ -325,7 +325,7 @@ def test_bounds_and_proofs_hold_for_the_world_beyond_the_window(first: int) -> N
         zones = random_walls(seed)
         rng = np.random.default_rng([seed, 1])
         ends = [(*rng.uniform(-1500.0, 1500.0, 2).tolist(), 100.0) for _ in range(2)]
-        most = WORLD_M if rng.random() < 0.7 else 8000.0  # what memory allows
+        most = WORLD_M if rng.random() < 0.7 else 8000.0  # the widest window that memory allows
         said: list[Progress] = []
 
         def over(half_m: float, zones: tuple[Zone, ...] = zones, most: float = most) -> Airspace:
@@ -354,7 +354,7 @@ def test_bounds_and_proofs_hold_for_the_world_beyond_the_window(first: int) -> N
             assert found.path.length_m <= optimum * 1.0011, seed
             assert found.lower_bound is not None
             assert found.path.length_m <= found.lower_bound * 1.0011, seed
-    assert wider > 3  # that the case is met at all
+    assert wider > 3  # the case does occur
 
 
 def test_a_plan_within_one_window_is_asked_once_and_as_it_was() -> None:
@@ -374,7 +374,7 @@ def test_a_plan_within_one_window_is_asked_once_and_as_it_was() -> None:
 def test_the_lines_of_a_border_in_degrees_lie_within_the_nodes() -> None:
     p = problem_of(source_of(ROW_4))
     lines, bow_m = border(p)
-    inward = lines * (1.0 - 1e-4)  # a metre: their ends lie on the border
+    inward = lines * (1.0 - 1e-4)  # about 1 m shorter, because their ends lie on the border
     ground = p.airspace.surface.ground_at(inward[..., 0], inward[..., 1])
     assert np.isfinite(ground).all()
     assert bow_m < 0.5

@@ -1,4 +1,4 @@
-"""The taut string, held against linear programmes and a shortest path through the visibility graph."""
+"""The taut string, compared with linear programmes and a shortest path through the visibility graph."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Doors = tuple[Floats, Floats, Floats, float, float]
 
 
 def random_doors(seed: int) -> Doors:
-    """A wandering tube, some doors open without end, some shut to a point; a third of them on whole metres."""
+    """A random tube; some doors are unlimited, some are single points; a third of the tubes have whole metres."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 26))
     s = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 3.0, n - 1))])
@@ -32,7 +32,7 @@ def random_doors(seed: int) -> Doors:
 
 
 def least_by_linear_programme(s: Floats, low: Floats, high: Floats, z0: float, z1: float) -> tuple[float, float]:
-    """Least total variation, and least steepest slope, of any profile through the doors."""
+    """The least total variation and the least maximum slope of any profile through the doors."""
     n = len(s)
     bounds = [(a if np.isfinite(a) else None, b if np.isfinite(b) else None) for a, b in zip(low, high, strict=True)]
     bounds[0], bounds[-1] = (z0, z0), (z1, z1)
@@ -54,7 +54,7 @@ def least_by_linear_programme(s: Floats, low: Floats, high: Floats, z0: float, z
 
 
 def shortest_by_visibility(s: Floats, low: Floats, high: Floats, z0: float, z1: float) -> float:
-    """Length of the shortest way over the visibility graph of all door edges."""
+    """Length of the shortest profile through the visibility graph of all door edges."""
     points = [(0, z0)]
     for i in range(1, len(s) - 1):
         points += [(i, z) for z in {low[i], high[i]} if np.isfinite(z)]

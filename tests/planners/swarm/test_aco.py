@@ -1,4 +1,4 @@
-"""Ants: a graph of allowed edges alone, eq. 1 and 2 by hand, exact budgets, and paths that pass the check."""
+"""Ant colony: only allowed edges, eq. 1 and 2 by hand, exact budgets, and paths that pass the check."""
 
 from __future__ import annotations
 
@@ -68,14 +68,14 @@ def test_an_edge_is_open_exactly_where_dense_points_are_allowed_and_it_is_not_to
 
 
 def test_steps_are_drawn_by_scent_and_nearness() -> None:
-    """Eq. 1: of two edges, one with 4 times the scent and half the length's fifth power, by their weights."""
+    """Eq. 1: two edges, the second with 4 times the scent and twice the length, are drawn by their weights."""
     lengths = np.array([[1.0, 2.0, np.inf]])
     scent = np.array([[1.0, 4.0, 50.0]])
     eager = lengths**-5.0
     ways = _walk(np.random.default_rng(0), 20_000, [eager], [scent], 1.0)
     share = (ways[:, 1] == 0).mean()
     assert share == pytest.approx(1.0 / (1.0 + 4.0 / 32.0), abs=0.01)
-    assert (ways[:, 1] < 2).all()  # never along a closed edge
+    assert (ways[:, 1] < 2).all()  # never along a forbidden edge
 
 
 def test_an_ant_in_a_dead_end_is_dropped() -> None:
@@ -99,7 +99,7 @@ def test_the_best_cost_never_rises_and_the_budget_is_exact() -> None:
     assert found.result.evaluations == 333
     assert found.result.stopped_by == "evaluations"
     history = found.result.history
-    assert (history.cost[0], history.evaluations[0]) == (np.inf, 0)  # as no colony has been yet
+    assert (history.cost[0], history.evaluations[0]) == (np.inf, 0)  # before the first colony
     assert (history.cost[1:] <= history.cost[:-1]).all()
     assert len(history.by_iteration()) == found.result.iterations + 1 == 8
     np.testing.assert_array_equal(history.by_iteration(), history.cost)

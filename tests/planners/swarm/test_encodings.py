@@ -1,4 +1,4 @@
-"""Encodings and curves: inside their bounds, through their stops, and each as its paper has it."""
+"""Encodings and curves: inside their bounds, through all terminals, and each as its paper defines it."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def test_the_scene_reads_the_raster_as_the_surface_does() -> None:
     surface = jacksboro().top_at(at[:, 0], at[:, 1])
     known = np.isfinite(surface)
     assert known.mean() > 0.5
-    # The quadratic map is off by less than a metre over 20 km, which is a hand's breadth of height on a slope.
+    # The quadratic map is off by less than 1 m over 20 km, which is a few decimetres of height on a slope.
     np.testing.assert_allclose(scene.ground(at)[known], surface[known], atol=0.5)
 
 

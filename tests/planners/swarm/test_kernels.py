@@ -1,4 +1,4 @@
-"""Kernels of swarm costs: machine code is what their source says, bit for bit wherever and whenever it is made."""
+"""Kernels of swarm costs: the machine code computes what its source says, bit for bit, on every processor."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def controls_of(cost: Cost, count: int, seed: int = 3) -> np.ndarray:
 
 
 def plain_terms(cost: Cost, controls: np.ndarray) -> np.ndarray:
-    """Terms by the functions as Python runs them."""
+    """Terms computed by the same functions, run by Python."""
     out = np.empty((len(controls), k.TERMS))
     before: Held = cost._before
     with np.errstate(invalid="ignore"):
@@ -79,13 +79,13 @@ def test_what_is_shipped_was_made_from_the_source_as_it_stands(name: str) -> Non
 def test_machine_code_gives_what_python_gives(objective: str, points: int) -> None:
     cost = cost_of(objective, points)
     controls = controls_of(cost, 3)
-    controls[0, 1] = controls[0, 0]  # it stands still, then climbs on the spot
+    controls[0, 1] = controls[0, 0]  # no movement, then a climb on the spot
     controls[1, 1] = controls[1, 0] + (0.0, 0.0, 90.0)
     np.testing.assert_allclose(cost.terms(controls), plain_terms(cost, controls), rtol=1e-9, atol=1e-9)
 
 
 def test_no_sum_of_what_is_shipped_may_still_be_reordered_or_fused() -> None:
-    """Else a processor's own instructions would decide what a swarm finds."""
+    """Otherwise the result of a swarm would depend on the processor's instructions."""
     bitcode = shelf.read_shipped(UNIT.shipped, UNIT.digest())
     assert bitcode is not None
     text = str(llvm.parse_bitcode(bitcode))
@@ -131,7 +131,7 @@ def test_two_processes_that_compile_for_themselves_get_the_same_bytes(tmp_path: 
 def test_an_older_processors_instructions_give_the_same_bytes(
     processor: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Vectors of two numbers or of four, with or without fused multiplication at hand."""
+    """Processors with vectors of two or four numbers, with or without fused multiplication."""
     if processor == "haswell" and not llvm.get_host_cpu_features().get("avx2", False):
         pytest.skip("this processor cannot run it")
     cost = cost_of("ib-abc", 7)
@@ -194,7 +194,7 @@ def test_points_are_added_on_long_legs_alone_and_stand_for_the_whole_length(foll
 
 
 def test_a_leap_through_a_cylinder_between_two_samples_is_charged() -> None:
-    """All points but the last near the start: the curve leaps the rest in a few chords, with no sample inside."""
+    """All points but the last are near the start: a few chords cover the rest, with no sample inside the cylinder."""
     wall = Zone("wall", Circle(1500.0, 1000.0, 30.0))
     problem = Problem(
         Airspace(ground(0.0), (wall,)), Limits(0.0), (100.0, 1000.0, 50.0), (1900.0, 1000.0, 50.0)
@@ -221,7 +221,7 @@ def test_no_two_places_of_a_path_that_are_looked_at_are_far_apart(encoding: str)
         for i in range(3):
             room[i][: len(path)] = path[:, i]
         ck.weigh(leg, room[3])
-        count = ck.divide(leg, step_m, *room, np.zeros(len(leg)))  # within its room, or it would raise here
+        count = ck.divide(leg, step_m, *room, np.zeros(len(leg)))  # raises if the arrays are too small
         assert room[3][:count].sum() == pytest.approx(leg.sum())
         assert count - len(path) <= leg.sum() / step_m
 

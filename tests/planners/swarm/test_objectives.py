@@ -1,4 +1,4 @@
-"""Every term of every cost against plain Python, written from the papers' equations sample by sample."""
+"""Every term of every cost, compared with plain Python written from the papers' equations, sample by sample."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def inside(point: list[float], scene: Scene) -> bool:
 
 
 class Oracle:
-    """Terms of one path from its samples, one `math` call after the other."""
+    """Terms of one path from its samples, in scalar Python."""
 
     def __init__(self, p: Problem, cost: Cost, samples: np.ndarray) -> None:
         self.p, self.points, self.stride = p, samples.tolist(), cost.stride
@@ -64,7 +64,7 @@ class Oracle:
         self.points_and_more = list(self.divided())
 
     def divided(self) -> Iterator[tuple[list[float], float, bool]]:
-        """Points, none further from the next than they may be; the length each stands for; whether it may be moved."""
+        """Points at most a step apart, each with the length that it stands for and whether it may be moved."""
         length = math.fsum(self.legs)
         step_m = max(1.5 * self.scene.straight_m / 200.0, k.UNEVEN * length / len(self.legs))
         before = 0.0
@@ -91,7 +91,7 @@ class Oracle:
         return float(centre[0]), float(centre[1]), max(math.dist(centre, q) for q in v)
 
     def floor(self, x: float, y: float) -> float:
-        """The lowest legal altitude, bilinear between the raster's nodes, which stand 20 m apart."""
+        """The lowest legal altitude, bilinear between the raster's nodes, which are 20 m apart."""
         e, n = 20.0 * math.floor(x / 20.0), 20.0 * math.floor(y / 20.0)
         corner = self.p.airspace.floor_amsl([e, e + 20.0, e, e + 20.0], [n, n, n + 20.0, n + 20.0], self.p.limits)
         a, b = (x - e) / 20.0, (y - n) / 20.0
@@ -190,7 +190,7 @@ def test_terms_are_those_of_the_equations(name: str) -> None:
     p = problem()
     cost = cost_of(name, p)
     controls = cost.code.controls(np.random.default_rng(5).random((7, cost.dim)))
-    controls[0, 2:4, 2] += 1500.0  # steeper than the volume allows, and out of it
+    controls[0, 2:4, 2] += 1500.0  # steeper than allowed, and outside of the volume
     samples = cost.curve.samples(controls)
     measured = cost.terms(controls)
     own = {
@@ -204,15 +204,15 @@ def test_terms_are_those_of_the_equations(name: str) -> None:
     for row, path in zip(measured, samples, strict=True):
         wanted = Oracle(p, cost, path).terms()
         for term in set(range(k.TERMS)) - unwanted - {k.UNKNOWN}:
-            # Rasters are in single precision, and a floor is careful by a hair more or less just beside a node.
+            # Rasters are in single precision, and beside a node the conservative floor differs slightly.
             assert row[term] == pytest.approx(wanted[term], rel=1e-3, abs=2e-2), (name, term)
         seen += row
     common = {k.STEEP, k.BELOW, k.ABOVE, k.INSIDE, k.DEEP, k.YAW, k.PITCH, k.TURNS, k.SLOPES, k.BEND, k.OUTSIDE}
-    assert all(seen[t] > 0 for t in common - unwanted)  # an oracle that agrees on zeros alone shows nothing
+    assert all(seen[t] > 0 for t in common - unwanted)  # agreement on zeros alone shows nothing
 
 
 def by_hand(name: str, t: np.ndarray, p: Problem, cost: Cost) -> float:
-    """The papers' sums from terms."""
+    """The papers' costs as sums of the terms."""
     straight = cost.code.scene.straight_m
     metres = t[k.BELOW] + t[k.ABOVE] + t[k.UNKNOWN] + t[k.INSIDE] + t[k.STEEP]
     bad = metres + 20.0 * (t[k.SUNK] + t[k.PROUD] + t[k.DEEP]) / straight
@@ -264,7 +264,7 @@ def test_floors_on_a_raster_of_their_own_or_on_the_grounds_give_the_same_terms()
     scene = cost.code.scene
     assert scene.floor_map is scene.quadratic
     together = cost.terms(controls)
-    apart = np.vstack([scene.floors, scene.floors[-1:]])  # a row that no sample needs: no longer the same nodes
+    apart = np.vstack([scene.floors, scene.floors[-1:]])  # a row more, which no sample needs: other nodes
     cost.code = replace(cost.code, scene=replace(scene, floors=apart))
     np.testing.assert_allclose(together[1:], cost.terms(controls)[1:], rtol=1e-12, atol=1e-9)
     assert together[0, k.UNKNOWN] > 0.0
@@ -289,7 +289,7 @@ def test_unknown_ground_is_charged_and_never_makes_a_cost_unknown() -> None:
         cost = Cost(p, Code.of("box", Scene.of(p), 4), OBJECTIVES[name])
         u = np.full((1, cost.dim), 0.5)
         terms = cost.terms(cost.code.controls(u))
-        # The void and the cell on either side; the floor, being careful, may take one cell more.
+        # The void and one cell on either side; the conservative floor may add one more.
         assert 180.0 < terms[0, k.UNKNOWN] < 330.0
         assert np.isfinite(cost(u)).all()
         assert np.isfinite(terms).all()
@@ -332,7 +332,7 @@ def test_a_vehicle_with_the_right_of_way_is_kept_apart_from_in_time() -> None:
 
 
 def every_pair(path: np.ndarray, clock: np.ndarray, points: np.ndarray, clocks: np.ndarray, apart_m: float) -> float:
-    """Eq. 28-30 over all pairs of points, whatever their times."""
+    """Eq. 28-30 over all pairs of points, without selecting pairs by time."""
     return sum(
         (0.5 - abs(t - s)) ** 3
         for q, t in zip(path.tolist(), clock.tolist(), strict=True)
@@ -343,7 +343,7 @@ def every_pair(path: np.ndarray, clock: np.ndarray, points: np.ndarray, clocks: 
 
 @pytest.mark.parametrize("tick", [None, 0.125, 0.5])
 def test_the_window_of_time_leaves_out_no_pair_of_points(tick: float | None) -> None:
-    # With ticks, clocks stand still, meet, and are apart by exactly what ends the window.
+    # With ticks, clocks may stand still, be equal, or differ by exactly the window's length.
     rng = np.random.default_rng(12)
     seen = 0.0
     for case in range(60):
@@ -363,7 +363,7 @@ def test_the_window_of_time_leaves_out_no_pair_of_points(tick: float | None) -> 
 
 def test_clocks_are_lengths_so_far_over_the_speed() -> None:
     paths = np.random.default_rng(4).uniform(-500.0, 500.0, (5, 30, 3))
-    paths[1, 7:10] = paths[1, 6]  # it stands still
+    paths[1, 7:10] = paths[1, 6]  # no movement
     found = np.full((5, 30), np.nan)
     sk.clocks_of(paths, 12.5, found)
     lengths = np.cumsum(np.linalg.norm(np.diff(paths, axis=1), axis=2), axis=1)

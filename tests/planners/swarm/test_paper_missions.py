@@ -1,4 +1,4 @@
-"""The papers' scenarios as mission files: what the papers and our decisions give, and every one can be flown."""
+"""The papers' scenarios as mission files: they match the papers and our decisions, and each can be flown."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_every_scenario_has_its_file() -> None:
 @pytest.mark.parametrize(
     ("name", "lengths"),
     [
-        # From (0, 0, 3), as decided: 152.48 m; the paper's own start on the ground gives 153.62 m.
+        # From (0, 0, 3), our decision: 152.48 m; the paper's start on the ground would give 153.62 m.
         ("krill-mound", [math.dist((0, 0, 3), (100, 100, 60))]),
         ("krill-hills", [math.dist((0, 0, 3), (100, 100, 60))]),
         ("krill-forest", [math.dist((0, 0, 3), (120, 120, 80))]),
@@ -73,7 +73,7 @@ def test_every_scenario_has_its_file() -> None:
     ],
 )
 def test_straight_lines_are_the_papers(name: str, lengths: list[float]) -> None:
-    # Ends stand a few centimetres higher where the wire's margins ask for it.
+    # Ends may be a few centimetres higher, because of the margins for rounding on the wire.
     assert [straight(p) for p in problems(name)] == pytest.approx(lengths, abs=0.06)
 
 
@@ -115,7 +115,7 @@ def test_cylinders_are_the_tables() -> None:
     assert [z.ceiling for z in tall] == [None] * 12
     tops = [z.ceiling.value_m for z in mission("ssgwo-table7").zones if z.ceiling is not None]
     assert tops == [13.5, 11.5, 15.5, 15.0, 14.25, 15.0, 13.5, 15.0]
-    # The two of Table 5 that overlap, by 6.1 m.
+    # Two cylinders of Table 5 overlap, by 6.1 m.
     overlaps = [
         a.radius_m + b.radius_m - math.dist((a.east_m, a.north_m), (b.east_m, b.north_m))
         for i, z in enumerate(low)
@@ -139,14 +139,14 @@ def test_fleets_have_their_order() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(NAMES))
 def test_every_scenario_is_planned_by_its_own_system_or_refused(name: str) -> None:
-    """A short run; what comes out passes the exact check, whatever the swarm made of it."""
+    """A short run: any path that is returned passes the exact check."""
     source = mission(name)
     for p in problems(name)[:2]:
         short = replace(p, options={**p.options, "iterations": 20})
         try:
             solution = get(source.planner.name).plan(short)
         except NoMission:
-            continue  # the pipeline hands a refusal on
+            continue  # a refusal is allowed
         assert violations(p, solution.path.points) == ()
         assert solution.path.length_m >= straight(p) - 1e-6
 

@@ -1,4 +1,4 @@
-"""Swarm planners: what they hand back passes the exact check, and what was wrong with the search's curve is said."""
+"""Swarm planners: the returned path passes the exact check, and faults of the search's own curve are reported."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_path() -> N
 
 
 def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The sampled cost is made blind: every curve looks free, and the straight one looks best."""
+    """With a cost that sees no obstacles every curve seems free, and the straight one seems best."""
     problem = toy(encoding="sections", points=3, iterations=30, population=30)
 
     def blind(name: str) -> object:
@@ -209,7 +209,7 @@ def test_a_refusal_has_a_place_on_real_ground() -> None:
     assert getattr(refusal.value, "east_m", None) is not None
 
 
-# With its own 30 points anywhere in the volume, SSGWO finds a way that can be mended from half of the seeds.
+# With its own encoding of 30 points anywhere in the volume, SSGWO finds a repairable path for half of the seeds.
 @pytest.mark.first_quick
 @pytest.mark.parametrize(("name", "seed"), [("krill", 1), ("ssgwo", 4), ("msfoa", 1), ("abo", 1), ("ib-abc", 1)])
 def test_the_five_systems_plan_a_mission_over_real_ground(name: str, seed: int) -> None:

@@ -1,4 +1,4 @@
-"""Turns: the arcs are built here again from the way points alone, and judged by samples."""
+"""Turns: the tests build the arcs again from the way points alone, and judge them by samples."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ LIMITS = Limits(min_agl_m=60.0, max_climb_deg=12.0, max_descent_deg=12.0)
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Legs and arcs as an autopilot would fly the way points: samples (N, 3) and metres along the plane."""
+    """Legs and arcs as an autopilot flies the way points: samples (N, 3) and distances along the track (m)."""
 
     points: Floats
     s_m: Floats
 
 
 def as_flown(way_points: Floats, radius_m: float, step_m: float = 1.0) -> Curve:
-    """Arcs from formulas: tangent to both legs, begun R·tan(turn / 2) before the corner. Fails where they overlap."""
+    """The curve with arcs tangent to both legs that begin R·tan(turn / 2) before the corner; fails if they overlap."""
     w = way_points[:, :2]
     legs = np.diff(w, axis=0)
     length = np.hypot(*legs.T)
@@ -74,7 +74,7 @@ def as_flown(way_points: Floats, radius_m: float, step_m: float = 1.0) -> Curve:
 
 
 def assert_sound(problem: Problem, found: Rounded, step_m: float = 1.0) -> Curve:
-    """Everything that is promised of a `Rounded`, by the exact check and by samples."""
+    """Assert everything that a `Rounded` promises, by the exact check and by samples; return the curve."""
     air, limits, radius = problem.airspace, problem.limits, problem.turn_radius_m
     legs = Legs.of_path(found.flown, limits)
     wide = replace(legs, track_error_m=legs.track_error_m + found.widen_m)
@@ -85,13 +85,13 @@ def assert_sound(problem: Problem, found: Rounded, step_m: float = 1.0) -> Curve
     curve = as_flown(found.way_points, radius, step_m)
     apart = np.concatenate([[True], np.hypot(*np.diff(curve.points[:, :2], axis=0).T) > 1e-6])
     assert faults(problem, Path(curve.points[apart]), slack_m=0.002) == []
-    # The length is that of the arcs, from formulas too.
+    # The length is that of the curve with arcs.
     length = np.hypot(np.diff(curve.s_m), np.diff(curve.points[:, 2])).sum()
     assert found.length_m == pytest.approx(length, rel=1e-6)
 
-    # The chords stand for this very curve: nothing lies farther from it than they were widened by, nor elsewhere.
+    # The chords follow this curve: they are nowhere farther from it than they are widened by.
     chords = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(found.flown[:, :2], axis=0).T))])
-    at = chords * curve.s_m[-1] / chords[-1]  # chords are shorter than arcs by a hair, evenly enough
+    at = chords * curve.s_m[-1] / chords[-1]  # chords are slightly and evenly shorter than arcs
     for k in range(3):
         off = np.abs(np.interp(at, curve.s_m, curve.points[:, k]) - found.flown[:, k])
         assert off.max() < 1.0
@@ -103,7 +103,7 @@ def assert_sound(problem: Problem, found: Rounded, step_m: float = 1.0) -> Curve
         assert abs(curve.points[near, 2] - middle[i, 2]) < 0.3 * step_m
     assert (found.widen_m <= CHORD_M).all()
 
-    # No turn is tighter than the radius: circles through three neighbours.
+    # No turn is tighter than the radius, by circles through three neighbours.
     p = found.flown[np.concatenate([[True], np.hypot(*np.diff(found.flown[:, :2], axis=0).T) > 0.05]), :2]
     a, b, c = p[:-2], p[1:-1], p[2:]
     twice = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
@@ -113,7 +113,7 @@ def assert_sound(problem: Problem, found: Rounded, step_m: float = 1.0) -> Curve
 
 
 def problem_of(corners: Floats, zones: list[Zone] | None = None, **changes: object) -> Problem:
-    """Over level ground 5 km wide, at 100 m, with the path's own ends."""
+    """A problem over level ground 5 km wide, from the first corner to the last; the turn radius is 100 m by default."""
     air = Airspace(ground(0.0, size_m=5000.0, step_m=50.0), zones or [])
     start, goal = (tuple(map(float, corners[k])) for k in (0, -1))
     fields: dict[str, object] = {"turn_radius_m": 100.0, **changes}
@@ -129,7 +129,7 @@ def no_pins(points: Floats) -> NDArray[np.bool_]:
 
 
 def zigzag(seed: int) -> tuple[Floats, list[Zone]]:
-    """Corners up to 140 degrees sharp, with a zone on the inside of each that touches both its legs."""
+    """Corners that turn by up to 140 degrees, with a zone inside each that touches both of its legs."""
     rng = np.random.default_rng(seed)
     while True:
         at, heading = np.array([rng.uniform(500, 1500), rng.uniform(1500, 3500)]), rng.uniform(-0.5, 0.5)
@@ -175,7 +175,7 @@ def test_random_paths_that_touch_zones_at_their_corners_are_rounded_and_legal_as
 
 
 def hills(seed: int, ceiling_m: float) -> Problem:
-    """Rough ground under a ceiling that cuts its hills off, with room for a climb all along."""
+    """A mission over rough ground with hills above the ceiling, and space to climb all along between them."""
     rng = np.random.default_rng(seed)
     peaks = [(rng.uniform(500, 4500, 2), rng.uniform(80, 160), rng.uniform(200, 450)) for _ in range(14)]
 
@@ -190,7 +190,7 @@ def hills(seed: int, ceiling_m: float) -> Problem:
 
 
 def way_below(problem: Problem, step_m: float = 100.0) -> Floats:
-    """A way that stays where the ceiling leaves room: shortest on a grid, then every corner cut that samples allow."""
+    """A path at the ceiling where the ground leaves it free: shortest on a grid, then corners cut as samples allow."""
     ceiling = (problem.limits.max_amsl_m or math.inf) - problem.limits.altitude_error_m
     n = round(5000.0 / step_m) + 1
     axis = np.linspace(0.0, 5000.0, n)
@@ -309,7 +309,7 @@ def test_energy_counts_climb_and_horizontal_metres_along_the_arcs() -> None:
 
 
 def walls(gap_m: float) -> list[Zone]:
-    """Two long walls, each with a gap, one after the other; the gaps lie 300 m aside of one another."""
+    """Two long walls, one after the other, each with a gap; the gaps are 300 m apart sideways."""
 
     def box(name: str, w: float, s: float, e: float, n: float) -> Zone:
         return Zone(name, Polygon(np.array([(w, s), (e, s), (e, n), (w, n)])))

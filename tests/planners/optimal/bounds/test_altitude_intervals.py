@@ -1,4 +1,4 @@
-"""Altitude intervals over cells, held to brute force: what zones leave, what is carried on, which tracks there are."""
+"""Altitude intervals over cells, compared with brute force: intervals between zones, reachable altitudes, tracks."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
 
 def random_storeys(rng: np.random.Generator, rows: int, cols: int) -> AltitudeIntervals:
-    """One or two intervals over most cells, start and goal in opposite corners, at altitudes of the ten."""
+    """One or two intervals over most cells; start and goal in opposite corners; all altitudes multiples of 10 m."""
     cell, low, high = [], [], []
     goal = rows * cols - 1
     for k in range(rows * cols):
@@ -93,8 +93,10 @@ def test_what_is_carried_on_is_the_least_of_all_ways(seed: int) -> None:
 def shortest(
     s: AltitudeIntervals, up: float, down: float, step_m: float = 2.0
 ) -> tuple[float, list[tuple[int, float]]]:
-    """The shortest track over middles of cells at altitudes of a lattice, searched through; and its intervals and
-    altitudes. From an interval to the next one passes the border at the mean of both altitudes."""
+    """Length of the shortest track over cell centres at altitudes ``step_m`` apart, with its intervals and altitudes.
+
+    A step from one interval to the next crosses the border at the mean of both altitudes.
+    """
     levels = np.arange(0.0, 60.0 + step_m, step_m)
     cols = s.shape[1]
     of: dict[int, list[int]] = {}
@@ -146,7 +148,7 @@ def test_storeys_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
             0.0, max_climb_deg=math.degrees(math.atan(climb)), max_descent_deg=math.degrees(math.atan(descent))
         )
         reached = Reached(s, limits, 1e4)
-        for longer in (500.0, 50.0, 10.0, 1e-6):  # what is known of longer ones is used for shorter ones
+        for longer in (500.0, 50.0, 10.0, 1e-6):  # results for longer tracks are used for shorter ones
             now = reached.within(length + longer, np.ones(s.shape[0] * s.shape[1], np.bool_))
             for k, z in way:
                 here = (now.cell == s.cell[k]) & (now.low_m <= z) & (z <= now.high_m)
@@ -154,7 +156,7 @@ def test_storeys_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
         found += 1
         straight_m = CELL_M * math.hypot(s.shape[0] - 1, s.shape[1] - 1)
         above += not len(s.reached(limits, straight_m + 2.0 * s.half_m).cell)
-    # Both are needed for the test to mean something: tracks, and limits that shut them out.
+    # The test means something only if there are tracks, and altitude limits that lengthen them.
     assert found >= len(seeds) / 2
     assert above >= 3
 
@@ -162,11 +164,11 @@ def test_storeys_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
 @pytest.mark.parametrize("free", ["neither", "start", "goal"])
 @pytest.mark.parametrize("limited", ["both", "climb"])
 def test_climbing_out_from_under_a_storey_takes_its_length(free: str, limited: str) -> None:
-    """A single row: under 10 m for 40 cells, over 50 m for the next 40, at a slope of 0.1."""
+    """A single row: below 10 m for 40 cells, above 50 m for the next 40, at a slope of 0.1."""
     cols = 80
     at = np.arange(cols)
     low, high = np.where(at < 40, 0.0, 50.0), np.where(at < 40, 10.0, 60.0)
-    low[40], high[40] = 0.0, 60.0  # here it can be climbed
+    low[40], high[40] = 0.0, 60.0  # the only cell to climb over
     away: Floats = CELL_M * at.astype(np.float64)
     left: Floats = away[::-1].copy()
     stops = Terminal(at[:1], None if free == "start" else 5.0), Terminal(at[-1:], None if free == "goal" else 55.0)
@@ -241,7 +243,7 @@ def test_every_altitude_that_is_legal_in_a_cell_lies_in_one_of_its_storeys(seed:
 
 
 def ridge_behind_a_low_storey() -> tuple[Leg, Problem]:
-    """Under 60 m for a kilometre, and 100 m behind that a ridge 300 m high all across: at a slope of 0.1."""
+    """Below 60 m for 1 km, and 100 m behind that a ridge 300 m high across the whole map, at a slope of 0.1."""
     rows, cols = 13, 61
     heights = np.zeros((rows, cols))
     heights[:, 42:45] = 300.0
@@ -256,9 +258,9 @@ def ridge_behind_a_low_storey() -> tuple[Leg, Problem]:
 
 def test_a_ridge_right_behind_a_low_storey_is_farther_than_the_plane_tells() -> None:
     leg, problem = ridge_behind_a_low_storey()
-    for slack in (0.0, 1.3):  # how far is far enough is told by the first
+    for slack in (0.0, 1.3):  # the first flood finds how far the second must reach
         leg.flood(slack)
-    # From 60 m up to 310 m takes 2500 m, but to the ridge it is 100: laps along it are a way.
+    # The climb from 60 m to 310 m takes 2500 m, but the ridge is 100 m away: laps along it are a solution.
     laps = [(2002.0, 10.0 + 580.0 * (k % 2), 59.0 + 56.0 * k) for k in range(6)]
     points = np.array(
         [(25.0, 310.0, 30.0), (2002.0, 310.0, 59.0), *laps, (2260.0, 310.0, 339.0), (2975.0, 310.0, 30.0)]
@@ -272,5 +274,5 @@ def test_a_ridge_right_behind_a_low_storey_is_farther_than_the_plane_tells() -> 
     proved = [m for m in np.arange(2950.0, track_m, 50.0).tolist() if not len(leg.intervals(m).cell)]
     assert max(proved) > plane + 500.0
     assert len(leg.intervals(track_m).cell)
-    # The straight way, and what more the climb takes: from under the zone's edge at 60 m to the ridge's top at 310 m.
+    # The straight track plus the climb's length: from 60 m under the zone's edge to 310 m over the ridge.
     assert max(proved) <= 2950.0 + 2500.0

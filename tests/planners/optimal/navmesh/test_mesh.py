@@ -1,5 +1,5 @@
-"""The two meshes of the plane, held to the exact check: what it passes is free in the one, what is free in the other
-it passes."""
+"""The two meshes of the plane, compared with the exact check: places that it passes are free in the mesh for bounds,
+and it passes all places that are free in the mesh for paths."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from tests.support.effort import draws, worlds
 SIZE_M, STEP_M = 600.0, 30.0
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 LEG_M = 1e-4
-"""Places are put to the exact check as legs so short."""
+"""Length of the legs by which places are put to the exact check."""
 
 
 def turned_grid(degrees: float, shear: float) -> GridMap:
-    """A grid in the plane, node (0, 0) in the north-west, turned and sheared."""
+    """A rotated and sheared grid in the plane, with node (0, 0) in the north-west."""
     a = math.radians(degrees)
     step = STEP_M * np.array([[math.cos(a), math.sin(a)], [-math.sin(a), math.cos(a)]]) @ np.array([[1, shear], [0, 1]])
     inverse = np.linalg.inv(step)
@@ -57,7 +57,7 @@ def level(rng: np.random.Generator, low: float, high: float, datum: str) -> Leve
 
 
 def polygon(rng: np.random.Generator, convex: bool) -> Polygon:
-    """A star around a place, or a regular polygon."""
+    """A star-shaped polygon around a random place, or a regular one if ``convex``."""
     corners = int(rng.integers(3, 9))
     turn = 2.0 * math.pi * np.arange(corners) / corners + rng.uniform(0.0, 6.0)
     radius = rng.uniform(40.0, 130.0) * (np.ones(corners) if convex else rng.uniform(0.35, 1.0, corners))
@@ -66,7 +66,7 @@ def polygon(rng: np.random.Generator, convex: bool) -> Polygon:
 
 
 def zones(rng: np.random.Generator, count: int, datum: str, kinds: str = "lfb") -> list[Zone]:
-    """Zones with a lid (l), a floor (f), both (b), or neither (n)."""
+    """Zones with a ceiling (l), a floor (f), both (b), or neither (n)."""
     out = []
     for k in range(count):
         kind = kinds[int(rng.integers(len(kinds)))]
@@ -89,14 +89,14 @@ def problem_of(surface: Surface, zones: list[Zone], limits: Limits, scale: float
 
 
 def legal(problem: Problem, places: Floats, cap_m: float, heights: int = 40) -> Bools:
-    """(N,) whether the exact check passes a place at any of many heights up to a cap."""
+    """Whether the exact check passes each place at any of many altitudes up to a cap, (N,)."""
     air, limits = problem.airspace, problem.limits
     n = len(places)
     floor = air.floor_amsl(places[:, 0], places[:, 1], limits)
     ground = air.surface.ground_at(places[:, 0], places[:, 1])
     floor = np.where(np.isfinite(floor), np.minimum(floor, cap_m), cap_m)
     tries = [np.full(n, cap_m)]
-    # The first height may be too low, as the conservative floor may be too high.
+    # Start 3 m below the floor, because the conservative floor may be too high.
     tries += [floor - 3.0 + t * (cap_m - floor + 3.0) for t in np.linspace(0.0, 1.0, heights)]
     for zone in air.zones:
         for at, sign in ((zone.floor, -1.0), (zone.ceiling, 1.0)):
@@ -114,7 +114,7 @@ def legal(problem: Problem, places: Floats, cap_m: float, heights: int = 40) -> 
 
 
 def free(mesh: Mesh, places: Floats) -> Bools:
-    """(N,) whether places lie in a mesh's free area: the linear excess of their triangle, and that it has a piece."""
+    """Whether places lie in a mesh's free area, (N,): the excess of their triangle is free there and has a piece."""
     out = np.zeros(len(places), np.bool_)
     rows, cols = mesh.excess.shape
     start, ends, joins = mesh.start, mesh.ends, mesh.joins
@@ -134,7 +134,7 @@ def free(mesh: Mesh, places: Floats) -> Bools:
 
 
 def inner(rng: np.random.Generator, count: int, plane: Plane) -> Floats:
-    """Places over the lattice, not at its rim."""
+    """Random places over the lattice, not at its rim."""
     rows, cols = plane.x.shape
     c, r = rng.uniform(0.6, cols - 1.6, count), rng.uniform(0.6, rows - 1.6, count)
     return np.asarray(
@@ -143,7 +143,7 @@ def inner(rng: np.random.Generator, count: int, plane: Plane) -> Floats:
 
 
 def away_from_rim(plane: Plane, at: Floats) -> Bools:
-    """(N,) places within whose reach all ground is known: of that a mesh knows cells, not metres."""
+    """Which places (N,) have only known ground within reach, which a mesh resolves by cells, not metres."""
     surface = plane.problem.airspace.surface
     cell = surface.grid(at[:, 0], at[:, 1])
     holes = np.argwhere(np.isnan(surface.ground_m))[:, ::-1]
@@ -207,7 +207,7 @@ def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str
             for a, b in zip(places[:24:2], places[1:24:2], strict=True):
                 way = mesh.track((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
                 if way is not None:
-                    # The ends may lie in the shut part of a triangle that is free in part.
+                    # The ends may lie in the blocked part of a triangle that is partly free.
                     found += [way.points[1:-1], 0.5 * (way.points[1:-2] + way.points[2:-1])]
             at = np.vstack(found)
             at = at[away_from_rim(plane, at)]
@@ -346,7 +346,7 @@ def test_ways_are_no_longer_in_the_mesh_for_bounds_than_in_that_for_paths(world:
 
 @pytest.mark.parametrize("top", [260.0, 340.0])
 def test_between_two_crossing_zones_there_is_room_only_where_their_levels_leave_some(top: float) -> None:
-    """Over the one and under the other."""
+    """The middle is free only above the ceiling of one zone and below the floor of the other."""
     z = np.full((21, 21), 100.0)
     surface = Surface(z, z, GridMap.affine(0.0, SIZE_M, STEP_M, STEP_M))
     lid = Zone("lid", Circle(250.0, 300.0, 150.0), None, Level(top, "amsl"))

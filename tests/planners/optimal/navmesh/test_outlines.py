@@ -1,4 +1,4 @@
-"""Shortest tracks around outlines, against the visibility graph of the benchmark, which shares nothing with them."""
+"""Shortest tracks around outlines, compared with the benchmark's visibility graph, which shares no code with them."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_bound_and_path_enclose_the_visibility_graphs_track(seed: int) -> None:
     assert found[0] is not None
     assert found[1] is not None
     low, high = (track.length_m for track in found)
-    # The oracle's arcs are chords inside the true ones.
+    # The oracle replaces arcs by chords, which are shorter.
     assert low <= oracle * (1.0 + 1e-4) + 0.05
     assert oracle <= high + 0.05
     assert high <= low * (1.0 + 3e-4) + 0.05
@@ -144,4 +144,4 @@ def test_what_would_be_too_large_is_left_alone(monkeypatch: pytest.MonkeyPatch) 
         Solids(zones, 0.0, 1.0, 2e-3, Budget.endless(), outer=True).shortest(
             (-1e3, 0.0), (1e3, 0.0), np.ones(1, np.bool_)
         )
-    assert plan(mission(zones, 33.0)).lower_bound is not None  # the lattice finds what the outlines do not
+    assert plan(mission(zones, 33.0)).lower_bound is not None  # the lattice finds a bound where the outlines do not

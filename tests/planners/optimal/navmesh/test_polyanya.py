@@ -1,4 +1,4 @@
-"""Shortest ways over meshes, held to visibility graphs over the same free triangles, made with shapely."""
+"""Shortest tracks over meshes, compared with visibility graphs over the same free triangles, made with shapely."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ FORMS = {
     "turned": np.array([[8.0, -6.0], [6.0, 8.0]]),
     "sheared": np.array([[9.0, 3.5], [-1.0, 13.0]]),
 }
-"""Columns: one step along a row, and one step to the next row."""
+"""Shapes of the grid as matrices; columns: one step along a row, and one step to the next row."""
 EACH_FORM = ["plain", pytest.param("turned", marks=pytest.mark.slow), "sheared"]
 REACH_M = 1e-7
-"""By so much the free area is grown before lines are held to it: coordinates are rounded."""
+"""The free area is grown by this before lines are tested against it, because coordinates are rounded."""
 
 
 def mesh_of(
@@ -48,7 +48,7 @@ def mesh_of(
     own: dict[int, Floats] | None = None,
     block: int = 4,
 ) -> Mesh:
-    """The mesh of an excess lattice; ``own`` (W, 4) the walls of cells that have their own."""
+    """The mesh of an excess lattice; ``own``: walls (W, 4) of each cell that has its own."""
     ny, nx = excess.shape
     cells = (ny - 1) * (nx - 1)
     excess = np.ascontiguousarray(excess, np.float64)
@@ -95,7 +95,7 @@ def mesh_of(
 
 
 def below_zero(corners: Floats, values: Floats) -> Floats:
-    """The part of a triangle (3, 2) where the linear function through ``values`` is not above 0."""
+    """The part of a triangle (3, 2) where the linear function through its corners' ``values`` is at most 0."""
     out: list[Floats] = []
     for k in range(3):
         p, q, a, b = corners[k], corners[(k + 1) % 3], values[k], values[(k + 1) % 3]
@@ -107,12 +107,12 @@ def below_zero(corners: Floats, values: Floats) -> Floats:
 
 
 def _wider(area: shapely.Geometry, by_m: float) -> shapely.Geometry:
-    with np.errstate(all="ignore"):  # corners that are all but straight
+    with np.errstate(all="ignore"):  # corners that are almost straight
         return area.buffer(by_m, join_style="mitre")
 
 
 class Free:
-    """The free area of an excess lattice, from its triangles alone, and shortest ways in it by brute force."""
+    """The free area of an excess lattice, made from its triangles, and shortest tracks in it by brute force."""
 
     def __init__(
         self, excess: Floats, diagonal: NDArray[np.int8], form: Floats, own: dict[int, Floats] | None = None
@@ -143,28 +143,28 @@ class Free:
         self.corners = np.unique(corners.round(9), axis=0)
 
     def narrowed(self) -> Free:
-        """The same without places where it is less than some micrometres wide: cells that meet at a node alone."""
+        """The area without places that are less than about 2 µm wide, where cells meet only at a node."""
         out = object.__new__(Free)
         out._hold(_wider(self.grown, -10.0 * REACH_M))
         return out
 
     def sight(self, a: Floats, b: Floats) -> Bools:
-        """(N,) whether straight lines (N, 2) to (N, 2) stay in the free area."""
+        """Whether straight lines from (N, 2) to (N, 2) stay in the free area, (N,)."""
         return np.asarray(shapely.covers(self.grown, shapely.linestrings(np.stack([a, b], axis=1))))
 
     def distances(self, places: Floats, sources: int) -> Floats:
-        """(sources, places) shortest ways from the first few of some places to all; inf where there is none."""
+        """Shortest lengths (sources, places) from the first ``sources`` places to all; inf if there is no track."""
         nodes = np.vstack([places, self.corners])
         i, j = np.triu_indices(len(nodes), 1)
         seen = self.sight(nodes[i], nodes[j])
         i, j = i[seen], j[seen]
-        # A length of 0 would be no edge to the sparse graph.
+        # A sparse graph treats a length of 0 as no edge.
         length = np.maximum(np.hypot(*(nodes[i] - nodes[j]).T), 1e-12)
         graph = csr_array((length, (i, j)), shape=(len(nodes), len(nodes)))
         return np.asarray(dijkstra(graph, directed=False, indices=np.arange(sources)))[:, : len(places)]
 
     def places(self, rng: np.random.Generator, count: int, form: Floats, shape: tuple[int, int]) -> Floats:
-        """(count, 2) random free places that are not near a cell's edge, fewer where little is free."""
+        """Up to ``count`` random free places (count, 2) that are not near a cell's edge; fewer if little is free."""
         at = rng.uniform(0.0, 1.0, (60 * count, 2)) * (np.array(shape[::-1]) - 1.0)
         part = at % 1.0
         at = at[(np.abs(part - 0.5).max(axis=1) < 0.49) & (np.abs(part[:, 0] - part[:, 1]) > 0.01)]
@@ -174,7 +174,7 @@ class Free:
 
 
 def hilly(rng: np.random.Generator, size: int, holes: int) -> Floats:
-    """Excess of about as much hill as valley, smoothed a little, with unknown nodes."""
+    """A random excess, about half above and half below 0, sometimes smoothed, with unknown nodes."""
     z = rng.normal(0.0, 1.0, (size, size))
     if rng.random() < 0.5:
         z[1:-1, 1:-1] = 0.4 * z[1:-1, 1:-1] + 0.15 * (z[2:, 1:-1] + z[:-2, 1:-1] + z[1:-1, 2:] + z[1:-1, :-2])
@@ -185,12 +185,12 @@ def hilly(rng: np.random.Generator, size: int, holes: int) -> Floats:
 
 
 def steps(rng: np.random.Generator, size: int) -> Floats:
-    """Excess of few values, so that saddles, edges and corners touch the cap exactly."""
+    """An excess with few values, so that saddles, edges and corners touch the cap exactly."""
     return np.asarray(rng.choice([-2.0, -1.0, 0.0, 1.0], (size, size), p=[0.25, 0.3, 0.2, 0.25]))
 
 
 def own_cells(rng: np.random.Generator, excess: Floats, count: int, *, least: bool = False) -> dict[int, Floats]:
-    """Some cells with one or two walls of their own, as zones give them; with ``least`` no lower than the lattice's."""
+    """Random cells with one or two walls of their own, as zones make them; ``least``: none below the lattice's."""
     nx = excess.shape[1]
     out = {}
     for k in rng.choice((excess.shape[0] - 1) * (nx - 1), count, replace=False).tolist():
@@ -221,7 +221,7 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
         free = Free(excess, diagonal, FORMS[form], own)
         places = free.places(rng, 6, FORMS[form], excess.shape)
         true = free.distances(places, len(places))
-        # No mesh is asked to pass where two cells meet at a node alone; nothing else may be longer.
+        # A mesh need not pass places where two cells meet only at a node; no other track may be longer.
         wide = free.narrowed().distances(places, len(places))
         for i in range(len(places)):
             for j in range(len(places)):
@@ -249,7 +249,7 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
 @pytest.mark.first_quick
 @pytest.mark.parametrize("form", EACH_FORM)
 def test_where_walls_touch_exactly_ways_are_legal_and_shorter_than_round_the_touching_places(form: str) -> None:
-    """A touching point may be passed or not, but nothing may be lost beside it, and no wall may be crossed."""
+    """A touching point may be passed or not, but tracks beside it must be found, and no wall may be crossed."""
     rng = np.random.default_rng(list(form.encode()))
     compared = 0
     for _ in range(24):
@@ -285,7 +285,7 @@ def test_a_way_is_never_longer_than_any_bent_line_that_is_free(seed: int, form: 
     places = free.places(rng, 40, FORMS[form], excess.shape)
     if len(places) < 3:
         return
-    # Two legs over every place between: whatever is free must not be shorter.
+    # No free pair of legs over any place in between may be shorter.
     a, b = places[0], places[1]
     seen = free.sight(np.repeat(a[None], len(places), 0), places) & free.sight(
         places, np.repeat(b[None], len(places), 0)
@@ -390,7 +390,7 @@ def test_a_flood_says_of_no_piece_that_it_is_farther_than_it_is(slack: float, fo
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("block", [pytest.param(1, marks=pytest.mark.slow), 4])
 def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block: int) -> None:
-    """Ways by a third place are about as long as one likes; whatever they cross belongs to the corridor."""
+    """Tracks over a third place may have any length; the corridor must contain all cells that they cross."""
     rng = np.random.default_rng([17, block, *form.encode()])
     inverse = np.linalg.inv(FORMS[form])
     crossed = left_out = 0
@@ -418,7 +418,7 @@ def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block
             points = np.vstack([first.points, second.points])
             t = np.linspace(0.0, 1.0, 400)[:, None]
             on = np.vstack([p + t * (q - p) for p, q in pairwise(points)]) @ inverse.T
-            inner = (np.abs(on - np.round(on)) > 1e-6).all(axis=1)  # which cell the border is of cannot be told
+            inner = (np.abs(on - np.round(on)) > 1e-6).all(axis=1)  # a point on a border belongs to no single cell
             i, j = np.floor(on[inner]).astype(int).T
             assert corridor[j, i].all()
             crossed += len(set(zip(i.tolist(), j.tolist(), strict=True)))
@@ -463,7 +463,7 @@ def test_a_guide_from_a_mesh_with_more_room_never_changes_the_answer(form: str, 
 def test_no_search_circles_about_a_corner_along_edges_that_are_all_but_straight(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """On this mission two portals in line with a corner led round and round it, until three million were looked at."""
+    """On this mission two portals in line with a corner once made the search circle it for three million portals."""
     (one,) = [p for p in problems("main", 102, count=7) if p.name == "main 102/04, 10 zones"]
     given_up = []
     real = polyanya.search

@@ -1,4 +1,4 @@
-"""Paths along the ways of bounds: a notch that was passed by is found, one that is shut is not, and the rest stays."""
+"""Paths along the tracks of bounds: a missed notch is found, a blocked notch is not, and vias are still passed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.support.searches import improve, looked
 
 
 def through(over_m: float, **more: object) -> PlaneSearch:
-    """With a path round the ridge, and the way of a bound through its notch."""
+    """A search with a path around the ridge and the track of a bound through its notch."""
     problem = replace(ridge(over_m, 0.2, 80.0, True), **more)  # type: ignore[arg-type]
     plane = looked(problem)
     below = plane.incumbent
@@ -41,7 +41,7 @@ def test_a_path_leads_through_a_notch_that_was_passed_by() -> None:
     assert below.best is not None
     assert below.cost < STRAIGHT_M
     assert faults(below.problem, Path(below.best)) == []
-    assert not bound_corridor.follow(plane)  # there is no other
+    assert not bound_corridor.follow(plane)  # there is no other notch
 
 
 @pytest.mark.slow
@@ -57,7 +57,7 @@ def test_stops_are_passed_as_before() -> None:
     plane = through(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
     below = plane.incumbent
     assert below.best is not None
-    assert not bound_corridor.follow(plane)  # nobody knows where on the path its stops are
+    assert not bound_corridor.follow(plane)  # the incumbent does not know which of its points are vias
     stop = np.array([500.0, MIDDLE_M + 30.0, 82.0])
     below.pinned = (np.abs(below.best - stop) < 1e-6).all(axis=1)
     below.pinned[[0, -1]] = True

@@ -1,4 +1,4 @@
-"""Slopes that are climbed aslant, because a zone a few metres up lets nobody do it otherwise."""
+"""Contour climbs: a steep slope is climbed aslant, because a zone a few metres above it prevents anything else."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ LID = Zone("lid", Circle(1000.0, 1000.0, 3000.0), Level(10.0 + ROOM_M, "agl"))
 
 
 def hill(east_m: Floats, _north_m: Floats) -> Floats:
-    """Level, then steeper than the climb limit from 700 to 1100 m, then level."""
+    """Ground that is level, steeper than the climb limit from 700 to 1100 m east, then level again."""
     return SLOPE * np.clip(east_m - 700.0, 0.0, 400.0)
 
 
 def under_a_lid() -> Problem:
-    """From west to east, no more than 15 m over the lowest that may be flown."""
+    """A mission from west to east with a zone whose floor is 15 m above the lowest legal altitude."""
     return Problem(
         Airspace(ground(hill), [LID]),
         LIMIT,
@@ -50,7 +50,7 @@ def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
     solution = optimal.plan(p)
     points = solution.path.points
     assert faults(p, solution.path) == []
-    # What is climbed between the foot and the top of the slope takes five times as much way.
+    # The climb from the slope's foot to its top needs a track of five times its height.
     rise_m = SLOPE * 400.0 - ROOM_M
     track_m = float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
     least_m = 1200.0 + 5.0 * rise_m
@@ -69,7 +69,7 @@ def test_the_track_over_the_lattice_has_way_enough_to_climb(objective: str) -> N
 
 
 def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> None:
-    # More room over the zone than under it; a path that dives under it all the same.
+    # There are more altitudes above the zone than below it, but the path goes below it.
     gentle = Limits(10.0, max_amsl_m=400.0, max_climb_deg=45.0, max_descent_deg=45.0)
     zone = Zone("interval", Circle(1000.0, 1000.0, 250.0), Level(40.0, "amsl"), Level(100.0, "amsl"))
     p = Problem(Airspace(ground(0.0), [zone]), gentle, (200.0, 1000.0, 80.0), (1800.0, 1000.0, 80.0))

@@ -1,4 +1,4 @@
-"""Tracks past what they can be flown neither over nor under, nor climb to: with laps, or around."""
+"""Detours past zones that a path cannot pass over or under, or cannot climb over in time: with laps, or around."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tests.support.planner_worlds import Floats, faults, ground
 from tests.support.searches import improve, looked, plane_of
 
 TENTH = Limits(10.0, max_climb_deg=math.degrees(math.atan(0.1)), max_descent_deg=math.degrees(math.atan(0.1)))
-"""Ten metres on for one up."""
+"""Limits with a slope of one in ten, up and down."""
 
 
 def box(west: float, south: float, east: float, north: float, low: float | None, high: float | None) -> Zone:
@@ -40,7 +40,7 @@ def box(west: float, south: float, east: float, north: float, low: float | None,
 
 
 def crossing(*zones: Zone, **changes: object) -> Problem:
-    """From west to east over level ground, 10 m up."""
+    """A mission from west to east over level ground, with both ends 10 m high."""
     p = Problem(Airspace(ground(0.0), zones), TENTH, (200.0, 1000.0, 10.0), (1800.0, 1000.0, 10.0), budget_s=600.0)
     return replace(p, **changes)  # type: ignore[arg-type]
 
@@ -50,7 +50,7 @@ def straight(p: Problem) -> tuple[Floats, NDArray[np.bool_], Floats]:
 
 
 def met(p: Problem, points: Floats) -> list[int]:
-    """Which boxes a path is in, by samples along it."""
+    """Indices of the boxes that a path enters, by samples along it."""
     a, b = points[:-1], points[1:]
     at = (a[:, None] + np.linspace(0.0, 1.0, 400)[:, None] * (b - a)[:, None]).reshape(-1, 3)
     out = []
@@ -65,7 +65,7 @@ def met(p: Problem, points: Floats) -> list[int]:
 
 
 def past(plane: PlaneSearch) -> None:
-    """Past what is in the way, more closely: without the bound, and without the lattice for slopes."""
+    """Run the detour searches, coarse and fine, without bounds and without the lattice for slopes."""
     plane.reach_longest()
     plane.try_below(plane.top_m, fine=True)
     plane.past(PAST, fine=False)
@@ -73,7 +73,7 @@ def past(plane: PlaneSearch) -> None:
 
 
 def found_in(p: Problem, closer: Callable[[PlaneSearch], None] = past) -> Incumbent:
-    """What is found below the ceiling alone."""
+    """The incumbent after the searches below the ceiling alone, checked after each."""
     plane = looked(p)
     below = plane.incumbent
     for again in (False, True):
@@ -87,7 +87,7 @@ def found_in(p: Problem, closer: Callable[[PlaneSearch], None] = past) -> Incumb
 
 
 def climbing_m(run_m: float, rise_m: float) -> float:
-    """Length of a way that rises so much, a tenth at most, over a track so long at least."""
+    """Length of a path that rises by ``rise_m`` at a slope of at most 0.1, over a track of at least ``run_m``."""
     return math.hypot(max(run_m, 10.0 * rise_m), rise_m)
 
 
@@ -95,7 +95,7 @@ def test_a_track_lacks_what_the_climb_takes_beyond_the_way_there() -> None:
     p = crossing(box(500.0, 0.0, 800.0, 2000.0, None, 70.0))
     lack = lacking(p, sampled_track(p, *straight(p)))
     assert isinstance(lack, Lacking)
-    # 60 m up in 300 m, where 600 m would do; down again there is room.
+    # A climb of 60 m has 300 m, but needs 600 m; the descent has enough.
     assert lack.laps_m == pytest.approx(300.0, abs=1.0)
     assert [(why.kind, round(why.s0_m), round(why.s1_m)) for why in lack.steep] == [("climb", 0, 300)]
     assert lack.steep[0].by == pytest.approx(30.0, abs=0.1)
@@ -163,13 +163,13 @@ def test_a_little_way_is_won_by_a_bend_and_not_by_laps() -> None:
     assert found is not None
     track, flown = found
     assert len(track.points) == 4
-    # 51 m up in 500 m: ten metres are missing.
+    # A climb of 51 m has 500 m: 10 m are missing.
     assert 1610.0 <= track.s_m[-1] <= 1612.0
     assert flown.cost < 1620.0
 
 
 def test_laps_lead_over_a_zone_that_cannot_be_passed_otherwise() -> None:
-    # From border to border, and too near to be climbed over straight on.
+    # The box reaches from border to border, and is too close to be climbed over on a straight track.
     p = crossing(box(400.0, 0.0, 600.0, 2000.0, None, 90.0))
     below = found_in(p)
     best = climbing_m(200.0, 80.0) + 200.0 + climbing_m(1200.0, 80.0)
@@ -186,7 +186,7 @@ def test_with_laps_the_bound_rises_and_stays_below_the_best_path() -> None:
 
 @pytest.mark.parametrize(("half_m", "around"), [(150.0, True), (850.0, False)])
 def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_way(half_m: float, around: bool) -> None:
-    """Under its western half there is room; its eastern half stands on a hill, over which one must be high by then."""
+    """A path fits below the zone's western half, but its eastern half stands on a hill, which must be overflown."""
 
     def hill(east: Floats, north: Floats) -> Floats:
         return np.where((east > 500.0) & (east < 700.0) & (np.abs(north - 1000.0) <= half_m), 60.0, 0.0)
@@ -210,7 +210,7 @@ def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_w
 
 @pytest.mark.slow
 def test_laps_are_flown_under_one_zone_to_get_over_another() -> None:
-    # A roof over the start leaves room for laps below it; past it, the wall is too near.
+    # Below the roof over the start there is space for laps; after it, the wall is too close.
     roof, wall = box(100.0, 0.0, 450.0, 2000.0, 80.0, None), box(500.0, 0.0, 600.0, 2000.0, None, 78.0)
     below = found_in(crossing(roof, wall))
     best = climbing_m(300.0, 68.0) + 100.0 + climbing_m(1200.0, 68.0)
@@ -219,7 +219,7 @@ def test_laps_are_flown_under_one_zone_to_get_over_another() -> None:
 
 @pytest.mark.slow
 def test_what_is_shut_for_one_cap_is_looked_at_again_for_the_best_path() -> None:
-    # Around both is shorter than over either, but over one of them, with laps, is shorter than that.
+    # A path around both is shorter than one over both; a path over one of them, with laps, is the shortest.
     p = crossing(box(300.0, 0.0, 400.0, 1900.0, None, 40.0), box(1500.0, 300.0, 1600.0, 2000.0, None, 70.0))
     below = found_in(p)
     assert below.cost <= 1.005 * (climbing_m(100.0, 30.0) + 1100.0 + climbing_m(200.0, 60.0) + 200.0)
@@ -227,7 +227,7 @@ def test_what_is_shut_for_one_cap_is_looked_at_again_for_the_best_path() -> None
 
 @pytest.mark.slow
 def test_a_track_a_hand_too_high_is_looked_at_again_a_hand_lower() -> None:
-    # Over real ground: the ceiling leaves no more than a saddle over the lid of a zone.
+    # On real ground: the ceiling leaves only a saddle open above a zone.
     (p,) = (named.problem for named in problems("main", 201, count=4) if named.name == "main 201/02, 40 zones")
     below = looked(p).incumbent
     assert below.cost < 1.02 * below.bound
@@ -237,7 +237,7 @@ def test_a_zone_over_ground_that_a_track_only_touches_is_no_band() -> None:
     zone = Zone("disc", Circle(1000.0, 1000.0, 100.0), None, Level(50.0, "agl"))
     air = Airspace(ground(0.0), [zone])
     for away in np.linspace(100.0, 100.1, 101):
-        # A leg that begins there and leads away.
+        # A leg that begins at the zone and leads away from it.
         tube = air.tube(np.array([[1000.0, 1000.0 + away], [1000.0, 1800.0]]), TENTH)
         assert all(len(b.top_m) for b in tube.bands)
         assert bool(tube.bands) == (away < 100.0 + 0.05 - 1e-9) or abs(away - 100.05) < 1e-3

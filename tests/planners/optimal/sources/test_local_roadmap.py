@@ -1,4 +1,4 @@
-"""The search among few places in small worlds: what it finds is legal, and near to optima found by other means."""
+"""The local roadmap in small worlds: its paths are legal, and close to optima found by other means."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def in_time() -> bool:
 
 
 def flat(discs: list[tuple[float, float, float]], via: tuple[Via, ...] = (), clearance_m: float = 0.0) -> Case:
-    """Unlimited cylinders (east, north, radius) on a plane without relief, past which the optimum is exact."""
+    """Cylinders of unlimited height (east, north, radius) on flat ground, past which the optimum is known exactly."""
     ground = plane_ground(np.zeros((5, 5)), 500.0, 500.0)
     zones = [Zone(f"zone {k}", Circle(*disc)) for k, disc in enumerate(discs)]
     air = Airspace(Surface(ground.heights, ground.heights, ground.grid), zones)
@@ -73,7 +73,7 @@ def test_a_slit_between_cylinders_is_flown_through(gap_m: float, clearance_m: fl
     north = np.array([960.0, 960.0 + sum(radii) + 2.0 * clearance_m + gap_m])
     north -= 0.5 * (north[0] + radii[0] + north[1] - radii[1]) - 1000.0
     discs = [(1000.0, float(n), r) for n, r in zip(north, radii, strict=True)]
-    # Long ways around: more cylinders on both sides, so near to these that nothing goes between.
+    # Only long tracks lead around: more cylinders on both sides, so close to these that no track fits in between.
     discs += [(1000.0, float(north[0]) - radii[0] - 150.0 + 1.0, 150.0)]
     discs += [(1000.0, float(north[1]) + radii[1] + 150.0 - 1.0, 150.0)]
     case = flat(discs, clearance_m=clearance_m)

@@ -1,4 +1,4 @@
-"""Notches in a ridge that are open by centimetres, where tracks must keep clear of the terrain beside them."""
+"""Notches in a ridge that are open by centimetres, with a track error that includes the terrain beside the track."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from tests.support.planner_worlds import Floats, faults, ground
 SIZE_M = 1800.0
 MIDDLE_M = 0.5 * SIZE_M
 STRAIGHT_M, ROUND_M = 1250.0, 1500.0
-"""A path through the notch is shorter than that, and one round the ridge longer."""
+"""A path through the notch is shorter than the first, and one around the ridge is longer than the second."""
 
 
 def ridge(over_m: float, askew: float, half_m: float, ends: bool) -> Problem:
-    """A ridge across the way with a notch whose highest place a ceiling leaves open by so much; ``askew``: how far it
-    runs aside, in metres a metre; ``half_m``: half the notch's width; ``ends``: whether it ends, far from there."""
+    """A mission across a ridge with a notch that the ceiling leaves open by ``over_m``.
+
+    ``askew``: by how much the ridge leans, metres east per metre north; ``half_m``: half the notch's width; ``ends``:
+    whether the ridge ends, far from the notch.
+    """
 
     def height(east: Floats, north: Floats) -> Floats:
         across = np.abs(east - MIDDLE_M - askew * (north - MIDDLE_M))
@@ -29,7 +32,7 @@ def ridge(over_m: float, askew: float, half_m: float, ends: bool) -> Problem:
 
     airspace = Airspace(ground(height, size_m=SIZE_M, step_m=30.0))
     limits = Limits(min_agl_m=60.0, track_error_m=3.0)
-    # Of the places that a track crosses at, whatever its way, the lowest; of those the highest.
+    # The lowest floor at each easting, and the highest of those: no track through the notch can stay lower.
     east, north = np.meshgrid(MIDDLE_M + np.arange(-15.0, 15.0, 0.25), MIDDLE_M + np.arange(-40.0, 50.0, 0.25))
     open_m = float(airspace.floor_amsl(east.ravel(), north.ravel(), limits).reshape(east.shape).min(axis=0).max())
     limits = Limits(min_agl_m=60.0, track_error_m=3.0, max_amsl_m=open_m + over_m)
