@@ -147,7 +147,7 @@ def without_stage(tree: Tree) -> Tree:
     return {name: c for name, c in tree.items() if name.partition("/")[0] != STAGE}
 
 
-# -- what must hold ---------------------------------------------------------------------------------------------------
+# -- requirements -----------------------------------------------------------------------------------------------------
 
 
 def mixtures(tree: Tree) -> list[str]:

@@ -9,8 +9,8 @@ recordings. The results are compared with what the vehicles really received and 
 - *false verified*: reported as verified, but at no time of the read-back on board;
 - *misdelivered*: an announcement, an item or a clearing was sent to a vehicle that is not the checked one, or that had
   reported to be elsewhere or (announcements, clearings) armed;
-- *untold*: exit 0 though the vehicle had reported to be armed or moved before the look after the read-back ended, or a
-  rival was heard;
+- *untold*: exit 0 although the vehicle had reported, by the end of the last look after the read-back, to be armed or
+  moved, or although a rival was heard;
 - *hang*: longer than the timeouts allow; *crash*: exit 70, or an exception.
 """
 

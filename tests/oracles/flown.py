@@ -169,7 +169,7 @@ class Rules:
         )  # fmt: skip
 
 
-# ── files, as the autopilot keeps them ───────────────────────────────────────────────────────────────────────────
+# ── files, as the autopilot stores them ──────────────────────────────────────────────────────────────────────────
 
 
 @dataclass

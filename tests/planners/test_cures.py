@@ -167,7 +167,7 @@ def test_a_ceiling_is_reported_close_to_the_lowest_that_does() -> None:
     assert 133.3 <= value <= 137.0
 
 
-# -- the bounds of what is tried -----------------------------------------------------------------------------------
+# -- limits of the trials ------------------------------------------------------------------------------------------
 
 
 @dataclass

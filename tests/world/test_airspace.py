@@ -373,7 +373,7 @@ def test_thousands_of_zones_are_found_through_the_lattice_as_one_by_one() -> Non
     judged(Airspace(surface, zones), legs, limits)
 
 
-# --- the whole -------------------------------------------------------------------------------------------------------
+# --- the whole check -------------------------------------------------------------------------------------------------
 
 
 def test_clear_says_what_examine_says_of_ten_thousand_legs_over_mountains() -> None:

@@ -270,7 +270,7 @@ def test_only_the_part_that_the_box_needs_is_read(tmp_path: Path) -> None:
     assert 34 + 6 <= cols <= 46
 
 
-# -- what is unknown ----------------------------------------------------------------------------------------------
+# -- unknown ground -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -525,7 +525,7 @@ def test_a_geoid_grid_beside_geoid_heights_is_refused(tmp_path: Path) -> None:
     assert "remove it" in str(refusal(degrees_tif(tmp_path / "a.tif"), geoid_grid=gtx(tmp_path / "g.gtx", -30.0)))
 
 
-# -- what is refused ----------------------------------------------------------------------------------------------
+# -- refused files and grids --------------------------------------------------------------------------------------
 
 
 def test_rasters_that_are_not_north_up_are_refused_with_the_cure(tmp_path: Path) -> None:
@@ -767,7 +767,7 @@ def test_a_terrain_that_is_two_or_none_is_refused(keys: dict[str, Any], words: s
         open_terrain(TerrainSpec(**keys), where="m")
 
 
-# -- what stands on the ground ------------------------------------------------------------------------------------
+# -- obstacles on the ground --------------------------------------------------------------------------------------
 
 
 def test_an_obstacle_height_stands_on_all_ground(tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_out_of_time_the_bound_holds_and_nothing_more_is_asked() -> None:
             assert len(caps.asked) <= some
 
 
-# --- what no short track avoids -----------------------------------------------------------------------------------
+# --- altitudes that no short track avoids -------------------------------------------------------------------------
 
 
 @given(st.integers(0, 2**31))

@@ -64,7 +64,7 @@ def box(west: float, south: float, east: float, north: float) -> Zone:
     return Zone("box", Polygon(np.array([[west, south], [east, south], [east, north], [west, north]])))
 
 
-# -- the world that was given ------------------------------------------------------------------------------------------
+# -- plans over several windows ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -257,7 +257,7 @@ def test_a_valley_is_shut_in_by_ground_where_it_does_not_reach_the_border() -> N
     assert not enclosed(over(cut))
 
 
-# -- the loop over windows, with a visibility graph for a planner ------------------------------------------------------
+# -- the loop over windows, with a visibility graph as the planner -----------------------------------------------------
 
 
 WORLD_M = 24_000.0

@@ -30,7 +30,7 @@ CELL_M = 10.0
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
 
-# --- what is carried from one interval to the next ------------------------------------------------------------------
+# --- altitudes carried from one interval to the next ----------------------------------------------------------------
 
 
 def random_storeys(rng: np.random.Generator, rows: int, cols: int) -> AltitudeIntervals:
@@ -87,7 +87,7 @@ def test_what_is_carried_on_is_the_least_of_all_ways(seed: int) -> None:
     np.testing.assert_array_equal(out, wanted)
 
 
-# --- no track that there is is called too short -------------------------------------------------------------------
+# --- no existing track is excluded as too short -------------------------------------------------------------------
 
 
 def shortest(
@@ -185,7 +185,7 @@ def test_climbing_out_from_under_a_storey_takes_its_length(free: str, limited: s
     assert there.away_m[41] >= 400.0 + lap_m - 50.0
 
 
-# --- what zones leave ---------------------------------------------------------------------------------------------
+# --- intervals that zones leave free ------------------------------------------------------------------------------
 
 
 def world(zones: list[Zone], heights: Floats, limits: Limits, start: Place, goal: Place) -> Leg:
