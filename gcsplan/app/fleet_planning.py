@@ -12,14 +12,13 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.app.climb_out import circling_m, climb_out_and_glide
 from gcsplan.app.detours import Detours
 from gcsplan.app.gate import SLACK_S, GateTime, gated
 from gcsplan.app.model import Brief, FleetPlan, VehiclePlan
 from gcsplan.app.planning import rebuilt
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.motion import TimedPath
@@ -27,8 +26,6 @@ from gcsplan.fleet.separation import Conflict, Place, Rules, separation
 from gcsplan.fleet.timing import Course, Route, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
 from gcsplan.world.world import World
-
-Ints = NDArray[np.intp]
 
 TERRAIN_STEP_M = 25.0
 LATER_S = 600.0
@@ -150,7 +147,7 @@ def _pace(points: Floats, home_deg: tuple[float, float], world: World) -> Floats
     return np.where(own > 0.01, true / np.maximum(own, 0.01), 1.0)
 
 
-def _over_ground(points: Floats, holds: Floats, numbers: Ints, world: World) -> tuple[Floats, Floats, Ints]:
+def _over_ground(points: Floats, holds: Floats, numbers: Indices, world: World) -> tuple[Floats, Floats, Indices]:
     """Cut the legs so that each keeps its height above ground, interpolated between the leg's ends."""
     ground_at = world.airspace.surface.ground_at
     agl = points[:, 2] - ground_at(points[:, 0], points[:, 1])

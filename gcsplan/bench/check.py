@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Indices
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.frame import Frame
 from gcsplan.world.limits import Limits
@@ -131,7 +131,7 @@ def _legs(rng: np.random.Generator, surface: Surface, count: int) -> Legs:
     )
 
 
-def _part(legs: Legs, which: NDArray[np.intp]) -> Legs:
+def _part(legs: Legs, which: Indices) -> Legs:
     return Legs(
         legs.start[which], legs.end[which], legs.column[which], legs.track_error_m[which], legs.altitude_error_m[which]
     )

@@ -15,9 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.world.zones import Circle, Zone
 
 SEGMENTS = 24
@@ -128,7 +127,7 @@ def _convex(ring: Floats) -> tuple[Floats, Floats, Floats]:
     return ring[convex], before[convex], after[convex]
 
 
-def _touches(origin: Floats, nodes: Floats, before: Floats, after: Floats) -> NDArray[np.bool_]:
+def _touches(origin: Floats, nodes: Floats, before: Floats, after: Floats) -> Bools:
     """(N,) whether the line from ``origin`` to each corner has both neighbours of the corner on the same side."""
     d = nodes - origin
     u, v = before - nodes, after - nodes
@@ -137,7 +136,7 @@ def _touches(origin: Floats, nodes: Floats, before: Floats, after: Floats) -> ND
     return np.asarray(one * other >= -1e-9 * np.maximum((d**2).sum(axis=1), 1.0))
 
 
-def _touches_at(nodes: Floats, corner: Floats, before: Floats, after: Floats, free: bool) -> NDArray[np.bool_]:
+def _touches_at(nodes: Floats, corner: Floats, before: Floats, after: Floats, free: bool) -> Bools:
     """(N,) as `_touches`, for the corner that the lines leave; ``free``: it is a place, where any line may turn."""
     if free:
         return np.ones(len(nodes), np.bool_)

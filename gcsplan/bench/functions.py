@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.bench.functions_printed import PRINTED, RUNS, WOLVES, Printed
 from gcsplan.errors import InputError
 from gcsplan.export.outdir import write_whole
@@ -219,7 +219,7 @@ def _work(job: _Job) -> list[tuple[float, int]]:
     return found
 
 
-def _row(key: tuple[str, str, str], costs: NDArray[np.float64], evaluations: int) -> dict[str, Any]:
+def _row(key: tuple[str, str, str], costs: Floats, evaluations: int) -> dict[str, Any]:
     function, algorithm, setting = key
     printed = PRINTED.get((function, algorithm))
     return {
@@ -241,7 +241,7 @@ def _fields(printed: Printed | None) -> dict[str, float | None]:
 
 
 def _claims(
-    costs: Mapping[tuple[str, str, str], NDArray[np.float64]],
+    costs: Mapping[tuple[str, str, str], Floats],
     functions: Sequence[str],
     algorithms: Sequence[str],
     runs: int,
@@ -282,7 +282,7 @@ def _claims(
     return out
 
 
-def _signed_rank(ours: NDArray[np.float64], theirs: NDArray[np.float64], *, two_sided: bool) -> float:
+def _signed_rank(ours: Floats, theirs: Floats, *, two_sided: bool) -> float:
     """p of "no difference" against "ours is less", or "they differ"; 1 if all pairs are equal."""
     from scipy.stats import wilcoxon
 

@@ -25,8 +25,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.bench.papers_scenarios import SCENARIOS, Contender, Set, prepare, settings_of
 from gcsplan.errors import GcsplanError, InputError, NoMission
 from gcsplan.planners.problem import Problem
@@ -261,7 +261,7 @@ def _nearest_m(found: Found, problem: Problem) -> float | None:
     zones = [z.shape for z in problem.airspace.zones if isinstance(z.shape, Circle)]
     if not zones:
         return None
-    wall: list[NDArray[np.float64]] = [
+    wall: list[Floats] = [
         np.hypot(found.curve[:, 0] - c.east_m, found.curve[:, 1] - c.north_m) - c.radius_m for c in zones
     ]
     return float(np.maximum(np.min(wall, axis=0), 0.0).mean())

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Legs
 
@@ -85,7 +84,7 @@ def passes(problem: Problem, points: object) -> bool:
     return not problem.airspace.examine(legs, problem.limits).violations
 
 
-def flown(points: Floats, radius_m: float) -> tuple[Floats, NDArray[np.bool_]] | None:
+def flown(points: Floats, radius_m: float) -> tuple[Floats, Bools] | None:
     """The track that a fixed wing flies along way points (N, 3): legs, and arcs as chords within `SAGITTA_M`.
 
     Returns its points (M, 3), none within `SAME_M` of the one before, and (M - 1,) whether a chord leads to the next.
@@ -122,7 +121,7 @@ def flown(points: Floats, radius_m: float) -> tuple[Floats, NDArray[np.bool_]] |
     return _distinct(np.column_stack([flat, np.interp(s, s[middle], points[:, 2])]), chord)
 
 
-def _distinct(track: Floats, chord: Sequence[bool]) -> tuple[Floats, NDArray[np.bool_]]:
+def _distinct(track: Floats, chord: Sequence[bool]) -> tuple[Floats, Bools]:
     """The track without points within `SAME_M` of the last one kept; the first and the last point always stay.
 
     ``chord`` states for each point whether a chord leads to it. Distances are in space, so that no climb on the spot is

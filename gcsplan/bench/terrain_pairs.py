@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.mission_file.world import make_box
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame, centre_of
@@ -86,9 +85,7 @@ class Cells:
         size = surface.grid.metres_per_cell(*surface.grid.centre)
         return cls(highest, e, n, 0.51 * float(np.hypot(*size)))
 
-    def joined(
-        self, surface: Surface, a: tuple[float, float], b: tuple[float, float], open_: NDArray[np.bool_]
-    ) -> bool:
+    def joined(self, surface: Surface, a: tuple[float, float], b: tuple[float, float], open_: Bools) -> bool:
         """Whether ``open_`` cells that share edges lead from the cell of ``a`` to that of ``b``."""
         from scipy.ndimage import label
 
@@ -109,7 +106,7 @@ class Cells:
             low, high = (low, middle) if self.joined(surface, a, b, self.floor_m <= middle) else (middle, high)
         return high
 
-    def outside(self, zones: tuple[Zone, ...] | list[Zone], clearance_m: float = 0.0) -> NDArray[np.bool_]:
+    def outside(self, zones: tuple[Zone, ...] | list[Zone], clearance_m: float = 0.0) -> Bools:
         """(rows, cols) the cells that no zone of unlimited height touches."""
         free = np.ones(self.floor_m.shape, np.bool_)
         for zone in zones:

@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.bench.terrain_pairs import (
     ABOVE_JOIN_M,
     MIN_AGL_M,
@@ -240,7 +240,7 @@ def _refined(surface: Surface) -> Surface:
 
 
 @cache
-def _refined_ground(nodes: bytes, shape: tuple[int, int]) -> NDArray[np.float64]:
+def _refined_ground(nodes: bytes, shape: tuple[int, int]) -> Floats:
     from scipy.ndimage import zoom
 
     ground = np.frombuffer(nodes).reshape(shape)

@@ -11,8 +11,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Indices
 from gcsplan.world.airspace import Airspace, Legs, Violation
 from gcsplan.world.limits import Limits
 
@@ -34,7 +34,7 @@ def rounded_up(by: float) -> float:
     return round(math.ceil(by * 100.0 - 1e-7) / 100.0, 2) if math.isfinite(by) and by < 1e9 else by
 
 
-def enough(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> Violation:
+def enough(v: Violation, broken: Indices, legs: Legs, limits: Limits, air: Airspace) -> Violation:
     """``v`` with a ``by`` in hundredths that is enough for all of ``broken``, the legs that break the same limit."""
     if v.kind == "coverage":
         return v
@@ -43,7 +43,7 @@ def enough(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, a
     return replace(v, by=by, value=v.limit - by if below else v.limit + by)
 
 
-def _lift(v: Violation, broken: NDArray[np.intp], legs: Legs, limits: Limits, air: Airspace) -> float:
+def _lift(v: Violation, broken: Indices, legs: Legs, limits: Limits, air: Airspace) -> float:
     """The smallest sufficient move found by trial, in metres: up, or down under a ceiling."""
     alone = Limits(
         min_agl_m=limits.min_agl_m if v.kind == "min_agl" else -1e9,

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.check.stretch import Stretch
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Legs, Violation
@@ -62,7 +61,7 @@ margin."""
 
 
 def nearest_misses(
-    stretches: Sequence[Stretch], legs: Legs, owner: NDArray[np.intp], report: LegReport, vehicle: Vehicle, world: World
+    stretches: Sequence[Stretch], legs: Legs, owner: Indices, report: LegReport, vehicle: Vehicle, world: World
 ) -> tuple[Miss, ...]:
     """Return a `Miss` for each limit that the vehicle has, and for the `MOST_ZONES` zones that it comes nearest to.
 
@@ -100,9 +99,7 @@ def nearest_misses(
     return tuple(found)
 
 
-def _heights(
-    stretches: Sequence[Stretch], legs: Legs, owner: NDArray[np.intp], vehicle: Vehicle, world: World
-) -> list[Miss]:
+def _heights(stretches: Sequence[Stretch], legs: Legs, owner: Indices, vehicle: Vehicle, world: World) -> list[Miss]:
     limits = vehicle.limits
     lifted = replace(legs, altitude_error_m=legs.altitude_error_m + LIFT_M)
     worst: dict[str, Violation] = {}

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.check.stretch import Stretch
 from gcsplan.world.airspace import Kind, LegReport, Legs, Violation
 from gcsplan.world.limits import Limits
@@ -43,7 +42,7 @@ class PlaneLegs:
     """
 
     legs: Legs
-    owner: NDArray[np.intp]
+    owner: Indices
     steep: Floats
 
 

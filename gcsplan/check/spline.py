@@ -13,12 +13,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.geodesy import degree_m, offset_m
 from gcsplan.check.stretch import Place
 
-Vector = NDArray[np.float64]
 LONGEST = 4.0  # SPLINE_FACTOR
 BULGE_M = 0.25
 MOST_PIECES = 200
@@ -27,7 +26,7 @@ LOOKS, BESIDE, STILL = 16, 1e-5, 1e-6
 fastest speed below which a curve counts as standing still."""
 
 
-def towards(a: Place, b: Place) -> Vector:
+def towards(a: Place, b: Place) -> Floats:
     """The vector (3,) from ``a`` to ``b``: east, north, up, metres."""
     return np.array([*offset_m(a, b), b[2] - a[2]])
 
@@ -35,7 +34,7 @@ def towards(a: Place, b: Place) -> Vector:
 Slopes = list[tuple[float, float]]
 
 
-def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[list[Place], float, Slopes]:
+def chords(start: Place, end: Place, leaves: Floats, arrives: Floats) -> tuple[list[Place], float, Slopes]:
     """The curve's points from ``start`` to ``end`` (both exact), its bulge beyond the chords, m, and its slopes.
 
     ``leaves``, ``arrives``: (3,) directions with their lengths, metres. The slopes are, for each chord, the steepest
@@ -57,7 +56,7 @@ def chords(start: Place, end: Place, leaves: Vector, arrives: Vector) -> tuple[l
     return [start, *inner, end], bend / (8.0 * pieces**2), _slopes(leaves, square, cube, pieces)
 
 
-def _slopes(leaves: Vector, square: Vector, cube: Vector, pieces: int) -> Slopes:
+def _slopes(leaves: Floats, square: Floats, cube: Floats, pieces: int) -> Slopes:
     """Steepest slopes of each piece, up and down: at its ends, at the slope's extremes, and at samples between.
 
     With the speed v(t), a quadratic in each direction, the slope is v_up / sqrt(r), r = v_east² + v_north². Its

@@ -187,7 +187,7 @@ def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
 
 
 def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | None = None) -> None:
-    """Print when to start each vehicle of a fleet by hand: gcsplan never arms or starts one."""
+    """Print when to start each vehicle of a fleet by hand: nothing is armed or started here."""
     if plan.fleet is None or len(plan.fleet.slots) < 2:
         return
     ready = {d.vehicle for d in results if d.verified and not d.code}

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 
 PARALLEL = 1e-13
 """Part of |v|²|u|² below which two velocities count as parallel: the minimum then also lies on an edge."""
@@ -22,7 +21,7 @@ class Pieces:
     places: Floats
     velocity: Floats
 
-    def take(self, rows: NDArray[np.intp]) -> Pieces:
+    def take(self, rows: Indices) -> Pieces:
         """The pieces of ``rows``, which may repeat."""
         return Pieces(self.from_s[rows], self.to_s[rows], self.places[rows], self.velocity[rows])
 
@@ -59,7 +58,7 @@ def nearest(a: Pieces, b: Pieces, apart_s: float = 0.0) -> tuple[Floats, Floats,
     best = np.full(len(d), np.inf)
     best_x, best_y = np.zeros(len(d)), np.zeros(len(d))
 
-    def offer(x: Floats, y: Floats, square: Floats, legal: NDArray[np.bool_]) -> None:
+    def offer(x: Floats, y: Floats, square: Floats, legal: Bools) -> None:
         better = legal & (square < best)
         best[better], best_x[better], best_y[better] = square[better], x[better], y[better]
 
@@ -125,7 +124,7 @@ def shifts(a: Pieces, b: Pieces, needed_m: float) -> tuple[Floats, Floats]:
     behind = b.from_s - a.from_s  # t2 - t1 = y - x + behind
     low, high = np.full(len(d), np.inf), np.full(len(d), -np.inf)
 
-    def offer(x: Floats, y: Floats, legal: NDArray[np.bool_]) -> None:
+    def offer(x: Floats, y: Floats, legal: Bools) -> None:
         shift = y - x + behind
         np.minimum(low, shift, out=low, where=legal)
         np.maximum(high, shift, out=high, where=legal)

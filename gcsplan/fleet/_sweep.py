@@ -10,13 +10,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet._nearest import Pieces, nearest
 from gcsplan.fleet.motion import TimedPath
-
-Ints = NDArray[np.intp]
 
 FOREVER_S = 1e9
 """End time of the last piece of a vehicle that ends in the air, s."""
@@ -46,14 +43,14 @@ class Fleet:
     window_s: float
     edges_s: Floats
     pieces: Pieces
-    offset: Ints
+    offset: Indices
     nodes: Floats
     stray: Floats
     fastest: Floats
     begins: Floats
     ends: Floats
-    first: Ints
-    last: Ints
+    first: Indices
+    last: Indices
 
     @property
     def horizon_s(self) -> float:
@@ -91,7 +88,7 @@ class Fleet:
         ends = np.array([FOREVER_S if p.ends_in_air else p.end_s for p in paths])
         return cls(tuple(paths), window_s, edges, pieces, offset, nodes, stray, fastest, begins, ends, first, last)
 
-    def bounds(self, i: Ints, j: Ints) -> tuple[Floats, Floats]:
+    def bounds(self, i: Indices, j: Indices) -> tuple[Floats, Floats]:
         """For pairs (M,): a lower bound in each slice (M, K), and the least distance at the slices' ends (M,), metres.
 
         Both are inf where the two are not in the air together.
@@ -119,7 +116,7 @@ class Fleet:
         seen = np.where(known, square, np.inf).min(axis=1)
         return np.where(shared & (begin <= end + 2.0 * w)[:, None], bound, np.inf), np.sqrt(seen)
 
-    def rows(self, i: Ints, j: Ints, k: Ints) -> Iterator[tuple[Ints, Ints, Ints]]:
+    def rows(self, i: Indices, j: Indices, k: Indices) -> Iterator[tuple[Indices, Indices, Indices]]:
         """All pairs of overlapping pieces of vehicles ``i`` and ``j`` in slices ``k`` (n,), in blocks.
 
         Each block has the row numbers among the n, and the numbers of the two pieces.
@@ -139,7 +136,7 @@ class Fleet:
             yield of[keep], a[keep], b[keep]
             start = stop
 
-    def least(self, i: Ints, j: Ints, cut_m: float = np.inf) -> Least:
+    def least(self, i: Indices, j: Indices, cut_m: float = np.inf) -> Least:
         """The least distance of pairs (M,), exact wherever it is below ``cut_m``."""
         out = Least.none(len(i))
         w = 2.0 * self.window_s
@@ -160,7 +157,7 @@ class Fleet:
             self._look(a, b, more.astype(np.intp), where.astype(np.intp), some, out)
         return out
 
-    def _look(self, i: Ints, j: Ints, pair: Ints, k: Ints, numbers: Ints, out: Least) -> None:
+    def _look(self, i: Indices, j: Indices, pair: Indices, k: Indices, numbers: Indices, out: Least) -> None:
         for of, a, b in self.rows(i[pair], j[pair], k):
             if not len(of):
                 continue
@@ -188,7 +185,7 @@ class Least:
     distance_m: Floats
     first_s: Floats
     second_s: Floats
-    pieces: Ints
+    pieces: Indices
 
     @classmethod
     def none(cls, count: int) -> Least:
@@ -207,7 +204,7 @@ def pieces_of(path: TimedPath) -> Pieces:
     return Pieces(times[:-1], times[1:], points[:-1], velocity)
 
 
-def overlap_of(pieces: Pieces, a: Ints, b: Ints, apart_s: float) -> NDArray[np.bool_]:
+def overlap_of(pieces: Pieces, a: Indices, b: Indices, apart_s: float) -> Bools:
     """Whether two pieces each overlap in time, by their times alone."""
     return np.asarray((pieces.from_s[a] <= pieces.to_s[b] + apart_s) & (pieces.from_s[b] <= pieces.to_s[a] + apart_s))
 
@@ -240,7 +237,7 @@ def _strays(path: TimedPath, edges: Floats) -> tuple[Floats, Floats]:
     return nodes, stray
 
 
-def _largest(values: Floats, low: Ints, high: Ints) -> Floats:
+def _largest(values: Floats, low: Indices, high: Indices) -> Floats:
     """The largest of ``values[low : high + 1]`` for each pair of ``low`` and ``high`` (K,)."""
     ends = np.empty(2 * len(low), dtype=np.intp)
     ends[0::2], ends[1::2] = low, high + 1

@@ -12,15 +12,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet._nearest import Pieces, shifts
 from gcsplan.fleet._sweep import pieces_of
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Rules
-
-Ints = NDArray[np.intp]
 
 GROUP, LEVELS = 6, 3
 """Boxes per group, and levels of groups: groups that do not touch are skipped as a whole."""
@@ -76,7 +73,7 @@ class Boxes:
         return Boxes(self.low - less, self.high + more)
 
 
-def _touching(a: Boxes, i: Ints, b: Boxes, j: Ints) -> tuple[Ints, Ints]:
+def _touching(a: Boxes, i: Indices, b: Boxes, j: Indices) -> tuple[Indices, Indices]:
     """Of the pairs ``i`` of ``a`` with ``j`` of ``b`` (n,), those whose boxes touch."""
     for axis in (3, 0, 1, 2):
         touch = np.flatnonzero((b.high[j, axis] >= a.low[i, axis]) & (b.low[j, axis] <= a.high[i, axis]))
@@ -90,7 +87,7 @@ class Spans:
 
     low: Floats
     high: Floats
-    who: Ints
+    who: Indices
 
     @classmethod
     def none(cls) -> Spans:
@@ -105,7 +102,7 @@ class Spans:
             np.concatenate([self.who, other.who]),
         )
 
-    def holds(self, shift_s: float) -> NDArray[np.bool_]:
+    def holds(self, shift_s: float) -> Bools:
         """(n,) whether each span forbids a shift."""
         return np.asarray((self.low < shift_s) & (shift_s < self.high))
 
@@ -169,7 +166,7 @@ class Taken:
 
     def _in_the_air(
         self, path: TimedPath, low_s: float, high_s: float, needed_m: float
-    ) -> list[tuple[Floats, Floats, Ints]]:
+    ) -> list[tuple[Floats, Floats, Indices]]:
         if not self.paths:
             return []
         near, window = needed_m, 2.0 * self.rules.window_s
@@ -181,7 +178,9 @@ class Taken:
         a, b = _touching(levels[0], mine.ravel(), self._levels[0], theirs.ravel())
         return [self._met(own, i, j, needed_m) for i, j in self._descend(levels, a, b, 1)]
 
-    def _descend(self, levels: Sequence[Boxes], a: Ints, b: Ints, level: int) -> Iterator[tuple[Ints, Ints]]:
+    def _descend(
+        self, levels: Sequence[Boxes], a: Indices, b: Indices, level: int
+    ) -> Iterator[tuple[Indices, Indices]]:
         """Pairs of pieces whose boxes touch, in blocks, within the pairs of groups (n,) of the level above."""
         step = np.arange(GROUP)
         for start in range(0, len(a), BLOCK):
@@ -195,14 +194,14 @@ class Taken:
             else:
                 yield from self._descend(levels, i, j, level + 1)
 
-    def _met(self, own: Pieces, a: Ints, box: Ints, needed_m: float) -> tuple[Floats, Floats, Ints]:
+    def _met(self, own: Pieces, a: Indices, box: Indices, needed_m: float) -> tuple[Floats, Floats, Indices]:
         who = np.searchsorted(self._first_box, box, side="right") - 1
         b = box - np.asarray(self._first_box, dtype=np.intp)[who] + np.asarray(self._first, dtype=np.intp)[who]
         low, high = shifts(own.take(a), self._pieces.take(b), needed_m)
         met = low <= high
         return low[met], high[met], who[met]
 
-    def _on_the_pads(self, path: TimedPath, needed_m: float) -> tuple[Floats, Floats, Ints]:
+    def _on_the_pads(self, path: TimedPath, needed_m: float) -> tuple[Floats, Floats, Indices]:
         """Spans of shifts in which one vehicle takes off or lands beside another that stands on the ground."""
         if not self.paths:
             return np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp)
@@ -210,9 +209,9 @@ class Taken:
         begins, ends, lands = self._pads[:, 4], self._pads[:, 5], self._pads[:, 6] > 0.0
         mine = self._lands(path)
         clear = self.rules.pad_clear_s
-        rows: list[tuple[NDArray[np.bool_], Floats, Floats]] = []
+        rows: list[tuple[Bools, Floats, Floats]] = []
 
-        def near(place: Floats, others: Floats) -> NDArray[np.bool_]:
+        def near(place: Floats, others: Floats) -> Bools:
             return np.asarray(np.hypot(others[:, 0] - place[0], others[:, 1] - place[1]) < needed_m)
 
         never = np.full(len(begins), math.inf)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,7 +26,7 @@ class TimedPath:
     points: Floats
     arrive_s: float
     ends_in_air: bool = False
-    pieces: NDArray[np.intp] | None = None
+    pieces: Indices | None = None
 
     def __post_init__(self) -> None:
         if self.times_s.ndim != 1 or self.points.shape != (len(self.times_s), 3) or len(self.times_s) < 2:

@@ -11,11 +11,9 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 
-Ints = NDArray[np.intp]
 Clock = Literal["first", "fleet"]
 Cost = Callable[[Floats], Floats]
 
@@ -57,7 +55,7 @@ def earliest_first(fast_s: Floats, latest_s: Floats, interval_s: float) -> float
 
 def best_order(
     fast_s: Floats, latest_s: Floats, interval_s: float, clock: Clock, first_s: float | None, cost: Cost | None = None
-) -> Ints | None:
+) -> Indices | None:
     """The order that finishes earliest, and among those with the same starting time the cheapest; None if none works.
 
     ``cost`` returns joules (n, n) of each vehicle (row) for arriving at the times (n,) that are passed to it. Exact for
@@ -91,11 +89,11 @@ def best_order(
     return None
 
 
-def _rows(cost: Cost, rows: Ints) -> Cost:
+def _rows(cost: Cost, rows: Indices) -> Cost:
     return lambda times: cost(times)[rows]
 
 
-def _assigned(fast_s: Floats, latest_s: Floats, times: Floats, cost: Cost | None, by_speed: Ints) -> Ints | None:
+def _assigned(fast_s: Floats, latest_s: Floats, times: Floats, cost: Cost | None, by_speed: Indices) -> Indices | None:
     """The vehicle for each of the ``times``, at the least cost; None if the times cannot all be kept."""
     n = len(times)
     if n == 0:

@@ -13,9 +13,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.fleet._nearest import below, nearest
 from gcsplan.fleet._sweep import Fleet, Least
@@ -141,8 +140,8 @@ class Pairs:
     """Pairs ``i``, ``j`` (M,) of a fleet's vehicles, and the least distance of each."""
 
     fleet: Fleet
-    i: NDArray[np.intp]
-    j: NDArray[np.intp]
+    i: Indices
+    j: Indices
     least: Least
 
     def encounter(self, a: int, b: int) -> Encounter | None:
@@ -247,7 +246,7 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
     landing = np.array([not p.ends_in_air and p.name not in rules.leaving for p in paths])
     needed, apart = rules.needed_m - TOLERANCE_M, 2.0 * rules.window_s
 
-    def near(a: Floats, b: Floats) -> NDArray[np.bool_]:
+    def near(a: Floats, b: Floats) -> Bools:
         d = a[:, None, :2] - b[None, :, :2]
         out = np.asarray(np.hypot(d[..., 0], d[..., 1]) < needed)
         np.fill_diagonal(out, False)

@@ -14,12 +14,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.vehicle import Vehicle
-
-Ints = NDArray[np.intp]
 
 CUT_M = 2.0
 """Distance between a way point and its rounded corner, m: 1 to 2 m were measured on a real ArduCopter at 10 m/s."""
@@ -56,7 +53,7 @@ class Stretch:
     radius_m: Floats
     turn: Floats
     heading: Floats
-    owner: Ints
+    owner: Indices
     accel_m_s2: float
     stops: bool = True
 
@@ -95,7 +92,7 @@ class Stretch:
         """Seconds for the stretch at a cruise speed; never rises with the speed."""
         return float(self._phases(cruise_m_s)[3].sum())
 
-    def motion(self, cruise_m_s: float, error_m: float = POSITION_ERROR_M) -> tuple[Floats, Floats, Ints]:
+    def motion(self, cruise_m_s: float, error_m: float = POSITION_ERROR_M) -> tuple[Floats, Floats, Indices]:
         """Times (M,) since the stretch began, places (M, 3) and legs (M,) at the end of each of M straight pieces.
 
         Straight motion at constant speed between them is at most ``error_m`` away from the true motion: with
@@ -134,7 +131,7 @@ class Stretch:
         straight = np.hypot(self.end[:, 0] - self.start[:, 0], self.end[:, 1] - self.start[:, 1])
         return np.where(self.radius_m > 0.0, self.radius_m * np.abs(self.turn), straight)
 
-    def _places(self, segment: Ints, share: Floats) -> Floats:
+    def _places(self, segment: Indices, share: Floats) -> Floats:
         """(M, 3) points at the part ``share`` of ``segment``."""
         start, end = self.start[segment], self.end[segment]
         places = start + (end - start) * share[:, None]
@@ -151,7 +148,7 @@ class Stretch:
 
 
 def legs(
-    points: Floats, vehicle: Vehicle, owner: Ints, leg_m: Floats | None = None, pace: Floats | None = None
+    points: Floats, vehicle: Vehicle, owner: Indices, leg_m: Floats | None = None, pace: Floats | None = None
 ) -> Stretch | None:
     """The stretch through ``points`` (N, 3) without a stop, its corners rounded; None if nothing moves.
 

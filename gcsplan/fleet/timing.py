@@ -15,16 +15,14 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column, legs
 from gcsplan.vehicle import Vehicle
 
 __all__ = ["POSITION_ERROR_M", "Course", "End", "Route", "motion_error_m", "speed_for"]
 
-Ints = NDArray[np.intp]
 End = Literal["land", "loiter", "rtl", "none"]
 
 LAND_SLOWLY_M = 10.0
@@ -57,7 +55,7 @@ class Route:
     end: End = "land"
     rtl_amsl_m: float | None = None
     holds_s: Floats | None = None
-    items: Ints | None = None
+    items: Indices | None = None
     climb_out: Floats | None = None
     glide: Floats | None = None
     pace: Floats | None = None
@@ -212,7 +210,7 @@ class _Motion:
         self.now_s = depart_s
         self.times = [np.array([depart_s])]
         self.points = [start[None, :]]
-        self.legs: list[Ints] = []
+        self.legs: list[Indices] = []
 
     def go(self, stretch: Stretch, speed_m_s: float, error_m: float) -> None:
         times, points, owner = stretch.motion(speed_m_s, error_m)

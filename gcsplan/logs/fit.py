@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.logs.flight_log import FlightLog
 
@@ -233,7 +232,7 @@ def _energy_until(t: Floats, watts: Floats, at: Floats) -> Floats:
     return np.asarray(total[k] + 0.5 * (watts[k] + np.interp(at, t, watts)) * (at - t[k]))
 
 
-def _paused(t: Floats, at: Floats) -> NDArray[np.bool_]:
+def _paused(t: Floats, at: Floats) -> Bools:
     """(N,) whether a pause of the readings reaches into each step between neighbours of ``at``."""
     long = np.flatnonzero(np.diff(t) > GAP_S)
     out = np.zeros(len(at) - 1, np.bool_)

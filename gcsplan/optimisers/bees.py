@@ -8,11 +8,10 @@ element is changed as a whole.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
-from gcsplan.optimisers.box import Indices, Run, Steps, clipped, keep_better, partners
+from gcsplan.optimisers.box import Run, Steps, clipped, keep_better, partners
 
 
 def abc(run: Run, *, limit: int, group: int) -> Steps:
@@ -96,10 +95,10 @@ def _one_element(run: Run, x: Floats, chosen: Indices, group: int) -> Floats:
     return clipped(np.where(_elements(run, len(chosen), run.dim, group), mine + phi * (mine - x[other]), mine))
 
 
-def _elements(run: Run, count: int, dim: int, group: int) -> NDArray[np.bool_]:
+def _elements(run: Run, count: int, dim: int, group: int) -> Bools:
     """Mask (count, dim) of one random element in each row."""
     chosen = run.rng.integers(0, -(-dim // group), size=(count, 1))
-    mask: NDArray[np.bool_] = np.arange(dim) // group == chosen
+    mask: Bools = np.arange(dim) // group == chosen
     return mask
 
 

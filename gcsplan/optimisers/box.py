@@ -6,11 +6,9 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 
-Indices = NDArray[np.intp]
 Steps = Generator[Floats, Floats, None]
 """A running optimiser: yields populations (n, dim) in [0, 1]; is sent their finite costs (n,), which it may change."""
 
@@ -96,7 +94,7 @@ def rms_distances(x: Floats) -> Floats:
     return np.sqrt(squares)
 
 
-def keep_better(x: Floats, f: Floats, tried: Floats, f_tried: Floats) -> NDArray[np.bool_]:
+def keep_better(x: Floats, f: Floats, tried: Floats, f_tried: Floats) -> Bools:
     """Replace rows of ``x`` and ``f`` by those of ``tried`` that cost less, in place; return which (n,)."""
     better = f_tried < f
     x[better] = tried[better]

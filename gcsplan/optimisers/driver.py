@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int64s
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.optimisers.box import WORST, Run
 from gcsplan.optimisers.registry import Entry, get
@@ -35,8 +35,8 @@ class State:
 class History:
     """For each batch in order (m,): cost evaluations so far, its iteration (0: first population), best cost so far."""
 
-    evaluations: NDArray[np.int64]
-    iterations: NDArray[np.int64]
+    evaluations: Int64s
+    iterations: Int64s
     cost: Floats
 
     def by_iteration(self) -> Floats:

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError
-from gcsplan.optimisers.box import Indices, Run, Steps, clipped, keep_better
+from gcsplan.optimisers.box import Run, Steps, clipped, keep_better
 
 
 def foa(run: Run, *, step: float) -> Steps:

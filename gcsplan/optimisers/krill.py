@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Generator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.optimisers.box import Run, Steps, clipped, rms_distances
 
 
@@ -67,7 +66,7 @@ def forage(
 ) -> Generator[Floats, Floats, Floats]:
     """Forage (fig. 5): try random places in sight, step towards the first better one; after T tries, step at random."""
     moved = np.empty_like(x)
-    hungry: NDArray[np.intp] = np.arange(len(x))
+    hungry: Indices = np.arange(len(x))
     for _ in range(attempts):
         # E eq. 5, 7: rand() in [0, 1] drifts to one corner; uniform in [−1, 1] in each dimension.
         look = clipped(x[hungry] + sight * rng.uniform(-1.0, 1.0, size=(len(hungry), x.shape[1])))

@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.optimisers.box import WORST, Run, Steps, clipped, keep_better
 
@@ -135,9 +134,7 @@ def tell(rng: np.random.Generator, x: Floats, leaders: Floats, a: float, origin:
     return told
 
 
-def scattered(
-    rng: np.random.Generator, x: Floats, first: NDArray[np.intp], others: NDArray[np.intp], a: float, count: int
-) -> Floats:
+def scattered(rng: np.random.Generator, x: Floats, first: Indices, others: Indices, a: float, count: int) -> Floats:
     """Positions (3, count, dim), eq. 17-19 drawn ``count`` times; b uniform in [0, 2] in each dimension; unclipped."""
     alpha, beta, delta = x[first]
     r1 = rng.integers(0, len(others), size=count)
@@ -233,5 +230,5 @@ def _halfway(tried: Floats, old: Floats) -> Floats:
     return np.where(tried > 1.0, (old + 1.0) / 2.0, tried)
 
 
-def _ranks(x: Floats) -> NDArray[np.float64]:
+def _ranks(x: Floats) -> Floats:
     return np.argsort(np.argsort(x, axis=1, kind="stable"), axis=1).astype(np.float64)

@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission, NoMissionReason
 from gcsplan.planners.budget import Budget
 from gcsplan.world.airspace import Airspace, Legs
@@ -75,7 +75,7 @@ class Problem:
     options: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
     widen: Callable[[float, float], Problem | None] | None = None
 
-    def leg_costs(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+    def leg_costs(self, start: Floats, end: Floats) -> Floats:
         """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""
         d = end - start
         flat = np.hypot(d[..., 0], d[..., 1])
@@ -83,7 +83,7 @@ class Problem:
             return np.asarray(self.horizontal_j_per_m * flat + self.vertical_j_per_m * np.abs(d[..., 2]))
         return np.asarray(np.hypot(flat, d[..., 2]))
 
-    def legal(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def legal(self, start: Floats, end: Floats) -> Bools:
         """(N,) whether straight legs from ``start`` (N, 3) to ``end`` (N, 3) pass the exact check; counted as work."""
         if not len(start):
             return np.zeros(0, np.bool_)
@@ -96,7 +96,7 @@ class Problem:
         self.budget.spend("cut", cut)
         return legal
 
-    def floors(self, east_m: NDArray[np.float64], north_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    def floors(self, east_m: Floats, north_m: Floats) -> Floats:
         """Lowest legal altitudes AMSL over places, see `Airspace.floor_amsl`; counted as work."""
         self.budget.spend("place", np.size(east_m))
         return self.airspace.floor_amsl(east_m, north_m, self.limits)

@@ -9,13 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Indices, Int8s
 from gcsplan.planners.problem import Problem
-
-Ints = NDArray[np.intp]
-Marks = NDArray[np.int8]
 
 PARTS = np.array([1.0, 0.5, 0.22, 0.1, 0.04, 0.015])
 """How far a point is moved towards the line between its neighbours, as parts of the distance to that line."""
@@ -89,8 +85,8 @@ class _Choices:
     the only choice is to leave it out; its place is then that of ``first``.
     """
 
-    first: Ints
-    last: Ints
+    first: Indices
+    last: Indices
     mids: Floats
     allowed: Bools
 
@@ -163,7 +159,7 @@ def _choices(points: Floats, pinned: Bools) -> _Choices:
     return _Choices(np.concatenate([one, two]), np.concatenate([one + 2, two + 3]), mids, allowed)
 
 
-def _still_known(marks: Marks, came_from: Ints) -> Marks:
+def _still_known(marks: Int8s, came_from: Indices) -> Int8s:
     """The states of a path's choices that remain valid from the path before.
 
     ``came_from`` (N,): index of each point in the path before, -1 if it is new; ``marks``: the states of that path's
@@ -179,7 +175,7 @@ def _still_known(marks: Marks, came_from: Ints) -> Marks:
     return known
 
 
-def _look(problem: Problem, points: Floats, choices: _Choices, asked: Bools, marks: Marks) -> None:
+def _look(problem: Problem, points: Floats, choices: _Choices, asked: Bools, marks: Int8s) -> None:
     """Run the exact check on the choices where ``asked`` (R, 12), and record the result in ``marks`` (R, 12)."""
     row, column = np.nonzero(asked)
     first, last, place = choices.first[row], choices.last[row], choices.mids[row, column]

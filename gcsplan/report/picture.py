@@ -17,8 +17,8 @@ from matplotlib.patches import Circle as CirclePatch
 from matplotlib.patches import Patch
 from matplotlib.patches import Polygon as PolygonPatch
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.report import space_picture
 from gcsplan.report.fleet_view import apart_m, flown_m, instants
@@ -129,7 +129,7 @@ def _colours(n: int) -> list[str]:
     return [TRACK_COLOURS[i % len(TRACK_COLOURS)] for i in range(n)]
 
 
-def track_en(world: World, verdict: Verdict) -> NDArray[np.float64]:
+def track_en(world: World, verdict: Verdict) -> Floats:
     """(N, 3) east_m, north_m, amsl_m of the ends of the flown stretches, with columns."""
     places = np.array([verdict.legs[0].start, *(leg.end for leg in verdict.legs)])
     return np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])

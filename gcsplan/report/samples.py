@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.mission import TERRAIN
 from gcsplan.world.limits import Limits
@@ -40,8 +39,8 @@ class Line:
     ceiling_m: Floats
     time_s: Floats
     used_j: Floats
-    leg: NDArray[np.intp]
-    end: NDArray[np.bool_]
+    leg: Indices
+    end: Bools
 
     @property
     def length_m(self) -> float:

@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.report.relief import Relief
 from gcsplan.report.samples import Line, level_amsl
 from gcsplan.world.surface import Surface
@@ -86,7 +85,7 @@ def zone_meshes(
     return meshes
 
 
-def _lid(zone: Zone) -> tuple[Floats, Floats, NDArray[np.intp]]:
+def _lid(zone: Zone) -> tuple[Floats, Floats, Indices]:
     """The rim of a zone's shape, points inside it, and the triangles over both."""
     shape = zone.shape
     if isinstance(shape, Circle):
@@ -114,20 +113,20 @@ def _thinned(shape: Polygon) -> Floats:
     return shape.vertices[:: max(1, len(shape.vertices) // MOST_CORNERS)]
 
 
-def _parts(corners: Floats) -> NDArray[np.intp]:
+def _parts(corners: Floats) -> Indices:
     """The number of parts that each edge is cut into."""
     lengths = np.hypot(*(np.roll(corners, -1, axis=0) - corners).T)
     return np.asarray(np.maximum(1, np.round(EDGE_PARTS * lengths / lengths.sum())), dtype=np.intp)
 
 
-def _corners(zone: Zone, n: int) -> NDArray[np.intp]:
+def _corners(zone: Zone, n: int) -> Indices:
     """Positions of the polygon's own corners among the ``n`` of its cut edges; none if too many to draw."""
     assert isinstance(zone.shape, Polygon)
     at = np.concatenate([[0], np.cumsum(_parts(_thinned(zone.shape)))[:-1]])
     return np.asarray(at if len(at) <= 24 and at[-1] < n else at[:0], dtype=np.intp)
 
 
-def triangles(corners: Floats) -> NDArray[np.intp]:
+def triangles(corners: Floats) -> Indices:
     """(N - 2, 3) corners of the triangles of a simple polygon (N, 2), counter-clockwise, by ear clipping."""
     left = list(range(len(corners)))
     out: list[tuple[int, int, int]] = []

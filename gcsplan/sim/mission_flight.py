@@ -13,15 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.sim.kinematics import AT_ONCE_M_S2
 from gcsplan.sim.trace import Trace
 from gcsplan.sim.track import PASSED, Track
 from gcsplan.sim.wind import Air, Weather
-
-Integers = NDArray[np.intp]
 
 STEP_S = 0.1
 SAMPLE_STEPS = 2
@@ -105,7 +102,7 @@ class _Ways:
         length = [t.length_m for t in tracks]
         along = [np.concatenate([[0.0], np.cumsum(one)]) for one in length]
         braking = [t.braking() for t in tracks]
-        self.first: Integers = np.cumsum([0, *(len(one) for one in length[:-1])]).astype(np.intp)
+        self.first: Indices = np.cumsum([0, *(len(one) for one in length[:-1])]).astype(np.intp)
         self.begin, self.end = np.concatenate([a[:-1] for a in along]), np.concatenate([a[1:] for a in along])
         self.square = np.concatenate([w[1:] for w in braking])
         self.cap = np.concatenate([t.cap_m_s for t in tracks])
@@ -130,7 +127,7 @@ class _Ways:
         return float(np.add.reduceat((self.end - self.begin) / slow + holds, self.first).max())
 
 
-def _next_stop(track: Track) -> Integers:
+def _next_stop(track: Track) -> Indices:
     """(N - 1,) the next node at which the vehicle stops, for each piece; the last node is always a stop."""
     n = len(track.points)
     stops = np.where(track.hold_s != PASSED, np.arange(n), n - 1)[1:]
@@ -229,7 +226,7 @@ class _Lanes:
             self._stop(int(lane), to_s - float(b[lane]), float(v[lane]), float(faster[lane]), float(left[lane]))
         self.piece = np.where(stops | self.done, self.piece, self._piece_at(k, self.s))
 
-    def _piece_at(self, k: Integers, s: Floats) -> Integers:
+    def _piece_at(self, k: Indices, s: Floats) -> Indices:
         """Return the pieces at ``s`` (L,): piece ``k`` or a later one before the next stop."""
         ends, k = self._ways.end, k.copy()
         behind = np.flatnonzero(s >= ends[k])
@@ -262,7 +259,7 @@ class _Lanes:
         first = int(ways.first[lane % len(self._tracks)])
         self.piece[lane] = first + node
 
-    def _headway(self, k: Integers, wind: Floats) -> Floats:
+    def _headway(self, k: Indices, wind: Floats) -> Floats:
         """Return the highest speed over ground along the course while the vehicle crabs into the wind."""
         course = self._ways.course[k]
         tail = (course * wind).sum(axis=1)

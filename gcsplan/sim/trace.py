@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.verdict import Finding
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
@@ -53,8 +52,8 @@ class Trace:
     name: str
     times_s: Floats
     points: Floats
-    column: NDArray[np.bool_]
-    seq: NDArray[np.intp]
+    column: Bools
+    seq: Indices
     arrive_s: float
     off_m: float
     slack_m: Floats
@@ -106,11 +105,11 @@ def examine(trace: Trace, vehicle: Vehicle, world: World) -> Judged:
     return Judged(agl, place, tuple(found))
 
 
-def _legs(trace: Trace) -> tuple[Legs, NDArray[np.intp]]:
+def _legs(trace: Trace) -> tuple[Legs, Indices]:
     """Return the trace as few straight legs, each widened by the offset of its samples, and each leg's first sample."""
     points = trace.points
-    firsts: list[NDArray[np.intp]] = []
-    lasts: list[NDArray[np.intp]] = []
+    firsts: list[Indices] = []
+    lasts: list[Indices] = []
     edges = [0, *(np.flatnonzero(np.diff(trace.column)) + 1).tolist(), len(trace.column)]
     for a, b in pairwise(edges):
         starts = np.arange(a, b, CHORD, dtype=np.intp)
@@ -242,7 +241,7 @@ def _reach(trace: Trace, begin_s: Floats, end_s: Floats) -> Floats:
     return np.asarray(along + 2.0 * trace.slack_m.max(initial=0.0))
 
 
-def _nearest(a: Trace, b: Trace, times: Floats, rows: NDArray[np.intp]) -> tuple[float, float]:
+def _nearest(a: Trace, b: Trace, times: Floats, rows: Indices) -> tuple[float, float]:
     """Return the least distance, and its time, while both fly within the intervals ``rows`` of ``times``.
 
     The possible deviations from uniform motion are subtracted.

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.arcs import bend
 from gcsplan.check.flight import follow
 from gcsplan.check.stretch import Flight, Stretch
@@ -55,8 +54,8 @@ class Track:
     command_m_s: Floats
     level: Floats
     accel_m_s2: Floats
-    column: NDArray[np.bool_]
-    seq: NDArray[np.intp]
+    column: Bools
+    seq: Indices
     goal: int
     ends_in_air: bool
     slowing_m_s2: float

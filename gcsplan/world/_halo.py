@@ -10,9 +10,8 @@ import threading
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.native.form import Held
 from gcsplan.world._compiled import HALO, surroundings
 from gcsplan.world._field import Field
@@ -60,7 +59,7 @@ class Surroundings:
                     self._seen[i, j] = True
         return self._held
 
-    def _tiles(self, start: Floats, end: Floats) -> NDArray[np.bool_]:
+    def _tiles(self, start: Floats, end: Floats) -> Bools:
         """Which tiles the lines meet; perhaps a few more."""
         found = np.zeros(self._seen.shape, np.bool_)
         length = np.hypot(*(end - start)[:, :2].T)

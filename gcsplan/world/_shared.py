@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int64s, Singles
 
 TOUCH_M = 1e-6
 """Float noise: a limit that is broken by less than this, m, counts as touched, and touching is legal."""
@@ -47,8 +44,8 @@ class Zones(NamedTuple):
     table: Floats
     vertex: Floats
     lattice: Floats
-    bucket: NDArray[np.int64]
-    near: NDArray[np.int64]
+    bucket: Int64s
+    near: Int64s
     most_corners: int
 
 
@@ -60,9 +57,9 @@ class Halo(NamedTuple):
     outward.
     """
 
-    slope: NDArray[np.float32]
-    high: NDArray[np.float32]
-    low: NDArray[np.float32]
+    slope: Singles
+    high: Singles
+    low: Singles
     cols: int
     rows: int
 

@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int64s
 from gcsplan.world._field import Field
 from gcsplan.world._shared import (
     BAND_HIGH,
@@ -97,7 +96,7 @@ def _ground_range(cell: tuple[int, int, int, int], ground: Floats) -> tuple[floa
     return float(part.min()), float(part.max())
 
 
-def _lattice(box: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+def _lattice(box: Floats) -> tuple[Floats, Int64s, Int64s]:
     """The lattice of coarse squares over all zones, and the zones of each square, one square after the other."""
     if not len(box):
         return np.array([0.0, 0.0, 1.0, 1.0, 1.0]), np.zeros(2, np.int64), np.zeros(0, np.int64)

@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.native.form import Held
 from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES, around, judge, room
 from gcsplan.world._field import Field
@@ -73,7 +73,7 @@ class Legs:
 
     start: Floats
     end: Floats
-    column: NDArray[np.bool_]
+    column: Bools
     track_error_m: Floats
     altitude_error_m: Floats
 
@@ -155,7 +155,7 @@ class LegReport:
     max_agl_m: Floats
     climb_deg: Floats
     zone_clearance_m: Floats
-    nearest_zone: NDArray[np.intp]
+    nearest_zone: Indices
     violations: tuple[Violation, ...]
 
 
@@ -207,11 +207,11 @@ class Airspace:
             self._violations(legs, limits, climb_deg, worst, hit[:hits], hit_at[:hits]),
         )
 
-    def clear(self, legs: Legs, limits: Limits) -> NDArray[np.bool_]:
+    def clear(self, legs: Legs, limits: Limits) -> Bools:
         """(N,) True where `examine` would find no violation; faster."""
         return self.clear_counted(legs, limits)[0]
 
-    def clear_counted(self, legs: Legs, limits: Limits) -> tuple[NDArray[np.bool_], float]:
+    def clear_counted(self, legs: Legs, limits: Limits) -> tuple[Bools, float]:
         """What `clear` returns, and into how many pieces ground beside the legs was cut: most work close to ground."""
         self._judge(legs, limits, False, ok := np.zeros(len(legs), np.bool_), _HELD_NOTHING)
         return ok, room.cut
@@ -279,7 +279,7 @@ class Airspace:
         legs: Legs,
         limits: Limits,
         full: bool,
-        ok: NDArray[np.bool_],
+        ok: Bools,
         found: Held,
     ) -> int:
         f = self._field
@@ -302,7 +302,7 @@ class Airspace:
         return (limits.horizontal_clearance_m + limits.track_error_m) * self.scale
 
     def _violations(
-        self, legs: Legs, limits: Limits, climb_deg: Floats, worst: Floats, hit: NDArray[np.intp], hit_at: Floats
+        self, legs: Legs, limits: Limits, climb_deg: Floats, worst: Floats, hit: Indices, hit_at: Floats
     ) -> tuple[Violation, ...]:
         """Violations by leg, in the order of the kinds."""
         leg, kind = np.nonzero(worst[:, :, 0] > 0.0)
@@ -339,7 +339,7 @@ class Airspace:
             for i, k, t, e, n, h, v, lim, off, zone in rows
         )
 
-    def _depths(self, legs: Legs, hit: NDArray[np.intp], hit_at: Floats) -> tuple[Floats, Floats]:
+    def _depths(self, legs: Legs, hit: Indices, hit_at: Floats) -> tuple[Floats, Floats]:
         """Signed distances to broken zones, never too large, and where on the leg.
 
         The kernel returns 0 anywhere inside a polygon, and any place inside a zone over ground: there the deepest place

@@ -11,9 +11,10 @@ import math
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pyproj import CRS, Transformer
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 
 FARTHEST_M = 150_000.0
@@ -56,12 +57,12 @@ class Frame:
         """The plane as a coordinate system, for rasters that have one of their own."""
         return CRS.from_proj4(f"{self._projection} +datum=WGS84 +units=m")
 
-    def to_plane(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> NDArray[np.float64]:
+    def to_plane(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
         """(..., 2) east_m, north_m of points in degrees (arrays of equal shape)."""
         east, north = self._forward.transform(np.asarray(lon_deg, float), np.asarray(lat_deg, float))
         return np.stack([np.asarray(east, float), np.asarray(north, float)], axis=-1)
 
-    def to_degrees(self, east_m: ArrayLike, north_m: ArrayLike) -> NDArray[np.float64]:
+    def to_degrees(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
         """(..., 2) latitude, longitude in degrees of points in the plane."""
         lon, lat = self._back.transform(np.asarray(east_m, float), np.asarray(north_m, float))
         return np.stack([np.asarray(lat, float), np.asarray(lon, float)], axis=-1)
@@ -70,7 +71,7 @@ class Frame:
         """Largest scale of the plane within ``distance_m`` of the origin: ``1 + d²/2R²`` (Snyder 1987, eq. 8-11)."""
         return 1.0 + 1.01 * distance_m**2 / (2.0 * EARTH_RADIUS_M**2)
 
-    def bow_m(self, start_deg: ArrayLike, end_deg: ArrayLike) -> NDArray[np.float64]:
+    def bow_m(self, start_deg: ArrayLike, end_deg: ArrayLike) -> Floats:
         """(N,) how far the line that is straight in degrees lies from the line straight in the plane, metres.
 
         ``start_deg``, ``end_deg``: (N, 2) latitude, longitude. The distance is measured between points at the same part

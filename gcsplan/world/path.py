@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from gcsplan.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
     """``points`` (N, 3), N >= 2: east_m, north_m, amsl_m; straight between neighbours."""
 
-    points: NDArray[np.float64]
+    points: Floats
 
     def __post_init__(self) -> None:
         p = np.ascontiguousarray(self.points, dtype=np.float64)
@@ -22,13 +23,13 @@ class Path:
         object.__setattr__(self, "points", p)
 
     @property
-    def leg_horizontal_m(self) -> NDArray[np.float64]:
+    def leg_horizontal_m(self) -> Floats:
         """(N - 1,) horizontal length of each leg."""
         d = np.diff(self.points, axis=0)
         return np.asarray(np.hypot(d[:, 0], d[:, 1]))
 
     @property
-    def leg_length_m(self) -> NDArray[np.float64]:
+    def leg_length_m(self) -> Floats:
         """(N - 1,) length of each leg in space."""
         return np.asarray(np.linalg.norm(np.diff(self.points, axis=0), axis=1))
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Indices
 from gcsplan.errors import InputError
 from gcsplan.world.datum import VerticalDatum, vertical_datum
 from gcsplan.world.frame import FARTHEST_M, Frame
@@ -262,7 +262,7 @@ def _take_off_geoid(window: Window, geoid: GeoidGrid, mosaic: Mosaic) -> None:
         line -= (1.0 - w) * along[j] + w * along[j + 1]
 
 
-def _sampled(count: int, step: int) -> NDArray[np.intp]:
+def _sampled(count: int, step: int) -> Indices:
     """0, step, 2·step … and the last index."""
     return np.unique(np.append(np.arange(0, count, step), count - 1))
 

@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.world import hulls
 from gcsplan.world._compiled import pieces
 from gcsplan.world._shapes import grown_edges
@@ -39,8 +38,6 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.tube import MARGIN_M, ZONE_ROOM_M, Reaches
 
-Ints = NDArray[np.intp]
-
 BOX_LOW, BOX_HIGH = [WEST_E, SOUTH_N], [EAST_E, NORTH_N]
 WIDER = 1.6
 UNUSED = -1e9
@@ -56,13 +53,13 @@ class Crossings:
     are included. ``begins``: whether the line begins within reach of the zone.
     """
 
-    way: Ints
-    zone: Ints
+    way: Indices
+    zone: Indices
     s0_m: Floats
     s1_m: Floats
     bottom_m: Floats
     top_m: Floats
-    begins: NDArray[np.bool_]
+    begins: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +88,7 @@ class Ways:
     legal_m: Floats
     ceiling_m: Floats
     crossings: Crossings
-    piece_way: Ints
+    piece_way: Indices
     piece_s_m: Floats
     piece_clear_m: Floats
     piece_legal_m: Floats
@@ -133,7 +130,7 @@ def over(
 
 def _pieces(
     air: Airspace, starts: Floats, ends: Floats, reaches: tuple[float, float, float], *, of_top: bool
-) -> tuple[Ints, Floats, Floats]:
+) -> tuple[Indices, Floats, Floats]:
     """The line of each piece, the distance along it at which the piece begins, and the kernel's rows.
 
     Both surfaces are the ground unless ``of_top``. Every other line is followed backwards, so that one track covers all

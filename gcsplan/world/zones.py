@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
+from gcsplan.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +35,7 @@ class Polygon:
     Holes are not kept: a hole in a no-fly polygon counts as no-fly.
     """
 
-    vertices: NDArray[np.float64]
+    vertices: Floats
 
 
 @dataclass(frozen=True, eq=False)

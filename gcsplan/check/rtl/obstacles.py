@@ -13,11 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Bools, Floats
-
-Ints = NDArray[np.intp]
+from gcsplan.arrays import Bools, Floats, Indices
 
 TOUCH_M = 1e-6
 GROUND, MAX_AMSL, MAX_AGL = -1, -2, -3
@@ -34,12 +31,12 @@ class Obstacles:
     """
 
     high: Floats
-    back: Ints
+    back: Indices
     bottom: Floats
     top: Floats
     base: Floats
     limit: Floats
-    what: Ints
+    what: Indices
 
     def __len__(self) -> int:
         return len(self.high)
@@ -98,7 +95,7 @@ class Obstacles:
             return None
         return int(rows[np.lexsort((self.top[rows], self.what[rows] >= 0, np.isinf(self._over(rows))))[-1]])
 
-    def _over(self, rows: Ints) -> Floats:
+    def _over(self, rows: Indices) -> Floats:
         """The level that passes over each obstacle of ``rows``; inf if none does."""
         return np.where(self.top[rows] <= self.limit[rows], self.top[rows], np.inf)
 
@@ -123,7 +120,7 @@ class Obstacles:
             *(np.concatenate([getattr(p, name) for p in parts]) for name in names),
         )
 
-    def ordered(self, order: Ints) -> Obstacles:
+    def ordered(self, order: Indices) -> Obstacles:
         """The same obstacles with the returns in another order."""
         place = np.empty(len(order), np.intp)
         place[order] = np.arange(len(order))

@@ -14,9 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.rtl.model import RULES, RallyAltitude
 from gcsplan.check.rtl.obstacles import Obstacles
 from gcsplan.check.rtl.refinement import CLEAR, Refinement
@@ -64,7 +63,7 @@ class _Place:
     slope: float
     at_end: bool
     obstacles: Obstacles
-    serves: NDArray[np.intp]
+    serves: Indices
 
 
 def rally_items(points: Sequence[RallyPoint]) -> tuple[MissionItem, ...]:
@@ -183,7 +182,7 @@ def _candidates(trace: MissionTrace, home: Target, vehicle: Vehicle) -> list[tup
     return out
 
 
-def _choose(away: Floats, safe: NDArray[np.bool_], size: Floats) -> list[int]:
+def _choose(away: Floats, safe: Bools, size: Floats) -> list[int]:
     """Choose the rows of points that leave little unsafe, if each part uses its nearest place (home is row 0).
 
     Points are removed one by one from the full set, because a single added point takes over all that lies beyond it and
@@ -231,7 +230,7 @@ TIE_M = 1.0
 """Two places whose distances differ by no more than this, m, count as equally far."""
 
 
-def _failures(obstacles: Obstacles, level: float, some: NDArray[np.intp], count: int) -> Obstacles:
+def _failures(obstacles: Obstacles, level: float, some: Indices, count: int) -> Obstacles:
     """The obstacles that are hit at ``level``, as obstacles that no level passes."""
     hit = obstacles.hit(level)
     n = int(hit.sum())

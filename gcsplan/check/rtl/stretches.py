@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Bools, Indices
 from gcsplan.check.rtl.obstacles import GROUND, MAX_AGL, MAX_AMSL, Obstacles
 from gcsplan.check.rtl.refinement import CLEAR, Refinement
 from gcsplan.check.rtl.sweep import Target
@@ -14,15 +14,12 @@ from gcsplan.check.rtl.trace import MissionTrace
 from gcsplan.check.rtl.verdict import UnsafeStretch
 from gcsplan.check.stretch import Place
 
-Ints = NDArray[np.intp]
 ROUND_M = 0.1
 LOOKED_AT = 500
 """Samples on the line home; messages name the highest of them."""
 
 
-def rel_home(
-    obstacles: Obstacles, level: float, home_amsl_m: float, returns: NDArray[np.bool_] | None = None
-) -> float | None:
+def rel_home(obstacles: Obstacles, level: float, home_amsl_m: float, returns: Bools | None = None) -> float | None:
     """A level as metres above home, rounded up if the rounded level passes too; None if it is infinite."""
     if math.isinf(level):
         return None
@@ -53,7 +50,7 @@ def stretches_of(
     return _without_doubles(found)
 
 
-def _groups(refinement: Refinement, bad: NDArray[np.bool_]) -> list[Ints]:
+def _groups(refinement: Refinement, bad: Bools) -> list[Indices]:
     """Runs of bad parts that follow each other on the trace."""
     where = np.flatnonzero(bad)
     if not len(where):
@@ -62,7 +59,7 @@ def _groups(refinement: Refinement, bad: NDArray[np.bool_]) -> list[Ints]:
 
 
 def _stretch(
-    trace: MissionTrace, refinement: Refinement, grade: int, level: float, group: Ints, target: Target | None
+    trace: MissionTrace, refinement: Refinement, grade: int, level: float, group: Indices, target: Target | None
 ) -> UnsafeStretch:
     obstacles, parts = refinement.strict[grade], refinement.parts
     mine = np.zeros(len(obstacles), np.bool_)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.rtl.model import RULES, about_turn_m, at_home_m
 from gcsplan.check.rtl.obstacles import GROUND, MAX_AGL, MAX_AMSL, Obstacles
 from gcsplan.check.rtl.trace import MissionTrace, TraceParts
@@ -62,7 +62,7 @@ class GradedObstacles:
     def __getitem__(self, grade: int) -> Obstacles:
         return (self.clear, self.legal)[grade]
 
-    def take(self, parts: NDArray[np.bool_]) -> GradedObstacles:
+    def take(self, parts: Bools) -> GradedObstacles:
         """The obstacles from some of the parts."""
         return GradedObstacles(self.clear.take(parts), self.legal.take(parts), 0)
 
@@ -176,7 +176,7 @@ def _climbs(met: ways.Ways, low: Floats, spare: Floats, climb: float) -> tuple[F
     return out[0], out[1]
 
 
-def _alike(extra: Floats, which: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+def _alike(extra: Floats, which: Indices) -> list[Indices]:
     """Groups of similar width, each in order."""
     if not len(which):
         return []
@@ -199,7 +199,7 @@ class _Builder:
             self.rows[grade].append(tuple(c if isinstance(c, np.ndarray) else np.full(n, c) for c in columns))
 
     def ground(
-        self, i: NDArray[np.intp], met: ways.Ways, base: Floats | float, clear_limit: Floats, legal_limit: Floats
+        self, i: Indices, met: ways.Ways, base: Floats | float, clear_limit: Floats, legal_limit: Floats
     ) -> None:
         """Add the terrain under each return, and the ceiling that max AGL sets above it."""
         self._put(0, i, -np.inf, met.clear_m, base, clear_limit, GROUND)
@@ -209,16 +209,16 @@ class _Builder:
         capped = np.isfinite(met.ceiling_m)
         self.ceiling(i[capped], met.ceiling_m[capped], MAX_AGL, (1,))
 
-    def zones(self, i: NDArray[np.intp], at: ways.Crossings, base: Floats | float, limit: Floats) -> None:
+    def zones(self, i: Indices, at: ways.Crossings, base: Floats | float, limit: Floats) -> None:
         """Add the zones that returns meet."""
         for grade in (0, 1):
             self._put(grade, i, at.bottom_m, at.top_m, base, limit, at.zone)
 
-    def one(self, grade: int, i: NDArray[np.intp], bottom: float, top: float, what: int) -> None:
+    def one(self, grade: int, i: Indices, bottom: float, top: float, what: int) -> None:
         """Add the same obstacle for each of ``i``, where the return is at its level."""
         self._put(grade, i, bottom, top, -np.inf, np.inf, what)
 
-    def ceiling(self, i: NDArray[np.intp], bottom: Floats, what: int, grades: tuple[int, ...]) -> None:
+    def ceiling(self, i: Indices, bottom: Floats, what: int, grades: tuple[int, ...]) -> None:
         """Add an altitude that the return may not exceed."""
         for grade in grades:
             self._put(grade, i, bottom, np.inf, -np.inf, np.inf, what)

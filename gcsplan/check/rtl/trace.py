@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.plane_legs import legs_in_plane
 from gcsplan.check.rtl.model import RULES
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
-
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +31,7 @@ class MissionTrace:
     along: Floats
     first: Floats
     last: Floats
-    seq: Ints
+    seq: Indices
     track_m: Floats
     altitude_m: Floats
     world: World
@@ -81,7 +78,7 @@ class TraceParts:
 
     start: Floats
     end: Floats
-    stretch: Ints
+    stretch: Indices
 
     def __len__(self) -> int:
         return len(self.start)
@@ -96,7 +93,7 @@ class TraceParts:
         """(N,) the u of each part's middle."""
         return 0.5 * (self.start + self.end)
 
-    def take(self, which: NDArray[np.bool_] | Ints) -> TraceParts:
+    def take(self, which: Bools | Indices) -> TraceParts:
         """The chosen parts."""
         return TraceParts(self.start[which], self.end[which], self.stretch[which])
 

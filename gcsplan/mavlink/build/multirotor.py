@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.mavlink.build.fixed_wing import build_wing
 from gcsplan.mavlink.build.order import Order, split_legs
 from gcsplan.mavlink.mission import commands as cmd
@@ -105,7 +106,7 @@ def _gate(order: Order, vehicle: Vehicle) -> MissionItem:
     return MissionItem(cmd.DELAY, m.NO_POSITION, (-1.0, float(hour), float(minute), float(second)))
 
 
-def _spaced(points: NDArray[np.float64], apart_m: float) -> NDArray[np.float64]:
+def _spaced(points: Floats, apart_m: float) -> Floats:
     """Drop inner points nearer than ``apart_m`` to the previous kept point or to the last point; keep the ends."""
     kept = [points[0]]
     for p in points[1:-1]:
@@ -114,7 +115,7 @@ def _spaced(points: NDArray[np.float64], apart_m: float) -> NDArray[np.float64]:
     return np.array([*kept, points[-1]])
 
 
-def _round_heights(points: NDArray[np.float64], base_m: float, vehicle: Vehicle) -> NDArray[np.int_]:
+def _round_heights(points: Floats, base_m: float, vehicle: Vehicle) -> NDArray[np.int_]:
     """Return heights above ``base_m`` in whole centimetres; rounding makes no leg steeper than its limit."""
     wanted = (points[:, 2] - base_m) * 100
     run_cm = np.hypot(*np.diff(points[:, :2], axis=0).T) * 100 - 3.0
@@ -128,7 +129,7 @@ def _round_heights(points: NDArray[np.float64], base_m: float, vehicle: Vehicle)
     return cm
 
 
-def _bearings(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _bearings(points: Floats) -> Floats:
     """(N - 1,) course of each leg, degrees clockwise from the plane's north, in [0, 360)."""
     d = np.diff(points[:, :2], axis=0)
     return np.asarray(np.degrees(np.arctan2(d[:, 0], d[:, 1])) % 360.0)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcsplan.arrays import Floats
 from gcsplan.world.world import World
 
 Point = tuple[float, float, float]
@@ -72,7 +72,7 @@ class Order:
     wing: Wing | None = None
 
 
-def split_legs(points: NDArray[np.float64], world: World) -> NDArray[np.float64]:
+def split_legs(points: Floats, world: World) -> Floats:
     """(N, 3) points with legs cut to at most `LONGEST_LEG_M` and until the bow of each is at most `BOW_M`."""
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
     bow = world.frame.bow_m(places[:-1], places[1:])

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.lattice import near_zone
 from gcsplan.planners.problem import Problem, terminals_of
@@ -45,7 +44,7 @@ class Line:
     """
 
     points: Floats
-    pinned: NDArray[np.bool_]
+    pinned: Bools
     pin_m: Floats
     amsl_m: Floats
     cost: float
@@ -159,7 +158,7 @@ class Guide:
             self.floor_m[rows, cols] += by_m
 
 
-def line_of(points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> Line:
+def line_of(points: Floats, pinned: Bools, pin_m: Floats) -> Line:
     """A line that is not evaluated yet."""
     return Line(points, pinned, pin_m, np.zeros(len(points)), math.inf, math.inf)
 
@@ -216,7 +215,7 @@ def make_guide(
     )  # fmt: skip
 
 
-def _near(problem: Problem, zone: Zone, x: Floats, y: Floats, step: float) -> tuple[NDArray[np.intp], ...] | None:
+def _near(problem: Problem, zone: Zone, x: Floats, y: Floats, step: float) -> tuple[Indices, ...] | None:
     """Rows and columns of the nodes within reach of a zone plus three quarters of a step; None if there are none."""
     w, s, e, n = zone.bounds
     reach = problem.airspace.beside_m(problem.limits) + 0.75 * step + 1.0
@@ -231,7 +230,7 @@ def _near(problem: Problem, zone: Zone, x: Floats, y: Floats, step: float) -> tu
 
 
 def _passed(
-    problem: Problem, zone: Zone, over: bool | None, x: Floats, y: Floats, jj: NDArray[np.intp], ii: NDArray[np.intp],
+    problem: Problem, zone: Zone, over: bool | None, x: Floats, y: Floats, jj: Indices, ii: Indices,
     floor: Floats, ceiling: Floats,
 ) -> bool:  # fmt: skip
     """Raise the floor over a zone, or lower the ceiling to below it, whichever leaves more altitude free.

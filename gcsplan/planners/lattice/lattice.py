@@ -12,15 +12,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.problem import ENDS_M, Problem, terminals_of
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
-
-Ints = NDArray[np.int64]
 
 STEPS = np.array([(1, 0), (0, 1), (1, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1)], dtype=np.int64)
 """Half of the 16 directions, in nodes (east, north); edge ``node * 8 + k`` goes from ``node`` by ``STEPS[k]``."""
@@ -47,13 +44,13 @@ class Lattice:
     floor_m: Floats
     ceiling_m: Floats
     ground_m: Floats
-    band_at: Ints
+    band_at: Int64s
     band_low: Floats
     band_high: Floats
-    band_agl: NDArray[np.bool_]
+    band_agl: Bools
     reach_m: float
 
-    def node_places(self, nodes: Ints) -> Floats:
+    def node_places(self, nodes: Int64s) -> Floats:
         """Places (K, 2) of nodes."""
         j, i = np.divmod(nodes, self.nx)
         return np.stack([self.west_m + i * self.step_m, self.south_m + j * self.step_m], axis=-1)
@@ -101,7 +98,7 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
     return Lattice(west, south, step_m, nx, ny, floor, ceiling, ground, at, low, high, agl, reach)
 
 
-def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: NDArray[np.bool_], beside_m: float) -> Floats:
+def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: Bools, beside_m: float) -> Floats:
     """Ground altitude where ``wanted`` and within ``beside_m`` of the box of a zone with a level AGL; 0 elsewhere."""
     asked = np.zeros(wanted.shape, np.bool_)
     for zone in problem.airspace.zones:
@@ -117,7 +114,7 @@ def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: NDArray[np.
     return ground
 
 
-def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_m: float) -> NDArray[np.bool_]:
+def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_m: float) -> Bools:
     if math.isinf(detour):
         return np.ones((len(y), len(x)), bool)
     terminals = terminals_of(problem)
@@ -130,10 +127,10 @@ def _within_detour(problem: Problem, x: Floats, y: Floats, detour: float, slack_
 
 def _edge_bands(
     air: Airspace, limits: Limits, reach: float, west: float, south: float, step: float, ground: Floats
-) -> tuple[Ints, Floats, Floats, NDArray[np.bool_]]:
+) -> tuple[Int64s, Floats, Floats, Bools]:
     """Edge, low, high and (B, 2) which of these are AGL, of every band of every zone; sorted by edge, then by low."""
     ny, nx = (ground.shape[0] + 1) // 2, (ground.shape[1] + 1) // 2
-    edges: list[Ints] = []
+    edges: list[Int64s] = []
     levels: list[Floats] = []
     for zone in air.zones:
         w, s, e, n = zone.bounds
@@ -170,7 +167,7 @@ def levels_of(limits: Limits, zone: Zone) -> Floats:
     return out
 
 
-def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) -> NDArray[np.bool_]:
+def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) -> Bools:
     """Whether segments ``a``–``b`` (K, 2) come within ``reach_m`` of a zone's shape in the plane: (K,).
 
     A circle's radius is in real metres; a real metre is at most ``scale`` metres of the plane.
@@ -200,7 +197,7 @@ class Links:
     """Edges between a terminal and nodes, one row for each gap between bands: ``node`` (K,), ``length_m`` (K,),
     ``low_m``, ``high_m`` (K, LINK_DOORS) from the terminal to the node."""
 
-    node: Ints
+    node: Int64s
     length_m: Floats
     low_m: Floats
     high_m: Floats

@@ -15,9 +15,8 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
 from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m, terminals_of
@@ -214,7 +213,7 @@ def pulled(problem: Problem, points: Floats, level: Level, deadline_s: float) ->
     return work.improve(deadline_s, lambda _phase, _cost: None)[0]
 
 
-def _sides(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> dict[int, bool]:
+def _sides(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> dict[int, bool]:
     """For each zone within reach of a path, by index: whether the path passes over it."""
     track = make_track(problem, points[:, :2], pinned, pin_m)
     s = distances(track.points)
@@ -319,12 +318,12 @@ class _Work:
     def _steps(self, parts: tuple[float, ...]) -> Floats:
         return np.array(parts) * self.way_m
 
-    def _mend(self, line: Line) -> tuple[tuple[Floats, NDArray[np.bool_]] | Unsettled, Line]:
+    def _mend(self, line: Line) -> tuple[tuple[Floats, Bools] | Unsettled, Line]:
         """Make way points of a line; after each refusal by the exact check, correct the guide and pull the line again.
 
         Return the way points, or why there are none, and the line as last pulled.
         """
-        found: tuple[Floats, NDArray[np.bool_]] | Unsettled
+        found: tuple[Floats, Bools] | Unsettled
         guide = make_guide(self.problem, [line.points], NARROW * self.way_m, self.over, FINE_M)
         line = guide.pull(line, self._steps(FINE_STEPS), FINE_GAIN * self.way_m, rounds=3)
         for attempt in range(MENDS):

@@ -14,13 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int64s
 from gcsplan.planners.lattice import search_kernels
 from gcsplan.planners.lattice.lattice import LINK_DOORS, STEPS, Lattice, Links
-
-Ints = NDArray[np.int64]
 
 LABELS_A_NODE = 8
 """Most labels that a node keeps; a search that drops more reports that it is not complete."""
@@ -124,9 +121,9 @@ def search(
 
 
 def _run(
-    lattice: Lattice, starts: Floats, links: tuple[Ints, Ints, Floats, Floats, Floats], terms: Floats, want: int,
+    lattice: Lattice, starts: Floats, links: tuple[Int64s, Int64s, Floats, Floats, Floats], terms: Floats, want: int,
     most_opened: int,
-) -> tuple[Ints, Floats, Ints, Ints]:  # fmt: skip
+) -> tuple[Int64s, Floats, Int64s, Int64s]:  # fmt: skip
     """Run the kernel, with larger arrays as often as needed; return the labels (integers and numbers), the state, and
     the indices of the labels at the goal."""
     nodes = lattice.nx * lattice.ny

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gcsplan.arrays import Bools
 from gcsplan.planners.optimal.navmesh.grid import Box, box_of, extent
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle
@@ -79,7 +77,7 @@ def _wanted_m(problem: Problem, straight_m: float) -> float:
     return max(least, min([most, *(r / 3.0 for r in radii)]))
 
 
-def fits_memory(problem: Problem, cells: NDArray[np.bool_], beside: int, ratio: int) -> bool:
+def fits_memory(problem: Problem, cells: Bools, beside: int, ratio: int) -> bool:
     """Whether a lattice ``ratio`` times finer over the box of ``cells``, widened by ``beside`` cells on each side, fits
     into memory."""
     row, col, last_row, last_col = box_of(cells)

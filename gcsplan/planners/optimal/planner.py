@@ -27,9 +27,8 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.planner import plan_band
@@ -98,7 +97,7 @@ def _turning(problem: Problem) -> Solution:
     sharp = _sharp(replace(problem, turn_radius_m=0.0), laps=False)
     points = sharp.path.points
 
-    def replan(extra_m: float) -> tuple[Floats, NDArray[np.bool_]] | None:
+    def replan(extra_m: float) -> tuple[Floats, Bools] | None:
         try:
             again = _sharp(with_more_clearance(problem, extra_m), laps=False).path.points
         except NoMission:
@@ -123,7 +122,7 @@ def _turning(problem: Problem) -> Solution:
     )
 
 
-def _terminals(problem: Problem, points: Floats) -> NDArray[np.bool_]:
+def _terminals(problem: Problem, points: Floats) -> Bools:
     """(N,) which points of a path are its terminals."""
     terminals = np.array(terminals_of(problem))
     away = np.hypot(*(points[:, None, :2] - terminals[None]).transpose(2, 0, 1)).min(axis=1)

@@ -14,7 +14,7 @@ from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.governor import Search, Size
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.level_world import in_window
-from gcsplan.planners.optimal.plane_search import PAST, SLACKS, PlaneSearch
+from gcsplan.planners.optimal.plane_search import SLACKS, PlaneSearch
 from gcsplan.planners.optimal.sources.bound_corridor import follow
 from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
@@ -35,7 +35,7 @@ MOST_CELLS = 50_000
 
 NAMES = (
     "straight", "outlines", "track_bound", "cap_search", "corridor_first", "lattice_first", "roadmap_first",
-    "roadmap_near", "fine_tracks", "detours", "detours_fine", "bound_corridor", "contour_climb", "lattice",
+    "roadmap_near", "fine_tracks", "detours", "bound_corridor", "contour_climb", "lattice",
     "local_roadmap", "cap_pairs", "length_bound", "altitude_intervals", "refinement",
 )  # fmt: skip
 """The names of all searches; which of them a mission has depends on its objective and limits."""
@@ -110,7 +110,6 @@ class Searches:
             Search("roadmap_first", 0.1, self._small_lacks, of(1.0, 0.0), self._search_small),
             Search("roadmap_near", 0.5, small(MUCH), of(0.5, 0.0), self._search_small),
             Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
-            Search("detours", 0.8, far, nodes(2.0), on(lambda plane: plane.past(PAST, fine=False))),
             Search("bound_corridor", 0.2, twice, nodes(3.0), on(follow)),
             Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
             Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
@@ -119,13 +118,13 @@ class Searches:
             return [
                 *rows,
                 Search("cap_pairs", 0.5, known, nodes(3.0), self._over(self._bound_caps), again=True),
-                Search("detours_fine", 0.3, far, nodes(4.0), on(lambda plane: plane.past(PAST_FINE, fine=True))),
+                Search("detours", 0.3, far, nodes(4.0), on(lambda plane: plane.past(PAST_FINE, fine=True))),
                 Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
             ]
         return [
             *rows,
             Search("length_bound", 0.9, known, nodes(1.0), on(halve), again=True, nearer=True),
-            Search("detours_fine", 0.3, known, nodes(4.0), self._over(self._past_finely)),
+            Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
             Search("altitude_intervals", 0.08, self._has_intervals, nodes(8.0), self._over(self._bound_by_intervals)),
             Search("refinement", 0.07, twice, nodes(8.0), self._over(self._refine)),
         ]

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
@@ -65,7 +64,7 @@ class Judge:
         return Legs.between(legs[:, :3], legs[:, 3:], self.problem.limits)
 
 
-def way_points(problem: Problem, track: Track, flown: Flown) -> tuple[Floats, NDArray[np.bool_]]:
+def way_points(problem: Problem, track: Track, flown: Flown) -> tuple[Floats, Bools]:
     """Way points (N, 3) at every vertex of the track and of its profile, and (N,) whether they must stay."""
     profile = flown.profile
     s = np.concatenate([track.s_m, profile.s_m])

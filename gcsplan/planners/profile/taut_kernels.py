@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int64s
 from gcsplan.planners.compiled import kernel
-
-Ints = NDArray[np.int64]
 
 
 @kernel("f8[] f8[] f8[] f8 f8 i8[,] f8[,]")
@@ -18,7 +15,7 @@ def draw(
     high: Floats,
     z0: float,
     z1: float,
-    at: Ints,
+    at: Int64s,
     chains: Floats,
 ) -> int:
     """Pull the string by the funnel algorithm; return its number of vertices.

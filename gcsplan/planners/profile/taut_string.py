@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int64s
 from gcsplan.planners.profile.taut_kernels import draw
 
 NO_LIMIT = 1e12
@@ -114,7 +113,7 @@ def _pinch(low: Floats, high: Floats, z0: float, z1: float) -> tuple[int, float]
     return worst, -1.0 if gap == -math.inf else gap  # -inf: every door is unbounded
 
 
-def _pull(s: Floats, low: Floats, high: Floats, z0: float, z1: float) -> tuple[NDArray[np.int64], Floats]:
+def _pull(s: Floats, low: Floats, high: Floats, z0: float, z1: float) -> tuple[Int64s, Floats]:
     n = len(s)
     at, chains = np.empty((3, n + 1), np.int64), np.empty((3, n + 1))
     count = draw(*(np.ascontiguousarray(a, np.float64) for a in (s, low, high)), z0, z1, at, chains)

@@ -12,9 +12,8 @@ from heapq import heappop, heappush
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.problem import ENDS_M, Problem
 from gcsplan.planners.profile.taut_kernels import edge
 from gcsplan.planners.profile.taut_string import NO_LIMIT, Blocked, Profile, taut_string
@@ -66,7 +65,7 @@ class Track:
     ``s_m`` (N,) metres along the track, scaled so that it ends where the tube ends."""
 
     points: Floats
-    pinned: NDArray[np.bool_]
+    pinned: Bools
     pin_m: Floats
     s_m: Floats
     tube: Tube
@@ -107,7 +106,7 @@ def distances(points: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.hypot(d[:, 0], d[:, 1]))])
 
 
-def divided(points: Floats, step_m: float) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+def divided(points: Floats, step_m: float) -> tuple[Indices, Indices, Indices]:
     """Divide legs of a track or path (N, 2 or 3) into equal parts, none longer than ``step_m``; for each part (K,) its
     leg, its index within that leg, and the number of parts of that leg."""
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -116,7 +115,7 @@ def divided(points: Floats, step_m: float) -> tuple[NDArray[np.intp], NDArray[np
     return leg, np.arange(len(leg)) - np.repeat(np.cumsum(parts) - parts, parts), parts[leg]
 
 
-def make_track(problem: Problem, points: Floats, pinned: NDArray[np.bool_], pin_m: Floats) -> Track:
+def make_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> Track:
     """A track with its tube; of points within 1 mm of the one before only one is kept, preferably the pinned one."""
     keep = np.ones(len(points), bool)
     last = 0

@@ -14,9 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import unknown_name
 from gcsplan.optimisers.driver import History, Result
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
@@ -164,9 +163,7 @@ def march(
     return Result(np.zeros(0), best_cost, spent, len(trace) - 1, account, stopped, "aco"), best  # type: ignore[arg-type]
 
 
-def _walk(
-    rng: np.random.Generator, ants: int, eager: list[Floats], scent: list[Floats], alpha: float
-) -> NDArray[np.intp]:
+def _walk(rng: np.random.Generator, ants: int, eager: list[Floats], scent: list[Floats], alpha: float) -> Indices:
     """Nodes (arrived, layers) of the ants that arrive; each step is drawn by eq. 1."""
     ways = np.zeros((ants, 1), np.intp)
     for e, s in zip(eager, scent, strict=True):

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices, Int64s
 from gcsplan.planners.swarm.curve_kernels import samples_of
 
 DEGREE = 3
@@ -27,9 +26,9 @@ class Curve:
     """
 
     basis: Floats
-    terminals: NDArray[np.intp]
+    terminals: Indices
     bands: Floats
-    spans: NDArray[np.int64]
+    spans: Int64s
 
     def samples(self, controls: Floats) -> Floats:
         """Samples (..., S, 3) of control points (..., N, 3)."""
@@ -57,7 +56,7 @@ def curve(points: tuple[int, ...], legs: tuple[int, ...]) -> Curve:
     return Curve(basis, np.array(terminals), *_bands(basis))
 
 
-def _bands(basis: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def _bands(basis: Floats) -> tuple[Floats, Int64s]:
     """`Curve.bands` and `Curve.spans` of a basis."""
     controls, samples = basis.shape
     width = DEGREE + 1
@@ -86,7 +85,7 @@ def _basis(controls: int, samples: int) -> Floats:
     return np.ascontiguousarray(basis.T)
 
 
-def fewer(points: Floats, kept: NDArray[np.intp], corridor_m: float) -> NDArray[np.intp]:
+def fewer(points: Floats, kept: Indices, corridor_m: float) -> Indices:
     """Indices of a subset of ``points`` (S, 3) whose polyline is within ``corridor_m`` of every point; ``kept`` stay.
 
     Douglas and Peucker 1973, between neighbours of ``kept``.

@@ -11,16 +11,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int64s, Singles
 from gcsplan.planners.swarm import scene_kernels as s
 from gcsplan.planners.swarm.compiled import device, kernel
 from gcsplan.planners.swarm.curve_kernels import CURVE, angle, chords, divide, draw, exponential, weigh
 from gcsplan.planners.swarm.scene_kernels import SCENE, gap_to, height_at, lookup, lookup_both, one_grid, place
-
-Singles = NDArray[np.float32]
-Ints = NDArray[np.int64]
 
 # Columns of the terms, all >= 0, in metres unless stated otherwise; m²: a depth integrated along the path.
 LENGTH, FLAT, RISE = 0, 1, 2  # length in space, in the plane, Σ|Δz|
@@ -333,7 +329,7 @@ def room(samples: int) -> list[Floats]:
 
 @kernel(f"f8[,,] {CURVE} {SCENE} i8 i8 {ROOM} f8[,]")
 def measure(
-    controls: Floats, bands: Floats, spans: Ints,
+    controls: Floats, bands: Floats, spans: Int64s,
     heights: Singles, quadratic: Floats, floors: Singles, floor_map: Floats, numbers: Floats, zones: Floats,
     corners: Floats, stride: int, wanted: int,
     cost: Floats, leg: Floats, run: Floats,

@@ -8,13 +8,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int64s
 from gcsplan.planners.swarm.compiled import device, kernel
-
-Ints = NDArray[np.int64]
 
 CURVE = "f8[,] i8[,]"
 """Forms of a curve's bands and spans."""
@@ -79,7 +74,7 @@ def blend(
 
 
 @device
-def draw(controls: Floats, bands: Floats, spans: Ints, x: Floats, y: Floats, z: Floats) -> None:
+def draw(controls: Floats, bands: Floats, spans: Int64s, x: Floats, y: Floats, z: Floats) -> None:
     """Write the samples of a curve of control points (N, 3), N >= 2.
 
     ``bands`` (4, S): weights of four control points, from the span's first on; ``spans`` (n, 3): first sample, end
@@ -102,7 +97,7 @@ def draw(controls: Floats, bands: Floats, spans: Ints, x: Floats, y: Floats, z: 
 
 
 @kernel(f"f8[,,] {CURVE} f8[] f8[] f8[] f8[,,]")
-def samples_of(controls: Floats, bands: Floats, spans: Ints, x: Floats, y: Floats, z: Floats, out: Floats) -> None:
+def samples_of(controls: Floats, bands: Floats, spans: Int64s, x: Floats, y: Floats, z: Floats, out: Floats) -> None:
     """Write the samples of curves (P, N, 3) to ``out`` (P, S, 3); ``x``, ``y``, ``z`` (S,) are working arrays."""
     for p in range(len(controls)):
         draw(controls[p], bands, spans, x, y, z)

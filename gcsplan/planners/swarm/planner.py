@@ -14,9 +14,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import unknown_name
 from gcsplan.optimisers.driver import Result, State, minimise
 from gcsplan.optimisers.registry import get as get_optimiser
@@ -86,7 +85,7 @@ class Found:
     result: Result
     scene: Scene
     curve: Floats
-    terminals: NDArray[np.intp]
+    terminals: Indices
     violations: tuple[Violation, ...]
     pitch_deg: float
     yaw_deg: float
@@ -131,9 +130,7 @@ def search(problem: Problem, optimiser: str, settings: Settings) -> Found:
     return judged(problem, result, scene, curve, cost.curve.terminals, cost.stride)
 
 
-def judged(
-    problem: Problem, result: Result, scene: Scene, curve: Floats, terminals: NDArray[np.intp], stride: int
-) -> Found:
+def judged(problem: Problem, result: Result, scene: Scene, curve: Floats, terminals: Indices, stride: int) -> Found:
     """The curve of a search with its violations; ``stride``: samples from node to node."""
     curve = np.ascontiguousarray(curve)
     d = np.diff(curve[::stride], axis=0)

@@ -12,9 +12,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import way_points
 from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
@@ -49,7 +48,7 @@ def violations(problem: Problem, points: Floats) -> tuple[Violation, ...]:
     return problem.airspace.examine(Legs.of_path(points, problem.limits), problem.limits).violations
 
 
-def repair(problem: Problem, scene: Scene, samples: Floats, terminals: NDArray[np.intp]) -> Repaired | None:
+def repair(problem: Problem, scene: Scene, samples: Floats, terminals: Indices) -> Repaired | None:
     """A legal path near the curve ``samples`` (S, 3), whose ``terminals`` (indices) stay; None if none is found.
 
     Tries a new profile over the curve's own track first, then tracks pushed out further and further.
@@ -70,7 +69,7 @@ def repair(problem: Problem, scene: Scene, samples: Floats, terminals: NDArray[n
     return None
 
 
-def _with_profile(problem: Problem, flat: Floats, terminals: NDArray[np.intp]) -> Floats | None:
+def _with_profile(problem: Problem, flat: Floats, terminals: Indices) -> Floats | None:
     """Way points over a track (N, 2) with the best altitude profile; None if no profile passes the exact check."""
     pinned = np.zeros(len(flat), bool)
     pinned[terminals] = True
@@ -116,8 +115,8 @@ def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
 
 
 def _push(
-    problem: Problem, scene: Scene, flat: Floats, terminals: NDArray[np.intp], half_m: float, margin_m: float
-) -> tuple[Floats, NDArray[np.intp], float] | None:
+    problem: Problem, scene: Scene, flat: Floats, terminals: Indices, half_m: float, margin_m: float
+) -> tuple[Floats, Indices, float] | None:
     """Push a track to open places within ``half_m``; return it, the indices of its terminals, and the largest push.
 
     It is the shortest chain of side steps. A step is open if its middle and its end are, and if the altitudes that can
@@ -169,7 +168,7 @@ def _push(
     return track, at_terminal, float(np.abs(aside[chosen]).max())
 
 
-def _ribbon(flat: Floats, terminals: NDArray[np.intp], half_m: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
+def _ribbon(flat: Floats, terminals: Indices, half_m: float) -> tuple[Floats, Floats, Indices]:
     """Stations (n, 2) along a track, unit vectors to the left there (n, 2), and the indices of its terminals.
 
     A ribbon must not fold: so turns of the track within the half-width are smoothed between terminals.
@@ -218,9 +217,7 @@ def k_keep(max_agl_m: float | None) -> float:
     return 0.0 if max_agl_m is None else 0.02 * max_agl_m
 
 
-def _pin(
-    problem: Problem, scene: Scene, low: Floats, high: Floats, at_terminal: NDArray[np.intp]
-) -> tuple[Floats, Floats]:
+def _pin(problem: Problem, scene: Scene, low: Floats, high: Floats, at_terminal: Indices) -> tuple[Floats, Floats]:
     """Close the ribbon at terminals except in its middle, and there all but the altitude of the terminal, if fixed."""
     low, high = low.copy(), high.copy()
     heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]

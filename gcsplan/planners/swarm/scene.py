@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices, Singles
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import VOLUME_KEYS
@@ -43,9 +42,9 @@ class Scene:
     the flight volume; ``terminals`` (M, 3): start, via points, goal; ``straight_m``: length from terminal to terminal
     in space."""
 
-    heights: NDArray[np.float32]
+    heights: Singles
     quadratic: Floats
-    floors: NDArray[np.float32]
+    floors: Singles
     floor_map: Floats
     numbers: Floats
     zones: Floats
@@ -136,7 +135,7 @@ class Scene:
         """Lowest legal altitude (...,) at points (..., 2 or more); NaN where ground within reach is unknown."""
         return self._heights(self.floors, self.floor_map, points)
 
-    def _heights(self, raster: NDArray[np.float32], to_raster: Floats, points: Floats) -> Floats:
+    def _heights(self, raster: Singles, to_raster: Floats, points: Floats) -> Floats:
         flat = np.ascontiguousarray(points).reshape(-1, points.shape[-1])
         out = np.empty(len(flat))
         k.heights_at(raster, to_raster, self.numbers, flat, out)
@@ -193,7 +192,7 @@ def _floors(
     box: tuple[float, float, float, float],
     centre: tuple[float, float],
     scale_m: float,
-) -> tuple[NDArray[np.float32], Floats | None]:
+) -> tuple[Singles, Floats | None]:
     """Lowest legal altitudes on the raster's own nodes, or on a grid over ``box`` if these are too many or too few.
 
     Returns the floors and the map to their grid, None if that is the raster's own.
@@ -215,7 +214,7 @@ def _floors(
     return np.ascontiguousarray(np.where(np.isfinite(floor), floor, np.nan), dtype=np.float32), to_nodes
 
 
-def _nodes(surface: Surface, cols: NDArray[np.intp], rows: NDArray[np.intp]) -> Floats:
+def _nodes(surface: Surface, cols: Indices, rows: Indices) -> Floats:
     """Places (rows, cols, 2) of nodes, by a quadratic fit: the exact inverse would take longer than the floors."""
     some_c, some_r = np.meshgrid(np.linspace(cols[0], cols[-1], 9), np.linspace(rows[0], rows[-1], 9))
     places = surface.grid.to_plane(some_c.ravel(), some_r.ravel())

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Singles
 from gcsplan.planners.swarm.compiled import device, kernel
-
-Singles = NDArray[np.float32]
 
 SCENE = "f4[,] f8[,] f4[,] f8[,] f8[] f8[,] f8[,]"
 """Forms of a scene's heights, quadratic, floors, floor_map, numbers, zones and corners."""
@@ -196,7 +193,7 @@ def nearness(
 
 @kernel("f8[,] f8[] f8[] f8[] f8[,] f8[,] b1[]")
 def shut_by_zones(
-    points: Floats, ground: Floats, low: Floats, high: Floats, zones: Floats, corners: Floats, out: NDArray[np.bool_]
+    points: Floats, ground: Floats, low: Floats, high: Floats, zones: Floats, corners: Floats, out: Bools
 ) -> None:
     """Write to ``out`` (N,) whether a zone closes all altitudes between ``low`` and ``high`` (N,) at a point."""
     for i in range(len(points)):

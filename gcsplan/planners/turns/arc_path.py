@@ -12,12 +12,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.turns.kernels import CHORD_M, fill_outline, part_neighbours, tangents
-
-Ints = NDArray[np.int64]
 
 MOST_DEG = 100.0
 """Largest turn at one way point, in degrees."""
@@ -50,7 +47,7 @@ class ArcPath:
     gap_m: float
 
     @property
-    def pinned(self) -> NDArray[np.bool_]:
+    def pinned(self) -> Bools:
         """Which discs (K,) have a pin."""
         return np.isfinite(self.pin[:, 0])
 
@@ -67,17 +64,15 @@ class Outline:
     points: Floats
     s_m: Floats
     true_m: Floats
-    arcs: Ints
+    arcs: Int64s
     corners: Floats
     widen_m: Floats
-    disc: Ints
-    pins: Ints
+    disc: Int64s
+    pins: Int64s
     pin_m: Floats
 
 
-def through(
-    ends: Floats, radius_m: float, contact: Floats, sense: Floats, pinned: NDArray[np.bool_], pin_m: Floats
-) -> ArcPath:
+def through(ends: Floats, radius_m: float, contact: Floats, sense: Floats, pinned: Bools, pin_m: Floats) -> ArcPath:
     """The arc path whose turns pass through ``contact`` (K, 2) in their middle; discs it need not touch are removed."""
     heading = _headings(np.vstack([ends[:1], contact, ends[1:]]))
     sense, centre = sense.copy(), np.zeros_like(contact)
@@ -185,7 +180,7 @@ def _middles(heading: Floats) -> Floats:
     return np.asarray(heading[:-1] + 0.5 * ((turn + math.pi) % (2.0 * math.pi) - math.pi))
 
 
-def _without(arc_path: ArcPath, gone: NDArray[np.bool_]) -> ArcPath:
+def _without(arc_path: ArcPath, gone: Bools) -> ArcPath:
     keep = ~gone
     centre, sense, pin, pin_m = (a[keep] for a in (arc_path.centre, arc_path.sense, arc_path.pin, arc_path.pin_m))
     return replace(arc_path, centre=centre, sense=sense, pin=pin, pin_m=pin_m)

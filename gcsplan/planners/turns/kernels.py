@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.turns.compiled import kernel
-
-Ints = NDArray[np.int64]
 
 END_M, FORGIVEN_M = 60.0, 25.0
 """Within `END_M` metres of start and goal, floors that are exceeded by less than `FORGIVEN_M` metres are ignored (see
@@ -52,7 +49,7 @@ def tangents(
 
 
 @kernel("f8[,] f8 f8[,] f8[] b1[]")
-def part_neighbours(ends: Floats, radius: float, centre: Floats, sense: Floats, fixed: NDArray[np.bool_]) -> None:
+def part_neighbours(ends: Floats, radius: float, centre: Floats, sense: Floats, fixed: Bools) -> None:
     """Push neighbouring discs apart that are too close for a tangent, in place; ``fixed`` ones stay."""
     n = len(sense)
     for k in range(n + 1):
@@ -84,8 +81,8 @@ def part_neighbours(ends: Floats, radius: float, centre: Floats, sense: Floats, 
 @kernel("f8[,] f8 f8[,] f8[] f8[,] f8[] f8[] f8 f8 f8[,] f8[] f8[] i8[,] f8[,] i8[] i8[]")
 def fill_outline(
     ends: Floats, radius: float, centre: Floats, sense: Floats, pin: Floats, heading: Floats, turn: Floats,
-    step: float, most: float, points: Floats, true_m: Floats, widen: Floats, arcs: Ints, corners: Floats,
-    disc: Ints, pin_at: Ints,
+    step: float, most: float, points: Floats, true_m: Floats, widen: Floats, arcs: Int64s, corners: Floats,
+    disc: Int64s, pin_at: Int64s,
 ) -> int:  # fmt: skip
     """Fill the arrays of `Outline` (``widen[i]`` belongs to the chord that ends at point i); return how many points.
 

@@ -18,16 +18,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
 from gcsplan.planners.turns.arc_path import ArcPath, through, unlooped
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
 from gcsplan.world.path import Path
 
-Replan = Callable[[float], tuple[Floats, NDArray[np.bool_]] | None]
+Replan = Callable[[float], tuple[Floats, Bools] | None]
 """Plans a path with additional track error, its argument in metres (`with_more_clearance`); returns the points and
 which of them are pinned, or None if there is no path."""
 
@@ -66,7 +65,7 @@ class Rounded:
 def rounded(
     problem: Problem,
     points: Floats,
-    pinned: NDArray[np.bool_],
+    pinned: Bools,
     replan: Replan | None = None,
     *,
     patience: int = 1000,
@@ -109,7 +108,7 @@ def with_more_clearance(problem: Problem, extra_m: float) -> Problem:
     )  # fmt: skip
 
 
-def _rounded(problem: Problem, points: Floats, pinned: NDArray[np.bool_], patience: int) -> Rounded | None:
+def _rounded(problem: Problem, points: Floats, pinned: Bools, patience: int) -> Rounded | None:
     given = problem.cost(Path(points))
     best: Tried | None = None
     cost = math.inf
@@ -130,7 +129,7 @@ def _rounded(problem: Problem, points: Floats, pinned: NDArray[np.bool_], patien
     return Rounded(risen.way_points, risen.flown, risen.widen_m, length, cost)
 
 
-def _arc_paths(problem: Problem, points: Floats, pinned: NDArray[np.bool_]) -> Iterator[ArcPath]:
+def _arc_paths(problem: Problem, points: Floats, pinned: Bools) -> Iterator[ArcPath]:
     """Yield arc paths to start from: around all corners, then around fewer; of each first a variant without loops."""
     counts = set()
     for slack in SLACKS_M:
@@ -145,7 +144,7 @@ def _arc_paths(problem: Problem, points: Floats, pinned: NDArray[np.bool_]) -> I
         yield arc_path
 
 
-def arc_path_of(problem: Problem, points: Floats, pinned: NDArray[np.bool_], slack_m: float) -> ArcPath:
+def arc_path_of(problem: Problem, points: Floats, pinned: Bools, slack_m: float) -> ArcPath:
     """The arc path around the corners of a path that lie more than ``slack_m`` off straight lines; not checked yet."""
     flat = np.ascontiguousarray(points[:, :2], dtype=np.float64)
     must = np.array(pinned, dtype=bool)
@@ -174,7 +173,7 @@ def _right(a: Floats, b: Floats) -> Floats:
     return np.stack([way[:, 1], -way[:, 0]], axis=-1)
 
 
-def _corners(flat: Floats, must: NDArray[np.bool_], slack_m: float) -> NDArray[np.intp]:
+def _corners(flat: Floats, must: Bools, slack_m: float) -> Indices:
     """Indices of the points that remain without those near a straight line (Ramer, Douglas and Peucker); ``must`` stay,
     and points within 1 mm of the one before are dropped."""
     keep = must.copy()

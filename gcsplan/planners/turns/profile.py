@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
@@ -21,8 +20,6 @@ from gcsplan.planners.profile.tubes import cut, join
 from gcsplan.planners.turns.arc_path import Outline
 from gcsplan.planners.turns.kernels import CHORD_M, level, straighten
 from gcsplan.world.airspace import Band, Legs, Tube, Violation
-
-Ints = NDArray[np.int64]
 
 CORRECTIONS, CORRECTED_M = 8, 0.01
 """Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""

@@ -15,13 +15,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.optimal.navmesh.interval_kernels import spread
 from gcsplan.world.limits import Limits
-
-Ints = NDArray[np.int64]
 
 MOST = 4
 """Most intervals over one cell; zones that would make more are ignored."""
@@ -37,7 +34,7 @@ ROUNDS, WORTHWHILE = 4, 0.01
 class Terminal:
     """Where a track begins or ends: the cells that the place may lie in, and its altitude; None if that is free."""
 
-    cells: Ints
+    cells: Int64s
     amsl_m: float | None
 
 
@@ -52,7 +49,7 @@ class AltitudeIntervals:
     """
 
     shape: tuple[int, int]
-    cell: Ints
+    cell: Int64s
     low_m: Floats
     high_m: Floats
     away_m: Floats

@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.profile.taut_string import Blocked, Profile, taut_string
 
@@ -37,7 +36,7 @@ def altitude_ranges(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, F
     return at, _least(low, first, last, len(at)), -_least(-high, first, last, len(at))
 
 
-def _least(value: Floats, first: NDArray[np.intp], last: NDArray[np.intp], size: int) -> Floats:
+def _least(value: Floats, first: Indices, last: Indices, size: int) -> Floats:
     """(size,) the least ``value`` of all ranges ``first`` : ``last`` that contain a place; inf if none does."""
     # Each range is two overlapping blocks whose size is a power of two; minima pass from larger blocks to smaller ones.
     keep = last > first

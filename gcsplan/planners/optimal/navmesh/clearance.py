@@ -10,9 +10,8 @@ import math
 from itertools import combinations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Int8s, Int32s
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.clearance_kernels import fill
 from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, look_around, walk_around
@@ -23,7 +22,6 @@ from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.navmesh.zone_kernels import lift_lids, stamp_zones
 from gcsplan.planners.profile.track import divided
 
-Ints = NDArray[np.int32]
 Cone = tuple[float, float, float, float]
 """A climb cone, the highest altitudes near an end of a leg: its east_m and north_m, altitude there (m AMSL), slope."""
 
@@ -115,7 +113,7 @@ class ClearanceGrid:
         self._laid = False
         self._held: list[Cone] = []
         self._lift: Floats
-        self._either: NDArray[np.int8]
+        self._either: Int8s
 
     def _be_exact(self) -> None:
         """Set the floors of the nodes that are looked at to those of the exact check."""
@@ -267,14 +265,14 @@ def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:
     )
 
 
-def _spans(wanted: Bools, fineness: int) -> Ints:
+def _spans(wanted: Bools, fineness: int) -> Int32s:
     """(rows, 2) for each row of cells, cut ``fineness`` times finer: first wanted column, and that after the last."""
     first, last = wanted.argmax(axis=1), wanted.shape[1] - wanted[:, ::-1].argmax(axis=1)
     spans = np.stack([first, np.where(wanted.any(axis=1), last, first)], axis=-1) * fineness
     return np.ascontiguousarray(np.repeat(spans, fineness, axis=0), np.int32)
 
 
-def _around(span: Ints, cols: int) -> Ints:
+def _around(span: Int32s, cols: int) -> Int32s:
     """(rows + 1, 2) for each row of nodes: the first column no farther than `AROUND` nodes from cells of the ``span``,
     and that after the last."""
     first, last = np.full(len(span) + 1, cols), np.zeros(len(span) + 1, np.int64)

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Int8s, Int32s, Int64s
 from gcsplan.planners.compiled import device, kernel
-
-Ints = NDArray[np.int32]
 
 SPARE = 0.999
 """Share of a distance that is counted, because neighbouring cells differ slightly in size."""
@@ -18,9 +15,9 @@ SPARE = 0.999
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] b1[,] i8 f8 f8 f8 f8[,] b1 i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i1[]")
 def fill(
-    top: Floats, ground: Floats, steep: Floats, x: Floats, y: Floats, wanted: NDArray[np.bool_], fineness: int,
-    more: float, beside: float, cap: float, cones: Floats, low: bool, around: Ints, excess: Floats, floor: Floats,
-    under: Floats, fine_x: Floats, fine_y: Floats, diagonal: NDArray[np.int8],
+    top: Floats, ground: Floats, steep: Floats, x: Floats, y: Floats, wanted: Bools, fineness: int,
+    more: float, beside: float, cap: float, cones: Floats, low: bool, around: Int32s, excess: Floats, floor: Floats,
+    under: Floats, fine_x: Floats, fine_y: Floats, diagonal: Int8s,
 ) -> None:  # fmt: skip
     """Cut each ``wanted`` (rows - 1, cols - 1) cell into ``fineness`` parts a side and compute the values of the nodes.
 
@@ -103,7 +100,7 @@ def _rises(top: Floats, row: float, col: float, rows: float, cols: float, along:
 @kernel("f8[,] f8[,] i8 f8 f8 f8 f8 f8 f8[,] f8[,] b1[,]")
 def lay(
     corner_x: Floats, corner_y: Floats, step: int, ax: float, ay: float, bx: float, by: float, most: float, x: Floats,
-    y: Floats, inside: NDArray[np.bool_],
+    y: Floats, inside: Bools,
 ) -> None:  # fmt: skip
     """Compute the places of a lattice's nodes, bilinear between every ``step``-th; clear ``inside`` (rows - 1,
     cols - 1) at cells with a corner whose distances to (ax, ay) and (bx, by) add up to more than ``most``."""
@@ -124,7 +121,7 @@ def lay(
 
 
 @device
-def blank(value: Floats, around: Ints, at_first: float) -> None:
+def blank(value: Floats, around: Int32s, at_first: float) -> None:
     """Set ``value`` (rows, cols) to ``at_first`` at the nodes that are looked at. ``around`` (rows, 2): first column of
     each row, and that after the last. Others are never read, and memory that is never touched costs nothing."""
     for j in range(len(around)):
@@ -133,13 +130,13 @@ def blank(value: Floats, around: Ints, at_first: float) -> None:
 
 
 @device
-def _on_border(z: Floats, over: NDArray[np.int64], j: int, i: int) -> float:
+def _on_border(z: Floats, over: Int64s, j: int, i: int) -> float:
     """The height of the node j rows north and i columns east of the south-west corner; that of the border beyond it."""
     return float(z[over[3] - min(j, over[3] - over[1]), over[0] + min(i, over[2] - over[0])])
 
 
 @kernel("f8[,] i8[] i8 f8[,] f8[,]")
-def pool(z: Floats, over: NDArray[np.int64], stride: int, low: Floats, high: Floats) -> None:
+def pool(z: Floats, over: Int64s, stride: int, low: Floats, high: Floats) -> None:
     """Heights of every ``stride``-th node of a terrain model, rows going north, lowered (``low``) and raised (``high``)
     until the bilinear patches between them lie nowhere above, and nowhere below, the terrain model's own patches.
 

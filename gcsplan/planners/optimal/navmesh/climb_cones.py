@@ -10,15 +10,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int8s, Int32s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
 from gcsplan.planners.optimal.navmesh.mesh_kernels import stands
 from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
-
-Ints = NDArray[np.int32]
 
 BESIDE = 5
 """Nodes on each side of those that a cone could shut for which the distance must be known, too."""
@@ -32,8 +29,8 @@ SHUT = 3
 
 @kernel("i4[,] f8[,] f8[,] f8[,] i4[] f8[,] f8[,] f8[,] f8[] i1[,] f8[,]")
 def look_around(
-    around: Ints, excess: Floats, floor: Floats, lift: Floats, of: Ints, values: Floats, x: Floats, y: Floats,
-    cone: Floats, seen: NDArray[np.int8], away: Floats,
+    around: Int32s, excess: Floats, floor: Floats, lift: Floats, of: Int32s, values: Floats, x: Floats, y: Floats,
+    cone: Floats, seen: Int8s, away: Floats,
 ) -> int:  # fmt: skip
     """Find the nodes near an end that are higher than a path can climb to from there, and those around them.
 
@@ -61,8 +58,8 @@ def look_around(
 
 @kernel("i4[,] f8[,] f8[,] i4[] f8[,] f8[,] f8[] i1[,] f8[,] i8 f8[,] i4[,] i1[,] f8[] i4[]")
 def walk_around(
-    around: Ints, excess: Floats, lift: Floats, of: Ints, x: Floats, y: Floats, cone: Floats, seen: NDArray[np.int8],
-    away: Floats, missing: int, way: Floats, root: Ints, done: NDArray[np.int8], heap: Floats, ids: Ints,
+    around: Int32s, excess: Floats, lift: Floats, of: Int32s, x: Floats, y: Floats, cone: Floats, seen: Int8s,
+    away: Floats, missing: int, way: Floats, root: Int32s, done: Int8s, heap: Floats, ids: Int32s,
 ) -> None:  # fmt: skip
     """Measure tracks to the ``missing`` nodes that `look_around` left: from node to node, or straight from a node
     farther back where that line is free (lazy Theta*: Nash, Koenig and Tovey, AAAI 2010).
@@ -126,8 +123,8 @@ def walk_around(
 
 @kernel("i4[,] f8[,] f8[,] f8[,] i1[,] i4[] f8[,] f8[,] f8[,] f8[] b1 i1[,] f8[,]")
 def hold_down(
-    around: Ints, excess: Floats, floor: Floats, lift: Floats, either: NDArray[np.int8], of: Ints, values: Floats,
-    x: Floats, y: Floats, cone: Floats, lone: bool, seen: NDArray[np.int8], away: Floats,
+    around: Int32s, excess: Floats, floor: Floats, lift: Floats, either: Int8s, of: Int32s, values: Floats,
+    x: Floats, y: Floats, cone: Floats, lone: bool, seen: Int8s, away: Floats,
 ) -> None:  # fmt: skip
     """Raise the excess of nodes near an end to the floor minus the altitude that a path can climb to; for bounds only.
 
@@ -196,8 +193,8 @@ def _open(excess: Floats, lift: Floats, j: int, i: int) -> bool:
 
 @device
 def _mark(
-    around: Ints, excess: Floats, floor: Floats, lift: Floats, x: Floats, y: Floats, cone: Floats, left: int,
-    right: int, low: int, high: int, seen: NDArray[np.int8],
+    around: Int32s, excess: Floats, floor: Floats, lift: Floats, x: Floats, y: Floats, cone: Floats, left: int,
+    right: int, low: int, high: int, seen: Int8s,
 ) -> bool:  # fmt: skip
     """Set ``seen`` to -1 at nodes above a cone, and to -1 or -2 at `BESIDE` nodes around; return whether any are."""
     wide, found = BESIDE, False
@@ -221,7 +218,7 @@ def _mark(
 
 
 @device
-def _steps(excess: Floats, lift: Floats, of: Ints, i: int, j: int, p: int, q: int) -> bool:
+def _steps(excess: Floats, lift: Floats, of: Int32s, i: int, j: int, p: int, q: int) -> bool:
     """Whether a track may lead from a free node (j, i) straight to its neighbour (q, p)."""
     ny, nx = excess.shape
     if not _open(excess, lift, q, p):
@@ -238,7 +235,7 @@ def _steps(excess: Floats, lift: Floats, of: Ints, i: int, j: int, p: int, q: in
 
 
 @device
-def _walled(of: Ints, values: Floats, shape: tuple[int, int], j: int, i: int) -> bool:
+def _walled(of: Int32s, values: Floats, shape: tuple[int, int], j: int, i: int) -> bool:
     """Whether a node lies in a wall in every cell around it."""
     ny, nx = shape
     for k in range(4):
@@ -250,7 +247,7 @@ def _walled(of: Ints, values: Floats, shape: tuple[int, int], j: int, i: int) ->
 
 @device
 def _behind(
-    excess: Floats, lift: Floats, of: Ints, values: Floats, x: Floats, y: Floats, seen: NDArray[np.int8], away: Floats,
+    excess: Floats, lift: Floats, of: Int32s, values: Floats, x: Floats, y: Floats, seen: Int8s, away: Floats,
     i: int, j: int,
 ) -> float:  # fmt: skip
     """The length of a track to a node in a wall by way of its farthest free neighbour; inf if that is not known, 0 if
@@ -266,7 +263,7 @@ def _behind(
 
 
 @device
-def _sees(excess: Floats, lift: Floats, of: Ints, col: float, row: float, i: int, j: int, ends: bool) -> bool:
+def _sees(excess: Floats, lift: Floats, of: Int32s, col: float, row: float, i: int, j: int, ends: bool) -> bool:
     """Whether the straight line from a place (``col``, ``row``) to node (j, i) meets only wholly free cells. ``ends``:
     the place is the end of a leg."""
     nx = excess.shape[1]

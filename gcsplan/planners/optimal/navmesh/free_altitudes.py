@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int32s
 from gcsplan.planners.optimal.navmesh.interval_kernels import cut_intervals
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.zone_kernels import narrow_ranges
-
-Ints = NDArray[np.int32]
 
 
 def ranges(mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
@@ -22,7 +19,7 @@ def ranges(mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
     return low.ravel(), high.ravel()
 
 
-def intervals(mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: float) -> tuple[Ints, Floats, Floats]:
+def intervals(mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: float) -> tuple[Int32s, Floats, Floats]:
     """Cut the range of each cell, ``low_m`` to ``high_m`` from `ranges`, into the altitude intervals that zones leave.
 
     Returns the number of intervals (cells,), at most ``most``, and their lower and upper ends (cells, most), each
@@ -35,7 +32,7 @@ def intervals(mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: flo
     return count, low, high
 
 
-def _laid(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Ints, bool]:
+def _laid(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Int32s, bool]:
     """What the zone kernels take: ground, x and y of the mesh's nodes, numbers and forms of the shapes that are
     certainly shut, their boxes on the mesh, and whether the ground is the terrain model's own."""
     plane, (rows, cols) = mesh.plane, mesh.excess.shape

@@ -15,16 +15,14 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Int32s
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent, nodes, places, slopes
 from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, TOP, TOP_2, UNDER, UNDER_2
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, Fit, Shapes, make_shapes
 from gcsplan.planners.problem import Problem
 
-Ints = NDArray[np.int32]
 Box = tuple[float, float, float, float]
 """West, south, east, north, m; infinite: everywhere."""
 Reach = tuple[tuple[float, float], tuple[float, float], float]
@@ -51,7 +49,7 @@ class Plane:
     y: Floats
     tops: tuple[Floats, Floats]
     grounds: tuple[Floats, Floats]
-    inside: NDArray[np.bool_]
+    inside: Bools
     shapes: Shapes
     fit: Fit
     known: dict[tuple[float, float], tuple[float, float]] = field(default_factory=dict)
@@ -59,9 +57,7 @@ class Plane:
     scratch: Scratch = field(default_factory=Scratch)
     """Buffers for meshes that are no longer needed when the next one is made."""
 
-    def zones(
-        self, low: bool, under: NDArray[np.bool_] | None, over: NDArray[np.bool_] | None
-    ) -> tuple[Floats, Floats]:
+    def zones(self, low: bool, under: Bools | None, over: Bools | None) -> tuple[Floats, Floats]:
         """The shapes' numbers and forms, for bounds (``low``) or for paths. Where ``under`` or ``over`` (zones,) is
         false, the zone cannot be passed below its floor, or above its ceiling; None changes nothing."""
         zones, edges = self.shapes.low if low else self.shapes.high
@@ -76,7 +72,7 @@ class Plane:
             zones[~over[other] & (zones[:, PAIR] > 0.0), TOP_2] = np.inf
         return zones, edges
 
-    def boxes(self, row: int, col: int, fineness: int, rows: int, cols: int) -> Ints:
+    def boxes(self, row: int, col: int, fineness: int, rows: int, cols: int) -> Int32s:
         """(K, 4) the shapes' boxes on a part of the lattice that begins at cell (``row``, ``col``), cut ``fineness``
         times finer, of ``rows`` x ``cols`` nodes."""
         boxes = (self.shapes.boxes - np.array([col, col, row, row])) * fineness
@@ -141,9 +137,7 @@ def extent(problem: Problem, box: Box) -> Extent:
     return col0, row0, max(col1, col0 + 1), max(row1, row0 + 1)
 
 
-def finer_plane(
-    plane: Plane, cells: NDArray[np.bool_], parts: int, stride: int, fit: Fit
-) -> tuple[Plane, NDArray[np.bool_]]:
+def finer_plane(plane: Plane, cells: Bools, parts: int, stride: int, fit: Fit) -> tuple[Plane, Bools]:
     """Make a finer lattice over some of a plane's ``cells``; return it and those cells on it. See `make_plane`."""
     cols = plane.problem.airspace.surface.ground_m.shape[1]
     row, col, last_row, last_col = box_of(cells)
@@ -154,7 +148,7 @@ def finer_plane(
     return finer, on_finer(plane, cells, finer)
 
 
-def box_of(wanted: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+def box_of(wanted: Bools) -> tuple[int, int, int, int]:
     """First row and column that hold a true value, and those after the last; (0, 0, 1, 1) if nothing is true."""
     rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if not len(rows):
@@ -162,7 +156,7 @@ def box_of(wanted: NDArray[np.bool_]) -> tuple[int, int, int, int]:
     return int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1
 
 
-def on_finer(plane: Plane, cells: NDArray[np.bool_], finer: Plane) -> NDArray[np.bool_]:
+def on_finer(plane: Plane, cells: Bools, finer: Plane) -> Bools:
     """(rows - 1, cols - 1) which cells of a finer lattice lie in a plane's ``cells``, all of which it must cover."""
     ratio = plane.stride * finer.parts // (plane.parts * finer.stride)
     row, col, last_row, last_col = box_of(cells)

@@ -7,20 +7,17 @@ enters another one over the same cell, because a zone that covers the whole cell
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
 from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, over_ground, shut_over
 
-Ints = NDArray[np.int32]
-
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8 i4[] f8[,] f8[,]")
 def cut_intervals(
-    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, exact: bool, spare: float,
-    count: Ints, low: Floats, high: Floats,
+    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s, exact: bool, spare: float,
+    count: Int32s, low: Floats, high: Floats,
 ) -> None:  # fmt: skip
     """Cut away, from the ``count`` (cells,) intervals of each cell, ``low`` to ``high`` (cells, most), the altitudes
     that a zone certainly shuts over the whole cell, except for ``spare`` metres at its top and bottom.
@@ -63,8 +60,8 @@ def _cut(low: Floats, high: Floats, cell: int, count: int, bottom: float, top: f
 
 @kernel("i8[] i8[] i8 f8[] f8[] f8[] f8[] i8[] f8 f8[] f8[] i4[] i8[]")
 def spread(
-    first: NDArray[np.int64], cell: NDArray[np.int64], cols: int, low: Floats, high: Floats, own: Floats, most: Floats,
-    sources: NDArray[np.int64], begin: float, out: Floats, keys: Floats, ids: Ints, stack: NDArray[np.int64],
+    first: Int64s, cell: Int64s, cols: int, low: Floats, high: Floats, own: Floats, most: Floats,
+    sources: Int64s, begin: float, out: Floats, keys: Floats, ids: Int32s, stack: Int64s,
 ) -> None:  # fmt: skip
     """Compute the least value in each interval (``out``) of a quantity that never falls along a path.
 

@@ -6,16 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Int8s, Int32s, Int64s
 from gcsplan.planners.budget import RATES
 from gcsplan.planners.optimal.navmesh.grid import Plane
 from gcsplan.planners.optimal.navmesh.mesh_kernels import in_reach, least_of_cells, least_of_portals, within
 from gcsplan.planners.optimal.navmesh.portals import GroundTrack, Place, Portals
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE
-
-Ints = NDArray[np.int32]
 
 BENT_M = LOOSE.bent_m
 """Metres that a raster's line may bow between the corners of a block, at most."""
@@ -38,9 +35,9 @@ class Mesh(Portals):
     col: int
     excess: Floats
     floor: Floats
-    diagonal: NDArray[np.int8]
-    span: Ints
-    piece: Ints
+    diagonal: Int8s
+    span: Int32s
+    piece: Int32s
 
     def lowest(self) -> Floats:
         """(cells,) the lowest floor at each cell's corners; -inf if one of them is not looked at."""
@@ -85,7 +82,7 @@ class Mesh(Portals):
         rows, cols = self.excess.shape
         return cells[self.row : self.row + rows - 1, self.col : self.col + cols - 1]
 
-    def cells_at(self, place: Place) -> NDArray[np.int64]:
+    def cells_at(self, place: Place) -> Int64s:
         """The numbers of the cells that a place may lie in, rising; for meshes as fine as their plane."""
         rows, cols = self.excess.shape
         c, r = self.plane.at(place)

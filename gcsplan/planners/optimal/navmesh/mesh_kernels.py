@@ -13,13 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats, Int8s, Int32s, Int64s
 from gcsplan.planners.compiled import device, kernel
-
-Ints = NDArray[np.int32]
-
 
 OPEN = -1e-9
 """Excess, m, above which a wall may stand at a node; a node with less is free all around."""
@@ -42,7 +38,7 @@ def _cut(p: float, q: float, t: Floats) -> bool:
 
 
 @device
-def _cut_own(of: Ints, values: Floats, k: int, start: int, end: int, t: Floats) -> bool:
+def _cut_own(of: Int32s, values: Floats, k: int, start: int, end: int, t: Floats) -> bool:
     """Shrink the part ``t`` of an edge of cell k, from corner ``start`` to corner ``end``, to where none of the cell's
     own walls stands; return whether anything remains."""
     n = of[k]
@@ -55,7 +51,7 @@ def _cut_own(of: Ints, values: Floats, k: int, start: int, end: int, t: Floats) 
 
 @kernel("f8[,] i4[] f8[,] i1[] i4[,] i4[,] i4[,] i8")
 def make_pieces(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], around: Ints, span: Ints, piece: Ints,
+    excess: Floats, of: Int32s, values: Floats, diagonal: Int8s, around: Int32s, span: Int32s, piece: Int32s,
     block: int,
 ) -> int:  # fmt: skip
     """Number the pieces in ``piece`` (cells, 2: lower and upper triangle, -1 where nothing is free); return how many.
@@ -104,14 +100,14 @@ def make_pieces(
 
 
 @device
-def _side(piece: Ints, diagonal: NDArray[np.int8], k: int, right: bool) -> int:
+def _side(piece: Int32s, diagonal: Int8s, k: int, right: bool) -> int:
     """The piece at the right side of a cell, or at the left (not ``right``)."""
     return piece[k, 0 if (diagonal[k] == 0) == right else 1]
 
 
 @device
 def _put(
-    ends: Floats, names: NDArray[np.int64], joins: Ints, n: int, room: int, x0: float, y0: float, x1: float, y1: float,
+    ends: Floats, names: Int64s, joins: Int32s, n: int, room: int, x0: float, y0: float, x1: float, y1: float,
     v0: int, v1: int, left: int, right: int,
 ) -> int:  # fmt: skip
     """Store portal n, from (x0, y0) to (x1, y1), with the pieces at its left and right, if there is room; return
@@ -124,7 +120,7 @@ def _put(
 
 
 @device
-def stands(of: Ints, values: Floats, cell: int, corner: int, above: float) -> bool:
+def stands(of: Int32s, values: Floats, cell: int, corner: int, above: float) -> bool:
     """Whether one of a cell's own walls exceeds ``above`` at a corner."""
     n = of[cell]
     while n > 0:
@@ -135,7 +131,7 @@ def stands(of: Ints, values: Floats, cell: int, corner: int, above: float) -> bo
 
 
 @device
-def _is_corner(excess: Floats, of: Ints, values: Floats, piece: Ints, nx: int, ny: int, j: int, i: int) -> bool:
+def _is_corner(excess: Floats, of: Int32s, values: Floats, piece: Int32s, nx: int, ny: int, j: int, i: int) -> bool:
     """Whether a node may lie on a wall or touches something that is not free, so that a track may turn there."""
     if i == 0 or j == 0 or i == nx - 1 or j == ny - 1 or excess[j, i] > OPEN:
         return True
@@ -147,7 +143,7 @@ def _is_corner(excess: Floats, of: Ints, values: Floats, piece: Ints, nx: int, n
 
 
 @device
-def _name(excess: Floats, of: Ints, values: Floats, piece: Ints, j: int, i: int) -> int:
+def _name(excess: Floats, of: Int32s, values: Floats, piece: Int32s, j: int, i: int) -> int:
     """A node's name; negative where no wall can stand, so that no track turns there."""
     ny, nx = excess.shape
     name = 8 * (j * nx + i)
@@ -156,8 +152,8 @@ def _name(excess: Floats, of: Ints, values: Floats, piece: Ints, j: int, i: int)
 
 @kernel("f8[,] i4[] f8[,] i1[] i4[,] i4[,] f8[,] f8[,] f8[,] i8[,] i4[,] f8[]")
 def make_portals(
-    excess: Floats, of: Ints, values: Floats, diagonal: NDArray[np.int8], span: Ints, piece: Ints,
-    x: Floats, y: Floats, ends: Floats, names: NDArray[np.int64], joins: Ints, t: Floats,
+    excess: Floats, of: Int32s, values: Floats, diagonal: Int8s, span: Int32s, piece: Int32s,
+    x: Floats, y: Floats, ends: Floats, names: Int64s, joins: Int32s, t: Floats,
 ) -> int:  # fmt: skip
     """Find every portal once: ``ends`` (room, 4) from x, y to x, y; ``names`` (room, 2) of its ends; ``joins``
     (room, 2) the pieces at its left and right. Returns how many there are, of which only the first ``room`` are stored.
@@ -251,9 +247,9 @@ def make_portals(
 
 @kernel("i4[,] i4[] i4[]")
 def sort_portals(
-    joins: Ints,
-    start: Ints,
-    order: Ints,
+    joins: Int32s,
+    start: Int32s,
+    order: Int32s,
 ) -> None:
     """List the portals of each piece p in ``order`` (2 N,), at start[p] : start[p + 1]; ``start`` (pieces + 1,) must
     be zeros."""
@@ -275,8 +271,8 @@ def sort_portals(
 
 @kernel("i4[,] f8[] i8 i4[,] i4[,] i8 i8 i8 i8 f8[]")
 def least_of_cells(
-    piece: Ints, value: Floats, cols: int, fine_piece: Ints, fine_span: Ints, fine_cols: int, ratio: int, row: int,
-    col: int, out: Floats,
+    piece: Int32s, value: Floats, cols: int, fine_piece: Int32s, fine_span: Int32s, fine_cols: int, ratio: int,
+    row: int, col: int, out: Floats,
 ) -> None:  # fmt: skip
     """Find, for each piece of a finer mesh, the least value of the coarse pieces in its cells (``out``, inf before).
 
@@ -304,7 +300,7 @@ def least_of_cells(
 
 
 @kernel("i4[,] f8[] f8[]")
-def least_of_portals(joins: Ints, met: Floats, entered: Floats) -> None:
+def least_of_portals(joins: Int32s, met: Floats, entered: Floats) -> None:
     """Find the least value ``met`` of each piece's portals (``entered``, inf before)."""
     for n in range(len(joins)):
         for k in range(2):
@@ -315,8 +311,8 @@ def least_of_portals(joins: Ints, met: Floats, entered: Floats) -> None:
 
 @kernel("i4[,] f8[] f8[] f8 b1[] i4[,] b1[]")
 def within(
-    joins: Ints, from_start: Floats, from_goal: Floats, limit: float, met: NDArray[np.bool_], piece: Ints,
-    out: NDArray[np.bool_],
+    joins: Int32s, from_start: Floats, from_goal: Floats, limit: float, met: Bools, piece: Int32s,
+    out: Bools,
 ) -> None:  # fmt: skip
     """Mark the cells (``out``, all false before) of pieces that tracks no longer than ``limit`` may enter: those at
     portals that such tracks meet, and those where ``met`` (pieces,) is true before, at both ends of the tracks."""
@@ -331,7 +327,7 @@ def within(
 
 @kernel("i4[,] f8[] f8[,] f8[,] f8 f8 f8 b1[,]")
 def in_reach(
-    piece: Ints, entered: Floats, x: Floats, y: Floats, at_x: float, at_y: float, limit: float, out: NDArray[np.bool_]
+    piece: Int32s, entered: Floats, x: Floats, y: Floats, at_x: float, at_y: float, limit: float, out: Bools
 ) -> None:
     """Mark the cells (``out``, all false before) for which ``entered`` of their pieces plus the straight distance from
     the cell to the place (``at_x``, ``at_y``) is at most ``limit``."""

@@ -16,15 +16,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place, Portals
 from gcsplan.world.zones import Circle, Zone
-
-Ints = NDArray[np.int32]
 
 COARSE = 4
 """Chords per quarter circle of every arc, at first."""
@@ -218,7 +215,7 @@ class Solids:
         self._tree = shapely.STRtree(shapely.box(*np.array([o.bounds for o in self.outlines]).reshape(-1, 4).T))
         self._known: set[int] = set()
 
-    def look_along(self, track: Floats, which: NDArray[np.bool_]) -> None:
+    def look_along(self, track: Floats, which: Bools) -> None:
         """Add the zones, out of ``which`` (zones,), that a track (N, 2) comes near, and draw their outlines finely
         there, before the first search."""
         line = shapely.LineString(track)
@@ -226,7 +223,7 @@ class Solids:
             if which[k] and self.outlines[k].refine(track):
                 self._known.add(k)
 
-    def shortest(self, a: Place, b: Place, which: NDArray[np.bool_]) -> GroundTrack | None:
+    def shortest(self, a: Place, b: Place, which: Bools) -> GroundTrack | None:
         """The shortest track from ``a`` to ``b`` around the zones ``which`` (zones,); None if they separate the two."""
         for _ in range(ROUNDS):
             known = [k for k in sorted(self._known) if which[k]]

@@ -15,9 +15,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.compiled import kernel
 from gcsplan.planners.optimal.navmesh.polyanya_nodes import (
     AHEAD,
@@ -48,10 +47,6 @@ from gcsplan.planners.optimal.navmesh.polyanya_nodes import (
     push,
 )
 
-Ints = NDArray[np.int32]
-
-Names = NDArray[np.int64]
-
 BAND = 0.005
 """Width of a band of estimated lengths, as a share of the straight distance to the goal."""
 BANDS = 1e8
@@ -65,10 +60,10 @@ MOST_TURNS = 8
     " f8[,] i4[,] i8[,] f8[] i4[] f8[,]"
 )
 def search(
-    start: Ints, ends: Floats, names: Names, joins: Ints, order: Ints, best: Floats, origin: Names, first: Ints,
-    widest: Ints, span: Floats, sources_at: Floats, sources_piece: Ints, goal: Floats, goal_piece: Ints, limit: float,
-    slack: float, most: int, remaining: Floats, met: Floats,
-    node: Floats, link: Ints, name: Names, heap: Floats, ids: Ints, out: Floats,
+    start: Int32s, ends: Floats, names: Int64s, joins: Int32s, order: Int32s, best: Floats, origin: Int64s,
+    first: Int32s, widest: Int32s, span: Floats, sources_at: Floats, sources_piece: Int32s, goal: Floats,
+    goal_piece: Int32s, limit: float, slack: float, most: int, remaining: Floats, met: Floats,
+    node: Floats, link: Int32s, name: Int64s, heap: Floats, ids: Int32s, out: Floats,
 ) -> int:  # fmt: skip
     """Find the shortest track from any source to the goal; its corners, from the goal back, are in ``out``.
 

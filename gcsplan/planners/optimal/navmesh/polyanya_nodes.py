@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.compiled import device
-
-Ints = NDArray[np.int32]
-Names = NDArray[np.int64]
 
 ROOT_X, ROOT_Y, COST, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, AHEAD = range(8)
 PIECE, CAME, PARENT, TURNS, PORTAL, NEXT = range(6)
@@ -25,7 +19,7 @@ GONE = -2
 
 
 @device
-def push(heap: Floats, ids: Ints, size: int, key: float, item: int) -> int:
+def push(heap: Floats, ids: Int32s, size: int, key: float, item: int) -> int:
     """Add an item to a binary heap with the least key first; return the new size."""
     k = size
     while k > 0:
@@ -39,7 +33,7 @@ def push(heap: Floats, ids: Ints, size: int, key: float, item: int) -> int:
 
 
 @device
-def pop(heap: Floats, ids: Ints, size: int) -> int:
+def pop(heap: Floats, ids: Int32s, size: int) -> int:
     """Remove the first item, (heap[0], ids[0]), of a binary heap; return the new size."""
     size -= 1
     key, item = heap[size], ids[size]
@@ -108,7 +102,7 @@ def place_on(ends: Floats, p: int, x: float, y: float) -> float:
 
 
 @device
-def join(node: Floats, link: Ints, name: Names, first: Ints, list_of: int, current: int) -> bool:
+def join(node: Floats, link: Int32s, name: Int64s, first: Int32s, list_of: int, current: int) -> bool:
     """Merge into a node's interval those on its portal that touch it and have the same root; return whether any do.
 
     Merged nodes become `GONE`. All nodes that are `GONE`, and the node itself, leave the portal's list, which begins at

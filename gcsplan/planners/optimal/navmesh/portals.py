@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.optimal.navmesh.polyanya import search
 
-Ints = NDArray[np.int32]
 Place = tuple[float, float]
 
 FIRST_NODES, NODES_OF_PIECE = 1 << 19, 8
@@ -42,11 +40,11 @@ class Portals:
     (portals, 4) is x, y of both ends, ``names`` (portals, 2) the names of both, all less than ``named``, and ``joins``
     (portals, 2) the pieces at the left and at the right."""
 
-    start: Ints
+    start: Int32s
     ends: Floats
-    names: NDArray[np.int64]
-    joins: Ints
-    order: Ints
+    names: Int64s
+    joins: Int32s
+    order: Int32s
     named: int
 
     @property

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.clearance_kernels import lay, pool
 from gcsplan.world.surface import GridMap
 
@@ -61,7 +60,7 @@ def _finer(z: Floats, parts: int) -> Floats:
 def places(
     grid: GridMap, col0: int, row1: int, shape: tuple[int, int], parts: float, span: int,
     reach: tuple[tuple[float, float], tuple[float, float], float] | None = None,
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:  # fmt: skip
+) -> tuple[Floats, Floats, Bools]:  # fmt: skip
     """(rows, cols) x and y of a lattice's nodes, bilinear between the corners of blocks of ``span`` cells, and
     (rows - 1, cols - 1) which cells lie within ``reach``: two places, and the largest sum of distances to both, m."""
     rows, cols = shape

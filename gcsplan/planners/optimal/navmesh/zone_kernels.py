@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int8s, Int32s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
-
-Ints = NDArray[np.int32]
 
 EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
 PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, NUMBERS = range(10, 17)
@@ -83,9 +80,9 @@ def _open(
 
 @kernel("i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] i8 f8 b1 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] f8[,]")
 def stamp_zones(
-    around: Ints, span: Ints, excess: Floats, floor: Floats, ground: Floats, steep: Floats, fineness: int, reach: float,
-    exact: bool, up: Floats, down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, low: bool,
-    of: Ints, values: Floats,
+    around: Int32s, span: Int32s, excess: Floats, floor: Floats, ground: Floats, steep: Floats, fineness: int,
+    reach: float, exact: bool, up: Floats, down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats,
+    boxes: Int32s, low: bool, of: Int32s, values: Floats,
 ) -> int:  # fmt: skip
     """Give the cells that zones shut walls of their own; return how many walls there are.
 
@@ -169,7 +166,7 @@ def _looks_beside(zones: Floats, z: int) -> bool:
 
 @device
 def _guess_beside(
-    around: Ints, steep: Floats, fineness: int, boxes: Ints, z: int, reach: float, up: Floats, down: Floats
+    around: Int32s, steep: Floats, fineness: int, boxes: Int32s, z: int, reach: float, up: Floats, down: Floats
 ) -> None:
     """Set ``up`` and ``down`` at a zone's nodes to the most that ground of slope ``steep`` rises and falls within
     reach."""
@@ -185,7 +182,7 @@ def _guess_beside(
 
 @device
 def _look_beside(
-    around: Ints, excess: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
+    around: Int32s, excess: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s,
     z: int, reach: float, up: Floats, down: Floats,
 ) -> None:  # fmt: skip
     """Set ``up`` and ``down`` at nodes to how far the zone's own ground within reach rises above, and falls below, the
@@ -224,8 +221,8 @@ def _look_beside(
 
 @kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8 f8[,] i1[,]")
 def lift_lids(
-    around: Ints, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints,
-    cap: float, rim: float, lift: Floats, either: NDArray[np.int8],
+    around: Int32s, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s,
+    cap: float, rim: float, lift: Floats, either: Int8s,
 ) -> None:  # fmt: skip
     """Set ``lift`` at each node of ``around`` to how far, m, zones there that can be flown over below ``cap`` are
     higher than the floor; 0 where there is none. Only nodes at most ``rim`` deep in a zone count: a path that does not
@@ -272,7 +269,7 @@ def shut_over(
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8[,] f8[,]")
 def narrow_ranges(
-    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Ints, exact: bool, low: Floats,
+    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s, exact: bool, low: Floats,
     high: Floats,
 ) -> None:  # fmt: skip
     """Raise the lowest, and lower the highest, altitude that can be flown at somewhere in each cell (``low``, ``high``:
@@ -298,7 +295,7 @@ def narrow_ranges(
 
 
 @device
-def _put(of: Ints, values: Floats, cell: int, wall: Floats, count: int) -> int:
+def _put(of: Int32s, values: Floats, cell: int, wall: Floats, count: int) -> int:
     """Store a cell's wall, its values at the corners, if it is above 0 at any; return how many walls there are."""
     if max(max(wall[0], wall[1]), max(wall[2], wall[3])) <= 0.0:
         return count
@@ -323,7 +320,7 @@ def _twist(floor: Floats, ground: Floats, j: int, i: int) -> float:
 
 @device
 def _in_part(
-    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, of: Ints, values: Floats, wall: Floats,
+    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, of: Int32s, values: Floats, wall: Floats,
     least: float, j: int, i: int, count: int,
 ) -> int:  # fmt: skip
     """Shut the part of a cell that certainly lies in a zone where it can be passed neither over nor under.

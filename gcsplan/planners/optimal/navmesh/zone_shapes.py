@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices, Int32s
 from gcsplan.planners.optimal.navmesh.zone_kernels import (
     BESIDE,
     BOTTOM,
@@ -28,8 +27,6 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
 )
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle, Zone
-
-Ints = NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +59,8 @@ class Shapes:
 
     low: tuple[Floats, Floats]
     high: tuple[Floats, Floats]
-    boxes: Ints
-    owner: NDArray[np.intp]
+    boxes: Int32s
+    owner: Indices
     cells: int
 
 
@@ -223,7 +220,7 @@ def _turns(d: Floats) -> float:
     return float(angle.sum() / (2.0 * np.pi))
 
 
-def _cells(bounds: Floats, x: Floats, y: Floats) -> Ints:
+def _cells(bounds: Floats, x: Floats, y: Floats) -> Int32s:
     """(K, 4) first and last column, first and last row of the cells whose nodes' bounding box may meet each of
     ``bounds`` (K, 4: west, south, east, north); clipped to the lattice."""
     rows, cols = x.shape

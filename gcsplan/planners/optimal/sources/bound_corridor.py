@@ -12,9 +12,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.corridor import joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Leg
@@ -178,7 +177,7 @@ def _nearest(places: Floats, track: Floats) -> tuple[Floats, Floats]:
     return away, where
 
 
-def _runs(some: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(some: Bools) -> list[tuple[int, int]]:
     """First and last index of each run of true values."""
     change = np.flatnonzero(np.diff(np.concatenate([[False], some, [False]]).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in zip(change[::2], change[1::2], strict=True)]

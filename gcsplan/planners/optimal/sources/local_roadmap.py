@@ -13,15 +13,12 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.optimal.sources.roadmap import Roadmap, path_over, terminals_by_leg
 from gcsplan.planners.optimal.sources.section_dp import cost_of
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.zones import Circle
-
-Ints = NDArray[np.intp]
 
 NODES, PLACES, LEVELS = 8000, (200, 1000), (7, 30)
 """About how many nodes a roadmap has; fewest and most places; fewest and most altitudes at each place."""
@@ -122,7 +119,7 @@ def _roadmap(in_time: Callable[[], bool], problem: Problem, starts: Floats, goal
     return Roadmap.of(problem, np.vstack([ends, flat]), once, (len(starts), len(goals)), spacing_m, in_time)
 
 
-def _near(places: Floats) -> Ints:
+def _near(places: Floats) -> Indices:
     """(2, E) each place and its nearest others."""
     n = len(places)
     apart = ((places[:, None] - places[None]) ** 2).sum(axis=2)
@@ -132,7 +129,7 @@ def _near(places: Floats) -> Ints:
     return np.stack([np.repeat(np.arange(n), max(count, 0)), nearest.ravel()])
 
 
-def _links_of_end(problem: Problem, k: int, end: Floats, nodes: Floats, spacing_m: float, first: int) -> Ints:
+def _links_of_end(problem: Problem, k: int, end: Floats, nodes: Floats, spacing_m: float, first: int) -> Indices:
     """(2, E) an end and the nodes about it, as far as they can be climbed to."""
     apart = np.hypot(*(nodes[:, :2] - end[:2]).T)
     near = np.flatnonzero(apart < max(2.5 * spacing_m, float(np.sort(apart)[: 4 * NEIGHBOURS].max(initial=0.0))))
@@ -195,7 +192,7 @@ def _heights(problem: Problem, ends: Floats, low: Floats, high: Floats) -> tuple
     return bottom_m, top_m, [*marks, *ends[:1, 2].tolist(), float(ends[-1, 2])]
 
 
-def _places(problem: Problem, low: Floats, high: Floats, count: int, spacing_m: float) -> tuple[Floats, Ints]:
+def _places(problem: Problem, low: Floats, high: Floats, count: int, spacing_m: float) -> tuple[Floats, Indices]:
     """(N, 2) places in a box, about ``count``, and (2, E) pairs of them to be linked however far apart."""
     part = _part(problem, low, high)
     c, r = (a.ravel() for a in np.meshgrid(np.arange(*part[1], dtype=float), np.arange(*part[0], dtype=float)))

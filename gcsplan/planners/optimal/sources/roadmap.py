@@ -11,15 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.optimal.sources.section_dp import FIXED, FREE, UPRIGHT, cheapest, cost_of, drawn
 from gcsplan.planners.problem import Problem
-
-Ints = NDArray[np.intp]
 
 WINDING = 1.06
 """Paths over a roadmap may cost that many times the best known path, for they turn at its nodes alone."""
@@ -85,7 +82,7 @@ def path_over(
     return out
 
 
-def _kinds_of(problem: Problem, points: Floats) -> Ints:
+def _kinds_of(problem: Problem, points: Floats) -> Indices:
     """(N,) kinds of the points of a path that passes start, vias and goal."""
     kinds = np.full(len(points), FREE)
     at = 0
@@ -151,7 +148,7 @@ class Roadmap:
         cls,
         problem: Problem,
         nodes: Floats,
-        pairs: Ints,
+        pairs: Indices,
         ends: tuple[int, int],
         spacing_m: float,
         in_time: Callable[[], bool],
@@ -193,7 +190,7 @@ class Roadmap:
         return start, out
 
 
-def _legal(problem: Problem, nodes: Floats, a: Ints, b: Ints, in_time: Callable[[], bool]) -> Bools:
+def _legal(problem: Problem, nodes: Floats, a: Indices, b: Indices, in_time: Callable[[], bool]) -> Bools:
     """(E,) which legs from nodes ``a`` to nodes ``b`` pass the exact check; False once time is over."""
     out = np.zeros(len(a), np.bool_)
     for k in range(0, len(a), AT_ONCE):
@@ -204,13 +201,13 @@ def _legal(problem: Problem, nodes: Floats, a: Ints, b: Ints, in_time: Callable[
     return out
 
 
-def _reached(graph: csr_array, source: int) -> tuple[Floats, Ints]:
+def _reached(graph: csr_array, source: int) -> tuple[Floats, Indices]:
     """(N,) the least cost from a source to each node, and the node before it; negative without one."""
     cost, before = dijkstra(graph, indices=[source], return_predecessors=True)
     return cost[0], before[0].astype(np.intp)
 
 
-def _trace(before: Ints, node: int) -> list[int]:
+def _trace(before: Indices, node: int) -> list[int]:
     """A node, the one before it, and so on to the end."""
     out = [node]
     while before[out[-1]] >= 0:

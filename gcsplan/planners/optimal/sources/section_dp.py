@@ -11,13 +11,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import divided
-
-Ints = NDArray[np.intp]
 
 FREE, UPRIGHT, FIXED = 0, 1, 2
 """Kinds of points: free to move, free to move up and down only, fixed."""
@@ -34,11 +31,11 @@ FAR_AHEAD = 24
 def drawn(
     problem: Problem,
     points: Floats,
-    kinds: Ints,
+    kinds: Indices,
     size_m: float,
     in_time: Callable[[], bool],
     halvings: int = HALVINGS,
-) -> tuple[Floats, Ints]:
+) -> tuple[Floats, Indices]:
     """A legal path (N, 3) of points of ``kinds`` (N,) made cheaper by moves of half ``size_m`` and less."""
     cost = cost_of(problem, points)
     for k in range(halvings):
@@ -58,7 +55,7 @@ def drawn(
     return points, kinds
 
 
-def cheapest(problem: Problem, points: Floats, kinds: Ints) -> tuple[Floats, Ints]:
+def cheapest(problem: Problem, points: Floats, kinds: Indices) -> tuple[Floats, Indices]:
     """The cheapest path over some points of a legal one, in order: all of its terminals, and of the others what
     helps."""
     n = len(points)
@@ -83,7 +80,7 @@ def cheapest(problem: Problem, points: Floats, kinds: Ints) -> tuple[Floats, Int
     return points[keep], kinds[keep]
 
 
-def _moved(problem: Problem, points: Floats, kinds: Ints, move_m: float) -> Floats:
+def _moved(problem: Problem, points: Floats, kinds: Indices, move_m: float) -> Floats:
     """The cheapest chain over places around each point, across the path and in height."""
     if len(points) < 3:
         return points
@@ -124,7 +121,7 @@ def _moved(problem: Problem, points: Floats, kinds: Ints, move_m: float) -> Floa
     return out
 
 
-def _divided(points: Floats, kinds: Ints, step_m: float) -> tuple[Floats, Ints]:
+def _divided(points: Floats, kinds: Indices, step_m: float) -> tuple[Floats, Indices]:
     """The same path with a point every ``step_m`` at least."""
     leg, part, parts = divided(points, step_m)
     t = (part / parts)[:, None]
