@@ -92,8 +92,10 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
     pitch = item.params[0] if item.params[0] > 0.0 else LEAST_PITCH_DEG
     climb_deg = min(pitch, pilot.vehicle.limits.max_climb_deg)
     run_m = (top - ground) / math.tan(math.radians(climb_deg))
-    part = run_m / flat_m((lat, lon, 0.0), ahead)
-    end = (lat + part * (ahead[0] - lat), lon + part * (ahead[1] - lon), top)
+    end = ahead
+    for _ in range(2):  # metres per degree change with the latitude, so the first end is millimetres off
+        part = run_m / flat_m((lat, lon, 0.0), end)
+        end = (lat + part * (end[0] - lat), lon + part * (end[1] - lon), top)
     pilot.note(
         f"item {seq}: the take-off is judged as a straight climb at {climb_deg:g}° on a heading of "
         f"{_bearing(pilot.home, ahead):.0f}° over {run_m:.0f} m: launch it that way; ArduPlane holds the heading that "
