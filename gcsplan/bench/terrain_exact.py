@@ -17,7 +17,7 @@ from numba.experimental import jitclass  # type: ignore[attr-defined]
 
 from gcsplan.world._entries import judge
 from gcsplan.world._field import Field
-from gcsplan.world._halo import halo_around
+from gcsplan.world._neighbourhood import extrema_around
 from gcsplan.world._shared import BOW_M
 from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.airspace import Airspace, _demands
@@ -52,9 +52,9 @@ def _arguments(airspace: Airspace, limits: Limits) -> tuple[Any, ...]:
     field = Field.of(surface.grid)
     zones = zones_as_arrays(airspace.zones, surface, field, scale)
     near_m = limits.track_error_m * scale + (0.0 if field.affine else BOW_M + field.error_m)
-    near = halo_around(field, surface.top_m, near_m)
-    far = halo_around(field, surface.top_m, near_m + limits.horizontal_clearance_m * scale)
-    over = halo_around(field, surface.ground_m, near_m)
+    near = extrema_around(field, surface.top_m, near_m)
+    far = extrema_around(field, surface.top_m, near_m + limits.horizontal_clearance_m * scale)
+    over = extrema_around(field, surface.ground_m, near_m)
     nothing = np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2))
     return (
         field.packed, surface.ground_m, surface.top_m, *near, *far, *over, *zones,

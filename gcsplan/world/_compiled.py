@@ -11,7 +11,7 @@ import numpy as np
 from gcsplan.native.form import Held
 from gcsplan.native.kernels import Kernels
 
-_HALO = "f4[,] f4[,] f4[,] i8 i8"
+_EXTREMA = "f4[,] f4[,] f4[,] i8 i8"
 _ZONES = "f8[,] f8[,] f8[] i8[] i8[] i8"
 _ROOM = "f8[,] f8[] f8[] i8[] i8[]"
 
@@ -26,25 +26,25 @@ KERNELS = Kernels(
         "_sweep_zones.py",
         "_judge.py",
         "_envelope.py",
-        "_surroundings.py",
+        "_extrema.py",
         "_entries.py",
         "surface.py",
     ),
     "gcsplan.world._entries",
     {
         "judge": (
-            f"f8[] f8[,] f8[,] {_HALO} {_HALO} {_HALO} {_ZONES} f8[,] f8[,] b1[] f8[] f8[] "
+            f"f8[] f8[,] f8[,] {_EXTREMA} {_EXTREMA} {_EXTREMA} {_ZONES} f8[,] f8[,] b1[] f8[] f8[] "
             f"f8 f8 f8 f8 f8 f8 f8 b1 b1[] f8[,] f8[,,] i8[] i8[,] f8[,] {_ROOM}"
         ),
-        "pieces": f"f8[] f8[,] f8[,] {_HALO} {_HALO} {_HALO} f8[,] f8 f8 f8 f8[,]",
-        "around": f"f8[] f8[,] {_HALO} f8 f8[,] f8 f8[]",
-        "surroundings": "f8[,] f8 f8 i8 i8 i8[] f4[,,] f4[,] f4[,] f4[,]",
+        "pieces": f"f8[] f8[,] f8[,] {_EXTREMA} {_EXTREMA} {_EXTREMA} f8[,] f8 f8 f8 f8[,]",
+        "around": f"f8[] f8[,] {_EXTREMA} f8 f8[,] f8 f8[]",
+        "local_extrema": "f8[,] f8 f8 i8 i8 i8[] f4[,,] f4[,] f4[,] f4[,]",
     },
 )
 
 
-SURFACE, ONE_SURFACE, HALO, ZONES = "f8[] f8[,] f8[,]", "f8[] f8[,]", _HALO, _ZONES
-"""Forms of arguments that stay the same over many calls: the map with both surfaces or one, a halo, the zones."""
+SURFACE, ONE_SURFACE, EXTREMA, ZONES = "f8[] f8[,] f8[,]", "f8[] f8[,]", _EXTREMA, _ZONES
+"""Forms of arguments that stay the same over many calls: the map with one or both surfaces, extrema, zones."""
 
 FOUND = "f8[,] f8[,,] i8[] i8[,] f8[,]"
 """Forms of the arrays into which `judge` writes its results."""
@@ -95,6 +95,6 @@ def around(*arguments: Any) -> int:
     return KERNELS["around"](*arguments)
 
 
-def surroundings(*arguments: Any) -> int:
-    """See `gcsplan.world._surroundings.surroundings`."""
-    return KERNELS["surroundings"](*arguments)
+def local_extrema(*arguments: Any) -> int:
+    """See `gcsplan.world._extrema.local_extrema`."""
+    return KERNELS["local_extrema"](*arguments)

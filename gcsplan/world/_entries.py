@@ -1,12 +1,12 @@
-"""The kernels that Python calls, with the parts of halos, zones and demands as separate arguments."""
+"""The kernels that Python calls, with the parts of local extrema, zones and demands as separate arguments."""
 
 from __future__ import annotations
 
 from gcsplan.world._envelope import around as around_kernel
 from gcsplan.world._envelope import pieces as pieces_kernel
+from gcsplan.world._extrema import local_extrema as local_extrema_kernel
 from gcsplan.world._judge import judge as judge_kernel
-from gcsplan.world._shared import Demands, Halo, Zones
-from gcsplan.world._surroundings import surroundings as surroundings_kernel
+from gcsplan.world._shared import Demands, LocalExtrema, Zones
 from gcsplan.world._sweep import device
 
 
@@ -24,9 +24,9 @@ def judge(  # type: ignore[no-untyped-def]
     """See `gcsplan.world._judge.judge`."""
     return judge_kernel(
         m, ground, top,
-        Halo(near_slope, near_high, near_low, near_cols, near_rows),
-        Halo(far_slope, far_high, far_low, far_cols, far_rows),
-        Halo(over_slope, over_high, over_low, over_cols, over_rows),
+        LocalExtrema(near_slope, near_high, near_low, near_cols, near_rows),
+        LocalExtrema(far_slope, far_high, far_low, far_cols, far_rows),
+        LocalExtrema(over_slope, over_high, over_low, over_cols, over_rows),
         Zones(table, vertex, lattice, bucket, near_zones, most_corners),
         start, end, column, track, altitude,
         Demands(min_agl_m, max_agl_m, max_amsl_m, clearance_m, scale, max_climb, max_descent),
@@ -45,9 +45,9 @@ def pieces(  # type: ignore[no-untyped-def]
     """See `gcsplan.world._envelope.pieces`."""
     return pieces_kernel(
         m, ground, top,
-        Halo(under_slope, under_high, under_low, under_cols, under_rows),
-        Halo(beside_slope, beside_high, beside_low, beside_cols, beside_rows),
-        Halo(beyond_slope, beyond_high, beyond_low, beyond_cols, beyond_rows),
+        LocalExtrema(under_slope, under_high, under_low, under_cols, under_rows),
+        LocalExtrema(beside_slope, beside_high, beside_low, beside_cols, beside_rows),
+        LocalExtrema(beyond_slope, beyond_high, beyond_low, beyond_cols, beyond_rows),
         track, low_m, near_m, far_m, rows,
     )  # fmt: skip
 
@@ -55,10 +55,10 @@ def pieces(  # type: ignore[no-untyped-def]
 @device
 def around(m, z, slope, high, low, cols, rows, sign, points, reach_m, out):  # type: ignore[no-untyped-def]
     """See `gcsplan.world._envelope.around`."""
-    around_kernel(m, z, Halo(slope, high, low, cols, rows), sign, points, reach_m, out)
+    around_kernel(m, z, LocalExtrema(slope, high, low, cols, rows), sign, points, reach_m, out)
 
 
 @device
-def surroundings(z, step_x, step_y, cols, rows, box, room, slope, high, low):  # type: ignore[no-untyped-def]
-    """See `gcsplan.world._surroundings.surroundings`."""
-    return surroundings_kernel(z, step_x, step_y, cols, rows, box, room, slope, high, low)
+def local_extrema(z, step_x, step_y, cols, rows, box, room, slope, high, low):  # type: ignore[no-untyped-def]
+    """See `gcsplan.world._extrema.local_extrema`."""
+    return local_extrema_kernel(z, step_x, step_y, cols, rows, box, room, slope, high, low)

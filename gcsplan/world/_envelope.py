@@ -17,7 +17,7 @@ from gcsplan.world._sweep_terrain import EDGE
 CHORD_M = 0.05
 MOST_CUTS = 64  # most parts of the line in one cell
 NEAR_UNKNOWN_M = 10.0  # pieces are cut to this beside unknown ground, so that little of the track is lost
-MOST_CELLS = 16  # examined one by one for the slope beside a piece; if there are more, the halo bounds them
+MOST_CELLS = 16  # examined one by one for the slope beside a piece; if there are more, the local extrema bound them
 
 
 @device
@@ -43,20 +43,20 @@ def steepest_in(m, z, slopes, i, j, c0, r0, c1, r1):  # type: ignore[no-untyped-
 
 
 @device
-def lift_beside(m, z, halo, ea, na, eb, nb, c0, r0, c1, r1, i, j, reach):  # type: ignore[no-untyped-def]
+def lift_beside(m, z, extrema, ea, na, eb, nb, c0, r0, c1, r1, i, j, reach):  # type: ignore[no-untyped-def]
     """How much higher than a short segment in cell (i, j) the surface may lie within ``reach``, m; NaN where unknown.
 
     The segment's ends are given in the plane, then in the grid.
     """
-    if halo.slope[j, i] == math.inf:
+    if extrema.slope[j, i] == math.inf:
         return math.nan
-    if halo.slope[j, i] < 0.0:
-        d, _ = unknown_near(m, z, halo.cols, halo.rows, ea, na, eb, nb, reach, i, j)
+    if extrema.slope[j, i] < 0.0:
+        d, _ = unknown_near(m, z, extrema.cols, extrema.rows, ea, na, eb, nb, reach, i, j)
         if d < reach:
             return math.nan
     x, y = reach / m[STEP_X], reach / m[STEP_Y]
     return reach * steepest_in(
-        m, z, halo.slope, i, j, min(c0, c1) - x, min(r0, r1) - y, max(c0, c1) + x, max(r0, r1) + y
+        m, z, extrema.slope, i, j, min(c0, c1) - x, min(r0, r1) - y, max(c0, c1) + x, max(r0, r1) + y
     )
 
 
@@ -83,8 +83,8 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, r
 
     Fill ``rows``, as many as fit: s at the end of the piece in metres along the track; lower bound of the ground within
     ``low_m`` at both ends; upper bound of the top within ``near_m``; the same within ``far_m``. Bounds are linear
-    between; NaN where the ground within reach is unknown. ``under``, ``beside``, ``beyond``: halos of the ground and of
-    the top for the three reaches, each made for its reach plus the bow.
+    between; NaN where the ground within reach is unknown. ``under``, ``beside``, ``beyond``: local extrema of the
+    ground and of the top for the three reaches, each made for its reach plus the bow.
     """
     count = 0
     s_start = 0.0
@@ -169,14 +169,14 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, r
                         if reach <= 0.0:
                             continue
                         z = ground if which == 0 else top
-                        halo = under if which == 0 else (beside if which == 1 else beyond)
-                        lift = lift_beside(m, z, halo, ea, na, eb, nb, va, vb, wa, wb, ii, jj, reach)
+                        extrema = under if which == 0 else (beside if which == 1 else beyond)
+                        lift = lift_beside(m, z, extrema, ea, na, eb, nb, va, vb, wa, wb, ii, jj, reach)
                         if which == 0:
-                            bound = halo.low[jj, ii]
+                            bound = extrema.low[jj, ii]
                             whole = min(low0, low1) - lift < bound
                             low0, low1 = (bound, bound) if whole else (low0 - lift, low1 - lift)
                             continue
-                        bound = halo.high[jj, ii]
+                        bound = extrema.high[jj, ii]
                         whole = max(up0, up1) + lift > bound
                         if which == 1:
                             near0, near1 = (bound, bound) if whole else (up0 + lift, up1 + lift)
@@ -191,11 +191,11 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, r
 
 
 @device
-def around(m, z, halo, sign, points, reach_m, out):  # type: ignore[no-untyped-def]
+def around(m, z, extrema, sign, points, reach_m, out):  # type: ignore[no-untyped-def]
     """Upper bound of ``sign·height`` within ``reach_m`` of each point (N, 2) of the plane; NaN where unknown.
 
     The tightest of three bounds: by the gradient at the point, if the disc lies in one cell; by the highest corner of
-    the cells' parts in the disc's box; by the halo. ``out`` (N,).
+    the cells' parts in the disc's box; by the local extrema. ``out`` (N,).
     """
     rows, cols = z.shape
     for p in range(len(points)):
@@ -204,7 +204,7 @@ def around(m, z, halo, sign, points, reach_m, out):  # type: ignore[no-untyped-d
         if not (-EDGE <= c <= cols - 1.0 + EDGE and -EDGE <= r <= rows - 1.0 + EDGE):
             continue
         i, j = min(max(int(math.floor(c)), 0), cols - 2), min(max(int(math.floor(r)), 0), rows - 2)
-        slope = halo.slope[j, i]
+        slope = extrema.slope[j, i]
         if slope == math.inf:
             continue
         u, v = min(max(c - i, 0.0), 1.0), min(max(r - j, 0.0), 1.0)
@@ -217,13 +217,13 @@ def around(m, z, halo, sign, points, reach_m, out):  # type: ignore[no-untyped-d
             continue
         if slope < 0.0:
             d, _ = unknown_near(
-                m, z, halo.cols, halo.rows, points[p, 0], points[p, 1], points[p, 0], points[p, 1], reach_m, i, j
+                m, z, extrema.cols, extrema.rows, points[p, 0], points[p, 1], points[p, 0], points[p, 1], reach_m, i, j
             )
             if d < reach_m:
                 continue
             slope = -slope
         x, y = reach_m / m[STEP_X], reach_m / m[STEP_Y]
-        best = min(h + reach_m * slope, halo.high[j, i] if sign > 0.0 else -halo.low[j, i])
+        best = min(h + reach_m * slope, extrema.high[j, i] if sign > 0.0 else -extrema.low[j, i])
         if x <= u <= 1.0 - x and y <= v <= 1.0 - y:
             gx, gy = (kb + kd * v) / m[STEP_X], (kc + kd * u) / m[STEP_Y]
             best = min(best, h + reach_m * math.sqrt(gx * gx + gy * gy) + 0.5 * abs(kd) * x * y)

@@ -42,39 +42,39 @@ def judge_terrain(  # type: ignore[no-untyped-def]
 ):
     """Judge ground, obstacles and ceilings of one leg; return False at the first violation unless ``full``.
 
-    ``near``, ``far``: halos of the top for the track error and for the clearance; ``over``: of the ground for the track
-    error. ``worst[leg, kind]``: depth (for coverage, how far unknown ground reaches in) and fraction. ``out[8:11]``:
-    lowest height above top, its fraction, and highest above ground; the rest of ``out`` is `sweep`'s.
+    ``near``, ``far``: local extrema of the top for the track error and for the clearance; ``over``: of the ground for
+    the track error. ``worst[leg, kind]``: depth (for coverage, how far unknown ground reaches in) and fraction.
+    ``out[8:11]``: lowest height above top, its fraction, and highest above ground; the rest of ``out`` is `sweep`'s.
     """
     fine = True
     track_m = track * want.scale
     out[8], out[9], out[10] = math.nan, 0.0, math.nan
     for kind in (MIN_AGL, TERRAIN, MAX_AGL):
-        z, halo, sign, need, reach = top, near, 1.0, want.min_agl_m + altitude, track_m
+        z, extrema, sign, need, reach = top, near, 1.0, want.min_agl_m + altitude, track_m
         judged = True
         if kind == MIN_AGL:
             need = -math.inf if column else need
         elif kind == TERRAIN:
             if column or want.clearance_m <= 0.0:
                 continue
-            halo, need, reach = far, altitude, track_m + want.clearance_m * want.scale
+            extrema, need, reach = far, altitude, track_m + want.clearance_m * want.scale
             # Skip the search if even the steepest slope does not lift the ground to the flight level.
             same = near.cols == far.cols and near.rows == far.rows
             if same and out[LOW] - altitude >= (out[REACH] + want.clearance_m * want.scale) * out[STEEPEST]:
                 continue
         else:
-            z, halo, sign, need = ground, over, -1.0, altitude - want.max_agl_m
+            z, extrema, sign, need = ground, over, -1.0, altitude - want.max_agl_m
             judged = want.max_agl_m < math.inf
             if not (full or judged):
                 continue
-        sure = glance(m, z, halo.slope, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out)
+        sure = glance(m, z, extrema.slope, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out)
         good = sure > 0
         if sure < 0 and judged:
             return False
         if not good:
-            extremes = halo.high if sign > 0.0 else halo.low
+            extremes = extrema.high if sign > 0.0 else extrema.low
             good = sweep(
-                m, z, halo.slope, extremes, halo.cols, halo.rows, sign,
+                m, z, extrema.slope, extremes, extrema.cols, extrema.rows, sign,
                 e0, n0, h0, e1, n1, h1, need, reach, stack, full, out,
             )  # fmt: skip
         if not good and judged:
@@ -129,7 +129,7 @@ def judge(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Judge every leg; return the number of zone violations.
 
-    ``m``, ``ground``, ``top``: map, surfaces; ``near``, ``far``, ``over``: halos, see `judge_terrain`; ``zs``: zones.
+    ``m``, ``ground``, ``top``: map, surfaces; ``near``, ``far``, ``over``: see `judge_terrain`; ``zs``: zones.
     ``start``, ``end`` (n, 3), ``column``, ``track``, ``altitude`` (n,): as in `Legs`.
 
     ``ok`` (n,): no violation. With ``full`` also ``found`` (n, 4): lowest height above top, its fraction, highest above

@@ -49,7 +49,7 @@ class Zones(NamedTuple):
     most_corners: int
 
 
-class Halo(NamedTuple):
+class LocalExtrema(NamedTuple):
     """Bounds over the known cells within ``cols`` and ``rows`` of each cell, (rows - 1, cols - 1) float32.
 
     ``slope`` (rise over run) is ``inf`` in a cell that is itself unknown, and negative (its magnitude is the slope) if

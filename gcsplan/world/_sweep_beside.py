@@ -22,18 +22,18 @@ def bar_above(depth):  # type: ignore[no-untyped-def]
 
 
 @device
-def unknown_near(m, z, halo_c, halo_r, e0, n0, e1, n1, reach, i, j):  # type: ignore[no-untyped-def]
+def unknown_near(m, z, extrema_c, extrema_r, e0, n0, e1, n1, reach, i, j):  # type: ignore[no-untyped-def]
     """Distance from a short segment in cell (i, j) to the nearest unknown patch, and where on the segment.
 
-    Only patches up to ``halo_c`` columns and ``halo_r`` rows away are examined; ``inf`` if there is none.
+    Only patches up to ``extrema_c`` columns and ``extrema_r`` rows away are examined; ``inf`` if there is none.
     """
     rows, cols = z.shape
     c0, r0 = to_grid(m, e0, n0)
     c1, r1 = to_grid(m, e1, n1)
     sx, sy = local_steps(m, e0, n0, e1, n1, reach)
     best, at = math.inf, 0.0
-    for jj in range(j - halo_r, j + halo_r + 1):
-        for ii in range(i - halo_c, i + halo_c + 1):
+    for jj in range(j - extrema_r, j + extrema_r + 1):
+        for ii in range(i - extrema_c, i + extrema_c + 1):
             if 0 <= ii < cols - 1 and 0 <= jj < rows - 1:
                 total = z[jj, ii] + z[jj, ii + 1] + z[jj + 1, ii] + z[jj + 1, ii + 1]
                 if not math.isnan(total):

@@ -118,13 +118,13 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
 
 
 @device
-def sweep(m, z, slopes, extremes, halo_c, halo_r, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full, out):  # type: ignore[no-untyped-def]
+def sweep(m, z, slopes, extremes, extrema_c, extrema_r, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full, out):  # type: ignore[no-untyped-def]
     """Judge one leg against one demand; return False at the first break found, unless ``full``.
 
-    ``slopes``, ``extremes``: the surface's halo, of ``halo_c`` columns and ``halo_r`` rows. ``out``: lowest
+    ``slopes``, ``extremes``: local extrema, over ``extrema_c`` columns and ``extrema_r`` rows. ``out``: lowest
     ``sign·(altitude − height)`` on the line and where; depth of the worst break (more than `TOUCH_M` is one) and where;
-    distance to the nearest unknown patch, searched within reach, and where; steepest slope within the halo of the cells
-    under the leg, ``inf`` if unknown patches are among them; the reach with the line's bow.
+    distance to the nearest unknown patch, searched within reach, and where; steepest slope within reach of the
+    cells under the leg, ``inf`` if unknown patches are among them; the reach with the line's bow.
     """
     rows, cols = z.shape
     length = math.hypot(e1 - e0, n1 - n0)
@@ -215,7 +215,7 @@ def sweep(m, z, slopes, extremes, halo_c, halo_r, sign, e0, n0, h0, e1, n1, h1, 
                         if r > 0.0 and round_ == 0 and out[UNKNOWN] > 0.0:
                             ta, te = first + t * share, first + tb * share
                             d, s = unknown_near(
-                                m, z, halo_c, halo_r, e0 + (e1 - e0) * ta, n0 + (n1 - n0) * ta,
+                                m, z, extrema_c, extrema_r, e0 + (e1 - e0) * ta, n0 + (n1 - n0) * ta,
                                 e0 + (e1 - e0) * te, n0 + (n1 - n0) * te, r, i, j,
                             )  # fmt: skip
                             if d < out[UNKNOWN]:

@@ -23,7 +23,7 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.native.form import Held
 from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES, around, judge, room
 from gcsplan.world._field import Field
-from gcsplan.world._halo import Surroundings
+from gcsplan.world._neighbourhood import Neighbourhood
 from gcsplan.world._shapes import deepest_in_circle, deepest_inside
 from gcsplan.world._shared import (
     BAND_HIGH,
@@ -174,7 +174,7 @@ class Airspace:
         self.scale = scale
         self._field = Field.of(surface.grid)
         self._zones = zones_as_arrays(self.zones, surface, self._field, scale)
-        self._halos: dict[tuple[bool, int, int], Surroundings] = {}
+        self._neighbourhoods: dict[tuple[bool, int, int], Neighbourhood] = {}
         ground, top = (np.ascontiguousarray(a, dtype=np.float64) for a in (surface.ground_m, surface.top_m))
         self._heights = ground, top
         self._surfaces = Held(SURFACE, self._field.packed, ground, top)
@@ -243,10 +243,10 @@ class Airspace:
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
             raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
 
-        def halo(of_top: bool, reach_m: float) -> Held:
+        def extrema(of_top: bool, reach_m: float) -> Held:
             return self._held(of_top, reach_m, points[:-1], points[1:])
 
-        return make_tube(points, limits, self._field, self._zones, halo, self._surfaces, self._grounds, self.scale)
+        return make_tube(points, limits, self._field, self._zones, extrema, self._surfaces, self._grounds, self.scale)
 
     def straight_cells(self, bow_m: float) -> int:
         """How many cells of the terrain model in a row have lines that are straight in the plane within ``bow_m``."""
@@ -265,14 +265,14 @@ class Airspace:
         return out.reshape(e.shape)
 
     def _held(self, of_top: bool, reach_m: float, start: Floats, end: Floats) -> Held:
-        """The kernels' halo of top or ground for a reach, along lines (N, 2 or more); one for each size in cells."""
+        """The kernels' extrema of top or ground for a reach, along lines (N, 2 or more); one for each size in cells."""
         f = self._field
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))
-        if key not in self._halos:
+        if key not in self._neighbourhoods:
             heights = self._heights[of_top]
-            self._halos[key] = Surroundings(self.surface.grid, f, heights, reach_m)
-        return self._halos[key].along(start, end)
+            self._neighbourhoods[key] = Neighbourhood(self.surface.grid, f, heights, reach_m)
+        return self._neighbourhoods[key].along(start, end)
 
     def _judge(
         self,

@@ -94,19 +94,19 @@ def make_tube(
     limits: Limits,
     field: Field,
     zones: Zones,
-    halo: Callable[[bool, float], Held],
+    extrema: Callable[[bool, float], Held],
     surfaces: Held,
     grounds: Held,
     scale: float,
 ) -> Tube:
-    """The tube over ``track`` (N, 2); ``halo(of_top, reach_m)`` returns the surface's bounds. See `Tube`.
+    """The tube over ``track`` (N, 2); ``extrema(of_top, reach_m)`` returns the surface's bounds. See `Tube`.
 
     ``surfaces``: the map with ground and top; ``grounds``: the map with the ground for both.
     """
     reach = Reaches.of(limits, field, scale)
     bow = 0.0 if field.affine else BOW_M + 2.0 * field.error_m
-    under, beside = halo(False, reach.near_m + bow), halo(True, reach.near_m + bow)
-    beyond = halo(True, reach.far_m + bow)
+    under, beside = extrema(False, reach.near_m + bow), extrema(True, reach.near_m + bow)
+    beyond = extrema(True, reach.far_m + bow)
     rows = _pieces(surfaces, under, beside, beyond, track, (reach.near_m, reach.near_m, reach.far_m))
     error, margin = limits.altitude_error_m, reach.near_margin_m
     floor = rows[:, 3:5] + (limits.min_agl_m + error + margin)
@@ -122,7 +122,7 @@ def make_tube(
         np.concatenate([[0.0], rows[:, 0]]),
         np.where(unknown, np.inf, floor),
         ceiling,
-        _bands(track, limits, field, zones, halo, reach, grounds),
+        _bands(track, limits, field, zones, extrema, reach, grounds),
     )
 
 
@@ -140,7 +140,7 @@ def _pieces(
 
 def _bands(
     track: Floats, limits: Limits, field: Field, zones: Zones,
-    halo: Callable[[bool, float], Held], reach: Reaches, grounds: Held,
+    extrema: Callable[[bool, float], Held], reach: Reaches, grounds: Held,
 ) -> tuple[Band, ...]:  # fmt: skip
     """One band for each span of the track within reach of a zone, by zone and distance along the track."""
     error = limits.altitude_error_m
@@ -151,7 +151,7 @@ def _bands(
         numbers = zones.table[zone]
         bottom, top, agl = numbers[FLOOR], numbers[CEILING], numbers[[FLOOR_AGL, CEILING_AGL]]
         if agl.any():
-            around = halo(False, wide + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
+            around = extrema(False, wide + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))
             part = _between(track, length, s0, s1)
             ground = _pieces(grounds, around, around, around, part, (wide,) * 3)
             if not len(ground):

@@ -114,7 +114,7 @@ def test_this_llvm_reads_what_is_shipped() -> None:
     assert bitcode is not None
     code = Machine().compile(bitcode)
     assert code is not None
-    assert set(Machine().link(code, tuple(WORLD.forms))) == {"judge", "pieces", "around", "surroundings"}
+    assert set(Machine().link(code, tuple(WORLD.forms))) == {"judge", "pieces", "around", "local_extrema"}
 
 
 def test_a_kernel_from_source_from_what_is_shipped_and_from_the_cache_is_the_same(room: Path) -> None:

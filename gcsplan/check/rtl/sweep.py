@@ -19,7 +19,7 @@ from gcsplan.check.rtl.model import RULES, about_turn_m, at_home_m
 from gcsplan.check.rtl.obstacles import GROUND, MAX_AGL, MAX_AMSL, Obstacles
 from gcsplan.check.rtl.trace import MissionTrace, TraceParts
 from gcsplan.vehicle import Vehicle
-from gcsplan.world import ways
+from gcsplan.world import level_lines
 
 GROUPS = 6
 """Most groups into which lines home of similar width are put; each group is judged with its greatest width."""
@@ -89,8 +89,8 @@ def obstacles_of_returns(
     climb = vehicle.climb_m_s / vehicle.speed_max_m_s if math.isfinite(vehicle.climb_m_s) else 1.0
     found = _Builder(high)
     for some in _alike(extra, away):
-        swept = ways.Swept(regions[some], own[some])
-        met = ways.over(air, start[some], end[some], limits, float(extra[some].max()), swept)
+        swept = level_lines.Swept(regions[some], own[some])
+        met = level_lines.over(air, start[some], end[some], limits, float(extra[some].max()), swept)
         found.cost += len(met.piece_way)
         at = met.crossings
         if rule.climbs_first:
@@ -103,13 +103,15 @@ def obstacles_of_returns(
             found.zones(i, at, -np.inf, low[i] + climb * np.maximum(at.s0_m - reach[i] - about_m, 0.0))
     if rule.climbs_first:  # near home the altitude is not known: no zone may be within reach
         for some in _alike(extra, np.flatnonzero(distance + reach <= there_m)):
-            swept = ways.Swept(regions[some], own[some])
-            met = ways.over(air, start[some], end[some], limits, float(extra[some].max()), swept)
+            swept = level_lines.Swept(regions[some], own[some])
+            met = level_lines.over(air, start[some], end[some], limits, float(extra[some].max()), swept)
             i = some[met.crossings.way]
             found.zones(i, met.crossings, low[i], np.full(len(i), -np.inf))
     else:
         for some in _alike(extra, np.arange(n)):
-            met = ways.over(air, start[some], start[some], limits, float(extra[some].max()) + about_m * air.scale)
+            met = level_lines.over(
+                air, start[some], start[some], limits, float(extra[some].max()) + about_m * air.scale
+            )
             found.cost += len(met.piece_way)
             found.ground(some, met, -np.inf, low[some], low[some])
             i = some[met.crossings.way]
@@ -147,13 +149,13 @@ def _over_home(found: _Builder, trace: MissionTrace, target: Target, vehicle: Ve
     """Add the descent over home, or a plane's circle there, with which every return ends."""
     air, limits = trace.world.airspace, vehicle.limits
     if RULES[vehicle.autopilot].climbs_first:
-        at = ways.over(air, target.en[None], target.en[None], limits).crossings
+        at = level_lines.over(air, target.en[None], target.en[None], limits).crossings
         for zone, bottom, top in zip(at.zone.tolist(), at.bottom_m.tolist(), at.top_m.tolist(), strict=True):
             if top > target.ground_amsl_m:
                 found.ceiling(np.arange(n), np.full(n, bottom), zone, (0, 1))
         return
     circle = RULES[vehicle.autopilot].circle_m(target.ground_amsl_m + CIRCLE_ABOVE_M)
-    met = ways.over(air, target.en[None], target.en[None], limits, circle * air.scale)
+    met = level_lines.over(air, target.en[None], target.en[None], limits, circle * air.scale)
     every = np.arange(n)
     for grade, floor in enumerate((met.clear_m[0], met.legal_m[0])):
         found.one(grade, every, -np.inf, float(floor), GROUND)
@@ -165,7 +167,7 @@ def _over_home(found: _Builder, trace: MissionTrace, target: Target, vehicle: Ve
         found.ceiling(every, np.full(n, met.ceiling_m[0]), MAX_AGL, (1,))
 
 
-def _climbs(met: ways.Ways, low: Floats, spare: Floats, climb: float) -> tuple[Floats, Floats]:
+def _climbs(met: level_lines.LevelLines, low: Floats, spare: Floats, climb: float) -> tuple[Floats, Floats]:
     """For both grades: inf for each plane that stays above the ground while it climbs from ``low``, else -inf."""
     out = []
     reached = low[met.piece_way] + climb * np.maximum(met.piece_s_m - spare[met.piece_way], 0.0)
@@ -199,7 +201,7 @@ class _Builder:
             self.rows[grade].append(tuple(c if isinstance(c, np.ndarray) else np.full(n, c) for c in columns))
 
     def ground(
-        self, i: Indices, met: ways.Ways, base: Floats | float, clear_limit: Floats, legal_limit: Floats
+        self, i: Indices, met: level_lines.LevelLines, base: Floats | float, clear_limit: Floats, legal_limit: Floats
     ) -> None:
         """Add the terrain under each return, and the ceiling that max AGL sets above it."""
         self._put(0, i, -np.inf, met.clear_m, base, clear_limit, GROUND)
@@ -209,7 +211,7 @@ class _Builder:
         capped = np.isfinite(met.ceiling_m)
         self.ceiling(i[capped], met.ceiling_m[capped], MAX_AGL, (1,))
 
-    def zones(self, i: Indices, at: ways.Crossings, base: Floats | float, limit: Floats) -> None:
+    def zones(self, i: Indices, at: level_lines.Crossings, base: Floats | float, limit: Floats) -> None:
         """Add the zones that returns meet."""
         for grade in (0, 1):
             self._put(grade, i, at.bottom_m, at.top_m, base, limit, at.zone)

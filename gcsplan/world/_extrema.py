@@ -1,4 +1,4 @@
-"""The bounds around each cell of a surface, in one pass over it: the kernel of `_halo`."""
+"""The bounds around each cell of a surface, in one pass over it: the kernel of `_neighbourhood`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ SLOPE, HIGH, LOW, LOST = range(4)
 
 
 @device
-def surroundings(z, step_x, step_y, cols, rows, box, room, slope, high, low):  # type: ignore[no-untyped-def]
-    """Fill a ``box`` of a `Halo` of nodes ``z``: ``slope``, ``high``, ``low`` (rows - 1, cols - 1).
+def local_extrema(z, step_x, step_y, cols, rows, box, room, slope, high, low):  # type: ignore[no-untyped-def]
+    """Fill a ``box`` of a `LocalExtrema` of nodes ``z``: ``slope``, ``high``, ``low`` (rows - 1, cols - 1).
 
-    ``box``: first row, end of rows, first column, end of columns. ``room``: work array for a block and its
-    surroundings.
+    ``box``: first row, end of rows, first column, end of columns. ``room``: work array for a block and the
+    cells around it.
     """
     n, m = min(box[1], slope.shape[0]), min(box[3], slope.shape[1])
     tall, wide = room.shape[0] - 2 * rows, room.shape[2] - 2 * cols

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.world import hulls, ways
+from gcsplan.world import hulls, level_lines
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
@@ -32,7 +32,7 @@ def test_what_is_clear_of_ground_and_zones_passes_the_exact_check(make: object) 
         limits = replace(random_limits(rng, ground), max_climb_deg=90.0, max_descent_deg=90.0, max_amsl_m=None)
         air = Airspace(surface_of(rng, ground), random_zones(rng, ground), scale=float(rng.choice([1.0, 1.0003])))
         ends = np.array([random_leg(rng, ground) for _ in range(9)])
-        met = ways.over(air, ends[:, 0], ends[:, 1], limits)
+        met = level_lines.over(air, ends[:, 0], ends[:, 1], limits)
         for need, asked in (
             (met.clear_m, replace(limits, min_agl_m=0.0, max_agl_m=None)), (met.legal_m, limits),
         ):  # fmt: skip
@@ -54,13 +54,13 @@ def test_what_is_needed_over_a_slope_and_where() -> None:
     air = Airspace(Surface(z, z, GridMap.affine(-1000.0, 3000.0, 100.0, 100.0)))
     limits = Limits(20.0, max_agl_m=120.0, altitude_error_m=5.0)
     a, b = np.array([[0.0, 0.0], [2000.0, 500.0]]), np.array([[2000.0, 0.0], [2000.0, 500.0]])
-    met = ways.over(air, a, b, limits)
+    met = level_lines.over(air, a, b, limits)
     assert met.clear_m == pytest.approx([80.0, 80.0], abs=0.02)
     assert met.legal_m == pytest.approx([100.0, 100.0], abs=0.02)
     assert met.ceiling_m == pytest.approx([25.0 + 115.0, 75.0 + 115.0], abs=0.02)
-    wide = ways.over(air, a, b, limits, 40.0)
+    wide = level_lines.over(air, a, b, limits, 40.0)
     assert wide.clear_m == pytest.approx([81.0, 81.0], abs=0.05)
-    back = ways.over(air, np.vstack([a, b[:1]]), np.vstack([b, a[:1]]), limits)
+    back = level_lines.over(air, np.vstack([a, b[:1]]), np.vstack([b, a[:1]]), limits)
     assert back.piece_s_m[back.piece_way == 2].max() == pytest.approx(1900.0, abs=101.0)
 
 
@@ -77,7 +77,7 @@ def test_zones_are_met_where_they_are() -> None:
     limits = Limits(20.0, horizontal_clearance_m=10.0, altitude_error_m=2.0)
     a = np.array([[0.0, 0.0], [600.0, 0.0], [1500.0, 0.0], [0.0, 300.0]])
     b = np.array([[2000.0, 0.0], [600.0, 0.0], [2000.0, 0.0], [2000.0, 300.0]])
-    at = ways.over(air, a, b, limits).crossings
+    at = level_lines.over(air, a, b, limits).crossings
     found = {(int(w), int(k)): i for i, (w, k) in enumerate(zip(at.way, at.zone, strict=True))}
     assert set(found) == {(0, 0), (0, 1), (1, 1)}
     disc, inside = found[0, 0], found[1, 1]
@@ -94,8 +94,8 @@ def test_nothing_demanded_still_means_not_within() -> None:
     air = Airspace(Surface(z, z, GridMap.affine(-1000.0, 3000.0, 100.0, 100.0)), [Zone("square", Polygon(square))])
     a = np.array([[600.0, 0.0], [0.0, 0.0], [0.0, 101.0], [0.0, 100.0]])
     b = np.array([[600.0, 0.0], [900.0, 0.0], [900.0, 101.0], [450.0, 100.0]])
-    swept = ways.Swept(np.stack([a, a, b], axis=1), np.zeros(4))
-    met = ways.over(air, a, b, Limits(20.0), 0.0, swept).crossings
+    swept = level_lines.Swept(np.stack([a, a, b], axis=1), np.zeros(4))
+    met = level_lines.over(air, a, b, Limits(20.0), 0.0, swept).crossings
     assert met.way.tolist() == [0, 1]
     assert met.begins.tolist() == [True, False]
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.native.form import Held
-from gcsplan.world._compiled import HALO, surroundings
+from gcsplan.world._compiled import EXTREMA, local_extrema
 from gcsplan.world._field import Field
-from gcsplan.world._shared import Halo
+from gcsplan.world._shared import LocalExtrema
 from gcsplan.world.surface import GridMap
 
 LARGE = 2_000_000
@@ -29,8 +29,8 @@ TALL, WIDE, WIDER = 64, 1024, 4
 of the reach around them, in cells."""
 
 
-class Surroundings:
-    """The halo of a surface (rows, cols) for a reach. Tiles that have not been examined count as unknown."""
+class Neighbourhood:
+    """The local extrema of a surface (rows, cols) for a reach. Tiles that have not been examined count as unknown."""
 
     def __init__(self, grid: GridMap, field: Field, heights: Floats, reach_m: float) -> None:
         self._grid, self._field, self._heights, self._reach_m = grid, field, heights, reach_m
@@ -38,24 +38,24 @@ class Surroundings:
         self._seen = np.ones((0, 0), np.bool_)
         rows, cols = heights.shape[0] - 1, heights.shape[1] - 1
         if rows * cols > LARGE:
-            self.halo = _not_looked_at(field, heights, reach_m)
+            self.extrema = _not_looked_at(field, heights, reach_m)
             self._seen = np.zeros((-(-rows // TILE), -(-cols // TILE)), np.bool_)
         else:
-            self.halo = halo_around(field, heights, reach_m)
-        self._held = Held(HALO, *self.halo)
+            self.extrema = extrema_around(field, heights, reach_m)
+        self._held = Held(EXTREMA, *self.extrema)
 
-    def __reduce__(self) -> tuple[type[Surroundings], tuple[GridMap, Field, Floats, float]]:
+    def __reduce__(self) -> tuple[type[Neighbourhood], tuple[GridMap, Field, Floats, float]]:
         """Pickle the inputs only: a copy in another process examines its tiles anew."""
-        return Surroundings, (self._grid, self._field, self._heights, self._reach_m)
+        return Neighbourhood, (self._grid, self._field, self._heights, self._reach_m)
 
     def along(self, start: Floats, end: Floats) -> Held:
-        """The halo in the kernels' form, examined along lines between places (N, 2 or more) of the plane."""
+        """The extrema in the kernels' form, examined along lines between places (N, 2 or more) of the plane."""
         if self._seen.size and not self._seen.all():
             tiles = self._tiles(start, end)
             with self._lock:  # a caller who waits here finds the tiles done
                 for i, j in np.argwhere(tiles & ~self._seen).tolist():
                     rows, cols = (slice(k * TILE, (k + 1) * TILE) for k in (i, j))
-                    _look_at(self._field, self._heights, self.halo, rows, cols)
+                    _look_at(self._field, self._heights, self.extrema, rows, cols)
                     self._seen[i, j] = True
         return self._held
 
@@ -77,26 +77,37 @@ class Surroundings:
         return found
 
 
-def halo_around(field: Field, heights: Floats, reach_m: float) -> Halo:
-    """The halo of a surface, examined everywhere."""
-    halo = _not_looked_at(field, heights, reach_m)
-    _look_at(field, heights, halo, slice(0, halo.slope.shape[0]), slice(0, halo.slope.shape[1]))
-    return halo
+def extrema_around(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
+    """The local extrema of a surface, examined everywhere."""
+    extrema = _not_looked_at(field, heights, reach_m)
+    _look_at(field, heights, extrema, slice(0, extrema.slope.shape[0]), slice(0, extrema.slope.shape[1]))
+    return extrema
 
 
-def _not_looked_at(field: Field, heights: Floats, reach_m: float) -> Halo:
-    """A halo in which everything is unknown."""
+def _not_looked_at(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
+    """Local extrema that are unknown everywhere."""
     shape = heights.shape[0] - 1, heights.shape[1] - 1
     cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
     slope, high, low = (np.empty(shape, np.float32) for _ in range(3))
     slope.fill(np.inf)
-    return Halo(slope, high, low, cols, rows)
+    return LocalExtrema(slope, high, low, cols, rows)
 
 
-def _look_at(field: Field, heights: Floats, halo: Halo, rows: slice, cols: slice) -> None:
-    """Fill these rows and columns of a halo."""
-    tall = min(max(TALL, WIDER * halo.rows), rows.stop - rows.start)
-    wide = min(max(WIDE, WIDER * halo.cols), cols.stop - cols.start)
-    room = np.empty((tall + 2 * halo.rows, 4, wide + 2 * halo.cols), np.float32)
+def _look_at(field: Field, heights: Floats, extrema: LocalExtrema, rows: slice, cols: slice) -> None:
+    """Fill these rows and columns of local extrema."""
+    tall = min(max(TALL, WIDER * extrema.rows), rows.stop - rows.start)
+    wide = min(max(WIDE, WIDER * extrema.cols), cols.stop - cols.start)
+    room = np.empty((tall + 2 * extrema.rows, 4, wide + 2 * extrema.cols), np.float32)
     box = np.array([rows.start, rows.stop, cols.start, cols.stop], np.int64)
-    surroundings(heights, field.step_x, field.step_y, halo.cols, halo.rows, box, room, halo.slope, halo.high, halo.low)
+    local_extrema(
+        heights,
+        field.step_x,
+        field.step_y,
+        extrema.cols,
+        extrema.rows,
+        box,
+        room,
+        extrema.slope,
+        extrema.high,
+        extrema.low,
+    )

@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
-from gcsplan.world import _halo
+from gcsplan.world import _neighbourhood
 from gcsplan.world._field import Field
-from gcsplan.world._halo import Surroundings, halo_around
-from gcsplan.world._shared import Halo
+from gcsplan.world._neighbourhood import Neighbourhood, extrema_around
+from gcsplan.world._shared import LocalExtrema
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
@@ -29,7 +29,7 @@ def rough(rng: np.random.Generator, shape: tuple[int, int], unknown: float) -> F
     return z
 
 
-def by_hand(field: Field, z: Floats, halo: Halo) -> tuple[Floats, Floats, Floats]:
+def by_hand(field: Field, z: Floats, extrema: LocalExtrema) -> tuple[Floats, Floats, Floats]:
     """Slope, highest and lowest height around every cell, in plain numpy and double precision."""
     corners = np.stack([z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]])
     across = np.maximum(abs(corners[1] - corners[0]), abs(corners[3] - corners[2])) / field.step_x
@@ -39,9 +39,11 @@ def by_hand(field: Field, z: Floats, halo: Halo) -> tuple[Floats, Floats, Floats
     rows, cols = steep.shape
     for r in range(rows):
         for c in range(cols):
-            box = np.s_[max(r - halo.rows, 0) : r + halo.rows + 1, max(c - halo.cols, 0) : c + halo.cols + 1]
+            box = np.s_[
+                max(r - extrema.rows, 0) : r + extrema.rows + 1, max(c - extrema.cols, 0) : c + extrema.cols + 1
+            ]
             known = ~np.isnan(steep[box])
-            beyond = known.size < (2 * halo.rows + 1) * (2 * halo.cols + 1)
+            beyond = known.size < (2 * extrema.rows + 1) * (2 * extrema.cols + 1)
             slope[r, c] = steep[box][known].max(initial=0.0) * (-1.0 if beyond or not known.all() else 1.0)
             high[r, c] = corners[:, *box][:, known].max(initial=-np.inf)
             low[r, c] = corners[:, *box][:, known].min(initial=np.inf)
@@ -56,18 +58,22 @@ def test_it_bounds_all_that_is_around_and_hardly_more(seed: int) -> None:
     z = rough(rng, (int(rng.integers(2, 60)), int(rng.integers(2, 60))), float(rng.choice([0.0, 0.002, 0.1])))
     grid = GridMap.affine(0.0, 0.0, float(rng.uniform(1.0, 30.0)), float(rng.uniform(1.0, 30.0)))
     field = Field.of(grid)
-    halo = halo_around(field, z, float(rng.choice([0.0, 1.0, 10.0, 90.0])))
-    slope, high, low = by_hand(field, z, halo)
-    assert np.array_equal(np.isinf(halo.slope), np.isinf(slope))
+    extrema = extrema_around(field, z, float(rng.choice([0.0, 1.0, 10.0, 90.0])))
+    slope, high, low = by_hand(field, z, extrema)
+    assert np.array_equal(np.isinf(extrema.slope), np.isinf(slope))
     known = np.isfinite(slope)
-    assert np.array_equal(np.signbit(halo.slope[known]), np.signbit(slope[known]))
-    for ours, theirs, sign in ((abs(halo.slope), abs(slope), 1.0), (halo.high, high, 1.0), (halo.low, low, -1.0)):
+    assert np.array_equal(np.signbit(extrema.slope[known]), np.signbit(slope[known]))
+    for ours, theirs, sign in (
+        (abs(extrema.slope), abs(slope), 1.0),
+        (extrema.high, high, 1.0),
+        (extrema.low, low, -1.0),
+    ):
         a, b = sign * ours[known].astype(float), sign * theirs[known]
         assert (a >= b).all()
         assert (a <= b + 1e-3 + 3e-6 * abs(b)).all()
 
 
-def same_where_seen(part: Halo, whole: Halo, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> bool:
+def same_where_seen(part: LocalExtrema, whole: LocalExtrema, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> bool:
     return all(np.array_equal(a[rows, cols], b[rows, cols]) for a, b in zip(part[:3], whole[:3], strict=True))
 
 
@@ -80,21 +86,21 @@ def test_lines_find_all_that_they_meet_looked_at_and_little_else(
     z = rough(rng, (900, 1100), 1e-4)
     grid = GridMap.affine(0.0, 0.0, 5.0, 4.0)
     field = Field.of(grid)
-    whole = halo_around(field, z, reach_m)
-    monkeypatch.setattr(_halo, "LARGE", 1000)
+    whole = extrema_around(field, z, reach_m)
+    monkeypatch.setattr(_neighbourhood, "LARGE", 1000)
     for _ in range(20):
-        ours = Surroundings(grid, field, z, reach_m)
-        assert np.isinf(ours.halo.slope).all()
+        ours = Neighbourhood(grid, field, z, reach_m)
+        assert np.isinf(ours.extrema.slope).all()
         start, end = np.stack([rng.uniform(-200.0, 5700.0, (2, 3)), -rng.uniform(-200.0, 3800.0, (2, 3))], axis=-1)
         ours.along(start, end)
         t = np.linspace(0.0, 1.0, 20_000)[:, None, None]
         cells = np.floor(grid(*(start + t * (end - start)).reshape(-1, 2).T)).astype(np.intp)
         cells = cells[((cells >= 0) & (cells < [1099, 899])).all(axis=1)]
-        assert same_where_seen(ours.halo, whole, cells[:, 1], cells[:, 0])
+        assert same_where_seen(ours.extrema, whole, cells[:, 1], cells[:, 0])
         assert not ours._seen.all()
     copy = pickle.loads(pickle.dumps(ours))
     copy.along(start, end)
-    assert same_where_seen(copy.halo, whole, cells[:, 1], cells[:, 0])
+    assert same_where_seen(copy.extrema, whole, cells[:, 1], cells[:, 0])
 
 
 @pytest.mark.slow
@@ -114,7 +120,7 @@ def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkey
     clear, report = whole.clear(legs, limits), whole.examine(legs, limits)
     floor, ceiling = whole.floor_amsl(*start[:, :2].T, limits), whole.ceiling_amsl(*start[:, :2].T, limits)
     tubes = [whole.tube(np.stack([a[:2], b[:2]]), limits) for a, b in zip(start, end, strict=True)]
-    monkeypatch.setattr(_halo, "LARGE", 1000)
+    monkeypatch.setattr(_neighbourhood, "LARGE", 1000)
     assert clear.any()
     assert not clear.all()
     # One leg at a time in a new airspace, so that only its own tiles have been examined.
@@ -133,8 +139,8 @@ def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkey
 
 def test_what_was_not_looked_at_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     """A kernel that reaches a tile that was not examined must not treat it as flat ground."""
-    monkeypatch.setattr(_halo, "LARGE", 100)
-    monkeypatch.setattr(Surroundings, "_tiles", lambda self, start, end: np.zeros(self._seen.shape, np.bool_))
+    monkeypatch.setattr(_neighbourhood, "LARGE", 100)
+    monkeypatch.setattr(Neighbourhood, "_tiles", lambda self, start, end: np.zeros(self._seen.shape, np.bool_))
     z = np.full((50, 50), 100.0)
     blind = Airspace(Surface(z, z, GridMap.affine(0.0, 0.0, 10.0, 10.0), {}))
     limits = Limits(min_agl_m=30.0, max_agl_m=500.0, horizontal_clearance_m=20.0, track_error_m=3.0)

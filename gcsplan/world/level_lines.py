@@ -75,7 +75,7 @@ class Swept:
 
 
 @dataclass(frozen=True, eq=False)
-class Ways:
+class LevelLines:
     """What N lines meet.
 
     ``clear_m`` (N,): the lowest AMSL level over the whole line that meets no ground or obstacle within errors and
@@ -96,7 +96,7 @@ class Ways:
 
 def over(
     air: Airspace, starts: Floats, ends: Floats, limits: Limits, wide_m: float = 0.0, swept: Swept | None = None
-) -> Ways:
+) -> LevelLines:
     """The lines from each of ``starts`` (N, 2) straight to its ``ends`` (N, 2), all widened by ``wide_m`` of the plane.
 
     Errors and clearance of ``limits`` are included; a line of no length stands for its point. ``swept``: the regions
@@ -125,7 +125,7 @@ def over(
     if limits.max_agl_m is not None:
         np.minimum.at(ceiling_m, way, low + limits.max_agl_m)
     found = _crossings(air, starts, ends, reach, wide_m, error, swept)
-    return Ways(clear_m, legal_m, ceiling_m, found, way, s0, high, legal)
+    return LevelLines(clear_m, legal_m, ceiling_m, found, way, s0, high, legal)
 
 
 def _pieces(
@@ -168,7 +168,7 @@ def _pieces(
 
 
 def _few(reach_m: float, air: Airspace) -> float:
-    """A reach that is no less, rounded up to one of few: a halo is made for each, and holds for smaller reaches too."""
+    """A reach that is no less, rounded up to one of few: local extrema are computed once for each."""
     cell = min(air._field.step_x, air._field.step_y)
     if reach_m <= cell:
         return reach_m
