@@ -459,3 +459,20 @@ def test_legs_that_make_no_sense_are_refused(change: dict[str, Floats], message:
     }  # fmt: skip
     with pytest.raises(ValueError, match=message):
         Legs(**(good | change))  # type: ignore[arg-type]
+
+
+def test_pieces_of_ground_are_counted_where_legs_pass_close_over_it() -> None:
+    ground = jacksboro()
+    airspace = Airspace(Surface(ground.heights, ground.heights, ground.grid), [], scale=1.0)
+    limits = Limits(60.0, horizontal_clearance_m=30.0, track_error_m=3.0, altitude_error_m=5.0)
+    east = np.linspace(-5_000.0, 5_000.0, 200)
+    floor = airspace.floor_amsl(east, np.zeros(200), limits)
+    counts = []
+    for over_m in (0.01, 300.0):
+        points = np.column_stack([east, np.zeros(200), floor + over_m])
+        legs = Legs.of_path(points, limits)
+        legal, cut = airspace.clear_counted(legs, limits)
+        assert np.array_equal(legal, airspace.clear(legs, limits))
+        counts.append(cut)
+    assert counts[0] > 100.0 > counts[1] == 0.0
+    assert airspace.clear_counted(Legs.of_path(points[:2], limits), limits)[1] == 0.0  # of that call alone

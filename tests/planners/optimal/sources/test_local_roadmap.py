@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gcsplan.planners.budget import RATES
 from gcsplan.planners.optimal.planner import plan
+from gcsplan.planners.optimal.sources import roadmap
 from gcsplan.planners.optimal.sources.local_roadmap import small_path
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace
@@ -123,6 +125,21 @@ def test_worlds_with_very_many_zones_are_searched_as_well() -> None:
     assert faults(case, Path(found[0])) == []
     p = case.problem
     assert cost_of(p, found[0]) <= 1.01 * shortest_past_discs(p.start[:2], p.goal[:2], np.array(discs))
+
+
+def test_a_roadmap_asks_for_time_between_blocks_of_legs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(roadmap, "AT_ONCE", 500)
+    p = flat([(1000.0, 1000.0, 100.0)]).problem
+    asked: list[float] = []
+
+    def in_time() -> bool:
+        asked.append(p.budget.spent)
+        return len(asked) < 6
+
+    assert small_path(p, None, in_time) is None  # too few legs were checked to reach the goal
+    assert len(asked) >= 6
+    legs = np.diff(asked[:6]) / RATES["leg"]
+    assert (legs < 3000.0).all()  # the check itself counts 1,250
 
 
 def test_long_missions_and_stops_in_one_place_are_left_alone() -> None:
