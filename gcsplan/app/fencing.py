@@ -190,7 +190,7 @@ def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[l
 def _notes(name: str, fence: Fence) -> list[tuple[str, str]]:
     notes = [(name, words) for words in fence.notes]
     if not fence.items:
-        notes.append((name, "no zone can be told as a fence: the fence on board is left as it is"))
+        notes.append((name, "no zone can be sent as a fence: the fence on board is left as it is"))
     return notes
 
 

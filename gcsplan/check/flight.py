@@ -132,7 +132,7 @@ class _Pilot(Aboard):
             last = self.flight.stretches[-1] if self.flight.stretches else None
             if last is not None and (last.kind != "loiter" or last.hold_s < math.inf):
                 self.flight.not_judged.append(
-                    "after the last item ArduPlane returns home by itself (RTL): that way is not judged; "
+                    "after the last item ArduPlane returns home by itself (RTL): that return is not judged; "
                     "end the mission with a landing, a loiter or an RTL"
                 )
 

@@ -95,7 +95,7 @@ def bench_terrain(
     ),
     kinds: Annotated[str, typer.Option(metavar="LIST", help="Kinds of problems.")] = "main,energy,band,large,many,turn",
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the problems.")] = 1,
-    runs: Annotated[int, typer.Option(metavar="N", help="Runs of ours; medians are told.")] = 9,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of ours; medians are reported.")] = 9,
     seconds: Annotated[str, typer.Option(metavar="LIST", help="OMPL's seconds.")] = "1,10",
     rivals: Annotated[bool, typer.Option("--rivals/--no-rivals", help="Run OMPL too (extra `bench`).")] = True,
     swarms: Annotated[bool, typer.Option("--swarms/--no-swarms", help="Run mealpy too (extra `bench`).")] = True,

@@ -98,7 +98,7 @@ def talking(names: Sequence[str]) -> Iterator[None]:
     except KeyboardInterrupt:
         raise interrupted(
             f"interrupted while talking to {', '.join(names)}: a transfer under way was broken off, and the vehicle "
-            f"was told; what it holds now is unknown: send it again, or compare with gcsplan verify"
+            f"was informed; its mission is now unknown: send it again, or compare with gcsplan verify"
         ) from None
 
 

@@ -40,7 +40,7 @@ def profile_html(subject: Subject, line: Line, found: list[Passage], index: int,
         title = f"no-fly zone {p.zone.name}: {zone_heights(p.zone)}"
         shapes.append(axes.area(_wide(run[part], axes), low, high, "zone", title))
     if not np.array_equal(line.top_m, line.ground_m, equal_nan=True):
-        shapes.append(axes.area(run, line.ground_m, line.top_m, "obstacles", "trees and buildings, as told"))
+        shapes.append(axes.area(run, line.ground_m, line.top_m, "obstacles", "trees and buildings, as stated"))
     shapes.append(axes.area(run, bottom, line.ground_m, "ground"))
     shapes.append(axes.line(run, line.amsl_m, "casing"))
     shapes.append(axes.line(run, line.amsl_m, f"track t{index % COLOURS}"))

@@ -310,7 +310,7 @@ def test_ctrl_c_during_an_upload_says_what_is_unknown_now(run: Run, monkeypatch:
     monkeypatch.setattr(uploads, "run_jobs", interrupted)
     code, out, err = run("upload", "uav1.waypoints", "--to", "sim", "--mission", "m.yaml", "--json")
     assert code == 130
-    assert "what it holds now is unknown" in err
+    assert "its mission is now unknown" in err
     assert "uav1" in json.loads(out)["error"]["message"]
 
 

@@ -143,7 +143,7 @@ def _return_altitude(values: Values, wanted_m: float | None) -> list[str]:
         return [] if wanted_m is None else ["the return altitude on board could not be read"]
     height_m = values[name] * _RETURN_ALTITUDE[name]
     if wanted_m is None:
-        return [f"after a failsafe it returns at {height_m:g} m above home ({name}); that way was not checked"]
+        return [f"after a failsafe it returns at {height_m:g} m above home ({name}); that return was not checked"]
     if abs(height_m - wanted_m) > _SAME_M:
         return [f"it returns at {height_m:g} m above home ({name}); the return was checked at {wanted_m:g} m"]
     return []
