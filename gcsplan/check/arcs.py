@@ -56,6 +56,9 @@ MOST_BANK_DEG = 45.0
 SETTLES_S = 15.0
 """Seconds on a straight leg until the L1 controller is back on it (NAVL1_PERIOD 17, NAVL1_DAMPING 0.75)."""
 
+L1_PERIODS_S = (1.0, 60.0)
+"""ArduPlane's range for NAVL1_PERIOD, s; it also bounds the simulation of a turn in `tracking`."""
+
 SAME_M = 0.02
 GRAVITY_M_S2 = 9.80665
 
@@ -77,6 +80,13 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
         flight.not_judged.append(
             f"the arcs of {radius:g} m that {vehicle.name} flies at its corners are not judged: {mission.autopilot} "
             f"begins a turn by parameters that the mission does not hold"
+        )
+        return
+    least_s, most_s = L1_PERIODS_S
+    if not least_s <= tuning.l1_period_s <= most_s:
+        flight.not_judged.append(
+            f"NAVL1_PERIOD is {tuning.l1_period_s:g} s, and ArduPlane takes {least_s:g} to {most_s:g} s: the arcs that "
+            f"it flies at its corners are not judged"
         )
         return
     fastest = max((s.speed_m_s for s in flight.stretches), default=0.0)
@@ -178,7 +188,7 @@ class _Run:
             tangent = tangent_m(self.radius, turn)
             begins = self._begins_m(mission, s, abs(turn), flight)
             early_m, late_m = (abs(b - tangent) for b in begins)
-            wander_m = tracking_m(self.radius, turn, s.speed_m_s, self.tuning.l1_period_s, self.tuning.l1_damping)
+            wander_m = tracking_m(self.radius, turn, s.speed_m_s, self.tuning)
             self.wander_m = max(self.wander_m, wander_m)
             off_m = max(early_m, late_m) * math.sin(min(abs(turn), 0.5 * math.pi))
             off_m += max(0.0, wander_m - self.error_m)
@@ -199,7 +209,7 @@ class _Run:
             )
             # Left sharp, so that the rest can be judged.
             found[k], found[k + 1] = _Corner(off_m=a.off_m), _Corner(off_m=b.off_m)
-        settles_s = SETTLES_S * max(self.tuning.l1_period_s / DEFAULTS.l1_period_s, 1.0)
+        settles_s = SETTLES_S * self.tuning.l1_slower
         for k, s in enumerate(self.run[:-1]):  # on a leg too short to settle, the offset remains at the next turn
             if self.long_m[k] - found[k].tangent - found[k + 1].tangent < settles_s * s.speed_m_s:
                 found[k + 1] = replace(found[k + 1], off_m=found[k + 1].off_m + found[k].off_m)

@@ -13,10 +13,9 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-__all__ = ["late_m", "tracking_m"]
+from gcsplan.check.tuning import DEFAULTS, Tuning
 
-L1_DAMPING, L1_PERIOD_S = 0.75, 17.0
-"""Defaults of NAVL1_DAMPING and NAVL1_PERIOD."""
+__all__ = ["late_m", "tracking_m"]
 
 LATE_S, LATE_PER_SINE = 0.72, 3.0
 """Seconds of flight by which a turn lies outside its arc, and how fast that grows with the sine of a small turn."""
@@ -27,54 +26,38 @@ MOST_BANK_DEG, BANK_S = 45.0, 0.5
 STEP_S, CALM_S = 0.1, 30.0
 """Time step (ArduPlane steers ten times a second), and how long the flight is simulated after the turn, s."""
 
+SLOWEST_M_S = 1.0
+"""Slower turns are simulated at this speed, which no plane flies: the steps of a turn grow as its speed falls."""
+
 CAPTURE_SINE = math.sqrt(0.5)
 GRAVITY_M_S2 = 9.80665
 
 
-def late_m(turn_rad: float, speed_m_s: float, period_s: float = L1_PERIOD_S) -> float:
+def late_m(turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> float:
     """How far outside its arc a turn was measured to lie, m, scaled to a speed; and to a NAVL1_PERIOD that is longer
     than the one it was measured with."""
     turn = min(abs(turn_rad), 0.5 * math.pi)
-    slower = max(period_s / L1_PERIOD_S, 1.0)
-    return LATE_S * slower * speed_m_s * min(1.0, LATE_PER_SINE * math.sin(turn))
+    return LATE_S * tuning.l1_slower * speed_m_s * min(1.0, LATE_PER_SINE * math.sin(turn))
 
 
-def tracking_m(
-    radius_m: float,
-    turn_rad: float,
-    speed_m_s: float,
-    period_s: float = L1_PERIOD_S,
-    damping: float = L1_DAMPING,
-) -> float:
-    """How far from its arc a turn that begins at the tangent length is flown in calm air, m; 0 at speed 0.
-
-    ``period_s``, ``damping``: the vehicle's NAVL1_PERIOD and NAVL1_DAMPING.
-    """
+def tracking_m(radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> float:
+    """How far from its arc a turn that begins at the tangent length is flown in calm air, m; 0 at speed 0."""
     if not speed_m_s > 0.0:
         return 0.0
     turn = min(math.radians(math.ceil(math.degrees(abs(turn_rad)) - 1e-6)), math.radians(170.0))
-    return max(
-        late_m(turn_rad, speed_m_s, period_s),
-        l1_off_m(radius_m, turn, round(speed_m_s, 1), round(period_s, 2), round(damping, 3)),
-    )
+    speed = max(round(speed_m_s, 1), SLOWEST_M_S)
+    return max(late_m(turn_rad, speed_m_s, tuning), l1_off_m(radius_m, turn, speed, tuning))
 
 
 @lru_cache(maxsize=4096)
-def l1_off_m(
-    radius_m: float,
-    turn_rad: float,
-    speed_m_s: float,
-    period_s: float = L1_PERIOD_S,
-    damping: float = L1_DAMPING,
-) -> float:
+def l1_off_m(radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> float:
     """The largest distance from the arc under the L1 law, m, for a turn to the left between long legs."""
     tangent = radius_m * math.tan(0.5 * turn_rad)
-    ahead = damping * period_s / math.pi * speed_m_s
-    gain = 4.0 * damping**2 * speed_m_s**2 / ahead
+    ahead = tuning.l1_ahead_m(speed_m_s)
+    gain = 4.0 * tuning.l1_damping**2 * speed_m_s**2 / ahead
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
     x, y, heading, bank, worst = -tangent, 0.0, 0.0, 0.0, 0.0  # the corner is the origin, the first leg the x axis
-    calm_s = CALM_S * max(period_s / L1_PERIOD_S, 1.0)
-    steps = math.ceil((2.0 * tangent / speed_m_s + calm_s) / STEP_S)
+    steps = math.ceil((2.0 * tangent / speed_m_s + CALM_S * tuning.l1_slower) / STEP_S)
     most = math.radians(MOST_BANK_DEG)
     for _ in range(steps):
         aside = cos * y - sin * x  # left of the new leg

@@ -41,10 +41,18 @@ class Tuning:
         """``parameter``, its value and the source of the value, in words."""
         return f"{parameter} {value:g} {unit}, {'read from the vehicle' if parameter in self.read else 'the default'}"
 
+    @property
+    def l1_slower(self) -> float:
+        """How many times slower than with the default NAVL1_PERIOD ArduPlane settles on a leg, at least 1."""
+        return max(self.l1_period_s / DEFAULTS.l1_period_s, 1.0)
+
+    def l1_ahead_m(self, speed_m_s: float) -> float:
+        """The L1 distance, m: how far ahead on its leg ArduPlane aims."""
+        return self.l1_damping * self.l1_period_s / math.pi * speed_m_s
+
     def plane_turns_m(self, speed_m_s: float, turn_rad: float, growth: float = 1.0) -> float:
         """How far before a way point without its own radius ArduPlane turns, m (`AP_L1_Control::turn_distance`)."""
-        ahead_m = self.l1_damping * self.l1_period_s / math.pi * speed_m_s
-        return min(self.plane_radius_m * growth, ahead_m) * min(1.0, abs(turn_rad) / (0.5 * math.pi))
+        return min(self.plane_radius_m * growth, self.l1_ahead_m(speed_m_s)) * min(1.0, abs(turn_rad) / (0.5 * math.pi))
 
 
 DEFAULTS = Tuning()

@@ -26,6 +26,7 @@ from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tracking import l1_off_m, tracking_m
+from gcsplan.check.tuning import Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.timing import Course
@@ -390,10 +391,15 @@ def test_what_the_simulated_plane_was_off_its_arcs_is_within_what_is_told(
         assert off_m <= tracking_m(radius_m, math.radians(turn_deg), speed_m_s) <= 3.0 * off_m, turn_deg
 
 
+def test_a_speed_that_rounds_to_nothing_is_simulated_too() -> None:
+    assert 0.0 < tracking_m(100.0, math.radians(60.0), 0.04) < math.inf
+    assert tracking_m(100.0, math.radians(60.0), 0.0) == 0.0
+
+
 def test_a_slower_l1_controller_is_judged_wider() -> None:
     for radius_m, turn_deg, speed_m_s in ((100.0, 60.0, 21.0), (180.0, 90.0, 28.0), (100.0, 15.0, 14.6)):
         turn = math.radians(turn_deg)
-        usual, slow = (tracking_m(radius_m, turn, speed_m_s, period_s) for period_s in (17.0, 30.0))
+        usual, slow = (tracking_m(radius_m, turn, speed_m_s, Tuning(l1_period_s=s)) for s in (17.0, 30.0))
         assert usual == tracking_m(radius_m, turn, speed_m_s)
         assert slow >= 30.0 / 17.0 * usual * 0.9
 

@@ -251,3 +251,7 @@ def test_a_wing_with_a_slower_l1_controller_than_usual_is_judged_wider() -> None
     slow = verdict(flown, beside, craft, Tuning.of({"NAVL1_PERIOD": 30.0}))
     assert {(f.kind, f.zone) for f in slow.findings} == {("zone", "inside")}
     assert any("NAVL1_PERIOD 30" in note for note in slow.notes)
+    for period_s in (1e6, 1e-6):
+        odd = verdict(flown, beside, craft, Tuning.of({"NAVL1_PERIOD": period_s}))
+        assert odd.safe is None
+        assert any(f"NAVL1_PERIOD is {period_s:g} s" in words for words in odd.not_judged)
