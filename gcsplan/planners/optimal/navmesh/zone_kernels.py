@@ -102,9 +102,10 @@ def stamp_zones(
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         if _looks_beside(zones, z):
-            _guess_beside(around, steep, fineness, boxes, z, reach, up, down)
             if exact and zones[z, PAIR] == 0.0:
                 _look_beside(around, excess, ground, x, y, zones, edges, boxes, z, reach, up, down)
+            else:
+                _guess_beside(around, steep, fineness, boxes, z, reach, up, down)
         west = east = north_west = north_east = 0.0
         west_open = east_open = north_west_open = north_east_open = False
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
@@ -196,8 +197,6 @@ def _look_beside(
     every = 1 + max(rows, cols) // (MOST_BESIDE + 1)
     for j in range(boxes[z, 2], boxes[z, 3] + 2):
         for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
-            if up[j, i] == 0.0:
-                continue  # flat ground
             up[j, i] = down[j, i] = 0.0
             if excess[j, i] == np.inf:
                 continue

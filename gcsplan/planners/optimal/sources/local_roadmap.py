@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -44,11 +43,15 @@ def small_path(problem: Problem, known: Floats | None, in_time: Callable[[], boo
     ``known`` (M, 3): the best path so far, None without one. ``in_time`` returns False when the search must end; apart
     from that it is deterministic.
     """
+
+    def between(starts: Floats, goals: Floats, limit: float) -> Roadmap:
+        return _roadmap(problem, starts, goals, limit, in_time)
+
     found: tuple[Floats, Bools] | None = None
     best = math.inf if known is None else cost_of(problem, known)
     for _ in range(2):
         terminals = terminals_by_leg(problem, _straight(problem) if known is None else known)
-        better = path_over(problem, terminals, best, known, in_time, partial(_roadmap, in_time))
+        better = path_over(problem, terminals, best, known, in_time, between)
         if better is None:
             break
         before, found, known = best, better, better[0]
@@ -70,7 +73,7 @@ def _straight(problem: Problem) -> Floats:
     return np.column_stack([flat, np.where(known, heights, free)])
 
 
-def _roadmap(in_time: Callable[[], bool], problem: Problem, starts: Floats, goals: Floats, limit: float) -> Roadmap:
+def _roadmap(problem: Problem, starts: Floats, goals: Floats, limit: float, in_time: Callable[[], bool]) -> Roadmap:
     """The roadmap for paths from one of ``starts`` (K, 3) to one of ``goals`` that cost ``limit`` at most."""
     air, limits = problem.airspace, problem.limits
     ends = np.vstack([starts, goals])

@@ -38,14 +38,14 @@ def path_over(
     best: float,
     known: Floats | None,
     in_time: Callable[[], bool],
-    roadmap: Callable[[Problem, Floats, Floats, float], Roadmap],
+    roadmap: Callable[[Floats, Floats, float], Roadmap],
 ) -> tuple[Floats, Bools] | None:
     """(N, 3) a path cheaper than ``best`` over roadmaps from terminal to terminal, and (N,) which of its points are
     terminals; None if none was found.
 
     ``terminals`` (K, 3) from `terminals_by_leg`; ``best``: the cost to beat, inf without a path; ``known`` (M, 3): the
-    best path so far, which is drawn together as well. ``roadmap(problem, starts, goals, limit)`` makes the roadmap
-    between two terminals. ``in_time`` returns False when the search must end.
+    best path so far, which is drawn together as well. ``roadmap(starts, goals, limit)`` makes the roadmap between two
+    terminals. ``in_time`` returns False when the search must end.
     """
     straight = problem.leg_costs(terminals[:-1], terminals[1:])
     spare = WINDING * best - float(straight.sum())
@@ -55,7 +55,7 @@ def path_over(
     for k, limit in enumerate((straight + spare).tolist()):
         if not in_time():
             return None
-        roadmaps.append(roadmap(problem, columns[k], columns[k + 1], limit))
+        roadmaps.append(roadmap(columns[k], columns[k + 1], limit))
         reached.append(roadmaps[k].beyond(reached[k]))
     tried = [] if known is None else [(known, _kinds_of(problem, known))]
     if np.isfinite(reached[-1]).any():
