@@ -15,18 +15,19 @@ import numba
 import numpy as np
 from numba.experimental import jitclass  # type: ignore[attr-defined]
 
+from gcsplan.world._compiled import UNIT
 from gcsplan.world._entries import judge
 from gcsplan.world._field import Field
 from gcsplan.world._neighbourhood import extrema_around
-from gcsplan.world._shared import BOW_M
+from gcsplan.world._shared import BOW_M, Demands
 from gcsplan.world._zone_arrays import zones_as_arrays
-from gcsplan.world.airspace import Airspace, _demands
+from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 
 OneLeg = Callable[[float, float, float, float, float, float], bool]
 """``clear(east0_m, north0_m, amsl0_m, east1_m, north1_m, amsl1_m)``."""
 
-NAMES = tuple(inspect.signature(judge.py_func).parameters)
+NAMES = tuple(inspect.signature(judge).parameters)
 """Names of the kernel's arguments, in its order."""
 
 _classes: dict[tuple[Any, ...], Any] = {}
@@ -59,7 +60,7 @@ def _arguments(airspace: Airspace, limits: Limits) -> tuple[Any, ...]:
     return (
         field.packed, surface.ground_m, surface.top_m, *near, *far, *over, *zones,
         np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1, np.bool_), np.full(1, limits.track_error_m),
-        np.full(1, limits.altitude_error_m), *_demands(limits, scale), False, np.zeros(1, np.bool_), *nothing,
+        np.full(1, limits.altitude_error_m), *Demands.of(limits, scale), False, np.zeros(1, np.bool_), *nothing,
         np.empty((256, 8)), np.zeros(12), np.empty(2 * zones.most_corners), np.full(len(airspace.zones), -1),
         np.arange(len(airspace.zones)),
     )  # fmt: skip
@@ -82,6 +83,6 @@ def _compiled(types: tuple[Any, ...]) -> Any:
             "        return self.ok[0]",
         ]
     )
-    room: dict[str, Any] = {"judge": judge}
-    exec(source, room)
-    return jitclass(list(zip(NAMES, types, strict=True)))(room["OneLeg"])
+    scope = {"judge": UNIT.with_numba()["judge"]}
+    exec(source, scope)
+    return jitclass(list(zip(NAMES, types, strict=True)))(scope["OneLeg"])

@@ -11,16 +11,16 @@ import sys
 import time
 
 from gcsplan.native import shelf
-from gcsplan.native.kernels import Kernels
 from gcsplan.native.machine import llvm_version
+from gcsplan.native.unit import Unit
 
 ALL = {
-    "world": "gcsplan.world._compiled:KERNELS",
-    "planners": "gcsplan.planners.compiled:UNIT",
-    "swarm": "gcsplan.planners.swarm.compiled:UNIT",
-    "turns": "gcsplan.planners.turns.compiled:UNIT",
+    "world": "gcsplan.world._compiled",
+    "planners": "gcsplan.planners.compiled",
+    "swarm": "gcsplan.planners.swarm.compiled",
+    "turns": "gcsplan.planners.turns.compiled",
 }
-"""Kernel units by name. Each is made in its own process, because numba reads its options once."""
+"""The modules of kernel units, by name. Each is made in its own process, because numba reads its options once."""
 
 OPTIONS = {
     # For any processor, not vectorised.
@@ -38,22 +38,19 @@ def main(names: list[str]) -> None:
         for name in names or ALL:
             subprocess.run([sys.executable, "-m", "gcsplan.native", name], check=True)
         return
-    dotted = ALL[names[0]]
-    module, _, name = dotted.partition(":")
-    kernels: Kernels = getattr(importlib.import_module(module), name)
+    unit: Unit = importlib.import_module(ALL[names[0]]).UNIT
     began = time.perf_counter()
-    digest = kernels.digest()
+    digest = unit.digest()
     if digest is None:
-        raise SystemExit(f"the sources of {dotted} are not at hand")
-    vectors = getattr(kernels, "vectors", False)
-    if vectors and platform.machine().lower() not in ("x86_64", "amd64"):
+        raise SystemExit(f"the sources of {ALL[names[0]]} are not at hand")
+    if unit.vectors and platform.machine().lower() not in ("x86_64", "amd64"):
         raise SystemExit(f"{names[0]} is made on x86-64 alone: what is best in one vector is asked of that processor")
     assert "numba" not in sys.modules
-    os.environ.update({f"NUMBA_{key}": value for key, value in OPTIONS[vectors].items()}, NUMBA_DISABLE_JIT="0")
+    os.environ.update({f"NUMBA_{key}": value for key, value in OPTIONS[unit.vectors].items()}, NUMBA_DISABLE_JIT="0")
     made_with = {name: importlib.metadata.version(name) for name in ("numba", "llvmlite")} | {"llvm": llvm_version()}
-    shelf.write_shipped(kernels.shipped, digest, made_with, kernels.bitcode_from_source())
+    shelf.write_shipped(unit.shipped, digest, made_with, unit.bitcode_from_source())
     took = time.perf_counter() - began
-    print(f"{kernels.shipped}: {kernels.shipped.stat().st_size:,} bytes, {took:.1f} s", flush=True)
+    print(f"{unit.shipped}: {unit.shipped.stat().st_size:,} bytes, {took:.1f} s", flush=True)
 
 
 if __name__ == "__main__":

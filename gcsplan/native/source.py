@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from types import FunctionType
 from typing import Any, cast
 
@@ -135,16 +135,17 @@ def bitcode(kernels: Mapping[str, tuple[Any, tuple[Form, ...]]], *, vectors: boo
     return bytes(whole.as_bitcode())
 
 
-def bitcode_of_plain(
-    kernels: Mapping[str, tuple[Callable[..., Any], tuple[Form, ...]]],
+def with_numba(
+    kernels: Mapping[str, Callable[..., Any]],
     others: Mapping[int, Callable[..., Any]],
+    inlined: Set[int],
     *,
     vectors: bool = False,
-) -> bytes:
-    """The same for plain functions.
+) -> dict[str, Any]:
+    """The numba functions of plain ``kernels`` by name.
 
     ``others``: the plain functions, kernels included, that kernels call; each by the id of the object that modules know
-    under its name.
+    under its name. ``inlined``: ids of those that are copied into their caller.
     """
     scopes: dict[int, dict[str, Any]] = {}
 
@@ -153,15 +154,15 @@ def bitcode_of_plain(
         plain = cast(FunctionType, function)
         scope = scopes.setdefault(id(plain.__globals__), dict(plain.__globals__))
         twin = FunctionType(plain.__code__, scope, plain.__name__, plain.__defaults__, plain.__closure__)
-        return njit(**INSIDE, **(VECTORS if vectors else {}))(twin)
+        copied: dict[str, Any] = {"inline": "always"} if id(function) in inlined else {}
+        return njit(**copied, **INSIDE, **(VECTORS if vectors else {}))(twin)
 
     twins = {id(function): compiled(function) for function in {id(f): f for f in others.values()}.values()}
     for scope in scopes.values():
         for name, value in scope.items():
             if id(value) in others:
                 scope[name] = twins[id(others[id(value)])]
-    mine = {name: (twins[id(function)], forms) for name, (function, forms) in kernels.items()}
-    return bitcode(mine, vectors=vectors)
+    return {name: twins[id(function)] for name, function in kernels.items()}
 
 
 def _compiled(name: str, function: Any, forms: tuple[Form, ...]) -> str:

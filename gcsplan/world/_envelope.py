@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.world._shared import BOW_M, ERROR_M, STEP_X, STEP_Y
-from gcsplan.world._sweep import device, parts_of, slab, to_grid
+from gcsplan.arrays import Floats, Singles
+from gcsplan.world._compiled import device
+from gcsplan.world._shared import BOW_M, ERROR_M, STEP_X, STEP_Y, LocalExtrema
+from gcsplan.world._sweep import parts_of, slab, to_grid
 from gcsplan.world._sweep_beside import unknown_near
 from gcsplan.world._sweep_terrain import EDGE
 
@@ -21,12 +23,14 @@ MOST_CELLS = 16  # examined one by one for the slope beside a piece; if there ar
 
 
 @device
-def steepest_in(m, z, slopes, i, j, c0, r0, c1, r1):  # type: ignore[no-untyped-def]
+def steepest_in(
+    m: Floats, z: Floats, slopes: Singles, i: int, j: int, c0: float, r0: float, c1: float, r1: float
+) -> float:
     """Steepest slope of the known cells that meet a box of the grid around a place in cell (i, j)."""
     rows, cols = z.shape
     i0, i1, j0, j1 = math.floor(c0), math.floor(c1), math.floor(r0), math.floor(r1)
     if (i1 - i0 + 1) * (j1 - j0 + 1) > MOST_CELLS:
-        return abs(slopes[j, i])
+        return float(abs(slopes[j, i]))
     square = 0.0
     for jj in range(max(j0, 0), min(j1, rows - 2) + 1):
         for ii in range(max(i0, 0), min(i1, cols - 2) + 1):
@@ -43,7 +47,10 @@ def steepest_in(m, z, slopes, i, j, c0, r0, c1, r1):  # type: ignore[no-untyped-
 
 
 @device
-def lift_beside(m, z, extrema, ea, na, eb, nb, c0, r0, c1, r1, i, j, reach):  # type: ignore[no-untyped-def]
+def lift_beside(
+    m: Floats, z: Floats, extrema: LocalExtrema, ea: float, na: float, eb: float, nb: float, c0: float, r0: float,
+    c1: float, r1: float, i: int, j: int, reach: float,
+) -> float:  # fmt: skip
     """How much higher than a short segment in cell (i, j) the surface may lie within ``reach``, m; NaN where unknown.
 
     The segment's ends are given in the plane, then in the grid.
@@ -61,7 +68,9 @@ def lift_beside(m, z, extrema, ea, na, eb, nb, c0, r0, c1, r1, i, j, reach):  # 
 
 
 @device
-def put(rows, count, s, low0, low1, near0, near1, far0, far1):  # type: ignore[no-untyped-def]
+def put(
+    rows: Floats, count: int, s: float, low0: float, low1: float, near0: float, near1: float, far0: float, far1: float
+) -> int:
     """Add a piece that ends at ``s`` if it fits into ``rows``; return the new number of pieces."""
     if count < len(rows):
         rows[count, 0] = s
@@ -72,13 +81,16 @@ def put(rows, count, s, low0, low1, near0, near1, far0, far1):  # type: ignore[n
 
 
 @device
-def put_unknown(rows, count, s):  # type: ignore[no-untyped-def]
+def put_unknown(rows: Floats, count: int, s: float) -> int:
     """Add a piece over unknown ground; return the new number of pieces."""
     return put(rows, count, s, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
 @device
-def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, rows):  # type: ignore[no-untyped-def]
+def pieces(
+    m: Floats, ground: Floats, top: Floats, under: LocalExtrema, beside: LocalExtrema, beyond: LocalExtrema,
+    track: Floats, low_m: float, near_m: float, far_m: float, rows: Floats,
+) -> int:  # fmt: skip
     """Cut a track (N, 2) into pieces and bound the surface over each; return the number of pieces.
 
     Fill ``rows``, as many as fit: s at the end of the piece in metres along the track; lower bound of the ground within
@@ -141,8 +153,8 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, r
                 cuts = math.ceil(math.sqrt(0.25 * max(abs(gd * turn), abs(td * turn)) / CHORD_M))
                 edge = under.slope[jj, ii] < 0.0 or beside.slope[jj, ii] < 0.0 or beyond.slope[jj, ii] < 0.0
                 if edge:
-                    cuts = max(cuts, (tb - t) * run / NEAR_UNKNOWN_M)
-                cuts = min(max(int(math.ceil(cuts)), 1), MOST_CUTS)
+                    cuts = max(cuts, math.ceil((tb - t) * run / NEAR_UNKNOWN_M))
+                cuts = min(max(cuts, 1), MOST_CUTS)
                 g_bulge, t_bulge = 0.25 * gd * turn / (cuts * cuts), 0.25 * td * turn / (cuts * cuts)
                 u, v = min(max(c0 + t * dc - ii, 0.0), 1.0), min(max(r0 + t * dr - jj, 0.0), 1.0)
                 g0, t0 = ga + gb * u + gc * v + gd * u * v, ta + tu * u + tv * v + td * u * v
@@ -191,7 +203,9 @@ def pieces(m, ground, top, under, beside, beyond, track, low_m, near_m, far_m, r
 
 
 @device
-def around(m, z, extrema, sign, points, reach_m, out):  # type: ignore[no-untyped-def]
+def around(
+    m: Floats, z: Floats, extrema: LocalExtrema, sign: float, points: Floats, reach_m: float, out: Floats
+) -> None:
     """Upper bound of ``sign·height`` within ``reach_m`` of each point (N, 2) of the plane; NaN where unknown.
 
     The tightest of three bounds: by the gradient at the point, if the disc lies in one cell; by the highest corner of

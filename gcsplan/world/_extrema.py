@@ -6,13 +6,17 @@ import math
 
 import numpy as np
 
-from gcsplan.world._sweep import device
+from gcsplan.arrays import Floats, Int64s, Singles
+from gcsplan.world._compiled import device, kernel
 
 SLOPE, HIGH, LOW, LOST = range(4)
 
 
-@device
-def local_extrema(z, step_x, step_y, cols, rows, box, room, slope, high, low):  # type: ignore[no-untyped-def]
+@kernel("f8[,] f8 f8 i8 i8 i8[] f4[,,] f4[,] f4[,] f4[,]")
+def local_extrema(
+    z: Floats, step_x: float, step_y: float, cols: int, rows: int, box: Int64s, room: Singles, slope: Singles,
+    high: Singles, low: Singles,
+) -> int:  # fmt: skip
     """Fill a ``box`` of a `LocalExtrema` of nodes ``z``: ``slope``, ``high``, ``low`` (rows - 1, cols - 1).
 
     ``box``: first row, end of rows, first column, end of columns. ``room``: work array for a block and the
@@ -45,7 +49,7 @@ def local_extrema(z, step_x, step_y, cols, rows, box, room, slope, high, low):  
 
 
 @device
-def _look_at(z, step_x, step_y, row, left, count, into):  # type: ignore[no-untyped-def]
+def _look_at(z: Floats, step_x: float, step_y: float, row: int, left: int, count: int, into: Singles) -> bool:
     """Fill in steepest slope, highest and lowest (negated) node and unknown flag of ``count`` cells of a row.
 
     Return whether any is unknown. Beyond the border everything is unknown.
@@ -87,7 +91,7 @@ def _look_at(z, step_x, step_y, row, left, count, into):  # type: ignore[no-unty
 
 
 @device
-def _spread_along(line, count, window):  # type: ignore[no-untyped-def]
+def _spread_along(line: Singles, count: int, window: int) -> None:
     """Replace each place by the greatest of the ``window`` places from it on, wherever there are that many."""
     done, left = 1, count
     while done < window:
@@ -100,7 +104,7 @@ def _spread_along(line, count, window):  # type: ignore[no-untyped-def]
 
 
 @device
-def _spread_down(room, k, count, width, window):  # type: ignore[no-untyped-def]
+def _spread_down(room: Singles, k: int, count: int, width: int, window: int) -> None:
     """The same across rows, for field ``k``."""
     done, left = 1, count
     while done < window:
@@ -114,7 +118,7 @@ def _spread_down(room, k, count, width, window):  # type: ignore[no-untyped-def]
 
 
 @device
-def _put(line, any_lost, slope, high, low, left, width):  # type: ignore[no-untyped-def]
+def _put(line: Singles, any_lost: bool, slope: Singles, high: Singles, low: Singles, left: int, width: int) -> None:
     """Write a row of the spread values; ``slope`` holds the flags of the cells that are themselves unknown."""
     of_slope, of_high, of_low, near = line[SLOPE], line[HIGH], line[LOW], line[LOST]
     slope, high, low = slope[left : left + width], high[left : left + width], low[left : left + width]

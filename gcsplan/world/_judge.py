@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from gcsplan.arrays import Bools, Floats, Int64s
+from gcsplan.world._compiled import device, inlined
 from gcsplan.world._shared import (
     CLIMB,
     COVERAGE,
@@ -17,8 +19,10 @@ from gcsplan.world._shared import (
     TERRAIN,
     TOUCH_M,
     WEST_E,
+    Demands,
+    LocalExtrema,
+    Zones,
 )
-from gcsplan.world._sweep import device, inlined
 from gcsplan.world._sweep_terrain import (
     DEPTH,
     DEPTH_AT,
@@ -37,9 +41,11 @@ FEW_ZONES = 24  # up to this many, a look through all boxes is faster than the l
 
 
 @inlined
-def judge_terrain(  # type: ignore[no-untyped-def]
-    m, ground, top, near, far, over, column, e0, n0, h0, e1, n1, h1, track, altitude, want, stack, full, out, worst, leg
-):
+def judge_terrain(
+    m: Floats, ground: Floats, top: Floats, near: LocalExtrema, far: LocalExtrema, over: LocalExtrema, column: bool,
+    e0: float, n0: float, h0: float, e1: float, n1: float, h1: float, track: float, altitude: float, want: Demands,
+    stack: Floats, full: bool, out: Floats, worst: Floats, leg: int,
+) -> bool:  # fmt: skip
     """Judge ground, obstacles and ceilings of one leg; return False at the first violation unless ``full``.
 
     ``near``, ``far``: local extrema of the top for the track error and for the clearance; ``over``: of the ground for
@@ -94,7 +100,10 @@ def judge_terrain(  # type: ignore[no-untyped-def]
 
 
 @inlined
-def candidates(zone, lat, bucket, near, west, south, east, north, seen, stamp, list_of):  # type: ignore[no-untyped-def]
+def candidates(
+    zone: Floats, lat: Floats, bucket: Int64s, near: Int64s, west: float, south: float, east: float, north: float,
+    seen: Int64s, stamp: int, list_of: Int64s,
+) -> int:  # fmt: skip
     """Put the zones whose boxes overlap a box into ``list_of``, once each; return their number."""
     count = 0
     zones = len(zone)
@@ -123,10 +132,12 @@ def candidates(zone, lat, bucket, near, west, south, east, north, seen, stamp, l
 
 
 @device
-def judge(  # type: ignore[no-untyped-def]
-    m, ground, top, near, far, over, zs, start, end, column, track, altitude, want, full,
-    ok, found, worst, nearest, hit, hit_at, stack, out, events, seen, list_of,
-):  # fmt: skip
+def judge(
+    m: Floats, ground: Floats, top: Floats, near: LocalExtrema, far: LocalExtrema, over: LocalExtrema, zs: Zones,
+    start: Floats, end: Floats, column: Bools, track: Floats, altitude: Floats, want: Demands, full: bool, ok: Bools,
+    found: Floats, worst: Floats, nearest: Int64s, hit: Int64s, hit_at: Floats, stack: Floats, out: Floats,
+    events: Floats, seen: Int64s, list_of: Int64s,
+) -> int:  # fmt: skip
     """Judge every leg; return the number of zone violations.
 
     ``m``, ``ground``, ``top``: map, surfaces; ``near``, ``far``, ``over``: see `judge_terrain`; ``zs``: zones.
@@ -135,8 +146,7 @@ def judge(  # type: ignore[no-untyped-def]
     ``ok`` (n,): no violation. With ``full`` also ``found`` (n, 4): lowest height above top, its fraction, highest above
     ground, zone clearance; ``worst`` (n, 7, 2) by kind: depth (NaN if there is none; 1 for a climb too steep) and
     fraction; ``nearest`` (n,) zone; and, as many as fit, ``hit`` (leg, zone) and ``hit_at`` (signed distance,
-    fraction). ``stack`` (256, 8), ``out`` (12,), ``events`` (two for each corner), ``seen`` (all -1) and ``list_of``
-    (0, 1, …) by zone: work arrays.
+    fraction). The others are work arrays, see `WorkArrays`.
     """
     zone = zs.table
     zones = len(zone)

@@ -13,7 +13,8 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.native.form import Held
-from gcsplan.world._compiled import EXTREMA, local_extrema
+from gcsplan.world._compiled import EXTREMA
+from gcsplan.world._extrema import local_extrema
 from gcsplan.world._field import Field
 from gcsplan.world._shared import LocalExtrema
 from gcsplan.world.surface import GridMap

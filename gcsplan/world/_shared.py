@@ -6,9 +6,14 @@ import math
 from typing import NamedTuple
 
 from gcsplan.arrays import Floats, Int64s, Singles
+from gcsplan.world._compiled import device
+from gcsplan.world.limits import Limits
 
 TOUCH_M = 1e-6
 """Float noise: a limit that is broken by less than this, m, counts as touched, and touching is legal."""
+
+ANGLE_DEG = 1e-7
+"""Float noise of an angle: a climb that is steeper by less is legal."""
 
 RESOLUTION_M = 0.005
 """Height, m, to which branch and bound resolves what lies within reach; cases that are closer are refused."""
@@ -78,7 +83,26 @@ class Demands(NamedTuple):
     max_climb: float
     max_descent: float
 
+    @classmethod
+    def of(cls, limits: Limits, scale: float) -> Demands:
+        """The demands of ``limits`` in a plane with ``scale`` metres for a metre on the ground."""
+        return cls(
+            float(limits.min_agl_m),
+            math.inf if limits.max_agl_m is None else float(limits.max_agl_m),
+            math.inf if limits.max_amsl_m is None else float(limits.max_amsl_m),
+            float(limits.horizontal_clearance_m),
+            float(scale),
+            steepest(limits.max_climb_deg),
+            steepest(limits.max_descent_deg),
+        )
 
+
+def steepest(degrees: float) -> float:
+    """Rise over run of the steepest legal leg, with float noise allowed."""
+    return math.inf if degrees >= 90.0 else math.tan(math.radians(degrees + ANGLE_DEG))
+
+
+@device
 def steps_of(a: float, b: float, c: float, d: float) -> tuple[float, float]:
     """Lower bounds, m, of a column and a row from d(east, north)/d(col, row), [[a, b], [c, d]]; skew shortens both."""
     xx, yy, xy = a * a + c * c, b * b + d * d, abs(a * b + c * d)

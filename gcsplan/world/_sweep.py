@@ -1,16 +1,14 @@
 """Functions shared by all kernels of the exact check: the map to the grid, and plane geometry.
 
-Kernels are numba's, and imported only where they must be compiled: see `gcsplan.native`. In kernels a division by zero
-gives inf or NaN, as in numpy; NaN means unknown, so there is no fast math.
+In kernels a division by zero gives inf or NaN, as in numpy; NaN means unknown, so there is no fast math.
 """
 
 from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from gcsplan.native.source import INSIDE
+from gcsplan.arrays import Floats
+from gcsplan.world._compiled import device
 from gcsplan.world._shared import (
     AFFINE,
     BEND,
@@ -24,17 +22,9 @@ from gcsplan.world._shared import (
 )
 from gcsplan.world.surface import DEGREE
 
-device = njit(**INSIDE)
-"""A function that only kernels call. It allocates nothing: counting references would cost more than the rest."""
-
-inlined = njit(inline="always", **INSIDE)
-"""The same for a function with one caller, into which it is copied: that compiles faster than a separate function."""
-
-steps_in_kernel = device(steps_of)
-
 
 @device
-def to_grid(m, e, n):  # type: ignore[no-untyped-def]
+def to_grid(m: Floats, e: float, n: float) -> tuple[float, float]:
     """Column and row of a point of the plane; NaN beyond the fitted square."""
     u = (e - m[CENTRE_E]) * m[PER_UNIT]
     v = (n - m[CENTRE_N]) * m[PER_UNIT]
@@ -58,7 +48,7 @@ def to_grid(m, e, n):  # type: ignore[no-untyped-def]
 
 
 @device
-def plane_per_cell(m, e, n):  # type: ignore[no-untyped-def]
+def plane_per_cell(m: Floats, e: float, n: float) -> tuple[float, float, float, float]:
     """d(east, north)/d(col, row) at a point: a, b, c, d of [[a, b], [c, d]]."""
     u = (e - m[CENTRE_E]) * m[PER_UNIT]
     v = (n - m[CENTRE_N]) * m[PER_UNIT]
@@ -83,7 +73,7 @@ def plane_per_cell(m, e, n):  # type: ignore[no-untyped-def]
 
 
 @device
-def parts_of(m, length, bow_m):  # type: ignore[no-untyped-def]
+def parts_of(m: Floats, length: float, bow_m: float) -> tuple[int, float]:
     """Number of parts of a leg so that each part's bow is at most ``bow_m``, and that bow."""
     bow = m[BEND] * length * length / 8.0
     parts = 1
@@ -93,16 +83,16 @@ def parts_of(m, length, bow_m):  # type: ignore[no-untyped-def]
 
 
 @device
-def local_steps(m, e0, n0, e1, n1, around_m):  # type: ignore[no-untyped-def]
+def local_steps(m: Floats, e0: float, n0: float, e1: float, n1: float, around_m: float) -> tuple[float, float]:
     """Metres of a column and of a row, a lower bound within ``around_m`` of a segment."""
     a, b, c, d = plane_per_cell(m, 0.5 * (e0 + e1), 0.5 * (n0 + n1))
-    sx, sy = steps_in_kernel(a, b, c, d)
+    sx, sy = steps_of(a, b, c, d)
     keep = 1.0 - 1.1 * m[BEND] * (0.5 * math.hypot(e1 - e0, n1 - n0) + around_m) - 1e-9
     return sx * keep, sy * keep
 
 
 @device
-def box_distance(px, py, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
+def box_distance(px: float, py: float, x0: float, y0: float, x1: float, y1: float) -> float:
     """Distance of a point from an upright box; 0 inside."""
     dx = max(x0 - px, 0.0, px - x1)
     dy = max(y0 - py, 0.0, py - y1)
@@ -110,7 +100,7 @@ def box_distance(px, py, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
 
 
 @device
-def point_segment(px, py, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
     """Distance of a point from a segment, and where on it (0 … 1)."""
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
@@ -122,7 +112,7 @@ def point_segment(px, py, ax, ay, bx, by):  # type: ignore[no-untyped-def]
 
 
 @device
-def slab(start, step, low, high, t0, t1):  # type: ignore[no-untyped-def]
+def slab(start: float, step: float, low: float, high: float, t0: float, t1: float) -> tuple[float, float]:
     """The part of [t0, t1] where start + t·step lies within [low, high]; empty if the first exceeds the second."""
     if step == 0.0:
         return (t0, t1) if low <= start <= high else (1.0, 0.0)
@@ -133,7 +123,9 @@ def slab(start, step, low, high, t0, t1):  # type: ignore[no-untyped-def]
 
 
 @device
-def segment_box(ax, ay, bx, by, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
+def segment_box(
+    ax: float, ay: float, bx: float, by: float, x0: float, y0: float, x1: float, y1: float
+) -> tuple[float, float]:
     """Distance of a segment from an upright box, and where on the segment (0 … 1)."""
     t0, t1 = slab(ax, bx - ax, x0, x1, 0.0, 1.0)
     if t0 <= t1:
@@ -152,7 +144,9 @@ def segment_box(ax, ay, bx, by, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
 
 
 @device
-def within(ax, ay, dx, dy, x0, y0, x1, y1, reach):  # type: ignore[no-untyped-def]
+def within(
+    ax: float, ay: float, dx: float, dy: float, x0: float, y0: float, x1: float, y1: float, reach: float
+) -> tuple[float, float]:
     """The part [t0, t1] of a segment that lies within ``reach`` of an upright box; t0 > t1 if none does.
 
     The box grown by a disc is the union of two boxes and four discs, and convex: the hull of the parts is exact.

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
+from gcsplan.arrays import Floats
+from gcsplan.world._compiled import device
 from gcsplan.world._shared import BEND, ERROR_M, RESOLUTION_M, TOUCH_M
-from gcsplan.world._sweep import device, local_steps, segment_box, to_grid, within
+from gcsplan.world._sweep import local_steps, segment_box, to_grid, within
 
 MOST_PIECES = 1_000_000
 """Most pieces of one search; beyond it the demand counts as broken. Only hostile input reaches it."""
@@ -16,13 +18,16 @@ SMALLEST_M = 1e-3
 
 
 @device
-def bar_above(depth):  # type: ignore[no-untyped-def]
+def bar_above(depth: float) -> float:
     """The depth that a new break must exceed to count if one of ``depth`` is known: 5 mm or a tenth more."""
     return depth + max(RESOLUTION_M, RESOLUTION * depth) if depth > TOUCH_M else TOUCH_M
 
 
 @device
-def unknown_near(m, z, extrema_c, extrema_r, e0, n0, e1, n1, reach, i, j):  # type: ignore[no-untyped-def]
+def unknown_near(
+    m: Floats, z: Floats, extrema_c: int, extrema_r: int, e0: float, n0: float, e1: float, n1: float, reach: float,
+    i: int, j: int,
+) -> tuple[float, float]:  # fmt: skip
     """Distance from a short segment in cell (i, j) to the nearest unknown patch, and where on the segment.
 
     Only patches up to ``extrema_c`` columns and ``extrema_r`` rows away are examined; ``inf`` if there is none.
@@ -45,7 +50,10 @@ def unknown_near(m, z, extrema_c, extrema_r, e0, n0, e1, n1, reach, i, j):  # ty
 
 
 @device
-def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):  # type: ignore[no-untyped-def]
+def deepest(
+    m: Floats, z: Floats, sign: float, e0: float, n0: float, h0: float, e1: float, n1: float, h1: float, need: float,
+    reach: float, best: float, stack: Floats, full: bool,
+) -> tuple[float, float, int]:  # fmt: skip
     """Worst break of the demand along a short segment: its depth and where on the segment (< 0: none worse).
 
     ``best`` is the depth already known. With ``full`` the worst is resolved to 5 mm or a tenth, else the first break
@@ -124,7 +132,7 @@ def deepest(m, z, sign, e0, n0, h0, e1, n1, h1, need, reach, best, stack, full):
 
 
 @device
-def beside_point(m, z, sign, e, n, h, need, reach):  # type: ignore[no-untyped-def]
+def beside_point(m: Floats, z: Floats, sign: float, e: float, n: float, h: float, need: float, reach: float) -> float:
     """Deepest break at `SPOKES` places around a point, ``reach`` away from it; -inf if all of them are unknown."""
     rows, cols = z.shape
     c, r = to_grid(m, e, n)

@@ -14,8 +14,10 @@ from __future__ import annotations
 
 import math
 
+from gcsplan.arrays import Floats, Singles
+from gcsplan.world._compiled import device
 from gcsplan.world._shared import BEND, BOW_M, ERROR_M, TOUCH_M
-from gcsplan.world._sweep import device, parts_of, slab, to_grid
+from gcsplan.world._sweep import parts_of, slab, to_grid
 from gcsplan.world._sweep_beside import bar_above, beside_point, deepest, unknown_near
 
 EDGE = 1e-9  # columns or rows by which a leg along the border may seem to lie beyond it
@@ -28,7 +30,9 @@ CUT = 11  # pieces cut by the second tier so far, of all legs
 
 
 @device
-def least_in_cell(sign, kd, turn, before, after, t, tb):  # type: ignore[no-untyped-def]
+def least_in_cell(
+    sign: float, kd: float, turn: float, before: float, after: float, t: float, tb: float
+) -> tuple[float, float]:
     """Least of ``sign·(altitude − height)`` over the line in a cell, and where; ``turn`` is Δcol·Δrow over it.
 
     In the cell it is before + (after − before)·s + bulge·s·(1 − s), s from 0 to 1.
@@ -45,7 +49,10 @@ def least_in_cell(sign, kd, turn, before, after, t, tb):  # type: ignore[no-unty
 
 
 @device
-def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out):  # type: ignore[no-untyped-def]
+def glance(
+    m: Floats, z: Floats, slopes: Singles, sign: float, e0: float, n0: float, h0: float, e1: float, n1: float,
+    h1: float, need: float, reach: float, full: bool, out: Floats,
+) -> int:  # fmt: skip
     """The first tier alone, fast: 1 if the demand is surely kept, -1 if the line itself breaks it, 0 if unsure.
 
     With ``full`` the whole leg is examined; if the result is 1, ``out`` is then as `sweep` leaves it. Without ``full``
@@ -118,7 +125,11 @@ def glance(m, z, slopes, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out): 
 
 
 @device
-def sweep(m, z, slopes, extremes, extrema_c, extrema_r, sign, e0, n0, h0, e1, n1, h1, need, reach, stack, full, out):  # type: ignore[no-untyped-def]
+def sweep(
+    m: Floats, z: Floats, slopes: Singles, extremes: Singles, extrema_c: int, extrema_r: int, sign: float, e0: float,
+    n0: float, h0: float, e1: float, n1: float, h1: float, need: float, reach: float, stack: Floats, full: bool,
+    out: Floats,
+) -> bool:  # fmt: skip
     """Judge one leg against one demand; return False at the first break found, unless ``full``.
 
     ``slopes``, ``extremes``: local extrema, over ``extrema_c`` columns and ``extrema_r`` rows. ``out``: lowest

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+from gcsplan.arrays import Floats
+from gcsplan.world._compiled import device, inlined
 from gcsplan.world._shared import (
     BAND_HIGH,
     BAND_LOW,
@@ -35,8 +37,6 @@ from gcsplan.world._shared import (
     WEST_E,
 )
 from gcsplan.world._sweep import (
-    device,
-    inlined,
     local_steps,
     parts_of,
     plane_per_cell,
@@ -57,11 +57,11 @@ GLIMPSES = 8
 
 
 @device
-def signed_distance(zone, vertex, k, e, n):  # type: ignore[no-untyped-def]
+def signed_distance(zone: Floats, vertex: Floats, k: int, e: float, n: float) -> float:
     """Distance of a point from a zone's border, negative inside."""
     radius = zone[k, RADIUS]
     if radius >= 0.0:
-        return math.hypot(e - zone[k, EAST], n - zone[k, NORTH]) - radius
+        return float(math.hypot(e - zone[k, EAST], n - zone[k, NORTH]) - radius)
     best = math.inf
     inside = False
     a, b = int(zone[k, FIRST]), int(zone[k, LAST])
@@ -77,7 +77,7 @@ def signed_distance(zone, vertex, k, e, n):  # type: ignore[no-untyped-def]
 
 
 @device
-def approach(zone, vertex, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def approach(zone: Floats, vertex: Floats, k: int, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
     """Least distance of a segment from a zone's shape, and where on the segment; from a circle it is signed."""
     radius = zone[k, RADIUS]
     if radius >= 0.0:
@@ -109,7 +109,7 @@ def approach(zone, vertex, k, ax, ay, bx, by):  # type: ignore[no-untyped-def]
 
 
 @device
-def enters(zone, vertex, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-def]
+def enters(zone: Floats, vertex: Floats, k: int, ax: float, ay: float, bx: float, by: float, events: Floats) -> bool:
     """Whether a segment passes through the open inside of a polygon, by more than touching it.
 
     The segment is split at its crossings with the edges' lines and at the feet of the vertices on it. Between
@@ -150,7 +150,7 @@ def enters(zone, vertex, k, ax, ay, bx, by, events):  # type: ignore[no-untyped-
 
 
 @device
-def at_heights(h0, dh, floor_m, ceiling_m, altitude_m):  # type: ignore[no-untyped-def]
+def at_heights(h0: float, dh: float, floor_m: float, ceiling_m: float, altitude_m: float) -> tuple[float, float]:
     """The part of [0, 1] where h0 + t·dh, plus or minus ``altitude_m``, meets the open interval (floor, ceiling)."""
     if not floor_m < ceiling_m:
         return 1.0, 0.0
@@ -158,7 +158,10 @@ def at_heights(h0, dh, floor_m, ceiling_m, altitude_m):  # type: ignore[no-untyp
 
 
 @device
-def nearest_conflict(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, cutoff, stack, full):  # type: ignore[no-untyped-def]
+def nearest_conflict(
+    m: Floats, z: Floats, zone: Floats, vertex: Floats, k: int, e0: float, n0: float, h0: float, e1: float, n1: float,
+    h1: float, altitude_m: float, cutoff: float, stack: Floats, full: bool,
+) -> tuple[float, float]:  # fmt: skip
     """Least distance from a short segment to a point of a zone's shape where it meets the zone's heights, and where.
 
     Only distances below ``cutoff`` are found, else inf. Over unknown ground the zone is met at any height. Without
@@ -264,7 +267,10 @@ def nearest_conflict(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, 
 
 
 @device
-def glimpsed(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, t0, t1, altitude_m):  # type: ignore[no-untyped-def]
+def glimpsed(
+    m: Floats, z: Floats, zone: Floats, vertex: Floats, k: int, e0: float, n0: float, h0: float, e1: float, n1: float,
+    h1: float, t0: float, t1: float, altitude_m: float,
+) -> bool:  # fmt: skip
     """Whether one of a few places on the leg itself, from ``t0`` to ``t1``, lies in a zone and at its heights.
 
     If so, the zone is broken; the search for the nearest such place would find it too, but takes long near the zone's
@@ -295,7 +301,10 @@ def glimpsed(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, t0, t1, altitude_m):
 
 
 @inlined
-def meets(m, z, zone, vertex, k, e0, n0, h0, e1, n1, h1, altitude_m, reach, stack, events, full):  # type: ignore[no-untyped-def]
+def meets(
+    m: Floats, z: Floats, zone: Floats, vertex: Floats, k: int, e0: float, n0: float, h0: float, e1: float, n1: float,
+    h1: float, altitude_m: float, reach: float, stack: Floats, events: Floats, full: bool,
+) -> tuple[bool, float, float]:  # fmt: skip
     """Whether a leg breaks a zone; its signed distance from the shape at the worst point, and where on the leg.
 
     Without a break the distance is the least at which the leg meets the zone's heights (for a zone over ground a lower

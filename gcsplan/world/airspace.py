@@ -21,11 +21,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.native.form import Held
-from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES, around, judge, room
+from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES
+from gcsplan.world._entries import around, judge
 from gcsplan.world._field import Field
 from gcsplan.world._neighbourhood import Neighbourhood
 from gcsplan.world._shapes import deepest_in_circle, deepest_inside
 from gcsplan.world._shared import (
+    ANGLE_DEG,
     BAND_HIGH,
     BAND_LOW,
     BOW_M,
@@ -43,6 +45,7 @@ from gcsplan.world._shared import (
     TOUCH_M,
     Demands,
 )
+from gcsplan.world._work_arrays import work_arrays
 from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
@@ -54,9 +57,6 @@ __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 NEAR_M, NEAR_PART = 0.01, 0.01
 """The kernel finds the nearest place of a zone over ground to this many metres, or this part of the distance
 (`_sweep_zones.nearest_conflict`)."""
-
-ANGLE_DEG = 1e-7
-"""Float noise of an angle: a climb that is steeper by less is legal."""
 
 Kind = Literal["min_agl", "max_agl", "max_amsl", "terrain_clearance", "zone", "climb", "descent", "coverage"]
 
@@ -213,8 +213,9 @@ class Airspace:
 
     def clear_counted(self, legs: Legs, limits: Limits) -> tuple[Bools, float]:
         """What `clear` returns, and into how many pieces ground beside the legs was cut: most work close to ground."""
-        self._judge(legs, limits, False, ok := np.zeros(len(legs), np.bool_), _HELD_NOTHING)
-        return ok, room.cut
+        ok = np.zeros(len(legs), np.bool_)
+        self._judge(legs, limits, False, ok, _HELD_NOTHING)
+        return ok, work_arrays.cut
 
     def floor_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:
         """Lowest legal altitude over points of the plane, for terrain; conservative; +inf where unknown.
@@ -292,8 +293,8 @@ class Airspace:
             judge(
                 self._surfaces, near, far, self._held(False, near_m, *lines), self._held_zones,
                 legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
-                *_demands(limits, self.scale), full, ok, found,
-                room(self._zones.most_corners, len(self.zones)),
+                *Demands.of(limits, self.scale), full, ok, found,
+                work_arrays(self._zones.most_corners, len(self.zones)),
             )
         )  # fmt: skip
 
@@ -381,20 +382,3 @@ _NOTHING = (
     np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),
 )  # fmt: skip
 _HELD_NOTHING = Held(FOUND, *_NOTHING)
-
-
-def _steepest(degrees: float) -> float:
-    """Rise over run of the steepest legal leg, with float noise allowed."""
-    return math.inf if degrees >= 90.0 else math.tan(math.radians(degrees + ANGLE_DEG))
-
-
-def _demands(limits: Limits, scale: float) -> Demands:
-    return Demands(
-        float(limits.min_agl_m),
-        math.inf if limits.max_agl_m is None else float(limits.max_agl_m),
-        math.inf if limits.max_amsl_m is None else float(limits.max_amsl_m),
-        float(limits.horizontal_clearance_m),
-        float(scale),
-        _steepest(limits.max_climb_deg),
-        _steepest(limits.max_descent_deg),
-    )

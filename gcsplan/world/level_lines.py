@@ -13,7 +13,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.world import hulls
-from gcsplan.world._compiled import pieces
+from gcsplan.world._entries import pieces
 from gcsplan.world._shapes import grown_edges
 from gcsplan.world._shared import (
     BAND_HIGH,
@@ -53,7 +53,7 @@ class Crossings:
     are included. ``begins``: whether the line begins within reach of the zone.
     """
 
-    way: Indices
+    line: Indices
     zone: Indices
     s0_m: Floats
     s1_m: Floats
@@ -88,7 +88,7 @@ class LevelLines:
     legal_m: Floats
     ceiling_m: Floats
     crossings: Crossings
-    piece_way: Indices
+    piece_line: Indices
     piece_s_m: Floats
     piece_clear_m: Floats
     piece_legal_m: Floats
@@ -105,7 +105,7 @@ def over(
     starts, ends = (np.ascontiguousarray(a, dtype=np.float64) for a in (starts, ends))
     reach = Reaches.of(limits, air._field, air.scale)
     near, far = reach.near_m + wide_m, reach.far_m + wide_m
-    way, s0, rows = _pieces(
+    line, s0, rows = _pieces(
         air, starts, ends, (near if limits.max_agl_m is not None else UNUSED, near, far), of_top=True
     )
     error = limits.altitude_error_m
@@ -120,12 +120,12 @@ def over(
     low = np.where(unknown, -np.inf, rows[:, 1:3].min(axis=1) - (error + margin))
     n = len(starts)
     clear_m, legal_m, ceiling_m = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, np.inf)
-    np.maximum.at(clear_m, way, high)
-    np.maximum.at(legal_m, way, legal)
+    np.maximum.at(clear_m, line, high)
+    np.maximum.at(legal_m, line, legal)
     if limits.max_agl_m is not None:
-        np.minimum.at(ceiling_m, way, low + limits.max_agl_m)
+        np.minimum.at(ceiling_m, line, low + limits.max_agl_m)
     found = _crossings(air, starts, ends, reach, wide_m, error, swept)
-    return LevelLines(clear_m, legal_m, ceiling_m, found, way, s0, high, legal)
+    return LevelLines(clear_m, legal_m, ceiling_m, found, line, s0, high, legal)
 
 
 def _pieces(
@@ -161,10 +161,10 @@ def _pieces(
     leg = np.minimum(np.searchsorted(after, 0.5 * (begin + rows[:, 0]), side="right"), 2 * n - 2)
     own = leg % 2 == 0  # the others lead from line to line
     leg, begin, rows = leg[own], begin[own], rows[own]
-    way = leg // 2
+    line = leg // 2
     base = np.concatenate([[0.0], after])[leg]
-    s0 = np.where(back[way], after[leg] - rows[:, 0], begin - base)
-    return way, np.maximum(s0, 0.0), rows
+    s0 = np.where(back[line], after[leg] - rows[:, 0], begin - base)
+    return line, np.maximum(s0, 0.0), rows
 
 
 def _few(reach_m: float, air: Airspace) -> float:
@@ -183,7 +183,7 @@ def _crossings(
     length = np.hypot(*step.T)
     unit = np.divide(step, length[:, None], out=np.tile([1.0, 0.0], (len(starts), 1)), where=length[:, None] > 0.0)
     over_ground = (table[:, FLOOR_AGL] != 0.0) | (table[:, CEILING_AGL] != 0.0)
-    ways, zones, firsts, lasts, begins = [], [], [], [], []
+    lines, zones, firsts, lasts, begins = [], [], [], [], []
     low, high = np.minimum(starts, ends).min(axis=0), np.maximum(starts, ends).max(axis=0)
     around = reach.far_m + wide_m + ZONE_ROOM_M
     near = (table[:, BOX_LOW] <= high + around).all(axis=1) & (table[:, BOX_HIGH] >= low - around).all(axis=1)
@@ -204,22 +204,22 @@ def _crossings(
             near_it = _apart(swept.regions[met], row, vertex) < demanded - TOUCH_M
             met, demanded = met[near_it], demanded[near_it]
             begin = _apart(swept.regions[met, :2], row, vertex) < demanded - TOUCH_M
-        ways.append(met)
+        lines.append(met)
         begins.append(begin)
         zones.append(np.full(len(met), k))
         firsts.append(s0[met])
         lasts.append(s1[met])
-    if not ways:
+    if not lines:
         nothing, none = np.zeros(0), np.zeros(0, np.intp)
         return Crossings(none, none, nothing, nothing, nothing, nothing, np.zeros(0, np.bool_))
-    way, zone = np.concatenate(ways), np.concatenate(zones)
+    line, zone = np.concatenate(lines), np.concatenate(zones)
     s0, s1 = np.concatenate(firsts), np.concatenate(lasts)
     bottom, top = table[zone, FLOOR], table[zone, CEILING]
     follow = np.flatnonzero(over_ground[zone])
     if len(follow):
         wide = reach.far_m + wide_m + ZONE_ROOM_M
-        a = starts[way[follow]] + s0[follow, None] * unit[way[follow]]
-        b = starts[way[follow]] + s1[follow, None] * unit[way[follow]]
+        a = starts[line[follow]] + s0[follow, None] * unit[line[follow]]
+        b = starts[line[follow]] + s1[follow, None] * unit[line[follow]]
         part, _, rows = _pieces(air, a, b, (wide, wide, UNUSED), of_top=False)
         low, high = np.full(len(follow), np.inf), np.full(len(follow), -np.inf)
         # Bounds over all the ground under the zone hold too; where ground is unknown, the zone can be neither overflown
@@ -236,7 +236,7 @@ def _crossings(
         bottom[follow[agl]] = np.where(known, floor, -np.inf)[agl]
         agl = row[:, CEILING_AGL] != 0.0
         top[follow[agl]] = np.where(known, ceiling, np.inf)[agl]
-    return Crossings(way, zone, s0, s1, bottom - error_m, top + error_m, np.concatenate(begins))
+    return Crossings(line, zone, s0, s1, bottom - error_m, top + error_m, np.concatenate(begins))
 
 
 def _apart(regions: Floats, row: Floats, vertex: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.native.form import Held
-from gcsplan.world._compiled import pieces
+from gcsplan.world._entries import pieces
 from gcsplan.world._field import Field
 from gcsplan.world._shapes import spans
 from gcsplan.world._shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones

@@ -20,20 +20,25 @@ import pytest
 
 from gcsplan.native import notice, shelf
 from gcsplan.native.form import Held, read_forms
-from gcsplan.native.kernels import Kernels
 from gcsplan.native.machine import Machine
-from gcsplan.world._compiled import KERNELS as WORLD
+from gcsplan.native.unit import Unit
+from gcsplan.world._compiled import UNIT as WORLD
 
-FORMS = {"weigh": "f8[,] f4[] i8[,,] b1[] f8 i8 b1 f8[]"}
 SOURCE = """
-from numba import njit
+from pathlib import Path
 
-from gcsplan.native.source import INSIDE
+from gcsplan.native.unit import Unit
 
+UNIT = Unit("toy", Path(__file__).parent, "toys", ("weighing",))
 FACTOR = {factor}
 
 
-@njit(**INSIDE)
+@UNIT.inlined
+def times(value, factor):
+    return value * factor
+
+
+@UNIT.kernel("f8[,] f4[] i8[,,] b1[] f8 i8 b1 f8[]")
 def weigh(a, b, c, d, x, k, whole, out):
     total = 0.0
     for i in range(a.shape[0]):
@@ -45,7 +50,7 @@ def weigh(a, b, c, d, x, k, whole, out):
         for i in range(len(d)):
             if d[i]:
                 total += c[i, 0, 1] * k
-    out[0] = total * FACTOR
+    out[0] = times(total, FACTOR)
     return c.shape[2] + k
 """
 
@@ -61,26 +66,44 @@ def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder with the source of a kernel, and a cache of its own."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "toys").mkdir()
     write(tmp_path, 1.0)
     yield tmp_path
-    sys.modules.pop("weighing", None)
+    forget("toys")
 
 
 def write(room: Path, factor: float) -> None:
-    (room / "weighing.py").write_text(SOURCE.format(factor=factor), encoding="utf-8")
-    sys.modules.pop("weighing", None)
-    sys.path_importer_cache.clear()
+    (room / "toys" / "weighing.py").write_text(SOURCE.format(factor=factor), encoding="utf-8")
 
 
-def kernels(room: Path) -> Kernels:
-    return Kernels("toy", room, ("weighing.py",), "weighing", FORMS)
+def forget(package: str) -> None:
+    for name in [m for m in sys.modules if m.split(".")[0] == package]:
+        del sys.modules[name]
+    importlib.invalidate_caches()
+
+
+def imported_anew(name: str) -> Any:
+    """A module, from its source as it stands."""
+    forget(name.split(".")[0])
+    sys.dont_write_bytecode, before = True, sys.dont_write_bytecode
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.dont_write_bytecode = before
+
+
+def kernels(room: Path) -> Unit:
+    unit = imported_anew("toys.weighing").UNIT
+    assert isinstance(unit, Unit)
+    assert unit.folder == room / "toys"
+    return unit
 
 
 MADE: dict[str, bytes] = {}
 """Bitcode by the source that it was made from, which takes longer than all else here."""
 
 
-def ship(of: Kernels) -> None:
+def ship(of: Unit) -> None:
     digest = of.digest()
     assert digest is not None
     source = (of.shipped.parent / "weighing.py").read_text(encoding="utf-8")
@@ -95,7 +118,7 @@ def arguments() -> list[Any]:
     return [a, b, c, np.array([True, False, True]), 0.25, 7, True, np.zeros(1)]
 
 
-def value(of: Kernels, factor: float = 1.0) -> float:
+def value(of: Unit, factor: float = 1.0) -> float:
     given = arguments()
     assert of["weigh"](*given) == 2 + 7
     out = given[-1]
@@ -416,20 +439,13 @@ UNIT = Unit("marked", Path(__file__).parent, "{package}", ("_unit", "inner.helpe
 
 def fold_of(room: Path, package: str, scale: float) -> Any:
     """The functions of a package with marked kernels, written anew."""
-    for name in [m for m in sys.modules if m.split(".")[0] == package]:
-        del sys.modules[name]
     folder = room / package
     (folder / "inner").mkdir(parents=True, exist_ok=True)
     files = {"__init__": "", "_unit": UNIT_OF, "inner/__init__": "", "inner/helper": HELPER, "marked": MARKED}
     for name, text in files.items():
         text = text.format(package=package, helper="inner.helper", scale=scale)
         (folder / f"{name}.py").write_text(text, encoding="utf-8")
-    importlib.invalidate_caches()
-    sys.dont_write_bytecode, before = True, sys.dont_write_bytecode
-    try:
-        return importlib.import_module(f"{package}.marked")
-    finally:
-        sys.dont_write_bytecode = before
+    return imported_anew(f"{package}.marked")
 
 
 def test_marked_functions_run_as_machine_code_and_are_plain_functions_still(room: Path) -> None:

@@ -39,9 +39,9 @@ def test_what_is_clear_of_ground_and_zones_passes_the_exact_check(make: object) 
             level = need + rng.choice([0.0, 5.0, 40.0], len(need))
             under = level <= met.ceiling_m if asked.max_agl_m is not None else np.ones(len(level), np.bool_)
             at = met.crossings
-            hit = (level[at.way] > at.bottom_m + 1e-9) & (level[at.way] < at.top_m - 1e-9)
+            hit = (level[at.line] > at.bottom_m + 1e-9) & (level[at.line] < at.top_m - 1e-9)
             fine = np.isfinite(level) & under
-            fine[at.way[hit]] = False
+            fine[at.line[hit]] = False
             z = np.where(fine, level, 0.0)
             legs = Legs.between(np.column_stack([ends[:, 0], z]), np.column_stack([ends[:, 1], z]), asked)
             assert air.clear(legs, asked)[fine].all()
@@ -61,7 +61,7 @@ def test_what_is_needed_over_a_slope_and_where() -> None:
     wide = level_lines.over(air, a, b, limits, 40.0)
     assert wide.clear_m == pytest.approx([81.0, 81.0], abs=0.05)
     back = level_lines.over(air, np.vstack([a, b[:1]]), np.vstack([b, a[:1]]), limits)
-    assert back.piece_s_m[back.piece_way == 2].max() == pytest.approx(1900.0, abs=101.0)
+    assert back.piece_s_m[back.piece_line == 2].max() == pytest.approx(1900.0, abs=101.0)
 
 
 def test_zones_are_met_where_they_are() -> None:
@@ -78,7 +78,7 @@ def test_zones_are_met_where_they_are() -> None:
     a = np.array([[0.0, 0.0], [600.0, 0.0], [1500.0, 0.0], [0.0, 300.0]])
     b = np.array([[2000.0, 0.0], [600.0, 0.0], [2000.0, 0.0], [2000.0, 300.0]])
     at = level_lines.over(air, a, b, limits).crossings
-    found = {(int(w), int(k)): i for i, (w, k) in enumerate(zip(at.way, at.zone, strict=True))}
+    found = {(int(w), int(k)): i for i, (w, k) in enumerate(zip(at.line, at.zone, strict=True))}
     assert set(found) == {(0, 0), (0, 1), (1, 1)}
     disc, inside = found[0, 0], found[1, 1]
     assert (at.s0_m[disc], at.s1_m[disc]) == (pytest.approx(890.0, abs=0.1), pytest.approx(1110.0, abs=0.1))
@@ -96,7 +96,7 @@ def test_nothing_demanded_still_means_not_within() -> None:
     b = np.array([[600.0, 0.0], [900.0, 0.0], [900.0, 101.0], [450.0, 100.0]])
     swept = level_lines.Swept(np.stack([a, a, b], axis=1), np.zeros(4))
     met = level_lines.over(air, a, b, Limits(20.0), 0.0, swept).crossings
-    assert met.way.tolist() == [0, 1]
+    assert met.line.tolist() == [0, 1]
     assert met.begins.tolist() == [True, False]
 
 

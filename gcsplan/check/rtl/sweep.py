@@ -91,30 +91,30 @@ def obstacles_of_returns(
     for some in _alike(extra, away):
         swept = level_lines.Swept(regions[some], own[some])
         met = level_lines.over(air, start[some], end[some], limits, float(extra[some].max()), swept)
-        found.cost += len(met.piece_way)
+        found.cost += len(met.piece_line)
         at = met.crossings
         if rule.climbs_first:
             found.ground(some, met, low[some], cone[some], np.full(len(some), np.inf))
-            i = some[at.way]
+            i = some[at.line]
             found.zones(i, at, low[i], np.where(at.begins, -np.inf, cone[i]))
         else:
             found.ground(some, met, -np.inf, *_climbs(met, low[some], reach[some] + about_m, climb))
-            i = some[at.way]
+            i = some[at.line]
             found.zones(i, at, -np.inf, low[i] + climb * np.maximum(at.s0_m - reach[i] - about_m, 0.0))
     if rule.climbs_first:  # near home the altitude is not known: no zone may be within reach
         for some in _alike(extra, np.flatnonzero(distance + reach <= there_m)):
             swept = level_lines.Swept(regions[some], own[some])
             met = level_lines.over(air, start[some], end[some], limits, float(extra[some].max()), swept)
-            i = some[met.crossings.way]
+            i = some[met.crossings.line]
             found.zones(i, met.crossings, low[i], np.full(len(i), -np.inf))
     else:
         for some in _alike(extra, np.arange(n)):
             met = level_lines.over(
                 air, start[some], start[some], limits, float(extra[some].max()) + about_m * air.scale
             )
-            found.cost += len(met.piece_way)
+            found.cost += len(met.piece_line)
             found.ground(some, met, -np.inf, low[some], low[some])
-            i = some[met.crossings.way]
+            i = some[met.crossings.line]
             found.zones(i, met.crossings, -np.inf, low[i])
     _over_home(found, trace, target, vehicle, n)
     if limits.max_amsl_m is not None:
@@ -170,10 +170,10 @@ def _over_home(found: _Builder, trace: MissionTrace, target: Target, vehicle: Ve
 def _climbs(met: level_lines.LevelLines, low: Floats, spare: Floats, climb: float) -> tuple[Floats, Floats]:
     """For both grades: inf for each plane that stays above the ground while it climbs from ``low``, else -inf."""
     out = []
-    reached = low[met.piece_way] + climb * np.maximum(met.piece_s_m - spare[met.piece_way], 0.0)
+    reached = low[met.piece_line] + climb * np.maximum(met.piece_s_m - spare[met.piece_line], 0.0)
     for floor in (met.piece_clear_m, met.piece_legal_m):
         limit = np.full(len(low), np.inf)
-        limit[met.piece_way[reached < floor]] = -np.inf
+        limit[met.piece_line[reached < floor]] = -np.inf
         out.append(limit)
     return out[0], out[1]
 

@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from gcsplan.native import shelf
 from gcsplan.native.__main__ import ALL
 from gcsplan.native.form import Held
-from gcsplan.native.kernels import Kernels
+from gcsplan.native.unit import Unit
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.swarm import cost_kernels as k
 from gcsplan.planners.swarm import curve_kernels as ck
@@ -69,10 +69,9 @@ def plain_terms(cost: Cost, controls: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ALL)
 def test_what_is_shipped_was_made_from_the_source_as_it_stands(name: str) -> None:
-    module, _, attribute = ALL[name].partition(":")
-    kernels: Kernels = getattr(importlib.import_module(module), attribute)
-    made_of = json.loads(kernels.shipped.read_bytes().partition(b"\n")[0])["sources"]
-    assert made_of == kernels.digest(), f"run python -m gcsplan.native {name}"
+    unit: Unit = importlib.import_module(ALL[name]).UNIT
+    made_of = json.loads(unit.shipped.read_bytes().partition(b"\n")[0])["sources"]
+    assert made_of == unit.digest(), f"run python -m gcsplan.native {name}"
 
 
 @pytest.mark.parametrize(("objective", "points"), [("ssgwo", 9), ("msfoa", 3), ("ib-abc", 1), ("abo", 2)])
