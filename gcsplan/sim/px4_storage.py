@@ -63,7 +63,11 @@ _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
     cmd.LOITER_TO_ALT: (_positive, _same, _zero, _positive),
     cmd.VTOL_TAKEOFF: _HEADING_ONLY,
     cmd.VTOL_LAND: _HEADING_ONLY,
+    cmd.ROI: _NOTHING,
+    cmd.DO_SET_ROI: _NOTHING,
     cmd.DO_SET_ROI_LOCATION: _NOTHING,
+    cmd.DO_AUTOTUNE_ENABLE: _NOTHING,
+    cmd.COMPONENT_ARM_DISARM: _NOTHING,
     cmd.CONDITION_GATE: _NOTHING,
     cmd.FENCE_RETURN_POINT: _NOTHING,
     cmd.POLYGON_IN: (_vertices, _zero, _zero, _zero),
@@ -75,12 +79,12 @@ _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
 
 # Commands that PX4 accepts only in frame 2.
 _PLACELESS = frozenset({
-        cmd.RTL, cmd.DELAY, cmd.CONDITION_DELAY, cmd.CONDITION_DISTANCE, cmd.DO_JUMP, cmd.DO_CHANGE_SPEED,
+        cmd.RTL, cmd.ROI, cmd.DELAY, cmd.CONDITION_DELAY, cmd.CONDITION_DISTANCE, cmd.DO_JUMP, cmd.DO_CHANGE_SPEED,
         cmd.DO_SET_HOME, cmd.DO_SET_SERVO, cmd.DO_SET_ACTUATOR, cmd.DO_LAND_START, cmd.DO_SET_ROI_NONE,
         cmd.DO_CONTROL_VIDEO, cmd.DO_SET_ROI, cmd.DO_DIGICAM_CONTROL, cmd.DO_MOUNT_CONFIGURE,
         cmd.DO_MOUNT_CONTROL, cmd.DO_SET_CAM_TRIGG_DIST, cmd.DO_GRIPPER, cmd.DO_AUTOTUNE_ENABLE,
         cmd.DO_SET_CAM_TRIGG_INTERVAL, cmd.OBLIQUE_SURVEY, cmd.COMPONENT_ARM_DISARM, cmd.SET_CAMERA_MODE,
-        cmd.SET_CAMERA_FOCUS, cmd.SET_CAMERA_SOURCE, cmd.DO_GIMBAL_MANAGER_PITCHYAW,
+        cmd.SET_CAMERA_ZOOM, cmd.SET_CAMERA_FOCUS, cmd.SET_CAMERA_SOURCE, cmd.DO_GIMBAL_MANAGER_PITCHYAW,
         cmd.DO_GIMBAL_MANAGER_CONFIGURE, cmd.IMAGE_START_CAPTURE, cmd.IMAGE_STOP_CAPTURE,
         cmd.DO_TRIGGER_CONTROL, cmd.VIDEO_START_CAPTURE, cmd.VIDEO_STOP_CAPTURE, cmd.DO_VTOL_TRANSITION,
         cmd.DO_WINCH,
@@ -108,24 +112,34 @@ def _kept(item: MissionItem) -> MissionItem:
     if item.frame == NO_POSITION:
         if item.command not in _PLACELESS:
             raise Refused(UNSUPPORTED)
-        if item.command == cmd.DO_SET_ROI and item.params[0] not in (0.0, 1.0, 2.0):
-            raise Refused(INVALID_PARAM1)
+        _need_mode(item, (0, 1, 2))
         params = item.params
         if item.command == cmd.DO_JUMP:
             params = (_i16(params[0]), _u16(params[1]), params[2], params[3])
-        # PX4 stores x and y as float32 in this frame.
-        return MissionItem(
-            item.command, NO_POSITION, params, _through_float(item.x), _through_float(item.y), item.z, item.autocontinue
-        )
+        x, y = _through_float(item.x), _through_float(item.y)  # PX4 stores them as float32 in this frame
+        return MissionItem(_renamed(item), NO_POSITION, params, x, y, item.z, item.autocontinue)
     if item.frame not in _IN_INT_MODE:
         raise Refused(UNSUPPORTED_FRAME)
     if item.command not in _LOCATED:
         raise Refused(UNSUPPORTED)
+    _need_mode(item, (0, 3))
     first, second, third, fourth = (
         keep(value) for keep, value in zip(_LOCATED[item.command], item.params, strict=True)
     )
     frame = _IN_INT_MODE[item.frame]
-    return MissionItem(item.command, frame, (first, second, third, fourth), item.x, item.y, item.z, item.autocontinue)
+    return MissionItem(_renamed(item), frame, (first, second, third, fourth), item.x, item.y, item.z, item.autocontinue)
+
+
+def _need_mode(item: MissionItem, modes: tuple[int, ...]) -> None:
+    """Refuse a region of interest whose mode, param1, does not go with its frame."""
+    mode = item.params[0]
+    if item.command in (cmd.ROI, cmd.DO_SET_ROI) and (not math.isfinite(mode) or int(mode) not in modes):
+        raise Refused(INVALID_PARAM1)
+
+
+def _renamed(item: MissionItem) -> int:
+    """The command as stored: the older name of a region of interest becomes the newer one."""
+    return cmd.DO_SET_ROI if item.command == cmd.ROI else item.command
 
 
 def _through_float(value: int) -> int:

@@ -130,14 +130,15 @@ def refused_by_px4(item: MissionItem) -> str:
 def stored_by_px4(item: MissionItem) -> MissionItem:
     """Return ``item`` as it reads back from PX4 in MISSION_ITEM_INT, with frames 5 and 6 written as 0 and 3."""
     frame = FRAME_SYNONYMS.get(item.frame, item.frame)
+    command = cmd.DO_SET_ROI if item.command == cmd.ROI else item.command
     if frame == NO_POSITION:
         params = item.params
         if item.command == cmd.DO_JUMP:
             params = (_i16(params[0]), _u16(params[1]), params[2], params[3])
         x, y = (max(-(2**31), min(2**31 - 1, round(float32(v)))) for v in (item.x, item.y))
-        return MissionItem(item.command, frame, params, x, y, item.z, item.autocontinue)
+        return MissionItem(command, frame, params, x, y, item.z, item.autocontinue)
     rule = LOCATED.get(item.command, (_f32, _f32, _f32, _f32))
     p1, p2, p3, p4 = (keep(value) for keep, value in zip(rule, item.params, strict=True))
     if item.command in _FENCE:  # a fence point is stored without "relative" and autocontinue
         return MissionItem(item.command, GLOBAL, (p1, p2, p3, p4), item.x, item.y, item.z, False)
-    return MissionItem(item.command, frame, (p1, p2, p3, p4), item.x, item.y, item.z, item.autocontinue)
+    return MissionItem(command, frame, (p1, p2, p3, p4), item.x, item.y, item.z, item.autocontinue)

@@ -24,7 +24,6 @@ from tests.support.effort import draws
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 ARDUPILOTS = [COPTER, PLANE]
-ALSO_SIMULATED = {16, 17, 18, 19, 20, 21, 22, 31, 82, 93, 112, 177, 178, 195, 201, 206, 207}
 X, Y = 366_000_000, -843_800_000
 
 WIRE_FLOATS = st.one_of(
@@ -222,7 +221,7 @@ def test_px4_passes_raw_x_and_y_through_float32_without_a_frame() -> None:
 
 
 @settings(max_examples=draws(200))
-@given(ITEMS, st.sampled_from([*LOCATED, 20, 93, 112, 177, 178, 179, 206, 211, 2000, 2500]))
+@given(ITEMS, st.sampled_from([*LOCATED, *PX4_PLACELESS]))
 def test_px4s_rules_agree_with_an_independent_reading_of_its_source(shape: MissionItem, command: int) -> None:
     one = MissionItem(command, shape.frame, shape.params, shape.x, shape.y, shape.z)
     try:
@@ -267,16 +266,15 @@ def test_what_is_refused_is_just_what_the_simulated_vehicle_refuses(autopilot: A
         return False
 
     known = set(PX4_LOCATED) | set(PX4_PLACELESS) if autopilot is PX4 else set(RULES)
-    ours_alone = {80, 201, 212, 400, 531} if autopilot is PX4 else {94}  # versions differ
     seen = set()
-    for command in [*sorted(known - ours_alone - set(range(5000, 5101))), 9, 31000]:
+    for command in [*sorted(known - set(range(5000, 5101))), 9, 31000]:
         for frame in (0, 1, 2, 3, 4, 5, 6, 7, 10, 11):
             for params in ((0.0,) * 4, (0.0, 0.0, 0.0, math.nan), (0.0, math.inf, 0.0, 0.0)):
                 one = MissionItem(command, frame, params, X, Y, 60.0)
                 ours, theirs = profile_of(autopilot).refuses(one), refused_there(one)
                 seen.add((bool(ours), theirs))
                 assert theirs or not ours, (one, ours)
-                if command in known and (autopilot is PX4 or command in ALSO_SIMULATED):
+                if command in known:
                     assert bool(ours) is theirs, (one, ours)
     assert {(True, True), (False, False)} <= seen
     assert "above terrain" in profile_of(PX4).refuses(item(16, frame=10))
