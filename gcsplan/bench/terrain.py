@@ -17,7 +17,7 @@ from gcsplan.bench import terrain_ours as ours
 from gcsplan.bench import terrain_report as report
 from gcsplan.bench import terrain_rivals as others
 from gcsplan.bench.terrain_measure import OURS, OURS_LONG, Outcome
-from gcsplan.bench.terrain_problems import KINDS, NamedProblem, problems
+from gcsplan.bench.terrain_problems import KINDS, MOUNTAINS, NamedProblem, problems
 from gcsplan.errors import InputError
 from gcsplan.planners.optimal.searches import require_names
 
@@ -57,7 +57,7 @@ def run(
     directory: Path,
     *,
     seed: int = 1,
-    kinds: Sequence[str] = KINDS,
+    kinds: Sequence[str] = MOUNTAINS,
     runs: int = 9,
     seconds: Sequence[float] = (1.0, 10.0),
     rivals: bool = True,

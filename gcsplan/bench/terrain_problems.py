@@ -10,10 +10,11 @@ Kinds:
 - ``large``: five pairs of ``main`` with ten zones over the whole sample, refined ten times by cubic splines (3431 ×
   4021 nodes);
 - ``many``: a pair of ``main`` with a thousand small zones;
-- ``turn``: all of ``main`` with a turn radius of 100 m, and again of 200 m.
+- ``turn``: all of ``main`` with a turn radius of 100 m, and again of 200 m;
+- ``everyday``: missions of ``gcsplan bench everyday`` without vias, half of them with clearance and errors.
 
 Starts and goals are at the lowest legal altitude, rounded up to a centimetre. Clearance and errors are zero, so that
-other planners need only a yes or no; ``errors`` sets those of a real mission.
+other planners need only a yes or no; ``errors`` sets those of a real mission. Everyday missions have their own.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from functools import cache
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.bench import everyday, everyday_missions
 from gcsplan.bench.terrain_pairs import (
     ABOVE_JOIN_M,
     MIN_AGL_M,
@@ -43,7 +45,7 @@ from gcsplan.planners.problem import Objective, Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle
+from gcsplan.world.zones import Circle, Polygon
 
 ZONES = (0, 10, 40)
 BAND_M, BAND_DEG = (60.0, 120.0), (10.0, 15.0)
@@ -101,6 +103,11 @@ def key_of(problem: Problem) -> str:
         (f"{z.shape.east_m:.3f} {z.shape.north_m:.3f} {z.shape.radius_m:.3f}", str(z.floor), str(z.ceiling))
         for z in p.airspace.zones
         if isinstance(z.shape, Circle)
+    ]
+    zones += [
+        (" ".join(f"{x:.3f}" for x in z.shape.vertices.ravel()), str(z.floor), str(z.ceiling))
+        for z in p.airspace.zones
+        if isinstance(z.shape, Polygon)
     ]
     rows, cols = surface.ground_m.shape
     corners = surface.grid.to_plane([0.0, cols - 1.0], [0.0, rows - 1.0])
@@ -197,10 +204,22 @@ def _turn(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
             )
 
 
+def _everyday(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    each = everyday.COUNT // len(everyday_missions.KINDS) if count is None else count
+    for number in range(each * len(everyday_missions.KINDS)):
+        one = everyday_missions.draw(seed, number)
+        problem = everyday.problem_of(one)
+        if not problem.via:
+            yield NamedProblem(f"everyday {one.name}, {one.kind}", problem, "everyday", one.kind, (0, one.redraws))
+
+
 _KINDS: dict[str, Callable[[int, Limits, int | None], Iterator[NamedProblem]]] = {
     "main": _main, "energy": _energy, "band": _band, "large": _large, "many": _many, "turn": _turn,
+    "everyday": _everyday,
 }  # fmt: skip
 KINDS = tuple(_KINDS)
+MOUNTAINS = KINDS[:-1]
+"""The kinds over real mountains."""
 
 
 def _spread(count: int | None) -> list[int]:

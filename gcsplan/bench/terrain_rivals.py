@@ -20,7 +20,7 @@ from gcsplan.bench.terrain_problems import NamedProblem, key_of, problems
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 
-KINDS = ("main", "band")
+KINDS = ("main", "band", "everyday")
 """The kinds that all rivals can solve: length without a turn radius."""
 
 START_S = 180.0  # seconds to import, make the problems and compile

@@ -93,7 +93,9 @@ def bench_terrain(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables and figure go there.")] = Path(
         "bench-terrain"
     ),
-    kinds: Annotated[str, typer.Option(metavar="LIST", help="Kinds of problems.")] = "main,energy,band,large,many,turn",
+    kinds: Annotated[
+        str, typer.Option(metavar="LIST", help="Of problems; everyday, too.")
+    ] = "main,energy,band,large,many,turn",
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the problems.")] = 1,
     runs: Annotated[int, typer.Option(metavar="N", help="Runs of ours; medians are reported.")] = 9,
     seconds: Annotated[str, typer.Option(metavar="LIST", help="OMPL's seconds.")] = "1,10",

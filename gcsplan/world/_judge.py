@@ -140,13 +140,12 @@ def judge(
 ) -> int:  # fmt: skip
     """Judge every leg; return the number of zone violations.
 
-    ``m``, ``ground``, ``top``: map, surfaces; ``near``, ``far``, ``over``: see `judge_terrain`; ``zs``: zones.
-    ``start``, ``end`` (n, 3), ``column``, ``track``, ``altitude`` (n,): as in `Legs`.
+    ``m``, ``ground``, ``top``: map, surfaces; ``near``, ``far``, ``over``: see `judge_terrain`; ``zs``: zones;
+    ``start`` … ``altitude``: as in `Legs`. The last five are work arrays, see `WorkArrays`.
 
     ``ok`` (n,): no violation. With ``full`` also ``found`` (n, 4): lowest height above top, its fraction, highest above
     ground, zone clearance; ``worst`` (n, 7, 2) by kind: depth (NaN if there is none; 1 for a climb too steep) and
-    fraction; ``nearest`` (n,) zone; and, as many as fit, ``hit`` (leg, zone) and ``hit_at`` (signed distance,
-    fraction). The others are work arrays, see `WorkArrays`.
+    fraction; ``nearest`` (n,) zone; and, as many as fit, ``hit`` (leg, zone), ``hit_at`` (signed distance, fraction).
     """
     zone = zs.table
     zones = len(zone)

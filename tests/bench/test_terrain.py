@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-from gcsplan.bench import terrain, terrain_ours, terrain_report, terrain_rivals
+from gcsplan.bench import everyday_missions, terrain, terrain_ours, terrain_report, terrain_rivals
 from gcsplan.bench.terrain_measure import OURS, Memory, Outcome, flown, passes
 from gcsplan.bench.terrain_problems import KINDS, NamedProblem, key_of, problems
 from gcsplan.errors import InputError, NoMission
@@ -91,6 +91,15 @@ def test_zones_are_a_mix_that_covers_no_start_and_no_goal(main: list[NamedProble
     assert kinds == {"unlimited": 400, "over": 200, "under": 200}
     for few, many in zip(main[20:40], main[40:], strict=True):
         assert [z.shape for z in few.problem.airspace.zones] == [z.shape for z in many.problem.airspace.zones[:10]]
+
+
+def test_everyday_missions_are_problems_too() -> None:
+    few = problems("everyday", 1, count=1)
+    assert [p.group for p in few] == [k for k in everyday_missions.KINDS if k != "vias"]
+    all_of_them = {p.name: key_of(p.problem) for p in problems("everyday", 1)}
+    assert len(set(all_of_them.values())) == len(all_of_them) > 80  # polygons count in a key, too
+    assert {p.name: key_of(p.problem) for p in few}.items() <= all_of_them.items()
+    assert {p.problem.limits.horizontal_clearance_m for p in problems("everyday", 1, count=2)} == {0.0, 30.0}
 
 
 def test_a_seed_alone_makes_the_problems() -> None:
