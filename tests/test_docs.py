@@ -13,6 +13,7 @@ from typing import Any, get_args
 
 import pytest
 import yaml
+from PIL import Image
 
 import gcsplan
 from gcsplan import errors
@@ -25,6 +26,7 @@ from tests.support.paths import REPOSITORY
 TOP = REPOSITORY
 DOCS = TOP / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
+CURE = "run python docs/_make_pictures.py"
 
 
 @pytest.fixture(scope="module")
@@ -193,3 +195,12 @@ def test_readme_is_short() -> None:
 )
 def test_what_loads_from_elsewhere_is_seen(made: ModuleType, text: str, foreign: bool) -> None:
     assert bool(made.FOREIGN.search(text)) is foreign
+
+
+def test_the_pictures_show_the_sample_mission_as_it_is_planned_today() -> None:
+    (vehicle,) = gcsplan.plan(str(TOP / "missions" / "jacksboro.yaml")).vehicles
+    length = f"uav1: {vehicle.verdict.length_m:,.0f} m"
+    bound = f"no path is shorter than {vehicle.solution.lower_bound:,.0f} m"
+    for name, words in (("jacksboro.png", length), ("jacksboro-space.png", length), ("optimal.png", bound)):
+        with Image.open(TOP / "missions" / name) as picture:
+            assert picture.info["Description"].startswith(words), CURE

@@ -65,4 +65,6 @@ def draw(problem: Problem) -> Figure:
 
 def save(problem: Problem, file: FilePath | IO[bytes]) -> None:
     """Write the picture of `draw` as PNG."""
-    draw(problem).savefig(file, format="png", dpi=110, metadata={"Software": None})
+    figure = draw(problem)
+    words = figure.axes[0].get_title(loc="left")
+    figure.savefig(file, format="png", dpi=110, metadata={"Software": None, "Description": words})

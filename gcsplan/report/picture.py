@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path as FilePath
 from typing import IO
@@ -11,7 +12,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import LightSource
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle as CirclePatch
 from matplotlib.patches import Patch
@@ -22,6 +24,7 @@ from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.report import space_picture
 from gcsplan.report.fleet_view import apart_m, flown_m, instants
+from gcsplan.report.relief import TINTS, shaded
 from gcsplan.report.samples import line_of
 from gcsplan.report.subject import Page
 from gcsplan.world.world import World
@@ -30,6 +33,10 @@ from gcsplan.world.zones import Circle, Zone
 TRACK_COLOURS = ("#d62728", "#1f77b4", "#9467bd", "#e377c2", "#17becf", "#bcbd22")
 ZONE_COLOUR = "#ff7f0e"
 PIXELS = 900
+LABEL_PT, LINE_PT, LETTER_PT = 6.5, 9.0, 4.2
+"""Size of a zone's label, height of its line, and mean width of a letter, points."""
+MAP_PT = 9.3 * 72.0
+"""Width of the map without its scale and colours, points; labels are placed for it."""
 
 
 def draw(page: Page) -> Figure:
@@ -50,7 +57,7 @@ def draw(page: Page) -> Figure:
 def save(page: Page, file: FilePath | IO[bytes]) -> None:
     """Write the picture of `draw` as PNG."""
     with rc_context({"text.parse_math": False}):  # a dollar sign in a name must stay a dollar sign
-        draw(page).savefig(file, format="png", dpi=110, metadata={"Software": None})
+        draw(page).savefig(file, format="png", dpi=110, metadata=_described(page))
 
 
 def figures(page: Page) -> dict[str, bytes]:
@@ -73,9 +80,15 @@ def figures(page: Page) -> dict[str, bytes]:
     with rc_context({"text.parse_math": False}):
         for name, figure in drawn.items():
             buffer = io.BytesIO()
-            figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
+            figure.savefig(buffer, format="png", dpi=110, metadata=_described(page))
             out[name] = buffer.getvalue()
     return out
+
+
+def _described(page: Page) -> dict[str, str | None]:
+    """What a picture says of itself: the mission, and the length of each vehicle's path."""
+    lengths = "; ".join(f"{v.name}: {v.verdict.length_m:,.0f} m" for v in page.subjects)
+    return {"Software": None, "Title": page.title, "Description": lengths}
 
 
 def _figure(width: float, height: float) -> Figure:
@@ -150,19 +163,17 @@ def _map(ax: Axes, page: Page, extent: tuple[float, float, float, float]) -> Non
     lines = max(2, round(PIXELS * (north - south) / (east - west)))
     e, n = np.meshgrid(np.linspace(west, east, columns), np.linspace(north, south, lines))
     ground = page.world.airspace.surface.ground_at(e, n)
-    shown = np.where(np.isnan(ground), np.nanmin(ground), ground)
-    step = (east - west) / columns
-    shade = LightSource(azdeg=315, altdeg=40).hillshade(shown, vert_exag=1.5, dx=step, dy=step)
-    ax.imshow(shade, extent=(west, east, south, north), cmap="gray", vmin=0, vmax=1)
-    tint = ax.imshow(ground, extent=(west, east, south, north), cmap="terrain", alpha=0.45)
-    ax.figure.colorbar(tint, ax=ax, label="ground, m AMSL")
+    low, high = (float(np.nanmin(ground)), float(np.nanmax(ground))) if not np.isnan(ground).all() else (0.0, 0.0)
+    picture = shaded(ground, e[0], n[:, 0], low, high)
+    ax.imshow(np.rint(picture).astype(np.uint8), extent=(west, east, south, north))
+    tints = LinearSegmentedColormap.from_list("ground", [(at, (r / 255, g / 255, b / 255)) for at, (r, g, b) in TINTS])
+    heights = ScalarMappable(Normalize(low, max(high, low + 1.0)), tints)
+    ax.figure.colorbar(heights, ax=ax, label="ground, m AMSL")
     for zone in page.world.airspace.zones:
         ax.add_patch(_zone_patch(zone))
-        x0, y0, x1, y1 = zone.bounds
-        if x1 > west and x0 < east and y1 > south and y0 < north:
-            middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
-            halo = [withStroke(linewidth=2.0, foreground="white", alpha=0.7)]
-            ax.annotate(_zone_words(zone), middle, ha="center", va="center", fontsize=6.5, path_effects=halo, zorder=4)
+    halo = [withStroke(linewidth=2.0, foreground="white", alpha=0.7)]
+    for words, place in _labels(page.world.airspace.zones, extent):
+        ax.annotate(words, place, ha="center", va="center", fontsize=LABEL_PT, path_effects=halo, zorder=4)
     for vehicle, track, colour in zip(page.subjects, tracks, _colours(len(tracks)), strict=True):
         ax.plot(track[:, 0], track[:, 1], color=colour, lw=2, label=vehicle.name, marker=".", ms=5)
         ax.plot(*track[0, :2], "o", color=colour, ms=9, mec="white")
@@ -188,6 +199,36 @@ def _zone_words(zone: Zone) -> str:
     if zone.floor is None and zone.ceiling is None:
         return zone.name
     return f"{zone.name}\n{zone.floor or 'ground'} – {zone.ceiling or 'unlimited'}".replace(" m AGL –", " –")
+
+
+def _labels(zones: Sequence[Zone], extent: tuple[float, float, float, float]) -> list[tuple[str, tuple[float, float]]]:
+    """The label of each zone on the map and its middle: on the zone, or above or below it if another label is there.
+
+    Small zones first, since a label beside a large one is hard to assign to it.
+    """
+    west, south, east, north = extent
+    m_per_pt = (east - west) / MAP_PT
+    taken: list[tuple[float, float, float, float]] = []
+    found = []
+    for zone in sorted(zones, key=lambda z: z.bounds[2] - z.bounds[0]):
+        x0, y0, x1, y1 = zone.bounds
+        if not (x1 > west and x0 < east and y1 > south and y0 < north):
+            continue
+        words = _zone_words(zone)
+        lines = words.split("\n")
+        half = 0.5 * m_per_pt * max(map(len, lines)) * LETTER_PT, 0.5 * m_per_pt * len(lines) * LINE_PT
+        x, middle = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        steps = [0.0, *(sign * k * half[1] for k in range(1, 9) for sign in (-1.0, 1.0))]
+        boxes = [(x - half[0], middle + d - half[1], x + half[0], middle + d + half[1]) for d in steps]
+        free = [b for b in boxes if not any(_overlap(b, other) for other in taken)]
+        box = (free or boxes)[0]
+        taken.append(box)
+        found.append((words, (x, 0.5 * (box[1] + box[3]))))
+    return found
+
+
+def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def _profile(ax: Axes, world: World, verdict: Verdict, min_agl_m: float, colour: str) -> None:

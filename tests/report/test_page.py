@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass, replace
 from functools import cache
 from html.parser import HTMLParser
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ from gcsplan.mavlink.build.order import Order
 from gcsplan.report import fleet_view, markup
 from gcsplan.report.chart import Axes, ticks
 from gcsplan.report.page import BARE_DEM, render_check, render_page
-from gcsplan.report.picture import figures
+from gcsplan.report.picture import draw, figures
 from gcsplan.report.relief import UNKNOWN, extent_of, relief_of
 from gcsplan.report.samples import distance_m, line_of, passages
 from gcsplan.report.scene_data import triangles, zone_meshes
@@ -574,3 +575,20 @@ def test_each_figure_is_drawn_as_a_png_too() -> None:
         image = Image.open(io.BytesIO(content))
         assert image.format == "PNG"
         assert image.width > 800
+
+
+def test_no_label_of_the_map_lies_on_another() -> None:
+    page = page_of_plan(planned())
+    figure = draw(page)
+    figure.draw_without_rendering()  # type: ignore[no-untyped-call]
+    labels = [(t.get_text(), t.get_window_extent()) for t in figure.axes[0].texts]
+    assert {words.split("\n")[0] for words, _ in labels} >= {"relay mast", "raptor cliffs", "quarry", "airfield"}
+    for (one, a), (other, b) in combinations(labels, 2):
+        assert not a.padded(-1.0).overlaps(b.padded(-1.0)), (one, other)
+
+
+def test_the_map_has_the_reports_colours_low_ground_is_no_lake() -> None:
+    drawn = figures(page_of_plan(planned()))["report-map.png"]
+    pixels = np.asarray(Image.open(io.BytesIO(drawn)).convert("RGB"), np.int16)
+    red, green, blue = np.moveaxis(pixels, -1, 0)
+    assert float(np.mean((blue > green + 20) & (blue > red + 20))) < 0.001
