@@ -18,18 +18,12 @@ from typing import Any, NamedTuple, get_args
 import gcsplan
 from gcsplan import errors
 from gcsplan.cli import ending
-from gcsplan.mission_file import load, schema, vehicles
+from gcsplan.mission_file import load, schema, units, vehicles
 from gcsplan.planners import registry
 
 TOP = Path(__file__).resolve().parents[1]
 PACKAGE = Path(gcsplan.__file__).parent
 MARK = re.compile(r"^<!-- made: ([a-z-]+) -->$", re.MULTILINE)
-
-UNITS = {
-    "_j_per_m": "J/m", "_m_s3": "m/s³", "_m_s2": "m/s²", "_m_s": "m/s", "_percent": "%", "_deg": "°", "_mb": "MB",
-    "_m": "m", "_s": "s", "_j": "J", "_w": "W",
-}  # fmt: skip
-"""By the end of a key, longer ones first."""
 
 ELSEWHERE: Mapping[str, float] = {
     **vehicles.ERRORS,
@@ -137,7 +131,7 @@ def _value(key: str, told: Mapping[str, Any], named: Mapping[str, Any]) -> str:
             return f"[{unit}, {unit}]" + (f", each {bounds}" if bounds else "")
         return f"list of {inner}" + ("s" if inner == "section" else "")
     kind = {"number": "number", "integer": "whole number", "string": "text", "object": "mapping"}[told["type"]]
-    unit = next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
+    unit = units.UNITS.get(units.unit_end(key), "")
     return ", ".join(word for word in (unit or kind, _bounds(told)) if word)
 
 
@@ -151,6 +145,17 @@ def _bounds(told: Mapping[str, Any]) -> str:
         return f"{low:g} to {high:g}"
     signs = {"≥": low, ">": above, "≤": high, "<": below}
     return ", ".join(f"{sign} {value:g}" for sign, value in signs.items() if value is not None)
+
+
+def other_units() -> str:
+    """A table of the units that a key may be written in besides its own."""
+    lines = ["| keys that end in | may end in | with the value in |", "| --- | --- | --- |"]
+    for own, others in units.OTHERS.items():
+        ends = ", ".join(f"`{end}`" for end in others)
+        sizes = [f"{o.symbol} ({o.size:.7g} {units.UNITS[own]}{' for 1 V' if end == units.CHARGE else ''})"
+                 for end, o in others.items()]  # fmt: skip
+        lines.append(f"| `{own}` | {ends} | {', '.join(sizes)} |")
+    return "\n".join(lines)
 
 
 # -- the command line -------------------------------------------------------------------------------------------------
@@ -360,6 +365,7 @@ def from_top(name: str) -> str:
 
 PARTS: Mapping[str, Callable[[], str]] = {
     "mission-file": mission_file,
+    "other-units": other_units,
     "command-line": command_line,
     "exit-codes": exit_codes,
     "messages": all_messages,

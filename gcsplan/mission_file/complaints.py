@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from gcsplan.errors import Problem
 from gcsplan.mission_file.schema import FORMS, Keys, LocalPoint, nearest, shown
+from gcsplan.mission_file.units import nearest_key
 
 Section = TypeVar("Section", bound=Keys)
 
@@ -55,7 +56,7 @@ def key_path(where: str, loc: Iterable[int | str]) -> str:
 
 
 def _unknown(key: str, known: list[str]) -> str:
-    near = nearest(key, known)
+    near = nearest_key(key, known)
     return "unknown key" + (near or f"; known are {', '.join(known)}")
 
 

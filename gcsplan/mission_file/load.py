@@ -33,6 +33,7 @@ from gcsplan.mission_file.schema import (
     shown,
 )  # fmt: skip
 from gcsplan.mission_file.terminals import Terminals
+from gcsplan.mission_file.units import in_own_units
 from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle
 from gcsplan.mission_file.world import (
     covered,
@@ -101,10 +102,12 @@ class _Reading:
         planner_names: Collection[str] | None,
         around: Sequence[tuple[float, float]],
     ) -> None:
-        self.file, self.raw, self.planner_names, self.around = file, raw, planner_names, around
+        self.file, self.given, self.planner_names, self.around = file, raw, planner_names, around
         self.where = f"{where}: "
-        self.problems: list[Problem] = []
-        self.notes: list[str] = []
+        self.units = in_own_units(raw, self.where)
+        self.raw = self.units.raw
+        self.problems: list[Problem] = [*self.units.problems]
+        self.notes: list[str] = [*self.units.notes]
         self.local = raw.get("frame") is not None
 
     def mission(self) -> MissionFile:
@@ -146,7 +149,7 @@ class _Reading:
             site = Site(terrain, frame, box, placed, terminals, set(places), self.local)
             ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
-            raise InputError.of(problems)
+            raise InputError.of([self.units.as_written(p) for p in problems])
         info = ground.surface.info
         notes = info.get("notes", ())
         self.notes += [str(n) for n in notes] if isinstance(notes, tuple) else []
@@ -161,7 +164,7 @@ class _Reading:
         return replace(source, wider=partial(site.wider, source), reaching=self._reaching)
 
     def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
-        return _Reading(self.file, self.where.removesuffix(": "), self.raw, self.planner_names, places).mission()
+        return _Reading(self.file, self.where.removesuffix(": "), self.given, self.planner_names, places).mission()
 
     # -- the plain keys ------------------------------------------------------------------------------------------
 

@@ -1,0 +1,235 @@
+"""Other units for the keys of a mission file: ``min_agl_ft: 164`` for ``min_agl_m``.
+
+A key's name ends in its unit. Every key whose unit is in `OTHERS` may be written with one of the other endings there;
+`in_own_units` converts it before anything else reads the file. The keys come from the models in `schema`, so that a new
+key has its other units at once.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple, TypeGuard, get_args
+
+from gcsplan.errors import Problem
+from gcsplan.mission_file.schema import Keys, MissionKeys, shown
+
+UNITS = {
+    "_j_per_m": "J/m", "_m_s3": "m/s³", "_m_s2": "m/s²", "_m_s": "m/s", "_percent": "%", "_deg": "°", "_mb": "MB",
+    "_m": "m", "_s": "s", "_j": "J", "_w": "W",
+}  # fmt: skip
+"""Symbol of each unit, by the end of a key; longer ends first, since ``climb_m_s`` also ends in ``_s``."""
+
+VOLTS = "_v"
+"""End of the key beside a charge in mAh: the battery's nominal voltage."""
+
+
+class Other(NamedTuple):
+    """A unit that is converted: its symbol, and its size in the key's own unit (of a charge: for 1 V)."""
+
+    symbol: str
+    size: float
+
+
+OTHERS: Mapping[str, Mapping[str, Other]] = {
+    "_m": {"_ft": Other("ft", 0.3048), "_nm": Other("NM", 1852.0)},
+    "_m_s": {"_kt": Other("kt", 1852.0 / 3600.0), "_kmh": Other("km/h", 1.0 / 3.6)},
+    "_s": {"_min": Other("min", 60.0)},
+    "_j": {"_wh": Other("Wh", 3600.0), "_mah": Other("mAh", 3.6)},
+}
+"""The units that are understood, by the end of the key's own name and by the end that replaces it."""
+
+CHARGE = "_mah"
+
+MOST_VOLTS = 10_000.0
+
+MOST_NOTES = 20
+"""Most notes on conversions; more are counted."""
+
+
+class Written(NamedTuple):
+    """A key that may be written for another: the canonical ``key``, and the end that replaces ``own``."""
+
+    key: str
+    own: str
+    end: str
+
+    @property
+    def other(self) -> Other:
+        """The unit that it is written in."""
+        return OTHERS[self.own][self.end]
+
+
+@dataclass(frozen=True)
+class Converted:
+    """A mission in its own units: the mapping, what was converted, and the mistakes.
+
+    ``given`` maps the place of each converted key to its place in the file and both values in words.
+    """
+
+    raw: dict[str, Any]
+    notes: tuple[str, ...]
+    problems: tuple[Problem, ...]
+    given: Mapping[str, tuple[str, str]]
+
+    def as_written(self, problem: Problem) -> Problem:
+        """The problem at the key that is in the file, if it is about a converted one."""
+        for place, (written, words) in self.given.items():
+            rest = problem.where.removeprefix(place)
+            if rest != problem.where and rest[:1] in ("", "[", "."):
+                return Problem(written + rest, f"{problem.message} ({words})")
+        return problem
+
+
+def unit_end(key: str) -> str:
+    """The end of a key that is its unit, such as ``_m``, or an empty text."""
+    return next((end for end in UNITS if key.endswith(end)), "")
+
+
+def other_names(keys: Iterable[str]) -> dict[str, Written]:
+    """Every name in another unit that may stand for one of ``keys``."""
+    return {
+        key.removesuffix(own) + end: Written(key, own, end)
+        for key in keys
+        if (own := unit_end(key)) in OTHERS
+        for end in OTHERS[own]
+    }
+
+
+def nearest_key(key: str, known: Iterable[str]) -> str:
+    """``; did you mean …?`` with the nearest key, or an empty text.
+
+    For a key that ends in another unit the suggestion says the units that it may have, since the value differs too.
+    """
+    own = list(known)
+    others = other_names(own)
+    close = difflib.get_close_matches(key[:80], [*own, *others], n=1, cutoff=0.6)
+    if not close:
+        return ""
+    found = close[0]
+    canonical = others[found].key if found in others else found
+    unit = unit_end(canonical)
+    end = others[found].end if found in others else unit
+    if not unit or key.endswith(end) or key.rsplit("_", 1)[-1] in canonical.removesuffix(unit).split("_"):
+        return f"; did you mean {found}?"
+    names = [f"{canonical} (in {UNITS[unit]})", *(name for name, written in others.items() if written.key == canonical)]
+    return f"; did you mean {' or '.join([', '.join(names[:-1]), names[-1]] if len(names) > 1 else names)}?"
+
+
+def in_own_units(raw: Mapping[str, Any], where: str) -> Converted:
+    """The mission ``raw`` with every key under its own name; ``where`` precedes the places (``FILE: ``)."""
+    walk = _Walk()
+    plain = walk.section(MissionKeys, raw, where)
+    said: dict[str, list[str]] = {}
+    for written, words in walk.given.values():
+        said.setdefault(words, []).append(written.removeprefix(where))
+    notes = [
+        f"{places[0]}: {words}" + (f" (and {len(places) - 1} more)" if len(places) > 1 else "")
+        for words, places in said.items()
+    ]
+    if len(notes) > MOST_NOTES:
+        notes[MOST_NOTES:] = [f"{len(notes) - MOST_NOTES} more values are converted from other units"]
+    return Converted(plain, tuple(notes), tuple(walk.problems), walk.given)
+
+
+class _Walk:
+    """One walk over a file, section by section, with what it found."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+        self.given: dict[str, tuple[str, str]] = {}
+
+    def section(self, kind: type[Keys], raw: Mapping[str, Any], where: str) -> dict[str, Any]:
+        """A section in its own units; ``where`` precedes its keys."""
+        others, inner = _keys_of(kind)
+        charges = {_volts_of(written): key for key, written in others.items() if written.end == CHARGE}
+        plain: dict[str, Any] = {}
+        for key, value in raw.items():
+            if key in others:
+                self._convert(others[key], key, raw, plain, where)
+            elif key in charges:
+                if charges[key] not in raw:
+                    self.problems.append(Problem(where + key, f"counts with {charges[key]} only"))
+            else:
+                plain[key] = self._inside(inner[key], value, where + key) if key in inner else value
+        return plain
+
+    def _inside(self, kind: type[Keys], value: Any, place: str) -> Any:
+        """A section, or a list with sections in it; anything else is left for the reader to refuse."""
+        if isinstance(value, Mapping):
+            return self.section(kind, value, f"{place}.")
+        if isinstance(value, list):
+            return [
+                self.section(kind, v, f"{place}[{i}].") if isinstance(v, Mapping) else v for i, v in enumerate(value)
+            ]
+        return value
+
+    def _convert(
+        self, written: Written, key: str, raw: Mapping[str, Any], plain: dict[str, Any], where: str
+    ) -> None:  # fmt: skip
+        """Put the value of ``key`` into ``plain`` under its own name."""
+        place, value = where + key, raw[key]
+        twice = [name for name in raw if name == written.key or (name != key and name in _siblings(written))]
+        if twice:
+            self.problems.append(Problem(place, f"stands as {' and '.join(twice)} too; keep one"))
+        size, volts = written.other.size, ""
+        if written.end == CHARGE:
+            beside = _volts_of(written)
+            volt = raw.get(beside)
+            if not _is_number(volt) or not 0.0 < volt <= MOST_VOLTS:
+                given = "" if volt is None else f", given {shown(volt)}"
+                words = f"needs {beside}, the nominal voltage: a number above 0 and at most {MOST_VOLTS:g}{given}"
+                self.problems.append(Problem(place, words))
+                return
+            size, volts = size * float(volt), f" at {volt:g} V"
+        plain[written.key] = own = _times(value, size)
+        words = f"{_figures(value)} {written.other.symbol}{volts}, read as " if own is not value else "read as "
+        self.given[where + written.key] = (
+            place,
+            words + written.key + (f": {_figures(own)}" if own is not value else ""),
+        )
+
+
+@cache
+def _keys_of(kind: type[Keys]) -> tuple[dict[str, Written], dict[str, type[Keys]]]:
+    """The other names of a section's keys, and the keys that hold sections."""
+    inner = {key: found for key, field in kind.model_fields.items() if (found := _section_in(field.annotation))}
+    return other_names(kind.model_fields), inner
+
+
+def _section_in(annotation: Any) -> type[Keys] | None:
+    if isinstance(annotation, type) and issubclass(annotation, Keys):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _section_in(part)) is not None), None)
+
+
+def _siblings(written: Written) -> set[str]:
+    stem = written.key.removesuffix(written.own)
+    return {stem + end for end in OTHERS[written.own]}
+
+
+def _volts_of(written: Written) -> str:
+    """The key of the voltage that a charge is converted with."""
+    return written.key.removesuffix(written.own) + VOLTS
+
+
+def _is_number(value: Any) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+
+
+def _times(value: Any, size: float) -> Any:
+    """A number, or each number of a list, times ``size``; anything else is itself, and refused by the reader."""
+    if _is_number(value):
+        return float(value) * size
+    if isinstance(value, list) and value and all(map(_is_number, value)):
+        return [float(v) * size for v in value]
+    return value
+
+
+def _figures(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_figures, value))}]"
+    return f"{value:.10g}" if math.isfinite(value) else str(value)
