@@ -112,7 +112,7 @@ def bench_terrain(
     from rich.console import Console
 
     from gcsplan.bench import terrain, terrain_report
-    from gcsplan.cli.console import say
+    from gcsplan.cli.console import remark
 
     try:
         budgets = [float(s) for s in seconds.split(",")]
@@ -120,7 +120,7 @@ def bench_terrain(
         raise UsageError(f"--seconds takes numbers such as 1,10, given {seconds!r}") from None
     result = terrain.run(
         out, seed=seed, kinds=kinds.split(","), runs=runs, seconds=budgets, rivals=rivals, swarms=swarms,
-        kept_only=kept, long=minute, errors=errors, count=count, tell=say, gap_percent=gap,
+        kept_only=kept, long=minute, errors=errors, count=count, tell=remark, gap_percent=gap,
         without=without or (),
     )  # fmt: skip
     Console(width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
@@ -137,14 +137,14 @@ def bench_everyday(
     """Plan short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat, hills, the sample DEM."""
     from gcsplan.bench import everyday
     from gcsplan.bench.everyday_missions import KINDS
-    from gcsplan.cli.console import say
+    from gcsplan.cli.console import remark
 
     try:
         numbers = [int(s) for s in seeds.split(",")]
     except ValueError:
         raise UsageError(f"--seeds takes whole numbers such as 1,2,3, given {seeds!r}") from None
     asked = KINDS if kinds is None else kinds.split(",")
-    outcomes = everyday.run(out, seeds=numbers, count=count, kinds=asked, without=without or (), tell=say)
+    outcomes = everyday.run(out, seeds=numbers, count=count, kinds=asked, without=without or (), tell=remark)
     put(everyday.report(outcomes))
 
 

@@ -198,14 +198,14 @@ def _say_all(batch: Batch) -> None:
 
 def _say_findings(batch: Batch, allow_unjudged: bool) -> None:
     from gcsplan.app.checking import finding_lines
-    from gcsplan.cli.console import say
+    from gcsplan.cli.console import remark, say
 
     for c in batch.checked:
         for line in finding_lines(c, allow_unjudged=allow_unjudged):
             say(printable(line))
     for argument, error in batch.unreadable:
         for problem in error.problems:
-            say(printable(f"{problem}" if problem.where.startswith(argument) else f"{argument}: {problem}"))
+            remark(printable(f"{problem}" if problem.where.startswith(argument) else f"{argument}: {problem}"))
 
 
 def _report(batch: Batch, file: Path) -> None:

@@ -1,15 +1,18 @@
-"""Output for people: tables, progress and messages, on standard error, never on standard output."""
+"""Output for people: tables and verdicts on standard output; notes, progress and messages on standard error."""
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO, cast
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+
+from gcsplan.cli.ending import put
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
@@ -22,9 +25,37 @@ if TYPE_CHECKING:
 PLAIN_WIDTH = 130  # columns of a log file or a pipe, whose width is unknown
 WIDEST = 100_000
 
-console = Console(stderr=True, highlight=False, soft_wrap=True)
-if not console.is_terminal:
-    console.width = PLAIN_WIDTH
+
+class _Results:
+    """Standard output as a file for rich: a full disk or a closed output is our error, not one of rich."""
+
+    def write(self, text: str) -> int:
+        put(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """`put` has flushed already."""
+
+    def isatty(self) -> bool:
+        return sys.stdout is not None and sys.stdout.isatty()
+
+    def fileno(self) -> int:
+        return sys.stdout.fileno()
+
+    @property
+    def encoding(self) -> str:
+        return getattr(sys.stdout, "encoding", None) or "utf-8"
+
+
+RESULTS = cast(TextIO, _Results())
+
+console = Console(file=RESULTS, highlight=False, soft_wrap=True)
+"""Results."""
+aside = Console(stderr=True, highlight=False, soft_wrap=True)
+"""Notes, progress and errors."""
+for screen in (console, aside):
+    if not screen.is_terminal:
+        screen.width = PLAIN_WIDTH
 
 
 def number(value: float | None, decimals: int = 0, unit: str = "") -> str:
@@ -51,7 +82,7 @@ def _width(table: Table) -> int:
 def _print(table: Table) -> None:
     """Print the whole table, even if a narrow terminal breaks its lines: a verdict must not be cut off."""
     width = _width(table)
-    wide = console if width <= console.width else Console(stderr=True, highlight=False, soft_wrap=True, width=width)
+    wide = console if width <= console.width else Console(file=RESULTS, highlight=False, soft_wrap=True, width=width)
     wide.print(table)
 
 
@@ -183,7 +214,7 @@ def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
     say_notes_of([(d.vehicle, w) for d in results for w in d.warnings])
     for d in results:
         if d.message:
-            console.print(f"{d.vehicle}: {d.message}", style="red", markup=False)
+            aside.print(f"{d.vehicle}: {d.message}", style="red", markup=False)
 
 
 def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | None = None) -> None:
@@ -219,7 +250,7 @@ def homes_table(homes: Mapping[str, WayHome]) -> None:
 def say_notes(notes: Sequence[str]) -> None:
     """Print notes, each once, in order."""
     for note in dict.fromkeys(notes):
-        console.print(f"note: {note}", style="dim", markup=False)
+        aside.print(f"note: {note}", style="dim", markup=False)
 
 
 def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
@@ -233,7 +264,7 @@ def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
 @contextmanager
 def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer], None]]:
     """Show a live table of transfers, on a terminal only; yields a function to call with (name, progress)."""
-    if not console.is_terminal:
+    if not aside.is_terminal:
         yield lambda name, transfer: None
         return
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
@@ -243,7 +274,7 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
         TextColumn("{task.description}"), TextColumn("{task.fields[phase]}"), BarColumn(), MofNCompleteColumn(),
         TimeElapsedColumn(),
     )  # fmt: skip
-    with Bars(*columns, console=console, transient=True) as bars:
+    with Bars(*columns, console=aside, transient=True) as bars:
         tasks = {name: bars.add_task(escape(name), total=None, phase="looking for it") for name in names}
 
         def update(name: str, transfer: Transfer) -> None:
@@ -258,7 +289,7 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
 
 
 def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
-    """Print the planners, one per row, on standard output, since they are the command's result."""
+    """Print the planners, one per row."""
     table = _table("planners", [("name", False)])
     for name in ("what it does", "paper", "defaults"):
         table.add_column(name)
@@ -266,15 +297,17 @@ def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
         defaults = row["defaults"]
         words = ", ".join(f"{k} {v}" for k, v in defaults.items()) if isinstance(defaults, Mapping) else ""
         table.add_row(str(row["name"]), str(row["summary"]), str(row["paper"]) or "–", words or "–")
-    out = Console(highlight=False)
-    if not out.is_terminal:
-        out.width = PLAIN_WIDTH
-    out.print(table)
+    console.print(table, soft_wrap=False)
 
 
 def say(message: str) -> None:
-    """Print one line."""
+    """Print one line of the result."""
     console.print(message, markup=False)
+
+
+def remark(message: str) -> None:
+    """Print one line of what is done or noticed meanwhile."""
+    aside.print(message, markup=False)
 
 
 def rows_table(title: str, rows: Sequence[Mapping[str, str]], *, left: Sequence[str] = ("vehicle",)) -> None:

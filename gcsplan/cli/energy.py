@@ -35,7 +35,7 @@ def fit_energy(
     current. Standard output is what to paste into a vehicle of the mission file. Exit code 4 means that the log does
     not determine R1 or R2.
     """
-    from gcsplan.cli.console import say
+    from gcsplan.cli.console import remark
     from gcsplan.logs.fit import fit_energy as fit
     from gcsplan.logs.reader import read_log
 
@@ -53,15 +53,15 @@ def fit_energy(
     if as_json:
         emit({"logs": [str(file) for file in logs], "fit": found.as_dict()}, error)
     else:
-        say(
+        remark(
             f"{found.steps} steps of 5 s, {found.energy_j / 1e3:.0f} kJ, {found.speed_m_s:.1f} m/s; the model is off "
             f"by {found.off_percent:.1f} % of a step's energy (median)"
         )
         for note in found.notes:
-            say(f"note: {note}")
+            remark(f"note: {note}")
         for c in (found.vertical, found.horizontal, found.hover):
             if c.value is None:
-                say(f"{c.name}: {c.why}")
+                remark(f"{c.name}: {c.why}")
         put(found.yaml())
     raise typer.Exit(CheckFailed.exit_code if error else 0)
 

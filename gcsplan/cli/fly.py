@@ -24,7 +24,7 @@ def sim(
 
     Ctrl-C ends it.
     """
-    from gcsplan.cli.console import say
+    from gcsplan.cli.console import remark
     from gcsplan.sim.misbehaviour import Misbehaviour
     from gcsplan.sim.server import SimServer, serve
     from gcsplan.sim.vehicle import LoopbackVehicle
@@ -51,6 +51,6 @@ def sim(
 
     def ready(server: SimServer) -> None:
         names = ", ".join(f"system {v.sysid} ({v.autopilot})" for v in vehicles)
-        say(f"simulating {names}; connect to {server.url_for_gcs}; Ctrl-C ends it")
+        remark(f"simulating {names}; connect to {server.url_for_gcs}; Ctrl-C ends it")
 
     serve(vehicles, listen, on_ready=ready)

@@ -99,15 +99,15 @@ def plan(
     """
     from gcsplan.app import outputs, pipeline
     from gcsplan.app.gate import GateTime
-    from gcsplan.cli.console import homes_table, plan_table, say, say_notes_of
+    from gcsplan.cli.console import homes_table, plan_table, release_table, remark, say_notes_of, upload_table
     from gcsplan.cli.planning_display import planning_display
-    from gcsplan.export.outdir import add_output, can_hold, retire_outputs, settle_outputs, write_outputs, write_whole
+    from gcsplan.export.outdir import add_output, can_hold, settle_outputs, write_outputs, write_whole
 
     directory = Path(mission.stem) if out is None else out
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     each = _require_options(planner, objective, png, directory)
     if settle_outputs(directory):
-        say(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
+        remark(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
     try:
         source = pipeline.load_mission(mission)
         targets: dict[str, str] = {}
@@ -142,11 +142,7 @@ def plan(
     except UsageError:
         raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
-        try:
-            if retire_outputs(directory):
-                say(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
-        except InputError as error:  # the reason why there is no mission matters more
-            say(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
+        _retire(directory)
         raise
     pictures = {} if png is None else _pictures(planned, png, each)
     # Pictures of this plan inside its directory belong to its outputs, and are written and removed with them.
@@ -155,25 +151,27 @@ def plan(
     for file, content in pictures.items():
         write_whole(file, content)
     if in_the_way:
-        say(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
+        remark(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
     if not as_json:
         plan_table(planned)
         homes_table(homes)
         say_notes_of(fence_notes)
-        shown = [*list(files)[:SHOWN], f"… and {len(files) - SHOWN} more"] if len(files) > SHOWN + 1 else list(files)
-        say(f"written to {directory}{os.sep}: {', '.join(shown)}")
+        _say_files(directory, list(files))
     results: list[JobResult] = []
     if targets:
         options = UploadOptions(
             allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout
         )
-        results = _upload(planned, jobs, options, gate, as_json)
+        results = _upload(jobs, options, gate)
         try:
             add_output(directory, "upload.json", outputs.upload_text(planned, results, homes))
             if report:
                 add_output(directory, "report.html", outputs.report_of(planned, results, homes))
         except InputError as error:  # the outcome of the upload matters more
-            say(f"note: what became of the upload is not written: {error}")
+            remark(f"note: what became of the upload is not written: {error}")
+        if not as_json:
+            upload_table(results)
+            release_table(planned, results, gate)
     if as_json:
         emit(outputs.summary_of(planned, results, homes), uploads.failure(results) if targets else None)
     raise typer.Exit(uploads.exit_code(results) if targets else 0)
@@ -197,6 +195,26 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
     return each
 
 
+def _retire(directory: Path) -> None:
+    """Move the outputs of an earlier plan out of the way, since there is no mission now."""
+    from gcsplan.cli.console import remark
+    from gcsplan.export.outdir import retire_outputs
+
+    try:
+        if retire_outputs(directory):
+            remark(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
+    except InputError as error:  # the reason why there is no mission matters more
+        remark(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
+
+
+def _say_files(directory: Path, files: list[str]) -> None:
+    """Print what was written; a fleet has hundreds of files."""
+    from gcsplan.cli.console import say
+
+    shown = [*files[:SHOWN], f"… and {len(files) - SHOWN} more"] if len(files) > SHOWN + 1 else files
+    say(f"written to {directory}{os.sep}: {', '.join(shown)}")
+
+
 def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
     """One picture of everything, or one for each figure in the directory ``png``."""
     from gcsplan.app import outputs
@@ -206,23 +224,17 @@ def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
     return {png: outputs.picture_of(planned)}
 
 
-def _upload(
-    planned: Plan, jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None, as_json: bool
-) -> list[JobResult]:
-    """Upload all jobs with their progress shown, and print how each ended and when to start each vehicle."""
+def _upload(jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None) -> list[JobResult]:
+    """Upload all jobs with their progress shown."""
     from gcsplan.app import uploads
-    from gcsplan.cli.console import release_table, transfer_progress, upload_table
+    from gcsplan.cli.console import transfer_progress
     from gcsplan.sim.loopback import loopback_fleet
 
     if gate is not None:
         gate.require_ahead(datetime.now(UTC))  # planning took time, so check again
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
-        results = uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)
-    if not as_json:
-        upload_table(results)
-        release_table(planned, results, gate)
-    return results
+        return uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)
 
 
 def planners(as_json: JsonOption = False) -> None:

@@ -70,12 +70,12 @@ def planning_display(names: Sequence[str], objective: str = "length") -> Iterato
     On a terminal it is one line that is redrawn several times a second and disappears at the end; elsewhere a line on
     standard error every `LINE_S` seconds. The compilation of kernels, which happens once, is reported there at once.
     """
-    board, screen = PlanningBoard(names, objective), words.console
+    board, screen = PlanningBoard(names, objective), words.aside
     if screen.is_terminal and not screen.is_dumb_terminal:
         with _redrawn(board, screen), notice.told(board.note):
             yield board.report
     else:
-        with _repeated(board), notice.told(words.say):
+        with _repeated(board), notice.told(words.remark):
             yield board.report
 
 
@@ -92,7 +92,7 @@ def _repeated(board: PlanningBoard) -> Iterator[None]:
 
     def repeat() -> None:
         while not ended.wait(LINE_S):
-            words.say(board.line())
+            words.remark(board.line())
 
     thread = threading.Thread(target=repeat, name="planning display", daemon=True)
     thread.start()

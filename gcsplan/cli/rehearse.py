@@ -60,7 +60,7 @@ def rehearse(
     planned them. The exit code is 4 if a limit was broken, or the order or the separation was lost.
     """
     from gcsplan.app import pipeline, rehearsing
-    from gcsplan.cli.console import say, say_notes
+    from gcsplan.cli.console import remark, say, say_notes
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.sim.wind import Weather
 
@@ -82,7 +82,7 @@ def rehearse(
         with talking(names):
             result = rehearsing.rehearse_in_sitl(
                 planned, binary=sitl_binary, addresses=addresses, speedup=speedup, i_know=i_know,
-                report=None if as_json else lambda name, what: say(f"{name} {what}"),
+                report=None if as_json else lambda name, what: remark(f"{name} {what}"),
             )  # fmt: skip
     else:
         result = rehearsing.rehearse(planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed)

@@ -101,7 +101,7 @@ def test_a_violation_ends_the_command_with_four_and_is_said_in_both_ways(
     with pytest.raises(typer.Exit) as ended:
         lost(False)
     assert ended.value.exit_code == 4
-    said = " ".join(capsys.readouterr().err.split())
+    said = " ".join(capsys.readouterr().out.split())
     assert "came too low above ground" in said
     assert "(in 2 of 2 runs)" in said
 

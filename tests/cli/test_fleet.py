@@ -58,12 +58,12 @@ def boards(**trouble: Any) -> list[LoopbackVehicle]:
 
 def test_one_line_plans_uploads_verifies_and_tells_when_to_start_whom(run: Any, tmp_path: Path) -> None:
     with SimServer(boards(), "udpin:127.0.0.1:0", speedup=10.0) as server:
-        code, _, err = run("plan", write(tmp_path), "--upload", server.url_for_gcs, "--atomic")
+        code, out, err = run("plan", write(tmp_path), "--upload", server.url_for_gcs, "--atomic")
     assert code == 0, err
-    assert "arrival: sequence, 20 s apart; order west, south" in err
-    assert "separation:" in err
-    assert "release" in err
-    assert "nothing is armed or started" in err
+    assert "arrival: sequence, 20 s apart; order west, south" in out
+    assert "separation:" in out
+    assert "release" in out
+    assert "nothing is armed or started" in out
     upload = json.loads((tmp_path / "cross" / "upload.json").read_text())
     assert all(v["upload"]["verified"] for v in upload["vehicles"])
     assert upload["fleet"]["order"] == ["west", "south"]
@@ -121,11 +121,11 @@ def test_a_rehearsal_flies_the_fleet_and_ends_with_0_where_all_went_well(run: An
 
 
 def test_a_report_and_the_way_home_stand_beside_the_missions(run: Any, tmp_path: Path) -> None:
-    code, _, err = run("plan", write(tmp_path), "--report")
+    code, out, err = run("plan", write(tmp_path), "--report")
     assert code == 0, err
     page = (tmp_path / "cross" / "report.html").read_text()
     assert page.lstrip().lower().startswith("<!doctype html>")
     assert "west" in page
-    assert "way home" in err
+    assert "way home" in out
     summary = json.loads((tmp_path / "cross" / "summary.json").read_text())
     assert all("lowest_rel_home_m" in v["way_home"] for v in summary["vehicles"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -57,9 +58,10 @@ def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER, amsl_m: float = 471.0, 
 def test_plan_writes_its_outputs_into_a_directory_of_the_missions_name(run: Any, tmp_path: Path) -> None:
     code, out, err = run("plan", CROSSING)
     assert code == 0
-    assert out == ""
-    assert "safe" in err
-    assert "bare DEM" in err
+    assert "safe" in out
+    assert "bare DEM" in out
+    assert "written to crossing" in out
+    assert all(line.startswith("note: ") for line in err.splitlines())
     assert {p.name for p in (tmp_path / "crossing").iterdir() if not p.name.startswith(".")} == OUTPUTS
 
 
@@ -71,10 +73,10 @@ def test_the_same_plan_twice_gives_the_same_bytes(run: Any, tmp_path: Path) -> N
 
 
 def test_plan_upload_sim_is_verified_and_says_simulated(run: Any, tmp_path: Path) -> None:
-    code, _, err = run("plan", CROSSING, "--upload", "sim")
+    code, out, _ = run("plan", CROSSING, "--upload", "sim")
     assert code == 0
-    assert "verified" in err
-    assert "simulated" in err
+    assert "verified" in out
+    assert "simulated" in out
     upload = json.loads((tmp_path / "crossing" / "upload.json").read_text())["vehicles"][0]["upload"]
     assert upload["verified"] is True
     assert upload["simulated"] is True
@@ -145,13 +147,13 @@ def test_check_passes_what_plan_wrote_and_finds_what_was_spoilt(run: Any, tmp_pa
         spoilt[10] = str(float(spoilt[10]) - 20)
         rows[i] = "\t".join(spoilt)
     (tmp_path / "uav1.waypoints").write_text("\n".join(rows) + "\n")
-    code, out, err = run("check", CROSSING, "uav1.waypoints", "--json")
+    code, out, _ = run("check", CROSSING, "uav1.waypoints", "--json")
     assert code == 4
     kinds = {v["kind"] for v in json.loads(out)["verdicts"][0]["violations"]}
     assert "min_agl" in kinds
-    code, _, err = run("check", CROSSING, "uav1.waypoints")
+    code, out, _ = run("check", CROSSING, "uav1.waypoints")
     assert code == 4
-    assert "too low above ground" in err
+    assert "too low above ground" in out
 
 
 def test_what_cannot_be_judged_is_exit_4_unless_allowed(run: Any, tmp_path: Path) -> None:
@@ -266,3 +268,46 @@ def test_ctrl_c_is_exit_130(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_package_runs_as_a_module() -> None:
     ran = subprocess.run([sys.executable, "-m", "gcsplan", "--version"], capture_output=True, text=True, timeout=60)
     assert (ran.returncode, ran.stdout.strip(), ran.stderr) == (0, gcsplan.__version__, "")
+
+
+def test_results_go_to_standard_output_and_all_else_to_standard_error(run: Any, tmp_path: Path) -> None:
+    asides = ("note: ", "planning ", "compiling ")
+    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        link = server.url_for_gcs
+        for words, arguments in (
+            ("written to out", ["plan", CROSSING, "-o", "out", "--upload", link]),
+            ("read back", ["plan", CROSSING, "-o", "out", "--upload", link]),
+            ("lowest above ground", ["check", CROSSING, "out/uav1.plan"]),
+            ("accepted", ["upload", "out/uav1.plan", "--to", link, "--mission", CROSSING]),
+            ("verified", ["verify", "out/uav1.plan", "--to", link]),
+            ("written to back.plan", ["download", "--from", link, "-o", "back.plan"]),
+            ("is empty now", ["clear", "--to", link]),
+            ("flown as planned", ["rehearse", CROSSING]),
+            ("what it does", ["planners"]),
+        ):
+            code, out, err = run(*arguments)
+            assert code == 0, (arguments, err)
+            assert words in out, arguments
+            assert "note: " not in out, arguments
+            assert all(line.startswith(asides) for line in err.splitlines()), (arguments, err)
+            code, out, err = run(*arguments, "--json")
+            assert code == 0, (arguments, err)
+            json.loads(out)  # the document alone
+            assert all(line.startswith(asides) for line in err.splitlines()), (arguments, err)
+
+
+def test_what_is_piped_is_the_table_and_a_reader_that_goes_away_is_no_bug(run: Any, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "gcsplan", "plan", str(CROSSING), "-o", str(tmp_path / "out")]
+    log = tmp_path / "log.txt"
+    with log.open("w") as opened:
+        assert subprocess.run(command, stdout=opened, stderr=subprocess.DEVNULL, timeout=120).returncode == 0
+    text = log.read_text()
+    assert "lowest AGL, m" in text
+    assert re.search(r"verdict +safe", text)
+    assert "\x1b" not in text
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.close()
+        err = process.stderr.read()
+        assert process.wait(timeout=120) == 1
+    assert "Traceback" not in err
+    assert "internal" not in err

@@ -29,7 +29,7 @@ def test_a_plan_that_is_sent_nowhere_imports_nothing_of_what_sends_or_draws(tmp_
     done = subprocess.run(
         [sys.executable, "-c", PLAN, str(CROSSING), str(tmp_path / "out")], capture_output=True, text=True, check=True
     )
-    assert done.stdout.splitlines() == ["0 True", "[]"]
+    assert done.stdout.splitlines()[-2:] == ["0 True", "[]"]
 
 
 def test_a_process_can_settle_its_memory_more_than_once_and_where_the_c_library_cannot() -> None:

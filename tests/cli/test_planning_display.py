@@ -26,7 +26,7 @@ def screen(monkeypatch: pytest.MonkeyPatch, *, terminal: bool, width: int = 100)
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.delenv("NO_COLOR", raising=False)
     shown = io.StringIO()
-    monkeypatch.setattr(console, "console", Console(file=shown, force_terminal=terminal, width=width))
+    monkeypatch.setattr(console, "aside", Console(file=shown, force_terminal=terminal, width=width))
     return shown
 
 
@@ -80,7 +80,7 @@ def test_no_color_is_respected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setenv("NO_COLOR", "1")
     shown = io.StringIO()
-    monkeypatch.setattr(console, "console", Console(file=shown, force_terminal=True, width=100))
+    monkeypatch.setattr(console, "aside", Console(file=shown, force_terminal=True, width=100))
     with planning_display(["uav1"]) as report:
         report("uav1", Progress(0.0, 2.0, 1.0, "bound"))
         wait_until(lambda: "bound" in shown.getvalue())

@@ -190,7 +190,7 @@ def test_all_or_nothing_sends_nothing_where_a_link_does_not_open(monkeypatch: py
 
 def test_the_live_table_is_for_terminals_and_shows_where_each_vehicle_is(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
-    monkeypatch.setattr(console, "console", Console(file=screen, force_terminal=True, width=100, color_system=None))
+    monkeypatch.setattr(console, "aside", Console(file=screen, force_terminal=True, width=100, color_system=None))
     with console.transfer_progress(["uav1", "[/]odd"]) as tell:
         tell("uav1", Progress("upload", 3, 12))
         tell("uav1", Progress("verified", 12, 12))
@@ -198,7 +198,7 @@ def test_the_live_table_is_for_terminals_and_shows_where_each_vehicle_is(monkeyp
     shown = screen.getvalue()
     assert all(word in shown for word in ("uav1", "[/]odd", "verified", "refused", "12/12"))
     plain = io.StringIO()
-    monkeypatch.setattr(console, "console", Console(file=plain, width=100))
+    monkeypatch.setattr(console, "aside", Console(file=plain, width=100))
     with console.transfer_progress(["uav1"]) as tell:
         tell("uav1", Progress("upload", 3, 12))
     assert plain.getvalue() == ""
