@@ -106,6 +106,8 @@ def require_file(path: Path, *, where: str) -> None:
         with path.open("rb") as file:
             if not file.read(1):
                 raise InputError(f"{path} is empty", where=where)
+    except InputError:
+        raise
     except (OSError, ValueError) as why:
         raise InputError(f"{path} cannot be read: {why}", where=where) from None
 

@@ -897,7 +897,15 @@ def test_empty_files_and_folders_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.tif").touch()
     assert "empty" in str(refusal(tmp_path / "a.tif"))
     assert "folder" in str(refusal(tmp_path))
-    assert "cannot be read" in str(refusal("a\0b.tif"))
+    assert "is not there" in str(refusal("a\0b.tif"))
+
+
+def test_a_file_that_cannot_be_opened_is_named_once(tmp_path: Path) -> None:
+    (tmp_path / "empty.tif").touch()
+    for path in (tmp_path / "none.tif", tmp_path / "empty.tif", tmp_path):
+        words = str(refusal(path))
+        assert words.count(str(path)) == 1, words
+        assert words.count("terrain.dem") == 1, words
 
 
 def test_every_tile_at_fault_is_named(tmp_path: Path) -> None:
