@@ -80,10 +80,3 @@ class Vehicle:
         instead.
         """
         return self.autopilot is not Autopilot.ARDUPLANE and self.turn_radius_m <= 0.0
-
-    def leg_time_s(self, horizontal_m: float, rise_m: float, speed_m_s: float) -> float:
-        """Seconds for a straight leg: at cruise speed, or slower where the climb or descent rate limits the speed."""
-        rate_m_s = self.climb_m_s if rise_m >= 0 else self.descent_m_s
-        if math.isinf(rate_m_s):
-            return math.hypot(horizontal_m, rise_m) / speed_m_s
-        return max(horizontal_m / speed_m_s, abs(rise_m) / rate_m_s)

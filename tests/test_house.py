@@ -44,7 +44,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "mavlink.protocol": MISSION,
     "mavlink.link": MISSION | {"mavlink.protocol"},
     # The mission and how each autopilot stores it: never the transfer, never a link.
-    "check": MISSION,
+    # How long a flight takes is the fleet's model of motion.
+    "check": MISSION | {"fleet"},
     "export": ABOVE,
     "report": ABOVE | {"export"},
     "sim": VEHICLE | MAVLINK | {"check"},

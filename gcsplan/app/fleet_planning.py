@@ -18,7 +18,7 @@ from gcsplan.app.detours import Detours
 from gcsplan.app.gate import SLACK_S, GateTime, gated
 from gcsplan.app.model import Brief, FleetPlan, VehiclePlan
 from gcsplan.app.planning import rebuilt
-from gcsplan.arrays import Floats, Indices
+from gcsplan.check.clock import over_ground, pace_over_ground
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.motion import TimedPath
@@ -27,12 +27,8 @@ from gcsplan.fleet.timing import Course, Route, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
 from gcsplan.world.world import World
 
-TERRAIN_STEP_M = 25.0
 LATER_S = 600.0
 """Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
-ARDUPILOT_DEGREE_M = 111318.84502145034
-"""Metres per degree, Location.h, `LOCATION_SCALING_FACTOR`. An ArduCopter flew 0.2 % faster than commanded east and
-west at 37° N."""
 SEPARATION_M = 30.0
 """Separation that is judged if the file has no `arrival`, m."""
 
@@ -99,24 +95,23 @@ def route_of(v: VehiclePlan, world: World) -> Route:
     """The judged flight of the mission in metres, from the top of take-off to the approach, and how it ends.
 
     A mission of a paper that begins in the air and ends at its goal has no columns. Terrain-frame legs are cut every
-    `TERRAIN_STEP_M`: between way points they rise and sink with the ground.
+    `check.clock.TERRAIN_STEP_M`: between way points they rise and sink with the ground.
     """
     request, legs = v.request, v.verdict.legs
     flown = [leg for leg in legs if leg.on_path]
     ends = np.array([flown[0].start, *(leg.end for leg in flown)])
     points = np.column_stack([world.frame.to_plane(ends[:, 0], ends[:, 1]), ends[:, 2]])
     first = legs.index(flown[0])
-    gate_s = math.fsum(leg.hold_s for leg in legs[:first] if math.isfinite(leg.hold_s))
-    holds = np.array([gate_s, *(leg.hold_s for leg in flown)])
+    holds = np.array([v.verdict.gate_s, *(leg.hold_s for leg in flown)])
     ideal = request.end == "none" and request.start_amsl_m is not None
     ground = legs[0].start[2]
     ends_with = [leg for leg in legs[first:] if not leg.on_path]
     last = ends_with[-1] if ends_with else flown[-1]
     numbers = np.array([leg.seq for leg in flown], dtype=np.intp)
     if v.order.altitude_frame == "terrain":
-        points, holds, numbers = _over_ground(points, holds, numbers, world)
+        points, holds, numbers = over_ground(points, holds, numbers, world.airspace.surface)
     items = np.array([legs[0].seq, *numbers, last.seq], dtype=np.intp)
-    pace = _pace(points, legs[0].start[:2], world) if request.vehicle.lays_curves else None
+    pace = pace_over_ground(points, legs[0].start[:2], world.frame) if request.vehicle.lays_curves else None
     climb_out, glide = climb_out_and_glide(v, world)
     return Route(
         v.name, points,
@@ -130,38 +125,6 @@ def route_of(v: VehiclePlan, world: World) -> Route:
         glide=glide,
         pace=pace,
     )  # fmt: skip
-
-
-def _pace(points: Floats, home_deg: tuple[float, float], world: World) -> Floats:
-    """(N,) metres over ground per ArduPilot metre, for each leg, and last for the straight line home.
-
-    ArduPilot takes a degree of latitude as equally long everywhere, and a degree of longitude as that times the cosine
-    of the latitude halfway between home and the way point (Location.cpp, `get_vector_xy_from_origin_NE`).
-    """
-    lat, lon = world.frame.to_degrees(points[:, 0], points[:, 1]).T
-    north = (lat - home_deg[0]) * ARDUPILOT_DEGREE_M
-    span = (lon - home_deg[1] + 180.0) % 360.0 - 180.0
-    east = span * ARDUPILOT_DEGREE_M * np.cos(np.radians(0.5 * (lat + home_deg[0])))
-    own = np.hypot(np.roll(east, -1) - east, np.roll(north, -1) - north)
-    true = np.linalg.norm(np.roll(points[:, :2], -1, axis=0) - points[:, :2], axis=1)
-    return np.where(own > 0.01, true / np.maximum(own, 0.01), 1.0)
-
-
-def _over_ground(points: Floats, holds: Floats, numbers: Indices, world: World) -> tuple[Floats, Floats, Indices]:
-    """Cut the legs so that each keeps its height above ground, interpolated between the leg's ends."""
-    ground_at = world.airspace.surface.ground_at
-    agl = points[:, 2] - ground_at(points[:, 0], points[:, 1])
-    out, waits, owners = [points[:1]], [holds[:1]], []
-    for i in range(1, len(points)):
-        a, b = points[i - 1], points[i]
-        parts = max(1, math.ceil(math.hypot(*(b - a)[:2]) / TERRAIN_STEP_M))
-        t = np.arange(1, parts + 1) / parts
-        flat = a[:2] + t[:, None] * (b - a)[:2]
-        amsl = ground_at(flat[:, 0], flat[:, 1]) + agl[i - 1] + t * (agl[i] - agl[i - 1])
-        out.append(np.column_stack([flat, np.where(np.isnan(amsl), a[2] + t * (b[2] - a[2]), amsl)]))
-        waits.append(np.append(np.zeros(parts - 1), holds[i]))
-        owners.append(np.full(parts, numbers[i - 1]))
-    return np.concatenate(out), np.concatenate(waits), np.concatenate(owners)
 
 
 def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) -> Rules:

@@ -19,7 +19,7 @@ from gcsplan.export.kml import write_kml
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import ItemRow, Track
 from gcsplan.export.summary import write_summary
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
@@ -54,9 +54,9 @@ def outputs_of(
         )
     files["mission.kml"] = write_kml(plan.source.name, tracks, zones, frame)
     files["mission.geojson"] = write_geojson(plan.source.name, tracks, zones, frame)
-    motions = {m.name: m for m in plan.fleet.motions} if plan.fleet is not None else {}
+    slots = {s.name: s for s in plan.fleet.slots} if plan.fleet is not None else {}
     files["profile.csv"] = write_profile(
-        [row for v in plan.vehicles for row in item_rows(v.name, v.verdict, motions.get(v.name))]
+        [row for v in plan.vehicles for row in item_rows(v.name, v.verdict, slots.get(v.name))]
     )
     files["summary.json"] = write_summary(summary_of(plan, homes=homes))
     return files
@@ -209,19 +209,19 @@ def verdict_of(name: str, verdict: Verdict) -> dict[str, Any]:
     }
 
 
-def item_rows(vehicle: str, verdict: Verdict, motion: TimedPath | None = None) -> list[ItemRow]:
+def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[ItemRow]:
     """One row per wire item, with the figures of all stretches that are flown for it.
 
-    Times count from the fleet's common start if ``motion`` is there; otherwise from leaving the ground, by the verdict.
+    Times count from the fleet's common start if ``slot`` is there; otherwise from leaving the ground.
     """
-    until: dict[int, float] = {}
-    if motion is not None and motion.pieces is not None:
-        until = dict(zip(motion.pieces.tolist(), motion.times_s[1:].tolist(), strict=True))  # the last of each item
+    depart_s = 0.0 if slot is None else slot.depart_s
     flown: dict[int, list[LegFigures]] = {}
-    for leg in verdict.legs:
+    until: dict[int, float] = {}
+    for leg, clock_s in zip(verdict.legs, verdict.clock_s(slot), strict=True):
         flown.setdefault(leg.seq, []).append(leg)
+        until[leg.seq] = depart_s + clock_s
     home = verdict.legs[0].start if verdict.legs else None
-    rows, spent_j, clock_s = [], 0.0, 0.0
+    rows, spent_j = [], 0.0
     for seq, item in enumerate(verdict.mission.wire_items()):
         name = command_name(item.command)
         legs = flown.get(seq)
@@ -232,15 +232,13 @@ def item_rows(vehicle: str, verdict: Verdict, motion: TimedPath | None = None) -
             continue
         energy_j = math.fsum(leg.energy_j for leg in legs)
         spent_j += energy_j
-        # A hold at the gate has no piece of its own: its seconds count in the row of the take-off.
-        clock_s = until.get(seq, clock_s) if until else clock_s + math.fsum(leg.time_s for leg in legs)
         low = [leg.min_agl_m for leg in legs if not leg.column and not math.isnan(leg.min_agl_m)]
         steep = max((leg.climb_deg for leg in legs), key=abs)
         lat, lon, amsl = legs[-1].end
         rows.append(
             ItemRow(
                 vehicle, seq, name, lat, lon, amsl, legs[-1].agl_end_m, min(low) if low else None,
-                math.fsum(leg.length_m for leg in legs), steep, energy_j, spent_j, clock_s,
+                math.fsum(leg.length_m for leg in legs), steep, energy_j, spent_j, until[seq],
             )
         )  # fmt: skip
     return rows

@@ -32,7 +32,7 @@ def page_of_plan(plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[s
             v.problem.objective, "m" if v.problem.objective == "length" else "J",
             v.cost, v.solution.lower_bound, v.gap_percent, v.solution.stopped_by,
         )  # fmt: skip
-        slot = fleet.slot(v.name) if fleet is not None and several else None
+        slot = None if fleet is None else fleet.slot(v.name)
         notes = (*v.notes, *v.solution.notes, *v.verdict.notes, *(slot.notes if slot is not None else ()))
         subjects.append(
             Subject(

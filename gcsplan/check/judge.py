@@ -14,6 +14,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.climb_out import slant_findings
+from gcsplan.check.clock import seconds_of
 from gcsplan.check.corners import round_corners
 from gcsplan.check.enough import enough
 from gcsplan.check.flight import follow
@@ -76,7 +77,9 @@ def judge(
         findings += slant_findings([*flight.stretches, *flight.instead], vehicle, world)
     plane = legs_in_plane(flight.stretches, vehicle.limits, world, terrain_error_m)
     report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
-    figures = _figures(flight, plane, report, vehicle, world)
+    home = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
+    seconds = seconds_of(flight.stretches, vehicle, world, home)
+    figures = _figures(flight, plane, report, vehicle, world, seconds)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
     if flight.instead:  # alternatives must be legal too; the figures stay those of the mission
@@ -131,7 +134,7 @@ def _too_far(s: Stretch) -> Finding:
 
 
 def _figures(
-    flight: Flight, plane: PlaneLegs, report: LegReport, vehicle: Vehicle, world: World
+    flight: Flight, plane: PlaneLegs, report: LegReport, vehicle: Vehicle, world: World, seconds: Floats
 ) -> tuple[LegFigures, ...]:
     energy = vehicle.energy
     ground_end = world.airspace.surface.ground_at(plane.legs.end[:, 0], plane.legs.end[:, 1])
@@ -167,7 +170,7 @@ def _figures(
                 nearest_zone=world.airspace.zones[zone].name if zone >= 0 else "",
                 energy_j=energy.vertical_j_per_m * float(np.abs(rise).sum())
                 + energy.horizontal_j_per_m * horizontal_m + hold_j,
-                time_s=_time_s(vehicle, s, run, rise) + hold_s,
+                time_s=float(seconds[i]) + hold_s,
                 hold_s=s.hold_s,
                 hold_j=hold_j,
                 times=s.times,
@@ -175,13 +178,6 @@ def _figures(
             )
         )  # fmt: skip
     return tuple(figures)
-
-
-def _time_s(vehicle: Vehicle, s: Stretch, run_m: Floats, rise_m: Floats) -> float:
-    climb_m_s, descent_m_s = s.rates_m_s or (vehicle.climb_m_s, vehicle.descent_m_s)
-    if (climb_m_s, descent_m_s) != (vehicle.climb_m_s, vehicle.descent_m_s):
-        vehicle = replace(vehicle, climb_m_s=climb_m_s, descent_m_s=descent_m_s)
-    return math.fsum(vehicle.leg_time_s(h, r, s.speed_m_s) for h, r in zip(run_m, rise_m, strict=True))
 
 
 WORDS = {

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import accumulate
+from typing import TYPE_CHECKING
 
 from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.mavlink.mission.mission import Mission
+
+if TYPE_CHECKING:
+    from gcsplan.fleet.arrival import Slot
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +37,9 @@ class LegFigures:
     """Figures of one flown stretch; NaN where the ground is unknown.
 
     ``min_agl_m`` counts from the ground and what stands on it, on the line itself; ``agl_end_m`` from bare ground.
-    ``energy_j`` includes ``hold_j``, that of the hold; ``hold_s`` may be infinite (a loiter without end costs nothing
-    here). The figures are those of one pass; ``times``: how often it is flown, if a jump leads back. ``jumped_from``:
-    the jump that leads to it.
+    ``energy_j`` includes ``hold_j`` and ``time_s`` includes ``hold_s``, those of the hold at its end; ``hold_s`` may be
+    infinite (a loiter without end takes no energy and no time here). The figures are those of one pass; ``times``: how
+    often it is flown, if a jump leads back. ``jumped_from``: the jump that leads to it.
     """
 
     seq: int
@@ -113,7 +118,35 @@ class Verdict:
     def arrive_s(self) -> float:
         """Seconds from leaving the ground to the end of the path (the goal at approach altitude)."""
         last = max((i for i, leg in enumerate(self.legs) if leg.on_path), default=-1)
-        return math.fsum(leg.time_s * leg.times for leg in self.legs[: last + 1])
+        stays_s = self.legs[last].hold_s if last >= 0 else 0.0
+        return math.fsum(
+            [*(leg.time_s * leg.times for leg in self.legs[: last + 1]), -stays_s if math.isfinite(stays_s) else 0.0]
+        )
+
+    @property
+    def gate_s(self) -> float:
+        """Seconds of holding before the path begins."""
+        return math.fsum(leg.hold_s for leg in self._before_path if math.isfinite(leg.hold_s))
+
+    def clock_s(self, slot: Slot | None = None) -> tuple[float, ...]:
+        """Seconds from leaving the ground to the end of each leg, with all the rounds of a jump.
+
+        ``slot``: the vehicle's part of the time table. A wait at its gate that the mission states as a time of day has
+        no seconds in the mission: they count for the last leg before the path. A flight that is planned to begin in the
+        air (in the papers) begins with its path.
+        """
+        before = len(self._before_path)
+        times = [leg.time_s * leg.times for leg in self.legs]
+        if slot is not None and slot.route.start_ground_amsl_m is None:
+            times[:before] = [0.0] * before
+        elif slot is not None and before:
+            times[before - 1] += max(0.0, slot.hold_s - self.gate_s)
+        return tuple(accumulate(times))
+
+    @property
+    def _before_path(self) -> tuple[LegFigures, ...]:
+        first = next((i for i, leg in enumerate(self.legs) if leg.on_path), 0)
+        return self.legs[:first]
 
     @property
     def lowest(self) -> LegFigures | None:

@@ -11,7 +11,7 @@ specified paths").
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,6 +92,22 @@ class Stretch:
         """Seconds for the stretch at a cruise speed; never rises with the speed."""
         return float(self._phases(cruise_m_s)[3].sum())
 
+    def shares_s(self, cruise_m_s: float, legs: int) -> Floats:
+        """(``legs``,) the seconds of each leg, 0 to ``legs`` - 1 in ``owner``; together they are `time_s`.
+
+        Each half of a corner belongs to its own leg.
+        """
+        seconds = self._phases(cruise_m_s)[3].sum(axis=0)
+        shares: Floats = np.bincount(self.owner, weights=seconds, minlength=legs).astype(np.float64)
+        return shares
+
+    def at_its_own(self, speed_m_s: float) -> Stretch:
+        """The same stretch flown at ``speed_m_s``, whatever the cruise speed."""
+        return replace(
+            self, most_m_s=np.minimum(self.most_m_s, speed_m_s * self.per_cruise),
+            per_cruise=np.full_like(self.per_cruise, math.inf),
+        )  # fmt: skip
+
     def motion(self, cruise_m_s: float, error_m: float = POSITION_ERROR_M) -> tuple[Floats, Floats, Indices]:
         """Times (M,) since the stretch began, places (M, 3) and legs (M,) at the end of each of M straight pieces.
 
@@ -148,14 +164,16 @@ class Stretch:
 
 
 def legs(
-    points: Floats, vehicle: Vehicle, owner: Indices, leg_m: Floats | None = None, pace: Floats | None = None
-) -> Stretch | None:
+    points: Floats, vehicle: Vehicle, owner: Indices, leg_m: Floats | None = None, pace: Floats | None = None,
+    rates_m_s: Floats | None = None,
+) -> Stretch | None:  # fmt: skip
     """The stretch through ``points`` (N, 3) without a stop, its corners rounded; None if nothing moves.
 
     ``owner`` (N - 1,) numbers the legs. With a corner acceleration of inf, corners are sharp. In the middle of a corner
     the vehicle has the way point's altitude, because the tangents of nearly straight tracks are half a leg long.
     ``leg_m`` (N - 1,) are lengths from way point to way point, for legs that are parts of longer ones. ``pace`` (N -
-    1,) is the speed that results from a cruise speed of 1, if that is not 1.
+    1,) is the speed that results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are the rates of
+    climb and descent on each leg, if they are not the vehicle's own.
     """
     whole = np.linalg.norm(np.diff(points, axis=0), axis=1)
     keep = np.append(True, whole > _LEAST_LENGTH_M)
@@ -194,7 +212,8 @@ def legs(
     length = np.hypot(run_m, rise_m)
     there = arc_m > 0.0
     there[0::3] = length[0::3] > _LEAST_LENGTH_M
-    most, per_cruise = _bounds(length, run_m, rise_m, vehicle)
+    rates = np.array([[vehicle.climb_m_s, vehicle.descent_m_s]]) if rates_m_s is None else rates_m_s[keep[1:]][leg]
+    most, per_cruise = _bounds(length, run_m, rise_m, rates)
     if pace is not None:
         per_cruise *= pace[keep[1:]][leg]
     arc = arc_m > 0.0
@@ -262,9 +281,9 @@ def column(heights_m: Floats, most_m_s: Floats, place: Floats, vehicle: Vehicle,
     )  # fmt: skip
 
 
-def _bounds(length: Floats, run: Floats, rise: Floats, vehicle: Vehicle) -> tuple[Floats, Floats]:
+def _bounds(length: Floats, run: Floats, rise: Floats, rates_m_s: Floats) -> tuple[Floats, Floats]:
     """Largest speed along each segment by climb and descent rates, and its ratio to the cruise speed."""
-    rate = np.where(rise >= 0.0, vehicle.climb_m_s, vehicle.descent_m_s)
+    rate = np.where(rise >= 0.0, rates_m_s[:, 0], rates_m_s[:, 1])
     in_space = np.isinf(rate)
     with np.errstate(divide="ignore", invalid="ignore"):
         most = np.where(in_space | (rise == 0.0), math.inf, rate * length / np.abs(rise))

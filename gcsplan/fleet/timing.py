@@ -21,7 +21,9 @@ from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column, legs
 from gcsplan.vehicle import Vehicle
 
-__all__ = ["POSITION_ERROR_M", "Course", "End", "Route", "motion_error_m", "speed_for"]
+__all__ = [
+    "POSITION_ERROR_M", "Course", "End", "Route", "leg_lengths_m", "motion_error_m", "speed_for", "upright",
+]  # fmt: skip
 
 End = Literal["land", "loiter", "rtl", "none"]
 
@@ -113,7 +115,7 @@ class Course:
         self.takeoff = _takeoff(route, vehicle)
         self.to_goal: list[tuple[Stretch, float]] = []
         stops = [0, *(np.flatnonzero(holds[1:-1] > 0.0) + 1).tolist(), len(holds) - 1]
-        leg_m = _leg_m(route)
+        leg_m = leg_lengths_m(route.points, None if route.items is None else route.items[1:-1])
         waited = 0.0
         for i, j in pairwise(stops):
             owner = np.arange(i + 1, j + 1, dtype=np.intp)
@@ -240,29 +242,27 @@ class _Motion:
         return TimedPath(route.name, times[keep], points[keep], arrive_s, stays, items[keep[1:]])
 
 
-def _leg_m(route: Route) -> Floats:
-    """(N - 1,) metres from way point to way point, of the mission's leg that each piece of the route is part of.
+def leg_lengths_m(points: Floats, items: Indices | None) -> Floats:
+    """(N - 1,) metres from way point to way point, of the mission's leg that each piece of (N, 3) points is part of.
 
-    Pieces with the same item number are one leg, cut to follow the ground.
+    Pieces with the same of ``items`` (N - 1,) are one leg, cut to follow the ground.
     """
-    p = route.points
-    own = np.asarray(np.linalg.norm(np.diff(p, axis=0), axis=1))
-    if route.items is None:
+    own = np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
+    if items is None:
         return own
-    item = route.items[1:-1]
-    first = np.flatnonzero(np.append(True, item[1:] != item[:-1]))
-    last = np.append(first[1:], len(item))
-    whole = np.linalg.norm(p[last] - p[first], axis=1)
+    first = np.flatnonzero(np.append(True, items[1:] != items[:-1]))
+    last = np.append(first[1:], len(items))
+    whole = np.linalg.norm(points[last] - points[first], axis=1)
     return np.asarray(np.maximum(own, np.repeat(whole, last - first)))
 
 
 def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | None:
     ground, top = route.start_ground_amsl_m, route.points[0]
     if route.climb_out is not None:
-        return legs(route.climb_out, vehicle, np.zeros(len(route.climb_out) - 1, dtype=np.intp))
-    if ground is None or ground >= top[2]:
-        return None
-    return column(np.array([ground, top[2]]), np.array([vehicle.climb_m_s]), top[:2], vehicle, 0, stops=True)
+        way = legs(route.climb_out, vehicle, np.zeros(len(route.climb_out) - 1, dtype=np.intp))
+        # The mission sets its speed after the climb-out, which is flown at the vehicle's own.
+        return None if way is None else way.at_its_own(vehicle.speed_max_m_s)
+    return None if ground is None else next(iter(upright(top[:2], ground, float(top[2]), vehicle, 0)), None)
 
 
 def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
@@ -276,20 +276,17 @@ def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
         down = None if slanted is None else legs(slanted, vehicle, np.full(len(slanted) - 1, number, dtype=np.intp))
         return [] if down is None else [down]
     if route.end == "land" and route.goal_ground_amsl_m is not None:
-        return _landing(goal, route.goal_ground_amsl_m, vehicle, number)
+        return upright(goal[:2], float(goal[2]), route.goal_ground_amsl_m, vehicle, number)
     if route.end != "rtl":
         return []
     home_amsl, rtl_amsl = _home(route)
     level = max(float(goal[2]), rtl_amsl)
-    stretches = []
-    if level > goal[2]:
-        climb = np.array([vehicle.climb_m_s])
-        stretches.append(column(np.array([goal[2], level]), climb, goal[:2], vehicle, number, stops=True))
+    stretches = upright(goal[:2], float(goal[2]), level, vehicle, number)
     above = np.array([[goal[0], goal[1], level], [home[0], home[1], level]])
     pace = None if route.pace is None else route.pace[-1:]
     way = legs(above, vehicle, np.array([number], dtype=np.intp), pace=pace)
     stretches += [way] if way is not None else []
-    return stretches + _landing(above[1], home_amsl, vehicle, number)
+    return stretches + upright(home[:2], level, home_amsl, vehicle, number)
 
 
 def _home(route: Route) -> tuple[float, float]:
@@ -299,15 +296,22 @@ def _home(route: Route) -> tuple[float, float]:
     return route.start_ground_amsl_m, route.rtl_amsl_m
 
 
-def _landing(top: Floats, ground: float, vehicle: Vehicle, number: int) -> list[Stretch]:
-    slow_from = ground + LAND_SLOWLY_M
-    slow = min(vehicle.land_m_s, vehicle.descent_m_s)
-    if top[2] <= ground:
+def upright(place: Floats, from_amsl_m: float, to_amsl_m: float, vehicle: Vehicle, owner: int) -> list[Stretch]:
+    """A column over ``place`` (2,): a climb to a standstill, or a landing that is slow near the ground.
+
+    Empty if both altitudes are the same.
+    """
+    if from_amsl_m == to_amsl_m:
         return []
-    if top[2] <= slow_from:
-        return [column(np.array([top[2], ground]), np.array([slow]), top[:2], vehicle, number, stops=False)]
-    heights = np.array([top[2], slow_from, ground])
-    return [column(heights, np.array([vehicle.descent_m_s, slow]), top[:2], vehicle, number, stops=False)]
+    if from_amsl_m < to_amsl_m:
+        heights, most = [from_amsl_m, to_amsl_m], [vehicle.climb_m_s]
+    elif from_amsl_m <= (slow_from := to_amsl_m + LAND_SLOWLY_M):
+        heights, most = [from_amsl_m, to_amsl_m], [min(vehicle.land_m_s, vehicle.descent_m_s)]
+    else:
+        heights = [from_amsl_m, slow_from, to_amsl_m]
+        most = [vehicle.descent_m_s, min(vehicle.land_m_s, vehicle.descent_m_s)]
+    climbs = from_amsl_m < to_amsl_m
+    return [column(np.array(heights), np.array(most), place, vehicle, owner, stops=climbs)]
 
 
 def _flown(route: Route) -> Floats:

@@ -59,7 +59,7 @@ def render_check(
 def render_page(page: Page) -> str:
     """A `Page` as HTML text."""
     samples = max(150, min(1200, MOST_SAMPLES // max(len(page.subjects), 1)))
-    lines = [line_of(s.verdict, page.world, s.vehicle.limits, samples=samples) for s in page.subjects]
+    lines = [line_of(s.verdict, page.world, s.vehicle.limits, samples=samples, slot=s.slot) for s in page.subjects]
     drawn = [line for line in lines if line is not None]
     zones, surface = page.world.airspace.zones, page.world.airspace.surface
     relief = relief_of(page.world, extent_of(drawn, zones, surface))
@@ -177,9 +177,11 @@ def _card(subject: Subject, index: int) -> str:
         if verdict.battery_used_percent is not None
         else ("energy", num(verdict.energy_j / 1000, 0, "kJ"), "battery capacity not given")
     )  # fmt: skip
-    arrive = subject.slot.arrive_s if subject.slot is not None else verdict.arrive_s
-    since = "after the fleet's start" if subject.slot is not None else "after take-off"
-    figures.append(("arrives", minutes(arrive), f"{since}; {len(verdict.mission.wire_items())} mission items"))
+    since = "after take-off" if subject.motion is None else "after the fleet's start"
+    if subject.motion is None and subject.depart_s > 0.0:
+        since = f"after the start, {num(subject.depart_s, 0, 's')} of it on the ground"
+    items = len(verdict.mission.wire_items())
+    figures.append(("arrives", minutes(subject.arrive_s), f"{since}; {items} mission items"))
     if c is not None and c.objective == "energy":
         figures.insert(1, ("path energy", num(c.cost / 1000, 1, "kJ"), _gap_words(c.bound, c.gap_percent, 1e-3, "kJ")))
     cells = "".join(f"<div><dt>{name}</dt><dd>{value}<small>{more}</small></dd></div>" for name, value, more in figures)

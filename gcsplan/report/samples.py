@@ -9,6 +9,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.verdict import Verdict
+from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.mission.mission import TERRAIN
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
@@ -48,8 +49,13 @@ class Line:
         return float(self.run_m[-1])
 
 
-def line_of(verdict: Verdict, world: World, limits: Limits, *, samples: int = 1200) -> Line | None:
-    """The samples of a verdict's legs; None if it has none (nothing could be followed)."""
+def line_of(
+    verdict: Verdict, world: World, limits: Limits, *, samples: int = 1200, slot: Slot | None = None
+) -> Line | None:
+    """The samples of a verdict's legs; None if it has none (nothing could be followed).
+
+    ``slot``: the vehicle's part of the time table, see `Verdict.clock_s`.
+    """
     legs = verdict.legs
     if not legs:
         return None
@@ -61,7 +67,7 @@ def line_of(verdict: Verdict, world: World, limits: Limits, *, samples: int = 12
     items = verdict.mission.wire_items()
     columns: list[tuple[Floats, ...]] = []
     before = np.concatenate([[0.0], np.cumsum(horizontal)])
-    clock = np.concatenate([[0.0], np.cumsum([leg.time_s for leg in legs])])
+    clock = verdict.clock_s(slot)
     spent = np.concatenate([[0.0], np.cumsum([leg.energy_j for leg in legs])])
     for i, leg in enumerate(legs):
         t = np.linspace(0.0, 1.0, max(2, math.ceil(horizontal[i] / step) + 1))
@@ -75,7 +81,7 @@ def line_of(verdict: Verdict, world: World, limits: Limits, *, samples: int = 12
         columns.append(
             (
                 before[i] + t * horizontal[i], en[:, 0], en[:, 1], z,
-                clock[i] + t * leg.time_s, spent[i] + t * leg.energy_j,
+                clock[i] - (1.0 - t) * leg.time_s, spent[i] + t * leg.energy_j,
                 np.full(len(t), float(i)), np.arange(len(t)) == len(t) - 1,
             )
         )  # fmt: skip

@@ -31,8 +31,9 @@ class Certificate:
 class Subject:
     """One vehicle, or one checked file: its verdict, and other data on it.
 
-    ``motion`` and ``slot`` are its part of the fleet's time table, None if it flies alone. ``home`` is the way home
-    from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if nothing was sent.
+    ``slot`` is its part of the time table, None for a checked file; ``motion`` too, None if it flies alone. ``home`` is
+    the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if nothing was
+    sent.
     """
 
     name: str
@@ -44,6 +45,16 @@ class Subject:
     slot: Slot | None = None
     home: WayHome | None = None
     upload: Mapping[str, object] | None = None
+
+    @property
+    def depart_s(self) -> float:
+        """Seconds from the start until it leaves the ground."""
+        return self.slot.depart_s if self.slot is not None else 0.0
+
+    @property
+    def arrive_s(self) -> float:
+        """Seconds to the goal: from the start of the time table, or from the mission's beginning without one."""
+        return self.slot.arrive_s if self.slot is not None else self.verdict.arrive_s
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
                 f"{least(near.zone_clearance_m, 1, 'm')} {esc(near.nearest_zone)}" if near else "–",
                 num(verdict.max_climb_deg, 1, "°"), num(verdict.energy_j / 1000.0, 0, "kJ"),
                 num(verdict.battery_used_percent, 1, "%"),
-                minutes(s.slot.arrive_s if s.slot is not None else verdict.arrive_s), home,
+                minutes(s.arrive_s), home,
             )
         )  # fmt: skip
         marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None else "")
@@ -46,10 +46,9 @@ def legs_table(subject: Subject) -> str:
     """Each flown stretch: its end, heights, climb angle, nearest zone, energy and time."""
     bad = {f.seq for f in subject.verdict.findings}
     battery = subject.vehicle.energy.battery_j
-    used, clock, rows, marks = 0.0, 0.0, [], []
-    for leg in subject.verdict.legs:
+    used, rows, marks = 0.0, [], []
+    for leg, clock in zip(subject.verdict.legs, subject.verdict.clock_s(subject.slot), strict=True):
         used += leg.energy_j * leg.times
-        clock += leg.time_s * leg.times
         name = f"{leg.seq} {leg.kind}" + (f" ×{THIN}{leg.times}" if leg.times > 1 else "")
         near = f"{least(leg.zone_clearance_m, 0, 'm')} {esc(leg.nearest_zone)}" if leg.nearest_zone else "–"
         rows.append(

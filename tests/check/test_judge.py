@@ -35,6 +35,12 @@ def mission_over(
     return build_mission(Path(np.array(points)), where, craft, HOME_DEG, Order(**order)), craft  # type: ignore[arg-type]
 
 
+def ideal() -> Vehicle:
+    """A vehicle that changes its speed at once, so that times are lengths over speeds."""
+    at_once = dict.fromkeys(("accel_m_s2", "corner_accel_m_s2", "vertical_accel_m_s2", "land_m_s"), math.inf)
+    return replace(vehicle(), **at_once)
+
+
 def verdict_of(where: World, points: list[list[float]], craft: Vehicle | None = None, **order: object) -> Verdict:
     mission, craft = mission_over(where, points, craft, **order)
     return judge(mission, craft, where)
@@ -51,9 +57,29 @@ def test_a_mission_above_every_limit_is_safe_and_its_figures_add_up() -> None:
     assert verdict.lowest.min_agl_m == pytest.approx(66.0, abs=0.01)
     up_and_down = 120 * (66 + 66)
     assert verdict.energy_j == pytest.approx(up_and_down + 100 * verdict.length_m, rel=1e-5)
+    at_once = verdict_of(world(), HIGH_ENOUGH, ideal())
     flight_s = verdict.length_m / 15 + 66 / 2.5 + 66 / 1.5
-    assert verdict.time_s == pytest.approx(flight_s, rel=1e-5)
-    assert verdict.arrive_s == pytest.approx(flight_s - 66 / 1.5, rel=1e-5)
+    assert at_once.time_s == pytest.approx(flight_s, rel=1e-5)
+    assert at_once.arrive_s == pytest.approx(flight_s - 66 / 1.5, rel=1e-5)
+
+
+def test_a_leg_takes_the_time_of_its_acceleration_its_corner_and_its_braking_too() -> None:
+    up, out, on, down = verdict_of(world(), [[0.0, 0, 366], [900, 0, 366], [1800, 900, 366]]).legs
+    assert up.time_s == pytest.approx(66 / 2.5 + 2.5 / 1.0, rel=1e-9)
+    # The corner is cut by 2 m, on an arc that a corner acceleration of 2.5 m/s² allows to be flown at v = √(2.5·R).
+    bend = math.atan2(900, 900)
+    radius_m = 2.0 / (1.0 / math.cos(0.5 * bend) - 1.0)
+    slow_m_s = min(math.sqrt(2.5 * radius_m), 15.0)
+    assert slow_m_s < 15.0
+    tangent_m, arc_m = radius_m * math.tan(0.5 * bend), 0.5 * radius_m * bend
+    for leg, long_m in ((out, 900.0), (on, math.hypot(900, 900))):
+        speeding_m = (15.0**2 / 2 + (15.0**2 - slow_m_s**2) / 2) / 1.5
+        by_hand_s = (15.0 + 15.0 - slow_m_s) / 1.5 + (long_m - tangent_m - speeding_m) / 15.0 + arc_m / slow_m_s
+        assert leg.time_s == pytest.approx(by_hand_s, rel=2e-3)
+    # A landing brakes to the slow rate for its last 10 m, and does not stop.
+    braking_m = (1.5**2 - 0.5**2) / 2
+    by_hand_s = 1.5 + (56 - 1.5**2 / 2 - braking_m) / 1.5 + (1.5 - 0.5) + 10 / 0.5
+    assert down.time_s == pytest.approx(by_hand_s, rel=1e-6)
 
 
 def test_a_vehicle_that_flies_arcs_is_not_called_safe_on_the_strength_of_its_straight_legs() -> None:
@@ -171,7 +197,8 @@ def test_an_empty_mission_is_not_judged() -> None:
 
 
 def test_a_jump_back_is_judged_and_each_of_its_rounds_counts() -> None:
-    mission, craft = mission_over(world(), [[0.0, 0, 366], [900, 0, 366], [900, 800, 366], [1800, 800, 366]])
+    points = [[0.0, 0, 366], [900, 0, 366], [900, 800, 366], [1800, 800, 366]]
+    mission, craft = mission_over(world(), points, ideal())
     once = judge(mission, craft, world())
 
     def with_jump(rounds: int) -> Verdict:

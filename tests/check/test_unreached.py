@@ -87,7 +87,8 @@ def test_a_landing_that_a_return_leads_to_is_not_judged() -> None:
 
 
 def test_what_stands_behind_a_loop_without_end_is_a_finding_and_how_long_it_lasts_is_told() -> None:
-    craft = replace(vehicle(COPTER), energy=Energy(120.0, 100.0, battery_j=1e6, reserve=0.0))
+    at_once = dict.fromkeys(("accel_m_s2", "corner_accel_m_s2"), math.inf)  # a round takes its length over the speed
+    craft = replace(vehicle(COPTER), energy=Energy(120.0, 100.0, battery_j=1e6, reserve=0.0), **at_once)
     back = do(cmd.DO_JUMP, 2, -1)
     verdict = flown(COPTER, A, B, back, DOWN, craft=craft)
     assert [(f.kind, f.seq) for f in verdict.findings] == [("unreachable", 5)]
