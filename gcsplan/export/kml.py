@@ -84,7 +84,8 @@ def _track(track: Track, style: str) -> Iterable[str]:
 def _zone(zone: Zone, ring: Floats, top_m: float) -> Iterable[str]:
     yield (
         f"<Placemark><name>{_text(zone.name)}</name><description>no-fly {extent_words(zone)}</description>"
-        "<styleUrl>#zone</styleUrl>"
+        f"<styleUrl>#zone</styleUrl><ExtendedData>{_limit('lower', zone.floor, 'GND')}"
+        f"{_limit('upper', zone.ceiling, 'UNL')}</ExtendedData>"
     )
     ceiling = zone.ceiling or Level(top_m, "amsl")
     if zone.floor is None or zone.floor == Level(0.0, "agl"):
@@ -95,6 +96,12 @@ def _zone(zone: Zone, ring: Floats, top_m: float) -> Iterable[str]:
         yield _face(ring, ceiling, solid=False)
         yield "</MultiGeometry>"
     yield "</Placemark>"
+
+
+def _limit(key: str, level: Level | None, without: str) -> str:
+    """The level in words that `mission_file` reads: a zone without end is drawn with one, and must not be read so."""
+    words = without if level is None else f"{float(level.value_m)!r} m {level.datum.upper()}"
+    return f'<Data name="{key}"><value>{words}</value></Data>'
 
 
 def _face(ring: Floats, level: Level, *, solid: bool) -> str:

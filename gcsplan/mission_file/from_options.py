@@ -17,7 +17,7 @@ from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys
 from gcsplan.mission_file.vehicles import make_vehicle
 from gcsplan.mission_file.world import Box, make_spec, settle_zones
-from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zones_sha256
+from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
@@ -137,6 +137,7 @@ class OpenWorld:
             raise InputError.of([_renamed(p) for p in problems])
         notes = surface.info.get("notes", ())
         said = [*self.notes, *(str(n) for n in (notes if isinstance(notes, tuple) else ()))]
+        said += zone_notes(placed)
         if far:
             said.append(f"{len(far)} zone(s) of files lie too far away to matter and are left out")
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}

@@ -43,7 +43,7 @@ from gcsplan.mission_file.world import (
     make_spec,
     make_zones,
 )  # fmt: skip
-from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zones_sha256
+from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
 
@@ -143,6 +143,7 @@ class _Reading:
         if frame is not None and terrain is not None:
             placed, far = place_zones(drafts, frame)
             self._far(far, frame)
+            self.notes += zone_notes(placed)
             others = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in self.around if terrain.covers(*p))]
             others = [p for p in others if math.hypot(*p) <= FARTHEST_M]
             box = make_box([*(p.in_plane(frame) for p in places), *others], [z for _, z in placed], local=self.local)

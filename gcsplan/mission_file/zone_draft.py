@@ -23,6 +23,12 @@ from gcsplan.world.zones import Circle, Level, Polygon, Zone
 MAX_VERTICES = 100_000
 """Most vertices of one polygon."""
 
+Remark = tuple[str, str]
+"""What a user has to know about how a zone of a file was read: a sentence for all such zones, and what this one has."""
+
+SHOWN_ZONES = 20
+"""Most zones named in one note."""
+
 
 @dataclass(frozen=True, slots=True)
 class ZoneDraft:
@@ -39,6 +45,7 @@ class ZoneDraft:
     radius_m: float | None = None
     floor: Level | None = None
     ceiling: Level | None = None
+    remarks: tuple[Remark, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +173,19 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
             name = draft.name if len(shapes) == 1 else f"{draft.name}/{i + 1}"
             placed.append((draft, Zone(name, shape, draft.floor, draft.ceiling)))
     return placed, far
+
+
+def zone_notes(placed: Sequence[tuple[ZoneDraft, Zone]]) -> list[str]:
+    """The remarks of the zones in the plane, with one note for all zones that share a sentence."""
+    about: dict[str, list[str]] = {}
+    for draft in {id(draft): draft for draft, _ in placed}.values():  # a polygon may be cut into several zones
+        for sentence, detail in draft.remarks:
+            about.setdefault(sentence, []).append(f"{draft.name}{f' ({one_line(detail)})' if detail else ''}")
+    return [
+        f"{sentence}: {', '.join(zones[:SHOWN_ZONES])}"
+        + (f", and {len(zones) - SHOWN_ZONES} more" if len(zones) > SHOWN_ZONES else "")
+        for sentence, zones in about.items()
+    ]
 
 
 def looks_swapped(draft: ZoneDraft, frame: Frame) -> bool:

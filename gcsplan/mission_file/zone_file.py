@@ -1,23 +1,34 @@
 """The zones of one file from another program, in any of the formats.
 
-Polygons are prisms, Points with ``radius_m`` are cylinders. ``floor_agl_m``, ``ceiling_agl_m``, ``floor_amsl_m``,
-``ceiling_amsl_m`` are in a feature's properties, or in a Placemark's ExtendedData. A feature that cannot be understood
-is refused, never skipped, because a zone that is left out would be flown through. A hole counts as no-fly.
+Polygons are prisms, Points with ``radius_m`` are cylinders. Floors and ceilings are in a feature's properties, or in a
+Placemark's ExtendedData (`zone_attributes`). A feature that cannot be understood is refused, never skipped, because a
+zone that is left out would be flown through. A hole counts as no-fly.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, circle, polygon
+from gcsplan.mission_file.zone_attributes import Said
+from gcsplan.mission_file.zone_draft import Remark, ZoneDraft, circle, polygon
+from gcsplan.world.zones import Level
 
 MAX_ZONES = 20_000
-LARGEST_M = 1e6
-"""A height or radius above this, m, is a mistake."""
+RADIUS_OF_POLYGON = "the radius of a polygon is not read, so that nothing beyond its outline is kept clear"
 
-LEVEL_KEYS = ("floor_agl_m", "ceiling_agl_m", "floor_amsl_m", "ceiling_amsl_m")
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """The heights with which a format draws a polygon, as far as they limit it, and what is said of them."""
+
+    ceiling: Level | None = None
+    remarks: tuple[Remark, ...] = ()
+
+
+NOT_DRAWN = Drawn()
 
 
 @dataclass
@@ -36,23 +47,32 @@ class ZoneFile:
             return ()
         return (f"{self.path.name}: {self.holes} hole(s) in polygons count as no-fly",)
 
-    def add_ring(self, name: str, where: str, ring: list[tuple[float, float]], bounds: Bounds, key: str) -> None:
-        """Add a polygon by its outline, (latitude, longitude)."""
-        if self._room(where):
-            draft = polygon(name, where, ring, bounds, self.problems, key=key)
-            self.zones += [draft] if draft is not None else []
+    def add_ring(
+        self, said: Said, part: str, where: str, ring: list[tuple[float, float]], key: str, drawn: Drawn = NOT_DRAWN
+    ) -> None:
+        """Add a polygon called ``part`` by its outline, (latitude, longitude)."""
+        bounds = said.bounds
+        remarks = [*said.remarks, *drawn.remarks]
+        if drawn.ceiling is not None:
+            bounds = replace(bounds, **{f"ceiling_{drawn.ceiling.datum}_m": drawn.ceiling.value_m})
+        if said.radius_m is not None:
+            remarks.append((RADIUS_OF_POLYGON, f"{said.radius_m:g} m"))
+        self._add(polygon(part[:200], where, ring, bounds, self.problems, key=key), where, remarks)
 
     def add_circle(
-        self, name: str, where: str, centre: tuple[float, float], radius_m: float | None, bounds: Bounds
+        self, said: Said, part: str, where: str, centre: tuple[float, float], remarks: Sequence[Remark] = ()
     ) -> None:
-        """Add a circle by its centre, (latitude, longitude); a missing radius is a problem."""
-        if radius_m is None:
+        """Add a circle called ``part`` by its centre, (latitude, longitude); a missing radius is a problem."""
+        if said.radius_m is None:
             self.problems.append(Problem(where, "a Point needs radius_m to be a zone"))
-        elif self._room(where):
-            draft = circle(name, where, centre, radius_m, bounds, self.problems)
-            self.zones += [draft] if draft is not None else []
+        else:
+            draft = circle(part[:200], where, centre, said.radius_m, said.bounds, self.problems)
+            self._add(draft, where, [*said.remarks, *remarks])
 
-    def _room(self, where: str) -> bool:
+    def _add(self, draft: ZoneDraft | None, where: str, remarks: Sequence[Remark]) -> None:
+        if draft is None:
+            return
         if len(self.zones) >= MAX_ZONES:
             raise InputError(f"the file has more than {MAX_ZONES} zones", where=where)
-        return True
+        of_file = tuple((f"{self.path.name}: {sentence}", detail) for sentence, detail in remarks)
+        self.zones.append(replace(draft, remarks=of_file))

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_draft import Bounds
-from gcsplan.mission_file.zone_file import LARGEST_M, LEVEL_KEYS, ZoneFile
+from gcsplan.mission_file.zone_attributes import RADIUS, Attribute, Said, is_number, read_attributes, shown
+from gcsplan.mission_file.zone_file import Drawn, ZoneFile
+
+ALTITUDES = "the altitudes of corners are not read as limits"
 
 
 def read_geojson(path: Path, data: bytes) -> ZoneFile:
@@ -52,7 +54,7 @@ def _require_wgs84(whole: dict[str, Any], path: Path) -> None:
 
 def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
     if not isinstance(feature, dict):
-        found.problems.append(Problem(where, f"must be a Feature or a geometry, given {_shown(feature)}"))
+        found.problems.append(Problem(where, f"must be a Feature or a geometry, given {shown(feature)}"))
         return
     geometry: Any = feature
     properties: Any = {}
@@ -65,37 +67,49 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         return
     # gcsplan's own mission.geojson contains tracks and way points beside the zones; they are skipped.
     drawn = {"track": ("LineString", "MultiLineString"), "waypoint": ("Point",)}.get(str(properties.get("kind")), ())
-    if geometry.get("type") in drawn and "radius_m" not in properties:
+    if geometry.get("type") in drawn and not any(key.lower() == RADIUS for key in properties):
         return
-    name = next((str(v) for k in ("name", "Name", "title") if (v := properties.get(k)) not in (None, "")), fallback)
-    before = len(found.problems)
-    numbers = {k: _property(found, properties, k, where) for k in (*LEVEL_KEYS, "radius_m")}
-    if len(found.problems) > before:
+    said = read_attributes(_attributes(properties, geometry, where), fallback, found.problems)
+    if said is None:
         return
-    bounds = Bounds(**{k: numbers[k] for k in LEVEL_KEYS})
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     at = f"{where}.geometry.coordinates" if geometry is not feature else f"{where}.coordinates"
     if kind == "Point":
         centre = _position(found, coordinates, at)
         if centre is not None:
-            found.add_circle(name[:200], where, centre, numbers["radius_m"], bounds)
+            found.add_circle(said, said.name, where, centre, _unread([coordinates]).remarks)
     elif kind in ("Polygon", "MultiPolygon"):
         polygons = [coordinates] if kind == "Polygon" else coordinates
         if not isinstance(polygons, list) or not polygons:
-            found.problems.append(Problem(at, f"a {kind} needs a list of coordinates, given {_shown(polygons)}"))
+            found.problems.append(Problem(at, f"a {kind} needs a list of coordinates, given {shown(polygons)}"))
             return
         for i, rings in enumerate(polygons):
-            part = name if kind == "Polygon" else f"{name}/{i + 1}"
-            _rings(found, rings, part[:200], where, at if kind == "Polygon" else f"{at}[{i}]", bounds)
+            part = said.name if kind == "Polygon" else f"{said.name}/{i + 1}"
+            _rings(found, rings, said, part, where, at if kind == "Polygon" else f"{at}[{i}]")
     else:
         found.problems.append(
-            Problem(where, f"must be a Polygon, a MultiPolygon or a Point with radius_m, given {_shown(kind)}")
+            Problem(where, f"must be a Polygon, a MultiPolygon or a Point with radius_m, given {shown(kind)}")
         )
 
 
-def _rings(found: ZoneFile, rings: Any, name: str, where: str, at: str, bounds: Bounds) -> None:
+def _attributes(properties: dict[str, Any], geometry: dict[str, Any], where: str) -> list[Attribute]:
+    """Those of the feature, and those of its ``layer``, where ED-318 has the limits of a zone."""
+    given = [Attribute(key, value, f"{where}.properties.{key}") for key, value in properties.items()]
+    layer = geometry.get("layer")
+    if isinstance(layer, dict):
+        given += [Attribute(key, value, f"{where}.geometry.layer.{key}") for key, value in layer.items()]
+    return given
+
+
+def _unread(positions: list[Any]) -> Drawn:
+    """What is said of altitudes in positions; GeoJSON does not tell whether they are a floor, a ceiling or ground."""
+    heights = [p[2] for p in positions if len(p) > 2 and is_number(p[2]) and p[2] != 0]
+    return Drawn(remarks=((ALTITUDES, f"up to {max(heights):g} m"),)) if heights else Drawn()
+
+
+def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: str) -> None:
     if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
-        found.problems.append(Problem(at, f"a polygon is a list of rings, given {_shown(rings)}"))
+        found.problems.append(Problem(at, f"a polygon is a list of rings, given {shown(rings)}"))
         return
     found.holes += len(rings) - 1
     outline = []
@@ -105,13 +119,13 @@ def _rings(found: ZoneFile, rings: Any, name: str, where: str, at: str, bounds: 
             return
         outline.append(point)
     key = at.removeprefix(where).removeprefix(".")
-    found.add_ring(name, where, outline, bounds, key)
+    found.add_ring(said, part, where, outline, key, _unread(rings[0]))
 
 
 def _position(found: ZoneFile, position: Any, where: str) -> tuple[float, float] | None:
     """(latitude, longitude) of GeoJSON's [lon, lat]; None, and a problem, if it is not a position."""
-    if not isinstance(position, list) or len(position) < 2 or not all(_is_number(x) for x in position[:2]):
-        found.problems.append(Problem(where, f"a position is [longitude, latitude], given {_shown(position)}"))
+    if not isinstance(position, list) or len(position) < 2 or not all(is_number(x) for x in position[:2]):
+        found.problems.append(Problem(where, f"a position is [longitude, latitude], given {shown(position)}"))
         return None
     lon, lat = float(position[0]), float(position[1])
     if abs(lat) > 90.0 and abs(lon) <= 90.0 and abs(lat) <= 180.0:
@@ -120,26 +134,6 @@ def _position(found: ZoneFile, position: Any, where: str) -> tuple[float, float]
         )
         return None
     return lat, lon
-
-
-def _property(found: ZoneFile, properties: dict[str, Any], key: str, where: str) -> float | None:
-    value = properties.get(key)
-    if value is None:
-        return None
-    if not _is_number(value) or abs(value) > LARGEST_M:
-        found.problems.append(Problem(f"{where}.properties.{key}", f"must be a number, given {_shown(value)}"))
-        return None
-    return float(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, dict | list):
-        return "an object" if isinstance(value, dict) else f"a list of {len(value)}"
-    return repr(value)[:60]
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

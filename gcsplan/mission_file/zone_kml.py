@@ -1,7 +1,8 @@
 """Zones from KML: Placemarks with Polygons, or with Points whose ExtendedData has ``radius_m``.
 
-Heights come from ExtendedData alone (``floor_agl_m`` …), because the altitudes in the coordinates, and altitudeMode,
-only describe how Google Earth draws the outline. Namespaces are not required.
+Floors and ceilings come from ExtendedData. A polygon without them that is drawn from its altitude down to the ground
+(``extrude``) has its highest altitude as the ceiling, above the ground or above sea level as altitudeMode says. Other
+altitudes describe how a globe draws the outline, and a remark says that they are not read. Namespaces are not required.
 """
 
 from __future__ import annotations
@@ -9,16 +10,26 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_draft import Bounds
-from gcsplan.mission_file.zone_file import LARGEST_M, LEVEL_KEYS, ZoneFile
+from gcsplan.mission_file.zone_attributes import RADIUS, Attribute, Said, as_figure, read_attributes
+from gcsplan.mission_file.zone_file import NOT_DRAWN, Drawn, ZoneFile
+from gcsplan.mission_file.zone_levels import LARGEST_M
+from gcsplan.world.zones import Level
 
 MAX_DEPTH = 60
+MODES: dict[str, Literal["agl", "amsl"]] = {"relativeToGround": "agl", "absolute": "amsl"}
+"""What altitudes are counted from, by the altitudeModes in which they count at all."""
+
+Corner = tuple[float, float, float]
+"""Latitude, longitude and altitude of a corner; not a number if it has no altitude."""
+
+READ = "the ceiling is the height to which the zone is drawn; one over the ground follows it point by point"
+NOT_READ = "the drawn altitudes are not read as limits"
 _SHAPES = ("Polygon", "Point", "LineString", "LinearRing", "Model", "Track", "MultiTrack")
 
 
@@ -64,34 +75,31 @@ def _kind(element: Any) -> str:
 def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     name = next((t for c in placemark if _kind(c) == "name" and (t := (c.text or "").strip())), "")
     where = f"{found.path}: Placemark {number}" + (f" ({name[:60]})" if name else "")
-    name = (name or f"{found.path.stem}[{number}]")[:200]
-    data = _extended_data(placemark)
-    before = len(found.problems)
-    numbers = {k: _number(found, data, k, where) for k in (*LEVEL_KEYS, "radius_m")}
-    if len(found.problems) > before:
+    given = [Attribute("name", name, where), *_extended_data(placemark, where)]
+    said = read_attributes(given, f"{found.path.stem}[{number}]", found.problems)
+    if said is None:
         return
-    bounds = Bounds(**{k: numbers[k] for k in LEVEL_KEYS})
     shapes = [e for e in _walk(placemark, found.path, leaves=("Polygon", "Point")) if _kind(e) in _SHAPES]
     others = [_kind(e) for e in shapes if _kind(e) not in ("Polygon", "Point")]
     if others or not shapes:
-        given = others[0] if others else "none"
+        kind = others[0] if others else "none"
         found.problems.append(
-            Problem(where, f"its geometry must be Polygons, or Points with radius_m in ExtendedData, given {given}")
+            Problem(where, f"its geometry must be Polygons, or Points with radius_m in ExtendedData, given {kind}")
         )
         return
     for i, shape in enumerate(shapes):
-        part = name if len(shapes) == 1 else f"{name}/{i + 1}"
+        part = said.name if len(shapes) == 1 else f"{said.name}/{i + 1}"
         if _kind(shape) == "Point":
             points = _coordinates(found, shape, where)
             if points is not None and len(points) == 1:
-                found.add_circle(part, where, points[0], numbers["radius_m"], bounds)
+                found.add_circle(said, part, where, points[0][:2], _unread(points).remarks)
             elif points is not None:
                 found.problems.append(Problem(where, f"a Point has one coordinate, given {len(points)}"))
         else:
-            _polygon(found, shape, part, where, bounds)
+            _polygon(found, shape, said, part, where)
 
 
-def _polygon(found: ZoneFile, shape: Any, name: str, where: str, bounds: Bounds) -> None:
+def _polygon(found: ZoneFile, shape: Any, said: Said, part: str, where: str) -> None:
     outer = [e for e in _walk(shape, found.path) if _kind(e) == "outerBoundaryIs"]
     found.holes += sum(_kind(e) == "innerBoundaryIs" for e in _walk(shape, found.path))
     if len(outer) != 1:
@@ -99,18 +107,47 @@ def _polygon(found: ZoneFile, shape: Any, name: str, where: str, bounds: Bounds)
         return
     points = _coordinates(found, outer[0], where)
     if points is not None:
-        found.add_ring(name, where, points, bounds, "")
+        drawn = _unread(points) if said.of_levels else _drawn(shape, points)
+        found.add_ring(said, part, where, [p[:2] for p in points], "", drawn)
 
 
-def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[tuple[float, float]] | None:
-    """(latitude, longitude) of each ``lon,lat[,alt]`` below ``parent``; None, and a problem, if one is wrong."""
+def _drawn(shape: Any, points: list[Corner]) -> Drawn:
+    """The ceiling of a polygon that is drawn down to the ground: its highest corner, so that it is not made lower.
+
+    Altitudes of 0 are what programs write that draw flat outlines, and are no ceiling.
+    """
+
+    def texts(kind: str) -> set[str]:
+        return {(e.text or "").strip() for e in shape if _kind(e) == kind}
+
+    modes, heights = texts("altitudeMode"), [p[2] for p in points]
+    mode = modes.pop() if len(modes) == 1 else ""
+    if mode not in MODES or texts("extrude") not in ({"1"}, {"true"}) or not all(math.isfinite(h) for h in heights):
+        return _unread(points, mode)
+    top_m = max(heights)
+    if not any(heights) or (mode == "relativeToGround" and top_m <= 0.0):
+        return _unread(points, mode)
+    ceiling = Level(top_m, MODES[mode])
+    uneven = "" if min(heights) == top_m else ", the highest corner's"
+    return Drawn(ceiling, ((READ, f"{ceiling}{uneven}"),))
+
+
+def _unread(points: list[Corner], mode: str = "") -> Drawn:
+    heights = [p[2] for p in points if math.isfinite(p[2]) and p[2] != 0.0]
+    if not heights:
+        return NOT_DRAWN
+    return Drawn(remarks=((NOT_READ, " ".join(filter(None, [f"up to {max(heights):g} m", mode[:40]]))),))
+
+
+def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[Corner] | None:
+    """Each ``lon,lat[,alt]`` below ``parent``; None, and a problem, if one is wrong."""
     text = " ".join(e.text or "" for e in _walk(parent, found.path) if _kind(e) == "coordinates")
     points = []
     for word in text.split():
         try:
-            lon, lat = (float(x) for x in word.split(",")[:2])
+            lon, lat, *up = (float(x) for x in word.split(",")[:3])
         except ValueError:
-            lon = lat = math.nan
+            lon, lat, up = math.nan, math.nan, []
         if not (math.isfinite(lon) and math.isfinite(lat)):
             found.problems.append(Problem(where, f"coordinates are lon,lat[,alt] without spaces, given {word[:60]!r}"))
             return None
@@ -118,36 +155,24 @@ def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[tuple[float, 
             swapped = f"longitude and latitude look swapped: KML is lon,lat, given {word[:60]}"
             found.problems.append(Problem(where, swapped))
             return None
-        points.append((lat, lon))
+        points.append((lat, lon, up[0] if up and abs(up[0]) <= LARGEST_M else math.nan))
     if not points:
         found.problems.append(Problem(where, "has no coordinates"))
         return None
     return points
 
 
-def _extended_data(placemark: Any) -> dict[str, str]:
-    """Names and texts of ``<Data name><value>`` and ``<SimpleData name>``."""
-    data: dict[str, str] = {}
+def _extended_data(placemark: Any, where: str) -> list[Attribute]:
+    """Names and texts of ``<Data name><value>`` and ``<SimpleData name>``; a radius in figures is a number."""
+    given = []
     for child in placemark:
         if _kind(child) != "ExtendedData":
             continue
         for element in child.iter():
-            if _kind(element) == "Data":
-                data[element.get("name", "")] = next((e.text or "" for e in element if _kind(e) == "value"), "")
-            elif _kind(element) == "SimpleData":
-                data[element.get("name", "")] = element.text or ""
-    return data
-
-
-def _number(found: ZoneFile, data: dict[str, str], key: str, where: str) -> float | None:
-    text = data.get(key, "").strip()
-    if not text:
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= LARGEST_M:
-        found.problems.append(Problem(f"{where}.{key}", f"must be a number, given {text[:60]!r}"))
-        return None
-    return value
+            if _kind(element) not in ("Data", "SimpleData"):
+                continue
+            key = element.get("name", "")
+            texts = [element] if _kind(element) == "SimpleData" else [e for e in element if _kind(e) == "value"]
+            text = next((e.text or "" for e in texts), "").strip()
+            given.append(Attribute(key, as_figure(text) if key.lower() == RADIUS else text, f"{where}.{key}"))
+    return given

@@ -1,0 +1,253 @@
+"""What the attributes of a zone say, in every format: its name, floor, ceiling and radius.
+
+There is one table of names, and case does not matter. An attribute that seems to limit a zone but is not read leaves
+the zone larger, and a remark says so; a limit that is read and not understood is a mistake.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from gcsplan.errors import Problem
+from gcsplan.mission_file.zone_draft import Bounds, Remark
+from gcsplan.mission_file.zone_levels import (
+    EXAMPLES,
+    LARGEST_M,
+    REFERENCES,
+    UNITS,
+    LevelError,
+    Limit,
+    read_level,
+)
+from gcsplan.world.zones import Level
+
+NAMES = ("name", "title", "label", "designator", "identifier", "ident")
+RADIUS = "radius_m"
+OWN = ("flooraglm", "flooramslm", "ceilingaglm", "ceilingamslm")
+BOUNDS = {
+    "lower": "floor", "floor": "floor", "bottom": "floor", "base": "floor",
+    "upper": "ceiling", "ceiling": "ceiling", "top": "ceiling",
+}  # fmt: skip
+"""The words for a floor and for a ceiling with which attributes' names begin."""
+
+UNIT_NAMES = ("unit", "units", "uom")
+REFERENCE_NAMES = ("reference", "ref", "datum", "code")
+
+READ = "floors and ceilings are read from other attributes than gcsplan's own"
+NOT_READ = "these attributes are not read, and limit nothing"
+_PRESSURE = "flight levels are pressure altitudes, which move with the weather"
+UNDER_PRESSURE = f"{_PRESSURE}: these zones count from the ground up, and no mission passes under them"
+OVER_PRESSURE = f"{_PRESSURE}: these zones have no upper end, and no mission passes over them"
+
+_WORD = "|".join(sorted({w.lower() for w in (*UNITS, *REFERENCES)}, key=len, reverse=True))
+_LIMIT = re.compile(
+    rf"(?:distvert)?(?P<bound>{'|'.join(BOUNDS)})(?:ceiling|limit|lim|altitude|alt|height|elevation|elev|level)?"
+    rf"(?:(?:value|val)?(?P<first>{_WORD})?(?P<second>{_WORD})?|(?P<unit>{'|'.join(UNIT_NAMES)})"
+    rf"|(?:vertical)?(?:reference)?(?P<reference>{'|'.join(REFERENCE_NAMES)}))"
+)
+"""The name of an attribute of a floor or ceiling, in lower case, letters alone."""
+
+_SHARED = re.compile(
+    rf"(?:altitude|vertical|height)?(?:{'|'.join(UNIT_NAMES)})|uomdimensions|(?:altitude|vertical)(?:reference|datum)"
+)
+_SEEMS_A_LIMIT = re.compile(
+    r"floor|ceil|lower|upper|altitude|height|elev|vertical|limit|radius|buffer|(?<![a-z])(?:alt|agl|amsl|msl)(?![a-z])"
+)
+_OPENAIP_CODES = {"unit": {0: "M", 1: "FT", 6: "FL"}, "referencedatum": {0: "GND", 1: "MSL", 2: "STD"}}
+"""The numbers with which openAIP's files name units and references."""
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute:
+    """A name and a value as the file has them, and the place for messages."""
+
+    key: str
+    value: Any
+    where: str
+
+    @property
+    def plain(self) -> str:
+        """The name without case, spaces and signs, as the table has it."""
+        return re.sub(r"[^a-z0-9]", "", self.key.lower())
+
+    def __str__(self) -> str:
+        return f"{self.key[:40]} {repr(self.value)[:60]}"
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What the attributes of one zone say."""
+
+    name: str
+    radius_m: float | None
+    bounds: Bounds
+    remarks: tuple[Remark, ...]
+    of_levels: bool
+    """Whether an attribute speaks of a floor or ceiling, if only to say that there is none."""
+
+
+def read_attributes(given: Sequence[Attribute], name: str, problems: list[Problem]) -> Said | None:
+    """What the attributes say; ``name`` is for a zone without one. None, and ``problems``, if they cannot be read."""
+    given = [a for a in given if a.value is not None and not (isinstance(a.value, str) and not a.value.strip())]
+    reading = _Reading(_name(given) or name, problems)
+    before = len(problems)
+    radius_m = reading.radius_m([a for a in given if a.key.lower() == RADIUS])
+    bounds = reading.bounds(given)
+    used = [id(a) for a in given if a.key.lower() in (*NAMES, RADIUS) or _used(a)]
+    ignored = [a for a in given if id(a) not in used and _seems_a_limit(a)]
+    if ignored:
+        reading.remarks.append((NOT_READ, ", ".join(str(a) for a in ignored[:6]) + (", …" if len(ignored) > 6 else "")))
+    if len(problems) > before:
+        return None
+    return Said(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels)
+
+
+def shown(value: Any) -> str:
+    """A value of a file, for messages."""
+    if isinstance(value, dict | list):
+        return "an object" if isinstance(value, dict) else f"a list of {len(value)}"
+    return repr(value)[:60]
+
+
+def as_figure(text: str) -> float | str:
+    """The number that a text is, in formats that have no numbers; the text if it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def is_number(value: Any) -> bool:
+    """Whether the value is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _name(given: Sequence[Attribute]) -> str:
+    """The name: the first in the table's order, and of its spellings the one in lower case."""
+    named = [a for a in given if a.key.lower() in NAMES]
+    best = min(named, key=lambda a: (NAMES.index(a.key.lower()), a.key != a.key.lower()), default=None)
+    return "" if best is None else str(best.value).strip()
+
+
+def _used(attribute: Attribute) -> bool:
+    return bool(_LIMIT.fullmatch(attribute.plain) or _SHARED.fullmatch(attribute.plain))
+
+
+def _seems_a_limit(attribute: Attribute) -> bool:
+    if _SEEMS_A_LIMIT.search(attribute.key.lower()):
+        return True
+    try:
+        return isinstance(attribute.value, str) and bool(read_level(attribute.value))
+    except LevelError:
+        return False
+
+
+@dataclass
+class _Reading:
+    """One zone while its attributes are read."""
+
+    name: str
+    problems: list[Problem]
+    remarks: list[Remark] = field(default_factory=list)
+    of_levels: bool = False
+    read_as: list[str] = field(default_factory=list)
+
+    def radius_m(self, given: Sequence[Attribute]) -> float | None:
+        found = {self._metres(a): a for a in given}
+        if len(found) > 1:
+            self._wrong(given[1], f"and {given[0]} contradict each other: leave one out")
+        return next(iter(found), None)
+
+    def _metres(self, attribute: Attribute) -> float | None:
+        value = attribute.value
+        if is_number(value) and abs(value) <= LARGEST_M:
+            return float(value)
+        self.problems.append(Problem(attribute.where, f"must be a number, given {shown(value)}"))
+        return None
+
+    def bounds(self, given: Sequence[Attribute]) -> Bounds:
+        shared = [str(a.value) for a in given if _SHARED.fullmatch(a.plain)]
+        limits = [(a, match) for a in given if (match := _LIMIT.fullmatch(a.plain))]
+        levels: dict[str, float] = {}
+        for bound in ("floor", "ceiling"):
+            own = [(a, match) for a, match in limits if BOUNDS[match["bound"]] == bound]
+            beside = [str(a.value) for a, match in own if match["unit"] or match["reference"]]
+            read: dict[Level | Limit, Attribute] = {}
+            for a, match in own:
+                if match["unit"] or match["reference"]:
+                    continue
+                self.of_levels = True
+                implied = [w for w in (match["first"], match["second"]) if w]
+                level = self._level(a, implied + beside, shared)
+                if level is not None:
+                    read.setdefault(level, a)
+            levels |= self._settled(bound, read)
+        if self.read_as:
+            self.remarks.append((READ, ", ".join(self.read_as)))
+        return Bounds(**levels)
+
+    def _settled(self, bound: str, read: dict[Level | Limit, Attribute]) -> dict[str, float]:
+        """The level of one bound as the key and the value of a mission file; nothing where it has no end."""
+        if not read:
+            return {}
+        if len(read) > 1:
+            one, other = list(read.values())[:2]
+            self._wrong(other, f"and {one} say two things about one {bound}: leave one out, not both can hold")
+            return {}
+        ((level, attribute),) = read.items()
+        if isinstance(level, Level):
+            if bound == "ceiling" and level == Level(0.0, "agl"):
+                self._wrong(attribute, "is a ceiling at the ground, and the zone would lie wholly under ground")
+                return {}
+            if attribute.plain not in OWN and level != Level(0.0, "agl"):
+                self.read_as.append(f"{attribute}: {bound} at {level}")
+            return {f"{bound}_{level.datum}_m": level.value_m}
+        if level is Limit.PRESSURE:
+            self.remarks.append((UNDER_PRESSURE if bound == "floor" else OVER_PRESSURE, str(attribute)))
+        elif bound == "floor":
+            self._wrong(attribute, f"is a floor without end; write a height such as {EXAMPLES}")
+        return {}
+
+    def _level(self, attribute: Attribute, words: Sequence[str], shared: Sequence[str]) -> Level | Limit | None:
+        value = attribute.value
+        try:
+            if isinstance(value, str) and attribute.plain in OWN:
+                value = as_figure(value)
+            if isinstance(value, dict):
+                value, more = _parts(value)
+                words = [*words, *more]
+            if isinstance(value, bool) or not isinstance(value, int | float | str):
+                raise LevelError("it is no number and no text")
+            return read_level(value, words, shared)
+        except LevelError as why:
+            beside = f"({', '.join(words)[:60]}) " if words else ""
+            self._wrong(
+                attribute,
+                f"{beside}cannot be read as a level: {why}. Write for example {EXAMPLES}; rename "
+                "the attribute if it is no level",
+            )
+            return None
+
+    def _wrong(self, attribute: Attribute, words: str) -> None:
+        self.problems.append(Problem(attribute.where, f"zone {self.name[:60]!r}: {attribute} {words}"))
+
+
+def _parts(value: dict[Any, Any]) -> tuple[Any, list[str]]:
+    """Value and words of an object such as openAIP's ``{"value": 1500, "unit": 1, "referenceDatum": 1}``."""
+    number: Any = None
+    words = []
+    for key, part in value.items():
+        plain = re.sub(r"[^a-z]", "", str(key).lower())
+        if plain in ("value", "val"):
+            number = part
+        elif plain in (*UNIT_NAMES, *REFERENCE_NAMES, "referencedatum"):
+            words.append(_OPENAIP_CODES.get(plain, {}).get(part, "") if is_number(part) else str(part))
+            if not words[-1]:
+                raise LevelError(f"its {str(key)[:20]} {part!r} is not known")
+        else:
+            raise LevelError(f"its {str(key)[:20]!r} is not known")
+    return number, words
