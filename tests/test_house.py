@@ -19,7 +19,7 @@ ROOT = Path(gcsplan.__file__).parent
 MODULES = sorted(ROOT.rglob("*.py"))
 
 # The packages from the bottom up. Each may import what stands in its set, and itself; a module in none is a mistake.
-WORLD = {"arrays", "errors", "native", "world"}
+WORLD = {"arrays", "errors", "figures", "native", "world"}
 VEHICLE = WORLD | {"vehicle"}
 MISSION = VEHICLE | {"mavlink.mission"}
 MAVLINK = {"mavlink.mission", "mavlink.build", "mavlink.files", "mavlink.protocol", "mavlink.link"}
@@ -30,10 +30,11 @@ APP = OUTWARD | {"mission_file", "app"}
 MAY_IMPORT: dict[str, set[str]] = {
     "arrays": set(),
     "errors": set(),
+    "figures": set(),
     "native": set(),
     "world": {"arrays", "errors", "native"},
     "vehicle": WORLD,
-    "logs": {"arrays", "errors"},
+    "logs": {"arrays", "errors", "figures"},
     "optimisers": {"arrays", "errors"},
     "planners": WORLD | {"optimisers"},
     "fleet": VEHICLE,

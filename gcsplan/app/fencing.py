@@ -21,6 +21,7 @@ from gcsplan.check.judge import judge
 from gcsplan.check.plane_legs import legs_in_plane
 from gcsplan.check.verdict import Finding, Verdict
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
+from gcsplan.figures import counted
 from gcsplan.mavlink.build.fence import Area, Fence, areas_of, fence_of
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
@@ -163,7 +164,8 @@ def own_fence(
     except InputError as error:
         return replace(verdict, not_judged=(*verdict.not_judged, f"the file's fence: {error.message}")), ()
     out = sum(not a.inclusion for a in areas)
-    words = f"the file brings a fence of its own: {out} area(s) to stay out of, {len(areas) - out} to stay inside of"
+    inside = len(areas) - out
+    words = f"the file brings a fence of its own: {counted(out, 'area')} to stay out of, {inside} to stay inside of"
     # A fence acts at its border. Only errors can carry the aircraft across, so the clearance from zones is left out.
     plain = replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=0.0))
     found = breaches(areas, verdict.mission, plain, world) if verdict.legs else []

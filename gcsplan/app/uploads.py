@@ -25,6 +25,7 @@ from gcsplan.app.upload_job import LINK, SIM, JobResult, ProgressCall, UploadJob
 from gcsplan.app.upload_orders import order_of, report_end
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
+from gcsplan.figures import counted
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan, write_waypoints
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.mission.autopilots import profile_of
@@ -227,7 +228,7 @@ def _with_fence(result: JobResult, fence: UploadResult | GcsplanError | None) ->
         "items": fence.items,
         "seconds": fence.seconds,
     }
-    words = f"a fence of {fence.items} item(s) is on board too, read back and compared"
+    words = f"a fence of {counted(fence.items, 'item')} is on board too, read back and compared"
     return replace(
         result,
         warnings=tuple(dict.fromkeys((words, *result.warnings, *fence.warnings))),

@@ -10,6 +10,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.stretch import Stretch
+from gcsplan.figures import floored
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Legs, Violation
 from gcsplan.world.world import World
@@ -42,10 +43,13 @@ class Miss:
         """Describe it in one line."""
         what = f"{WORDS[self.kind]}{f' {self.zone}' if self.zone else ''}"
         left = (
-            f"{self.room:.1f} {self.unit} to spare" if self.room >= 0.0 else f"broken by {-self.room:.1f} {self.unit}"
+            f"{floored(self.room, 1):.1f} {self.unit} to spare"
+            if self.room >= 0.0
+            else f"broken by {-self.room:.1f} {self.unit}"
         )
+        value = floored(self.value, 1) if self.kind in LEAST else self.value
         return (
-            f"{what}: {self.value:.1f} {self.unit} of {self.limit:g}, {left}, item {self.seq} "
+            f"{what}: {value:.1f} {self.unit} of {self.limit:g}, {left}, item {self.seq} "
             f"({self.lat_deg:.6f}, {self.lon_deg:.6f}, {self.amsl_m:.0f} m AMSL)"
         )
 
@@ -55,6 +59,7 @@ WORDS = {
     "terrain_clearance": "lowest above ground within the clearance", "zone": "nearest to zone",
     "climb": "steepest climb", "descent": "steepest descent",
 }  # fmt: skip
+LEAST = ("min_agl", "terrain_clearance", "zone")
 LIFT_M = 50_000.0
 """An added altitude error, m, that breaks every limit of height on every leg; it breaks a limit by less the larger the
 margin."""

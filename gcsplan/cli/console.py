@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from gcsplan.cli.ending import put
+from gcsplan.figures import floored
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
@@ -63,6 +64,11 @@ def number(value: float | None, decimals: int = 0, unit: str = "") -> str:
     if value is None or not math.isfinite(value):
         return "–"
     return f"{value:,.{decimals}f}{unit}".replace(",", "\u2009")
+
+
+def least(value: float | None, decimals: int = 0, unit: str = "") -> str:
+    """A least value as in `number`, but rounded down."""
+    return number(None if value is None else floored(value, decimals), decimals, unit)
 
 
 def _table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
@@ -125,12 +131,12 @@ def _say_fleet(plan: Plan) -> None:
     closest = fleet.closest
     if fleet.separation is None:
         return
-    needed = f" of {arrival.separation_m:g} m" if arrival is not None else ""
+    needed = f" of {arrival.separation_m:g} m asked" if arrival is not None else ""
     if closest is None:
         say("separation: no two vehicles are in the air at the same time")
     else:
         a, b = closest.vehicles
-        say(f"separation: {closest.distance_m:.1f} m{needed}, {a} and {b} at T+{closest.time_s:.1f} s")
+        say(f"separation: {floored(closest.distance_m, 1):.1f} m{needed}, {a} and {b} at T+{closest.time_s:.1f} s")
 
 
 def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[Table]:
@@ -159,8 +165,8 @@ def _plan_row(v: VehiclePlan, fleet: FleetPlan | None) -> dict[str, str]:
         "above the bound, %": number(v.gap_percent, 2),
         "energy, kJ": number(verdict.energy_j / 1000),
         "battery, %": number(verdict.battery_used_percent),
-        "lowest AGL, m": f"{number(lowest.min_agl_m, 1)} of {limits.min_agl_m:g}" if lowest else "–",
-        "nearest zone, m": f"{number(nearest.zone_clearance_m, 1)} {escape(nearest.nearest_zone)}" if nearest else "–",
+        "lowest AGL, m": f"{least(lowest.min_agl_m, 1)} of {limits.min_agl_m:g}" if lowest else "–",
+        "nearest zone, m": f"{least(nearest.zone_clearance_m, 1)} {escape(nearest.nearest_zone)}" if nearest else "–",
         "steepest, °": f"{number(verdict.max_climb_deg, 1)}{climb}",
         "speed, m/s": number(v.speed_m_s, 2),
         "departs, s": number(slot.depart_s if slot else 0.0, 1) + held,
@@ -177,9 +183,9 @@ def verdict_table(name: str, verdict: Verdict) -> None:
     bad = {f.seq for f in verdict.findings}
     rows = [
         (
-            str(leg.seq), leg.kind, number(leg.length_m), number(leg.end[2], 1), number(leg.agl_end_m, 1),
-            "–" if leg.column else number(leg.min_agl_m, 1), number(leg.climb_deg, 1),
-            f"{number(leg.zone_clearance_m)} {escape(leg.nearest_zone)}" if leg.nearest_zone else "–",
+            str(leg.seq), leg.kind, number(leg.length_m), number(leg.end[2], 1), least(leg.agl_end_m, 1),
+            "–" if leg.column else least(leg.min_agl_m, 1), number(leg.climb_deg, 1),
+            f"{least(leg.zone_clearance_m)} {escape(leg.nearest_zone)}" if leg.nearest_zone else "–",
             number(leg.energy_j / 1000, 1), number(leg.time_s),
         )
         for leg in verdict.legs

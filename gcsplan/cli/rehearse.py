@@ -10,6 +10,7 @@ import typer
 from gcsplan.cli.ending import emit, talking
 from gcsplan.cli.options import JsonOption, MissionArgument, UnjudgedOption
 from gcsplan.errors import UsageError
+from gcsplan.figures import floored
 
 if TYPE_CHECKING:
     from gcsplan.app.model import Plan
@@ -117,7 +118,8 @@ def _ending(result: Rehearsal) -> list[str]:
         lines.append(f"order of arrival {', '.join(result.terms.order)}: kept{kept}")
     if result.closest is not None:
         a, b = result.closest.names
-        least = f"least separation {result.closest.distance_m:.1f} m ({a} and {b}, at {result.closest.time_s:.0f} s)"
+        apart_m = floored(result.closest.distance_m, 1)
+        least = f"least separation {apart_m:.1f} m ({a} and {b}, at {result.closest.time_s:.0f} s)"
         if result.terms.separation_m is not None:
             kept = f", kept in {result.separation_kept_runs} of {result.runs} runs" if result.runs > 1 else ""
             least += f" of {result.terms.separation_m:g} m asked{kept}"

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable
 
 from gcsplan.export.rows import ItemRow
+from gcsplan.figures import floored
 
 COLUMNS: tuple[tuple[str, str, int], ...] = (
     ("lat", "lat_deg", 7),
@@ -23,6 +24,8 @@ COLUMNS: tuple[tuple[str, str, int], ...] = (
 )
 """Column, field of `ItemRow`, decimals; the columns follow vehicle, seq and command."""
 
+LEAST = ("agl_m", "min_agl_on_leg_m")
+
 
 def write_profile(rows: Iterable[ItemRow]) -> str:
     """The CSV text: a header and one line per row, with LF and a decimal point; unknown values are empty."""
@@ -30,13 +33,13 @@ def write_profile(rows: Iterable[ItemRow]) -> str:
     table = csv.writer(out, lineterminator="\n")
     table.writerow(["vehicle", "seq", "command", *(name for name, _, _ in COLUMNS)])
     for row in rows:
-        numbers = [_cell(getattr(row, key), decimals) for _, key, decimals in COLUMNS]
+        numbers = [_cell(getattr(row, key), decimals, least=key in LEAST) for _, key, decimals in COLUMNS]
         table.writerow([row.vehicle, row.seq, row.command, *numbers])
     return out.getvalue()
 
 
-def _cell(value: float | None, decimals: int) -> str:
+def _cell(value: float | None, decimals: int, *, least: bool) -> str:
     if value is None or not math.isfinite(value):
         return ""
-    text = f"{value:.{decimals}f}"
+    text = f"{floored(value, decimals) if least else value:.{decimals}f}"
     return text.lstrip("-") if float(text) == 0.0 else text

@@ -7,6 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from gcsplan.figures import floored
+
 ORDER: dict[str, tuple[str, ...]] = {
     "": ("name", "gcsplan", "planner", "objective", "seed", "inputs", "vehicles", "fleet"),
     "inputs": ("dem_sha256", "vertical_datum", "resolution_m", "bare_dem", "zones_sha256"),
@@ -73,7 +75,5 @@ def _rounded(value: float, key: str) -> float | None:
         return None
     decimals = next((n for suffix, n in DECIMALS if key.endswith(suffix)), OTHER_DECIMALS)
     if key.startswith(("min_", "lower_bound")):
-        scaled = value * 10.0**decimals
-        # A true 60.0 may arrive as 59.999999999999: differences below the sixth place are noise.
-        value = math.floor(scaled + 1e-3) / 10.0**decimals if abs(scaled) < 1e15 else value
+        value = floored(value, decimals)
     return round(value, decimals) + 0.0

@@ -16,6 +16,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
+from gcsplan.figures import floored
 from gcsplan.fleet._nearest import below, nearest
 from gcsplan.fleet._sweep import Fleet, Least
 from gcsplan.fleet.motion import TimedPath
@@ -101,7 +102,7 @@ class Conflict:
     def describe(self, where: Where = in_metres) -> str:
         """One sentence: which vehicles, how near, when, and where."""
         a, b = self.worst.vehicles
-        near = f"{self.worst.distance_m:.1f} m, needed {self.needed_m:g} m"
+        near = f"{floored(self.worst.distance_m, 1):.1f} m, needed {self.needed_m:g} m"
         at = f"at {self.worst.time_s:.1f} s ({where(self.worst.middle)})"
         if self.kind == "air":
             return f"{a} and {b} come as near as {near}, {at}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.figures import counted
 
 EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
 LEAST_POINTS = 20
@@ -48,9 +49,11 @@ class FlightLog:
             away = np.abs(at[:, 1:3] - np.median(at[:, 1:3], axis=0))
             away[:, 1] = np.minimum(away[:, 1], 360.0 - away[:, 1])
             at = at[(away < FARTHEST_DEG).all(axis=1)]
-        for what, rows in (("positions", at), ("battery readings", watts)):
+        for what, rows in (("position", at), ("battery reading", watts)):
             if len(rows) < LEAST_POINTS:
-                raise InputError(f"holds {len(rows)} {what}, and at least {LEAST_POINTS} are needed", where=name)
+                raise InputError(
+                    f"holds {counted(len(rows), what)}, and at least {LEAST_POINTS} are needed", where=name
+                )
         east, north = _in_metres(at[:, 1], at[:, 2]) if degrees else (at[:, 1], at[:, 2])
         return cls(name, at[:, 0], east, north, at[:, 3], watts[:, 0], watts[:, 1], notes)
 

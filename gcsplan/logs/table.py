@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gcsplan.errors import InputError
+from gcsplan.figures import counted
 from gcsplan.logs.flight_log import FlightLog
 
 NAMES: dict[str, tuple[str, ...]] = {
@@ -72,8 +73,8 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
         if not good:
             bad.append(number)
     if len(bad) > MOST_BAD * max(len(lines) - 1, 1):
-        raise InputError(f"{len(bad)} lines hold no numbers, the first is line {bad[0]}", where=str(file))
-    notes = (f"{file.name}: {len(bad)} lines without numbers were passed over",) if bad else ()
+        raise InputError(f"{counted(len(bad), 'line')} without numbers, the first is line {bad[0]}", where=str(file))
+    notes = (f"{file.name}: passed over {counted(len(bad), 'line')} without numbers",) if bad else ()
     return FlightLog.of(str(file), places, power, notes, degrees=not flat)
 
 

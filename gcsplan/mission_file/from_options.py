@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.figures import counted
 from gcsplan.mission_file.complaints import read_section
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys
@@ -139,7 +140,7 @@ class OpenWorld:
         said = [*self.notes, *(str(n) for n in (notes if isinstance(notes, tuple) else ()))]
         said += zone_notes(placed)
         if far:
-            said.append(f"{len(far)} zone(s) of files lie too far away to matter and are left out")
+            said.append(f"left out: {counted(len(far), 'zone')} of files, too far away to matter")
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}
         inputs["zones_sha256"] = zones_sha256(self._drafts)
         inputs["notes"] = tuple(dict.fromkeys(said))

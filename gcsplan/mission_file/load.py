@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.figures import counted
 from gcsplan.mission_file.complaints import read_section, unknown_keys
 from gcsplan.mission_file.content import read_content
 from gcsplan.mission_file.ground import Ground, Site
@@ -301,7 +302,7 @@ class _Reading:
             else:
                 left_out += 1
         if left_out:
-            self.notes.append(f"{left_out} zone(s) of files lie too far away to matter and are left out")
+            self.notes.append(f"left out: {counted(left_out, 'zone')} of files, too far away to matter")
 
     def _open(self, spec: TerrainSpec) -> Terrain | None:
         where = f"{self.where}terrain"

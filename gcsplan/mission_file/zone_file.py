@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.figures import counted
 from gcsplan.mission_file.zone_attributes import Said
 from gcsplan.mission_file.zone_draft import Remark, ZoneDraft, circle, polygon
 from gcsplan.world.zones import Level
@@ -45,7 +46,7 @@ class ZoneFile:
         """Notes for the user."""
         if not self.holes:
             return ()
-        return (f"{self.path.name}: {self.holes} hole(s) in polygons count as no-fly",)
+        return (f"{self.path.name}: {counted(self.holes, 'hole')} in polygons counted as no-fly",)
 
     def add_ring(
         self, said: Said, part: str, where: str, ring: list[tuple[float, float]], key: str, drawn: Drawn = NOT_DRAWN

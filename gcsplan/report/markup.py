@@ -8,6 +8,8 @@ import math
 import unicodedata
 from collections.abc import Iterable, Sequence
 
+from gcsplan.figures import floored
+
 THIN, UNIT_GAP = "\u202f", "\u202f"
 _DIRECTION = frozenset("\u200e\u200f\u061c\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Characters that change the direction of writing: in a name, they could change how its neighbours read."""
@@ -35,12 +37,10 @@ def num(value: float | None, decimals: int = 0, unit: str = "") -> str:
 
 
 def least(value: float | None, decimals: int = 1, unit: str = "") -> str:
-    """A number as in `num`, but rounded down, so that a margin is never shown larger than it is."""
+    """A least value as in `num`, but rounded down."""
     if value is None or not math.isfinite(value):
         return "–"
-    power = 10.0**decimals
-    # A true 65.25 may arrive as 65.2499999: differences below the sixth place are noise.
-    return num(math.floor(value * power + 1e-3 * min(power, 1.0) + 1e-6 * power) / power, decimals, unit)
+    return num(floored(value, decimals), decimals, unit)
 
 
 def minutes(seconds: float | None) -> str:

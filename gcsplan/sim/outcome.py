@@ -11,6 +11,7 @@ import numpy as np
 
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
+from gcsplan.figures import floored
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.trace import Judged, Meeting, Trace, examine, meetings
 from gcsplan.vehicle import Vehicle
@@ -208,7 +209,7 @@ def _row(v: Performance, runs: int) -> dict[str, str]:
     if runs > 1:
         row["95 % within, s"] = "–" if v.p95_s is None else f"{v.p95_s:.2f}"
     row["down, s"] = seconds(_median(v.end_s))
-    row["lowest AGL, m"] = "–" if math.isnan(v.min_agl_m) else f"{v.min_agl_m:.1f}"
+    row["lowest AGL, m"] = "–" if math.isnan(v.min_agl_m) else f"{floored(v.min_agl_m, 1):.1f}"
     row["battery, %"] = "–" if v.battery_used_percent is None else f"{v.battery_used_percent:.0f}"
     return row
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.verdict import Finding
+from gcsplan.figures import floored
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.world import World
@@ -175,7 +176,7 @@ class Meeting:
     def describe(self, needed_m: float) -> str:
         """Return one sentence; ``needed_m`` is the required separation."""
         a, b = self.names
-        near = f"{self.distance_m:.1f} m, needed are {needed_m:g} m, at {self.time_s:.1f} s"
+        near = f"{floored(self.distance_m, 1):.1f} m, needed are {needed_m:g} m, at {self.time_s:.1f} s"
         if self.kind == "air":
             return f"{a} and {b} came as near as {near}"
         return f"{a} landed beside {b}, which stood there: {near}"

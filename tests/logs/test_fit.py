@@ -188,8 +188,8 @@ def test_csv_in_degrees_or_metres_with_power_or_volt_and_amp(tmp_path: Path) -> 
         ("", "empty"),
         ("time_s,lat,lon,amsl_m\n1,2,3,4\n", "no column for power_w"),
         ("a,b\n1,2\n", "no column for time_s, amsl_m, lat and lon, power_w"),
-        ("time_s,lat,lon,amsl_m,power_w\n" + "1,x,3,4,y\n" * 50, "50 lines hold no numbers, the first is line 2"),
-        ("time_s,lat,lon,amsl_m,power_w\n1,2,3,4,5\n", "1 positions"),
+        ("time_s,lat,lon,amsl_m,power_w\n" + "1,x,3,4,y\n" * 50, "50 lines without numbers, the first is line 2"),
+        ("time_s,lat,lon,amsl_m,power_w\n1,2,3,4,5\n", "1 position,"),
     ],
 )
 def test_a_csv_that_cannot_be_used_says_what_it_lacks(tmp_path: Path, text: str, words: str) -> None:

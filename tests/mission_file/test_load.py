@@ -366,7 +366,7 @@ def test_zones_from_files_are_found_beside_the_mission_and_keep_their_names_apar
     (tmp_path / "sub" / "z.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     mission = load(base(no_fly=[{"file": "sub/z.geojson"}]), tmp_path)
     assert [z.name for z in mission.zones] == ["R", "R #2"]
-    assert any("1 zone(s)" in n for n in mission.notes)
+    assert any("1 zone of" in n for n in mission.notes)
     features[1]["properties"]["radius_m"] = "60"
     features[2]["geometry"]["coordinates"] = [36.6, -84.3]
     (tmp_path / "sub" / "z.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))

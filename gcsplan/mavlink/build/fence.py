@@ -17,6 +17,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.figures import counted
 from gcsplan.mavlink.mission.autopilots import max_items, profile_of
 from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT
 from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7
@@ -200,10 +201,10 @@ def _require_storage(zones: Sequence[Zone], items: Sequence[MissionItem], autopi
     circles = sum(isinstance(z.shape, Circle) for z in zones)
     polygons = len(zones) - circles
     corners = len(items) - circles
-    what = f"{circles} circle(s) and {polygons} polygon(s) with {corners} corners"
+    what = f"{counted(circles, 'circle')} and {counted(polygons, 'polygon')} with {counted(corners, 'corner')}"
     most = max_items(autopilot, FENCE)
     if len(items) > most:
-        raise InputError(f"the fence has {len(items)} items ({what}) and {label} keeps {most}: {cure}")
+        raise InputError(f"the fence has {counted(len(items), 'item')} ({what}) and {label} keeps {most}: {cure}")
     storage = STORAGE_BYTES.get(autopilot)
     needed = HEAD_BYTES + CIRCLE_BYTES * circles + POLYGON_BYTES * polygons + CORNER_BYTES * corners
     if storage is not None and needed > storage:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.figures import counted
 from gcsplan.mavlink.files.file_items import (
     HAS_PLACE,
     MAX_BYTES,
@@ -144,7 +145,9 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     rally = rally_items(plan.get("rallyPoints"), f"{where}: rallyPoints")
     for key, own in (("geoFence", fence), ("rallyPoints", rally)):
         if own:
-            notes.append(f"the file's {key} ({len(own)} items) is no part of the mission and is not sent with it")
+            notes.append(
+                f"the file's {key} ({counted(len(own), 'item')}) is no part of the mission and is not sent with it"
+            )
     return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally)
 
 
@@ -270,7 +273,7 @@ class _Items:
             self._bad(key, f"a complex item ({name}) without its single items cannot be read; make it of way points")
             return
         how = "stands for" if where == key else "holds"
-        self.notes.append(f"{key} is a {name}: it was read as the {len(inner)} items that it {how}")
+        self.notes.append(f"{key} is a {name}: it was read as the {counted(len(inner), 'item')} that it {how}")
         for index, part in enumerate(inner):
             place = f"{where}[{index}]"
             if not isinstance(part, dict) or part.get("type") != "SimpleItem":

@@ -27,6 +27,7 @@ from collections.abc import Mapping
 from enum import auto
 from typing import Any, ClassVar
 
+from gcsplan.figures import counted
 from gcsplan.mavlink.mission.mission import MISSION, MissionItem
 from gcsplan.mavlink.protocol.machine import CANCELLED_BY_US, Label, Machine, Progress, Timers, checked_type
 from gcsplan.mavlink.protocol.messages import (
@@ -200,7 +201,7 @@ class Download(Machine):
             self._heard_at, self._tries, self.opaque_id = now, 0, message.opaque_id
             self._count = message.count
             if message.count > self._most:
-                words = f"it announces {message.count} items, and can hold at most {self._most}"
+                words = f"it announces {counted(message.count, 'item')}, and can hold at most {self._most}"
                 self._end(E.REFUSED, Refused(OURS, None, words))
                 return []
             if message.count == 0:
@@ -208,7 +209,10 @@ class Download(Machine):
             self._step(E.COUNT)
             return self._ask_item(now)
         if self._state is S.FETCHING and (message.count, message.opaque_id) != (self._count, self.opaque_id):
-            self._again(now, f"the vehicle's list changed from {self._count} to {message.count} items while being read")
+            self._again(
+                now,
+                f"the vehicle's list changed from {self._count} to {counted(message.count, 'item')} while being read",
+            )
         return []
 
     def _take_item(self, message: Item, now: float) -> list[Packet]:
@@ -277,7 +281,7 @@ class Download(Machine):
             self.retries += 1
             return self._ask_list(now)
         if now - self._heard_at >= max(2 * self.timers.response_s, 4 * self._wait_s):
-            self._again(now, f"silence after {len(self._items)} of {self._count} items")
+            self._again(now, f"silence after {len(self._items)} of {counted(self._count or 0, 'item')}")
             return []
         self._step(E.RETRY)
         self.retries += int(self._tries > 0)

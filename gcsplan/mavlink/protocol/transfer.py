@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from gcsplan.errors import InputError
+from gcsplan.figures import counted
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.compare import Difference, compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, MissionItem
@@ -335,14 +336,14 @@ def on_board(
     same = min(wrong, default=common) - start
     if same <= 0 and common > start:
         whose = "still holds another" if profile_of(autopilot).atomic or not began else "holds another"
-        return f"the vehicle {whose} {name} of {len(read)} items: do not take it for the one that was sent"
+        return f"the vehicle {whose} {name} of {counted(len(read), 'item')}: do not take it for the one that was sent"
     if len(read) == len(sent) and len(set(wrong)) < common - start and not profile_of(autopilot).atomic:
         unlike = ", ".join(map(str, sorted(set(wrong))[:8]))
         return (
-            f"the vehicle now holds {len(read)} items, of which {len(set(wrong))} are not as sent (item {unlike}); "
-            f"do not fly; upload again or clear"
+            f"the vehicle now holds {counted(len(read), 'item')}, of which {len(set(wrong))} are not as sent "
+            f"(item {unlike}); do not fly; upload again or clear"
         )
     return (
-        f"the vehicle now holds {len(read)} items of an unfinished upload, the first {same + start} as sent; "
-        f"do not fly; upload again or clear"
+        f"the vehicle now holds {counted(len(read), 'item')} of an unfinished upload, the first {same + start} as "
+        f"sent; do not fly; upload again or clear"
     )

@@ -15,7 +15,7 @@ function num(value, decimals, unit) {
 }
 
 // Room is rounded down, as everywhere on the page.
-const least = (v, d, unit) => num(v === null ? null : Math.floor(v * 10 ** d + 1e-6) / 10 ** d, d, unit);
+const least = (v, d, unit) => num(v === null ? null : Math.floor(v * 10 ** d + 1e-3) / 10 ** d, d, unit);
 
 function minutes(s) {
   const whole = Math.round(s);

@@ -352,7 +352,7 @@ def test_a_plan_files_own_fence_is_read_and_judged(tmp_path: Path) -> None:
         read = read_mission_file(file, autopilot=COPTER)
         assert read.fence == fence.items
         verdict, told = fencing.own_fence(read.fence, judge(mission, craft, where), craft, where)
-        assert "1 area(s) to stay out of" in told[0]
+        assert "1 area to stay out of" in told[0]
         assert verdict.safe is safe
 
 
@@ -484,7 +484,7 @@ def test_plan_and_upload_send_the_fence_where_that_is_asked_for(run: Any) -> Non
     code, _, err = run("plan", "m.yaml", "-o", "out", "--upload", "sim", "--fence")
     assert code == 0, err
     assert "'shed' is left out" in err
-    assert "a fence of 1 item(s) is on board too" in err
+    assert "a fence of 1 item is on board too" in err
     board = LoopbackVehicle(1, COPTER, lat_deg=36.6, lon_deg=-84.38, amsl_m=471.0)
     with SimServer([board], "udpin:127.0.0.1:0", speedup=10.0) as server:
         to = ("--to", server.url_for_gcs)

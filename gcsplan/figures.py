@@ -1,0 +1,24 @@
+"""How numbers are rounded and counted for people: one rule for each kind of number, in every table, page and file.
+
+A least value (a height above ground, a distance to a zone or between vehicles, what is left of a limit, a lower bound)
+is rounded down, so that it is never shown better than it is. Every other number is rounded to the nearest.
+"""
+
+from __future__ import annotations
+
+import math
+
+NOISE = 1e-3
+"""Part of the last digit that is taken for noise: a true 60.0 may arrive as 59.999999999999."""
+
+
+def floored(value: float, decimals: int) -> float:
+    """A least value, rounded down to ``decimals``; NaN and infinity are themselves."""
+    power = 10.0**decimals
+    scaled = value * power
+    return math.floor(scaled + NOISE) / power if abs(scaled) < 1e15 else value
+
+
+def counted(count: int, noun: str) -> str:
+    """A count with its noun: ``1 item``, ``2 items``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
