@@ -12,6 +12,7 @@ from typing import Any
 
 from gcsplan.app.fencing import own_fence
 from gcsplan.app.pipeline import world_of
+from gcsplan.app.way_home import home_of, is_required, lets_fly
 from gcsplan.check.judge import TERRAIN_ERROR_M, judge
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
@@ -43,7 +44,7 @@ class Checked:
     """One file, its vehicle, and the verdict in ``world``.
 
     ``fence`` and ``rally`` are the file's own. ``terrain_error_m`` is the error that terrain-frame legs were judged
-    with. ``way_home`` is None unless it was requested.
+    with. ``way_home`` is None unless it was requested; ``home_required``: the mission flies only with a safe return.
     """
 
     file: Path
@@ -57,6 +58,15 @@ class Checked:
     rally: tuple[MissionItem, ...] = ()
     terrain_error_m: float = TERRAIN_ERROR_M
     way_home: WayHome | None = None
+    home_required: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Returns:
+    """Whether the way home is judged, and whether it must be safe, which means that it is judged too."""
+
+    judged: bool = False
+    required: bool = False
 
 
 @dataclass(frozen=True)
@@ -93,9 +103,9 @@ def match(source: MissionFile, argument: str) -> tuple[VehicleRequest, Path]:
     raise UsageError(f"{argument}: which vehicle is it for? Write NAME={file} with one of {', '.join(by_name)}")
 
 
-def check_files(source: MissionFile, arguments: Sequence[str]) -> list[Checked]:
+def check_files(source: MissionFile, arguments: Sequence[str], *, returns: Returns = Returns()) -> list[Checked]:
     """Judge each FILE or NAME=FILE in the world of ``source``. Raises InputError or UsageError for unreadable files."""
-    batch = check_batch(source, arguments)
+    batch = check_batch(source, arguments, returns=returns)
     if batch.unreadable:
         if len(batch.unreadable) == 1:
             raise batch.unreadable[0][1]
@@ -103,11 +113,12 @@ def check_files(source: MissionFile, arguments: Sequence[str]) -> list[Checked]:
     return list(batch.checked)
 
 
-def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: bool = False) -> Batch:
+def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: Returns = Returns()) -> Batch:
     """Judge each FILE or NAME=FILE in the world of ``source``; a file that cannot be read does not stop the others.
 
-    ``returns``: also judge the way home from every point. If a file reaches beyond the terrain that was loaded for the
-    mission, more terrain is loaded. Raises UsageError if it is not clear which vehicle a file is for.
+    ``returns``: what of the way home is asked for, beside the mission file's own ``way_home``. If a file reaches beyond
+    the terrain that was loaded for the mission, more terrain is loaded. Raises UsageError if it is not clear which
+    vehicle a file is for.
     """
     requests = [match(source, argument) for argument in arguments]
     read: list[tuple[VehicleRequest, Path, MissionFileRead]] = []
@@ -122,6 +133,7 @@ def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: bool 
     source = _reaching(source, [place for _, _, r in read for place in places_of(r.mission)])
     world = world_of(source)
     error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
+    returns = Returns(returns.judged, is_required(source, returns.required))
     checked = [_judged(request, file, r, world, error_m, returns) for request, file, r in read]
     return Batch(source.name, tuple(checked), tuple(unreadable), source.inputs, source.notes)
 
@@ -136,7 +148,7 @@ def check_mission(source: MissionFile, mission: Mission, vehicle: str | None = N
     read = _at_start(MissionFileRead(mission), start, request.vehicle)
     source = _reaching(source, places_of(read.mission))
     error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
-    return _judged(request, file, read, world_of(source), error_m, returns=False)
+    return _judged(request, file, read, world_of(source), error_m, Returns())
 
 
 def _at_start(read: MissionFileRead, start: Home, vehicle: Vehicle) -> MissionFileRead:
@@ -190,12 +202,12 @@ def _reaching(source: MissionFile, places: Sequence[tuple[float, float]]) -> Mis
 
 
 def check_with_options(
-    options: WorldOptions, autopilot: Autopilot | None, arguments: Sequence[str], *, returns: bool = False
+    options: WorldOptions, autopilot: Autopilot | None, arguments: Sequence[str], *, returns: Returns = Returns()
 ) -> Batch:
     """Judge each FILE in the world that ``options`` describe.
 
     With ``autopilot`` None, a `.plan` file names its own; a `.waypoints` file names none and is judged for ArduCopter.
-    Files that lie too far apart for one plane get a plane each. ``returns``: also judge the way home from every point.
+    Files that lie too far apart for one plane get a plane each. ``returns``: what of the way home is asked for.
     Raises InputError if the options are wrong.
     """
     opened = OpenWorld(options)
@@ -255,7 +267,7 @@ def _request(opened: OpenWorld, mission: Mission, name: str, world: World) -> Ve
 
 
 def _judged(
-    request: VehicleRequest, file: Path, read: MissionFileRead, world: World, terrain_error_m: float, returns: bool
+    request: VehicleRequest, file: Path, read: MissionFileRead, world: World, terrain_error_m: float, returns: Returns
 ) -> Checked:
     vehicle, mission, notes = request.vehicle, read.mission, list(read.notes)
     if mission.autopilot is not vehicle.autopilot:
@@ -272,35 +284,48 @@ def _judged(
     if verdict.legs and verdict.legs[-1].kind == "cruise" and not any("without end" in n for n in verdict.notes):
         notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")
     home: WayHome | None = None
-    if returns:
-        from gcsplan.check.rtl.way_home import way_home
-
-        rtl_m = request.rtl_rel_home_m
-        home = way_home(verdict, vehicle, world, rtl_rel_home_m=rtl_m, terrain_error_m=terrain_error_m)
+    if returns.judged or returns.required:
+        home = home_of(verdict, request, world, terrain_error_m)
         notes += home.notes
     return Checked(
-        file, vehicle, request, mission, verdict, tuple(notes), world, read.fence, read.rally, terrain_error_m, home
-    )
+        file, vehicle, request, mission, verdict, tuple(notes), world, read.fence, read.rally, terrain_error_m, home,
+        returns.required,
+    )  # fmt: skip
 
 
 def passes(c: Checked, *, allow_unjudged: bool) -> bool:
-    """Whether a checked mission may fly: it breaks no limit, and neither does the way home if that was requested."""
-    judged = [c.verdict.safe, *([c.way_home.safe] if c.way_home is not None else [])]
-    return False not in judged and (allow_unjudged or None not in judged)
+    """Whether a checked mission may fly: it breaks no limit, and the way home lets it fly."""
+    path = c.verdict.safe is True or (c.verdict.safe is None and allow_unjudged)
+    return path and lets_fly(c.way_home, required=c.home_required)
 
 
 def finding_lines(c: Checked, *, allow_unjudged: bool = False) -> list[str]:
-    """One line per finding, ``file:item: kind: message``, in the format of compilers and linters."""
+    """One line per finding, ``file:item: kind: message``, in the format of compilers and linters.
+
+    A way home that is only reported is one line, ``file:item: warning: way_home: message``.
+    """
     lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(f.message)}" for f in c.verdict.findings]
-    unjudged = list(c.verdict.not_judged)
-    if c.way_home is not None:
-        lines += [f"{c.file}:{s.from_seq}: way_home: {s.describe()}" for s in c.way_home.unsafe]
-        if c.way_home.battery is not None and c.way_home.battery.short:
-            battery = c.way_home.battery
-            lines.append(f"{c.file}:{battery.no_return_seq or 0}: way_home: {battery.describe()}")
-        unjudged += [f"the way home: {words}" for words in c.way_home.not_judged if words not in unjudged]
     if not allow_unjudged:
-        lines += [f"{c.file}:{_item_in(w)}: not_judged: {_without_item(w)}" for w in unjudged]
+        lines += [f"{c.file}:{_item_in(w)}: not_judged: {_without_item(w)}" for w in c.verdict.not_judged]
+    return lines + home_lines(c)
+
+
+def home_lines(c: Checked) -> list[str]:
+    """The lines of `finding_lines` on a way home that is not safe; none if it is, or was not judged at all."""
+    home = c.way_home
+    if home is None or home.safe is True:
+        return []
+    first = home.unsafe[0].from_seq if home.unsafe else 0
+    battery = home.battery
+    if not home.unsafe and battery is not None and battery.no_return_seq is not None:
+        first = battery.no_return_seq
+    if lets_fly(home, required=c.home_required):
+        return [f"{c.file}:{first}: warning: way_home: {home.headline}"]
+    lines = [f"{c.file}:{first}: way_home: {home.headline}" + (f"; {home.advice}" if home.advice else "")]
+    lines += [f"{c.file}:{s.from_seq}: way_home: no safe return from {s.describe()}" for s in home.unsafe]
+    if battery is not None and battery.short:
+        lines.append(f"{c.file}:{battery.no_return_seq or 0}: way_home: {battery.describe()}")
+    lines += [f"{c.file}:{_item_in(w)}: not_judged: the way home: {_without_item(w)}" for w in home.not_judged]
     return lines
 
 
@@ -323,9 +348,9 @@ def failure(
     bad = [c for c in checked if not passes(c, allow_unjudged=allow_unjudged)]
     if not bad and not unreadable:
         return None
-    broken = any(c.verdict.safe is False or (c.way_home is not None and c.way_home.safe is False) for c in bad)
+    broken = any(c.verdict.safe is False or _home_broken(c) for c in bad)
     lines = [f"{c.vehicle.name}: {line}" for c in bad for line in c.verdict.describe().splitlines()]
-    lines += [line for c in bad for line in finding_lines(c) if ": way_home: " in line or "the way home: " in line]
+    lines += [line for c in bad if not lets_fly(c.way_home, required=c.home_required) for line in home_lines(c)]
     lines += [str(error) for _, error in unreadable]
     reason = "bad_input" if unreadable else "violation" if broken else "not_judged"
     problems: list[Problem] = [p for _, error in unreadable for p in error.problems]
@@ -338,6 +363,10 @@ def failure(
     if problems:
         document["problems"] = [{"where": p.where, "message": p.message} for p in problems]
     return document
+
+
+def _home_broken(c: Checked) -> bool:
+    return c.home_required and c.way_home is not None and c.way_home.safe is False
 
 
 def more_of(c: Checked) -> dict[str, Any]:

@@ -68,19 +68,6 @@ def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
     return rally_items(home.rally)
 
 
-def homes_of(plan: Plan) -> dict[str, WayHome]:
-    """The way home of every vehicle, from every point of its mission; takes about a second for 20 km."""
-    from gcsplan.check.rtl.way_home import way_home
-
-    return {
-        v.name: way_home(
-            v.verdict, v.request.vehicle, plan.world,
-            rtl_rel_home_m=v.request.rtl_rel_home_m, terrain_error_m=plan.source.terrain_error_m,
-        )
-        for v in plan.vehicles
-    }  # fmt: skip
-
-
 def report_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = MappingProxyType({})) -> str:
     """``report.html``: one page that needs no network."""
     from gcsplan.app.report_page import render

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from gcsplan.app import outputs, uploads
+from gcsplan.app import way_home as returns
 from gcsplan.app.checking import check_files, check_mission
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import require_passing
@@ -120,7 +121,8 @@ def write(
     vehicle returns from every point, which takes about a second for 20 km.
 
     Outputs of an earlier plan in ``folder`` are removed; any other file in the way is moved to its ``previous/``.
-    Raises CheckFailed if a verdict does not pass (with ``allow_unjudged``, what could not be judged passes). The
+    Raises CheckFailed if a verdict does not pass (with ``allow_unjudged``, what could not be judged passes), or if the
+    mission file says ``way_home: required`` and a return is unsafe or not judged. The
     earlier outputs are moved to ``previous/`` then, so that no old mission is flown by mistake. Raises InputError if
     ``folder`` cannot be written; nothing has changed then.
 
@@ -141,10 +143,10 @@ def write(
     settle_outputs(folder)
     try:
         require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
+        homes = returns.judged(planned, asked=report or way_home)
     except CheckFailed:
         retire_outputs(folder)
         raise
-    homes = outputs.homes_of(planned) if report or way_home else {}
     files = outputs.outputs_of(planned, homes)
     if report:
         files["report.html"] = outputs.report_of(planned, (), homes)
@@ -177,7 +179,7 @@ def report(
         >>> report(planned, way_home=False).startswith("<!DOCTYPE html>")
         True
     """
-    text = outputs.report_of(planned, results, outputs.homes_of(planned) if way_home else {})
+    text = outputs.report_of(planned, results, returns.homes_of(planned) if way_home else {})
     if file is not None:
         write_whole(Path(file), text)
     return text
@@ -204,7 +206,7 @@ def upload(
     Returns one `JobResult` per vehicle, in the plan's order: ``verified`` is True only if the mission was read back and
     equals what was sent; ``message`` says what went wrong. A failure of one vehicle does not affect the others and
     raises nothing; `gcsplan.app.uploads.exit_code` sums them up. Raises UsageError for bad targets, and, before
-    anything is sent, CheckFailed if a verdict does not pass.
+    anything is sent, CheckFailed if a verdict does not pass, or a return with ``way_home: required``.
     """
     if isinstance(to, Mapping):
         words = [f"{name}={url}" for name, url in to.items()]
@@ -212,12 +214,13 @@ def upload(
         words = [to] if isinstance(to, str) else list(to)
     targets = uploads.targets(words, [v.request.vehicle for v in planned.vehicles])
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
+    homes = returns.judged(planned, asked=False)
     from gcsplan.sim.loopback import loopback_fleet
 
     options = UploadOptions(
         allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s
     )
-    return uploads.run_jobs(uploads.jobs_of(planned, targets), options, progress, simulator=loopback_fleet)
+    return uploads.run_jobs(uploads.jobs_of(planned, targets, homes), options, progress, simulator=loopback_fleet)
 
 
 def rehearse(
@@ -236,10 +239,11 @@ def rehearse(
     Wind, gusts and position noise (`gcsplan.sim.wind.Weather`) are drawn from ``seed``, anew for each of ``runs``.
     ``progress(done, runs)`` is called from time to time. The result's ``safe`` is True if the arrivals were in order,
     and the separation and every limit were kept on the flown tracks; ``error()`` states what was not kept. Raises what
-    an upload raises, and InputError for invalid weather.
+    an upload raises, CheckFailed as `upload` does for a return that is required, and InputError for invalid weather.
     """
     from gcsplan.app import rehearsing
     from gcsplan.sim.wind import Weather
 
+    returns.judged(planned, asked=False)
     weather = Weather(wind_m_s, from_deg, gusts_m_s, noise_m)
     return rehearsing.rehearse(planned, weather=weather, runs=runs, seed=seed, progress=progress)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.fence import Fence
 from gcsplan.mavlink.mission.mission import Mission
@@ -34,7 +35,10 @@ class UploadOptions:
 
 @dataclass(frozen=True, eq=False)
 class UploadJob:
-    """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own)."""
+    """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own).
+
+    ``way_home`` is None unless it was judged.
+    """
 
     name: str
     url: str
@@ -45,6 +49,7 @@ class UploadJob:
     rtl_rel_home_m: float | None = None
     terrain_error_m: float = 0.0
     fence: Fence | None = None
+    way_home: WayHome | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from gcsplan.app.checking import Checked, split_name
@@ -34,6 +35,7 @@ from gcsplan.mission_file import MissionFile
 from gcsplan.vehicle import Autopilot, Vehicle
 
 if TYPE_CHECKING:
+    from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.mavlink.link.link import Link
     from gcsplan.mavlink.link.results import UploadResult
 
@@ -77,13 +79,15 @@ def _url(text: str, word: str) -> str:
         raise UsageError(f"{error.message}{hint}", where=f"upload to {word!r}") from None
 
 
-def jobs_of(plan: Plan, where: Mapping[str, str]) -> list[UploadJob]:
-    """The upload jobs of a plan; vehicles without a target are left out."""
+def jobs_of(
+    plan: Plan, where: Mapping[str, str], homes: Mapping[str, WayHome] = MappingProxyType({})
+) -> list[UploadJob]:
+    """The upload jobs of a plan; vehicles without a target are left out. ``homes``: ways home that were judged."""
     source = plan.source
     return [
         UploadJob(
             v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
-            source.terrain_error_m,
+            source.terrain_error_m, way_home=homes.get(v.name),
         )
         for v in plan.vehicles if v.name in where
     ]  # fmt: skip
@@ -102,7 +106,7 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
     return [
         UploadJob(
             c.vehicle.name, to[c.vehicle.name], c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m,
-            c.terrain_error_m,
+            c.terrain_error_m, way_home=c.way_home,
         )
         for c in checked
     ]  # fmt: skip

@@ -82,13 +82,13 @@ class BatteryHome:
         usable = 100.0 * self.usable_j / self.battery_j
         if self.point_of_no_return is None or self.no_return_m is None:
             return (
-                f"enough from everywhere: at most {self.most_percent:.0f} % is used with the return "
-                f"({usable:.0f} % may be), at km {self.most_m / 1e3:.2f}"
+                f"enough from everywhere: flight and return use {self.most_percent:.0f} % at most, from km "
+                f"{self.most_m / 1e3:.2f}; {usable:.0f} % may be used"
             )
         return (
             f"point of no return at km {self.no_return_m / 1e3:.2f} (item {self.no_return_seq}, "
-            f"{self.point_of_no_return[0]:.6f}, {self.point_of_no_return[1]:.6f}): beyond it up to "
-            f"{self.most_percent:.0f} % would be used with the return, and {usable:.0f} % may be"
+            f"{self.point_of_no_return[0]:.6f}, {self.point_of_no_return[1]:.6f}): from beyond it "
+            f"flight and return use up to {self.most_percent:.0f} %, and {usable:.0f} % may be used"
         )
 
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcsplan.cli.ending import complain, emit, printable
-from gcsplan.cli.options import JsonOption, UnjudgedOption
+from gcsplan.cli.options import JsonOption, RequireWayHomeOption, UnjudgedOption, WayHomeOption
 from gcsplan.errors import InputError, UsageError
 
 if TYPE_CHECKING:
-    from gcsplan.app.checking import Batch, Checked
+    from gcsplan.app.checking import Batch, Checked, Returns
     from gcsplan.mission_file.from_options import WorldOptions
 
 Number = float | None
@@ -57,12 +57,8 @@ def check(
     rtl_altitude: Annotated[
         Number, typer.Option(metavar="M", help="Above home, at which the vehicle returns (its own parameter).")
     ] = None,
-    way_home: Annotated[
-        bool,
-        typer.Option(
-            "--way-home", help="Also judge the return (RTL) from every point of every leg: terrain, zones, battery."
-        ),
-    ] = False,
+    way_home: WayHomeOption = False,
+    require_way_home: RequireWayHomeOption = False,
     allow_unjudged: UnjudgedOption = False,
     quiet: Annotated[
         bool, typer.Option("-q", "--quiet", help="Only findings, one a line: file:item: message. Nothing if all pass.")
@@ -80,7 +76,7 @@ def check(
 
     Every leg is judged along its whole length, as the autopilot flies it: jumps, loiters, take-off, landing, speeds,
     each altitude frame. The exit code is 0 if all pass, 4 on a violation or if anything could not be judged, 2 if a
-    file cannot be read.
+    file cannot be read. A return that is not safe is a warning, unless a safe one is required.
     """
     from gcsplan.app import checking, outputs
     from gcsplan.export.outdir import steady
@@ -98,7 +94,7 @@ def check(
         raise UsageError(f"--report {report}: a name that ends in .html, in a directory that is there, is wanted")
     make = _in_mission if _is_mission(files[0]) else _with_options
     with steady(checking.split_name(file)[1] for file in files if not _is_mission(file)):
-        batch = make(files, given, way_home)
+        batch = make(files, given, checking.Returns(way_home, require_way_home))
     failed = checking.failure(batch.checked, allow_unjudged=allow_unjudged, unreadable=batch.unreadable)
     if report is not None:
         _report(batch, report)
@@ -119,7 +115,7 @@ def _is_mission(argument: str) -> bool:
     return Path(argument).suffix.lower() in (".yaml", ".yml")
 
 
-def _in_mission(files: list[str], given: dict[str, object], returns: bool) -> Batch:
+def _in_mission(files: list[str], given: dict[str, object], returns: Returns) -> Batch:
     from gcsplan.app import checking, pipeline
 
     if given:
@@ -129,7 +125,7 @@ def _in_mission(files: list[str], given: dict[str, object], returns: bool) -> Ba
     return checking.check_batch(pipeline.load_mission(Path(files[0])), files[1:], returns=returns)
 
 
-def _with_options(files: list[str], given: dict[str, object], returns: bool) -> Batch:
+def _with_options(files: list[str], given: dict[str, object], returns: Returns) -> Batch:
     from gcsplan.app import checking
     from gcsplan.vehicle import Autopilot
 
@@ -179,19 +175,21 @@ def _place(text: str) -> tuple[float, float]:
 
 
 def _say_all(batch: Batch) -> None:
-    from gcsplan.cli.console import console, say, say_notes, verdict_table
+    from gcsplan.cli.console import say, say_notes, verdict_table
+    from gcsplan.cli.home_words import say_home, say_warnings
     from gcsplan.export.profile_text import profile_lines
 
     say_notes(batch.notes)
     for c in batch.checked:
         say_notes(c.notes)
-        verdict_table(f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})", c.verdict)
+        verdict_table(f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})", c.verdict, c.way_home)
         for miss in c.verdict.misses:
             say(miss.describe())
         for line in profile_lines(c.verdict, c.world):
             say(line)
         if c.way_home is not None:
-            console.print(c.way_home.describe(), style="red" if c.way_home.safe is False else None, markup=False)
+            say_home(c.way_home)
+    say_warnings({str(c.file): c.way_home for c in batch.checked})
     for _, error in batch.unreadable:
         complain(error)
 
@@ -216,4 +214,6 @@ def _report(batch: Batch, file: Path) -> None:
     if len(worlds) != 1:
         raise InputError("a report shows files of one area; none could be judged, or they lie too far apart")
     notes = [*batch.notes, *(f"not read, and not on this page: {error}" for _, error in batch.unreadable)]
-    write_whole(file, render_check(batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=notes))
+    homes = [c.way_home for c in batch.checked]
+    page = render_check(batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=notes, homes=homes)
+    write_whole(file, page)

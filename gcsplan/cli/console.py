@@ -92,14 +92,16 @@ def _print(table: Table) -> None:
     wide.print(table)
 
 
-def verdict_word(safe: bool | None) -> str:
-    """The coloured words safe, UNSAFE or not judged."""
+def verdict_word(safe: bool | None, home: WayHome | None = None) -> str:
+    """The coloured words safe, UNSAFE or not judged; a path without a safe return (``home``) is not simply safe."""
+    if safe is True and home is not None and home.safe is not True:
+        return "[yellow]path safe[/]"
     return {True: "[green]safe[/]", False: "[bold red]UNSAFE[/]", None: "[yellow]not judged[/]"}[safe]
 
 
-def plan_table(plan: Plan) -> None:
+def plan_table(plan: Plan, homes: Mapping[str, WayHome]) -> None:
     """Print a plan: a column for each vehicle, values beside their limits; a row for each in a large fleet."""
-    rows = [_plan_row(v, plan.fleet) for v in plan.vehicles]
+    rows = [_plan_row(v, plan.fleet, homes.get(v.name)) for v in plan.vehicles]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
     table = _table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
     for row in rows:
@@ -151,7 +153,7 @@ def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[T
     return tables
 
 
-def _plan_row(v: VehiclePlan, fleet: FleetPlan | None) -> dict[str, str]:
+def _plan_row(v: VehiclePlan, fleet: FleetPlan | None, home: WayHome | None) -> dict[str, str]:
     verdict = v.verdict
     slot = None if fleet is None else fleet.slot(v.name)
     held = f" + {slot.hold_s:.0f} at the gate" if slot and slot.hold_s > 0 else ""
@@ -171,11 +173,11 @@ def _plan_row(v: VehiclePlan, fleet: FleetPlan | None) -> dict[str, str]:
         "speed, m/s": number(v.speed_m_s, 2),
         "departs, s": number(slot.depart_s if slot else 0.0, 1) + held,
         "arrives, s": number(slot.arrive_s if slot else verdict.arrive_s, 1),
-        "verdict": verdict_word(verdict.safe),
+        "verdict": verdict_word(verdict.safe, home),
     }
 
 
-def verdict_table(name: str, verdict: Verdict) -> None:
+def verdict_table(name: str, verdict: Verdict, home: WayHome | None = None) -> None:
     """Print one row for each flown stretch of a mission."""
     columns = [("item", True), ("", False), ("leg m", True), ("to AMSL m", True), ("AGL m", True),
                ("lowest AGL m", True), ("climb °", True), ("nearest zone m", True), ("energy kJ", True),
@@ -191,7 +193,7 @@ def verdict_table(name: str, verdict: Verdict) -> None:
         for leg in verdict.legs
     ]  # fmt: skip
     for shown in (10, 9, 8):  # on a narrow terminal leave out time and energy; the limits matter more
-        table = _table(f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe)}", columns[:shown])
+        table = _table(f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe, home)}", columns[:shown])
         for leg, row in zip(verdict.legs, rows, strict=True):
             table.add_row(*row[:shown], style="red" if leg.seq in bad else None)
         if _width(table) <= console.width:
@@ -236,21 +238,6 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
     _print(table)
     if gate is not None:
         say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")
-
-
-def homes_table(homes: Mapping[str, WayHome]) -> None:
-    """Print one row for each vehicle whose way home was judged."""
-    if not homes:
-        return
-    columns = [("vehicle", False), ("return at, m above home", True), ("lowest safe from everywhere", True),
-               ("not safe from, m", True), ("rally points", True), ("way home", False)]  # fmt: skip
-    table = _table("[bold]way home[/]  the autopilot's own return, from every point of the mission", columns)
-    for name, home in homes.items():
-        at = f"{home.rtl_rel_home_m:g} {escape(home.parameter)}" + (" (default)" if home.assumed else "")
-        rally = str(len(home.rally)) if home.rally else "–"
-        lowest = number(home.lowest_rel_home_m, 1)
-        table.add_row(escape(name), at, lowest, number(home.unsafe_m), rally, verdict_word(home.safe))
-    _print(table)
 
 
 def say_notes(notes: Sequence[str]) -> None:

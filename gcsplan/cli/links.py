@@ -17,12 +17,14 @@ from gcsplan.cli.options import (
     FilesArgument,
     JsonOption,
     PlaceOption,
+    RequireWayHomeOption,
     SysidOption,
     TimeoutOption,
     ToOption,
     TypeOption,
     UncheckedSysidOption,
     UnjudgedOption,
+    WayHomeOption,
 )
 from gcsplan.errors import UsageError
 
@@ -42,6 +44,8 @@ def upload(
     ] = None,
     unchecked: Annotated[bool, typer.Option("--unchecked", help="Send without any check of safety.")] = False,
     sysid: UncheckedSysidOption = None,
+    way_home: WayHomeOption = False,
+    require_way_home: RequireWayHomeOption = False,
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
@@ -57,8 +61,10 @@ def upload(
     NAME= states which vehicle of the mission it is for.
     """
     from gcsplan.app import checking, fencing, pipeline, uploads
+    from gcsplan.app import way_home as returns
     from gcsplan.app.upload_job import UploadOptions
     from gcsplan.cli.console import say_notes, say_notes_of, transfer_progress, upload_table, verdict_table
+    from gcsplan.cli.home_words import say_warnings
     from gcsplan.export.outdir import require_settled, steady
     from gcsplan.sim.loopback import loopback_fleet
 
@@ -66,6 +72,8 @@ def upload(
         raise UsageError("give either --mission FILE, in whose world the files are checked, or --unchecked")
     if unchecked and (fence or fence_infinite):
         raise UsageError("--fence is made of the zones of a mission file: give --mission FILE instead of --unchecked")
+    if unchecked and (way_home or require_way_home):
+        raise UsageError("the way home is judged in the world of a mission file: give --mission FILE, not --unchecked")
     options = UploadOptions(
         allow_armed=allow_armed, ignore_position=ignore_position, unchecked=unchecked, atomic=atomic,
         timeout_s=timeout,
@@ -78,13 +86,17 @@ def upload(
         source = pipeline.load_mission(mission)
         uploads.targets([to], [r.vehicle for r in source.vehicles])  # report a wrong URL before any table
         with steady(checking.split_name(file)[1] for file in files):
-            checked = checking.check_files(source, files)
+            checked = checking.check_files(source, files, returns=checking.Returns(way_home, require_way_home))
         if not as_json:
             for c in checked:
                 say_notes(c.notes)
-                verdict_table(f"{c.file} as {c.vehicle.name}", c.verdict)
+                verdict_table(f"{c.file} as {c.vehicle.name}", c.verdict, c.way_home)
         verdicts = {c.vehicle.name: c.verdict for c in checked}
         pipeline.require_passing(verdicts, allow_unjudged=allow_unjudged)
+        homes = {c.vehicle.name: c.way_home for c in checked}
+        returns.require(homes, required=returns.is_required(source, require_way_home))
+        if not as_json:
+            say_warnings(homes)
         jobs = uploads.jobs_of_files(source, checked, to)
         if fence or fence_infinite:
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)

@@ -22,6 +22,17 @@ UnjudgedOption = Annotated[
 SysidOption = Annotated[
     int, typer.Option("--sysid", metavar="N", min=1, max=255, help="System id of the vehicle, 1 to 255.")
 ]
+WayHomeOption = Annotated[
+    bool, typer.Option("--way-home", help="Judge the return (RTL) from every point: terrain, zones, battery.")
+]
+RequireWayHomeOption = Annotated[
+    bool,
+    typer.Option(
+        "--require-way-home",
+        help="Judge the return, and refuse the mission unless it is safe from every point, as `way_home: required` "
+        "in the mission file does.",
+    ),
+]
 ToOption = Annotated[str, typer.Option("--to", metavar="URL", help=f"Where the vehicle is: {LINKS}")]
 FilesArgument = Annotated[
     list[str], typer.Argument(metavar="FILE...", help="FILE or NAME=FILE (the vehicle's name); .waypoints or .plan.")

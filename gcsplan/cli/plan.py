@@ -17,8 +17,10 @@ from gcsplan.cli.options import (
     JsonOption,
     MissionArgument,
     PlaceOption,
+    RequireWayHomeOption,
     TimeoutOption,
     UnjudgedOption,
+    WayHomeOption,
 )
 from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
@@ -64,9 +66,8 @@ def plan(
     report: Annotated[
         bool, typer.Option("--report", help="Also write report.html: map, profiles, way home, fleet; one page.")
     ] = False,
-    way_home: Annotated[
-        bool, typer.Option("--way-home", help="Judge the return home from everywhere (--report does so too).")
-    ] = False,
+    way_home: WayHomeOption = False,
+    require_way_home: RequireWayHomeOption = False,
     rally: Annotated[
         bool,
         typer.Option("--rally", help="Write the rally points that the way home proposes into each .plan."),
@@ -99,7 +100,9 @@ def plan(
     """
     from gcsplan.app import outputs, pipeline
     from gcsplan.app.gate import GateTime
-    from gcsplan.cli.console import homes_table, plan_table, release_table, remark, say_notes_of, upload_table
+    from gcsplan.app.way_home import judged
+    from gcsplan.cli.console import plan_table, release_table, remark, say_notes_of, upload_table
+    from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.export.outdir import add_output, can_hold, settle_outputs, write_outputs, write_whole
 
@@ -128,10 +131,10 @@ def plan(
                 gate_utc=None if gate is None else gate.start,
             )
         pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
-        homes = outputs.homes_of(planned) if report or way_home or rally else {}
+        homes = judged(planned, asked=report or way_home or rally, option=require_way_home)
         jobs: list[UploadJob] = []
         if upload or fence or fence_infinite:
-            jobs = uploads.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""))
+            jobs = uploads.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""), homes)
         fence_notes: list[tuple[str, str]] = []
         if fence or fence_infinite:  # a fence that the mission would breach is refused before anything is written
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
@@ -153,8 +156,8 @@ def plan(
     if in_the_way:
         remark(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
     if not as_json:
-        plan_table(planned)
-        homes_table(homes)
+        plan_table(planned, homes)
+        say_homes(homes)
         say_notes_of(fence_notes)
         _say_files(directory, list(files))
     results: list[JobResult] = []

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcsplan.cli.ending import emit, talking
-from gcsplan.cli.options import JsonOption, MissionArgument, UnjudgedOption
+from gcsplan.cli.options import JsonOption, MissionArgument, RequireWayHomeOption, UnjudgedOption, WayHomeOption
 from gcsplan.errors import UsageError
 from gcsplan.figures import floored
 
@@ -52,16 +52,21 @@ def rehearse(
         bool,
         typer.Option("--i-know", help="With --sitl: arm and start what is not on this machine, or is no simulator."),
     ] = False,
+    way_home: WayHomeOption = False,
+    require_way_home: RequireWayHomeOption = False,
     allow_unjudged: UnjudgedOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Plan, upload to simulated vehicles, fly them all in simulated time, and judge arrivals, separation and limits.
 
     The vehicles fly what they stored. Flight times come from a model of motion that shares nothing with the one that
-    planned them. The exit code is 4 if a limit was broken, or the order or the separation was lost.
+    planned them. The exit code is 4 if a limit was broken, the order or the separation was lost, or a safe return is
+    required and there is none.
     """
     from gcsplan.app import pipeline, rehearsing
+    from gcsplan.app import way_home as returns
     from gcsplan.cli.console import remark, say, say_notes
+    from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.sim.wind import Weather
 
@@ -79,6 +84,7 @@ def rehearse(
     with planning_display(names, source.planner.objective) as progress:
         planned = pipeline.plan(source, planner=planner, progress=progress)
     pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
+    homes = returns.judged(planned, asked=way_home, option=require_way_home)
     if in_sitl:
         with talking(names):
             result = rehearsing.rehearse_in_sitl(
@@ -92,12 +98,14 @@ def rehearse(
         failure = None
         if error is not None:
             failure = {"code": error.exit_code, "reason": error.reason, "message": error.message, "where": str(mission)}
-        emit({"name": source.name} | result.as_dict(), failure)
+        judged = {"way_home": {name: home.as_dict() for name, home in homes.items()}} if homes else {}
+        emit({"name": source.name} | result.as_dict() | judged, failure)
     else:
         _show(planned, result)
         say_notes(result.notes)
         for line in _ending(result):
             say(line)
+        say_homes(homes)
     raise typer.Exit(error.exit_code if error is not None else 0)
 
 

@@ -20,7 +20,14 @@ from gcsplan.figures import counted
 from gcsplan.mission_file.complaints import read_section, unknown_keys
 from gcsplan.mission_file.content import read_content
 from gcsplan.mission_file.ground import Ground, Site
-from gcsplan.mission_file.request import AltitudeFrame, ArrivalRequest, MissionFile, PlannerRequest, VehicleRequest
+from gcsplan.mission_file.request import (
+    AltitudeFrame,
+    ArrivalRequest,
+    MissionFile,
+    PlannerRequest,
+    ReturnRule,
+    VehicleRequest,
+)
 from gcsplan.mission_file.schema import (
     TOP_KEYS,
     ArrivalKeys,
@@ -122,6 +129,7 @@ class _Reading:
         name = self._name()
         altitude_frame: AltitudeFrame = self._choice("altitude_frame", get_args(AltitudeFrame), "relative")
         terrain_error_m = self._terrain_error(altitude_frame)
+        way_home: ReturnRule = self._choice("way_home", get_args(ReturnRule), "reported")
         frame_keys = self._section(FrameKeys, "frame")
         terrain_keys = self._section(TerrainKeys, "terrain")
         planner = self._planner()
@@ -161,7 +169,7 @@ class _Reading:
             name=name, path=self.file, stem=self.file.stem, frame=frame, surface=ground.surface, zones=ground.zones,
             airspace_scale=ground.scale, vehicles=ground.vehicles, arrival=arrival, planner=planner,
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
-            notes=tuple(dict.fromkeys(self.notes)),
+            notes=tuple(dict.fromkeys(self.notes)), way_home=way_home,
         )  # fmt: skip
         return replace(source, wider=partial(site.wider, source), reaching=self._reaching)
 

@@ -14,6 +14,7 @@ from gcsplan.world.zones import Zone
 
 AltitudeFrame = Literal["relative", "amsl", "terrain"]
 End = Literal["land", "loiter", "rtl", "none"]
+ReturnRule = Literal["required", "reported"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +86,8 @@ class MissionFile:
     the outputs; ``notes`` are for the user. ``wider(margin_m, most_cells)`` returns the same file with more terrain
     loaded: that far around all terminals, at least twice as far as here, or as far as there is terrain; None if that
     takes more cells, or if there is no more. ``level`` counts the widenings; the terrain of each contains that of the
-    one before. ``reaching(places)`` reads the same content again, with terrain for these places (latitude, longitude)
+    one before. ``way_home``: whether a safe return is required, or only reported where it is judged.
+    ``reaching(places)`` reads the same content again, with terrain for these places (latitude, longitude)
     too.
     """
 
@@ -106,4 +108,5 @@ class MissionFile:
     notes: tuple[str, ...]
     wider: Callable[[float, int], MissionFile | None] | None = None
     level: int = 0
+    way_home: ReturnRule = "reported"
     reaching: Callable[[Sequence[tuple[float, float]]], MissionFile] | None = None

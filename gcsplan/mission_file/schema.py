@@ -343,6 +343,8 @@ class MissionKeys(Keys):
     """The vehicles, with their starts and goals."""
     arrival: ArrivalKeys | None = None
     """How several vehicles arrive; if absent, their separation is not judged."""
+    way_home: Literal["required", "reported"] = "reported"
+    """A return that is unsafe or not judged: refused with exit code 4, or a warning where the return is judged."""
     planner: PlannerKeys = PlannerKeys()
     """The planner, its objective and its budget."""
     altitude_frame: Literal["relative", "amsl", "terrain"] = "relative"

@@ -8,6 +8,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.rtl.verdict import WayHome
+from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, STILL_NO_RETURN, counted
 from gcsplan.report.chart import Axes, chart_html
 from gcsplan.report.markup import esc, num, place, table, tools
 from gcsplan.report.plan_view import COLOURS
@@ -28,26 +29,20 @@ def home_lines(page: Page) -> str:
     if len(lines) <= MOST_LINES:
         return "".join(line for _, line in lines)
     names = ", ".join(esc(s.name) for s, _ in lines[:MOST_LINES])
-    text = f"<b>the way home of {len(lines)} vehicles is not safe, or not judged</b> ({names} …)"
-    return f'<p class="bare bad">{text}: see <a href="#home">below</a></p>'
+    text = f"<b>{len(lines)} vehicles have no safe return, or it was not judged</b> ({names} …)"
+    return f'<p class="bare bad">{text}: see <a href="#home">the way home</a></p>'
 
 
 def _home_line(subject: Subject, several: bool) -> str:
-    """One line for the page's head if the way home is unsafe or not judged; empty otherwise."""
+    """The headline for the page's head if the way home is unsafe or not judged; empty otherwise."""
     home = subject.home
     if home is None or home.safe is True:
         return ""
     who = f"{esc(subject.name)}: " if several else ""
-    if home.safe is None:
-        return f'<p class="bare">{who}the way home could not be judged: {esc("; ".join(home.not_judged))}</p>'
-    words = []
-    if home.unsafe:
-        words.append(f"not safe from {num(home.unsafe_m / 1000, 2, 'km')} of the way")
-    if home.battery is not None and home.battery.short:
-        words.append("beyond the battery from some of it")
-    judged = f"{esc(home.parameter)} {num(home.rtl_rel_home_m, 0, 'm')} above home"
-    text = f"<b>{who}the way home is {' and '.join(words)}</b> ({judged})"
-    return f'<p class="bare bad">{text}: see <a href="#home">below</a></p>'
+    cure = f": {esc(home.advice)}" if home.advice else ""
+    bad = " bad" if home.safe is False else ""
+    see = 'see <a href="#home">the way home</a>'
+    return f'<p class="bare{bad}"><b>{who}{esc(home.headline)}</b>{cure}; {see}</p>'
 
 
 def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object]) -> str:
@@ -62,14 +57,13 @@ def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object
 def _one(
     subject: Subject, home: WayHome, line: Line | None, index: int, charts: dict[str, object], *, open_: bool
 ) -> str:
-    word = {True: "safe from everywhere", False: "not safe from everywhere", None: "not judged"}[home.safe]
     chart = ""
     if line is not None and home.profile:
         name = f"home-{index}"
         chart = tools(name) + _chart(name, subject, home, line, index, charts) + _legend(home)
     listed = "".join(f"<li>{esc(n)}</li>" for n in (*home.not_judged, *home.notes))
     return (
-        f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: the way home is {word}</summary>"
+        f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: {esc(home.headline)}</summary>"
         f"{chart}{_facts(home)}{_stretches(subject, home)}{_battery(subject, home)}"
         + (f"<ul>{listed}</ul>" if listed else "")
         + "</details>"
@@ -78,16 +72,12 @@ def _one(
 
 def _facts(home: WayHome) -> str:
     rows = home.rows()
-    rows = [
-        (esc(label), esc(words)) for label, words in rows if label not in ("not clear", "not judged", "left unsafe")
-    ]
-    left = [words for label, words in rows if label == "left unsafe"]
-    folded = "".join(f"<li>{esc(words)}</li>" for words in left)
-    return table(
-        f"Return of {esc(home.vehicle)}, judged from every point of its mission", ("what|", "found|"), rows
-    ) + (
-        f"<details><summary>Unsafe even so: {len(left)} stretches</summary><ul>{folded}</ul></details>" if left else ""
-    )
+    listed = [(esc(a), esc(words)) for a, words in rows if a not in (NO_RETURN, NOT_JUDGED, STILL_NO_RETURN)]
+    left = "".join(f"<li>{esc(words)}</li>" for a, words in rows if a == STILL_NO_RETURN)
+    title = f"No safe return even so: {counted(len(home.left), 'stretch', 'stretches')}"
+    folded = f"<details><summary>{title}</summary><ul>{left}</ul></details>" if left else ""
+    caption = f"Return of {esc(home.vehicle)}, judged from every point of its path"
+    return table(caption, ("what|", "found|"), listed) + folded
 
 
 def _chart(name: str, subject: Subject, home: WayHome, line: Line, index: int, charts: dict[str, object]) -> str:
@@ -107,7 +97,7 @@ def _chart(name: str, subject: Subject, home: WayHome, line: Line, index: int, c
     shapes = [axes.area(run, np.full(len(run), -np.inf), line.ground_m, "ground")]
     for s in home.unsafe:
         ends = [s.from_m / unit, max(s.to_m / unit, s.from_m / unit + 0.002 * long)]
-        shapes.append(axes.area(ends, [-np.inf, -np.inf], [np.inf, np.inf], "nowhere", f"no safe way home: {s.why}"))
+        shapes.append(axes.area(ends, [-np.inf, -np.inf], [np.inf, np.inf], "nowhere", f"no safe return: {s.why}"))
     shapes += [
         axes.line(x, legal, "legal"), axes.line(x, clear, "clear"),
         axes.line([0.0, long], [level, level], "level"),
@@ -125,7 +115,7 @@ def _legend(home: WayHome) -> str:
         '<ul class="legend"><li><i class="stroke level"></i>return altitude judged</li>'
         '<li><i class="stroke clear"></i>needed to be clear of everything</li>'
         '<li><i class="stroke legal"></i>needed to keep min AGL too</li>'
-        + ('<li><i class="swatch nowhere"></i>no safe way home from here</li>' if home.unsafe else "")
+        + ('<li><i class="swatch nowhere"></i>no safe return from here</li>' if home.unsafe else "")
         + '<li><i class="swatch ground"></i>ground under the track</li></ul>'
     )
 
@@ -148,7 +138,7 @@ def _numbers(x: Floats, clear: Floats, legal: Floats, amsl: Floats, level: float
 
 def _stretches(subject: Subject, home: WayHome) -> str:
     rows, marks = [], []
-    for kind, stretches in (("unsafe", home.unsafe), ("limits broken", home.irregular)):
+    for kind, stretches in (("no safe return", home.unsafe), ("outside a limit", home.irregular)):
         for s in stretches:
             rows.append(
                 (
@@ -157,11 +147,11 @@ def _stretches(subject: Subject, home: WayHome) -> str:
                     num(s.lowest_rel_home_m, 0, "m") if s.lowest_rel_home_m is not None else "none",
                 )
             )  # fmt: skip
-            marks.append("bad" if kind == "unsafe" else "close")
+            marks.append("close" if stretches is home.irregular else "bad")
     if not rows:
         return ""
     head = ("on the way to|", "|", "along the track", "why|", "in the way|", "safe from, above home")
-    return table(f"Where the way home of {esc(subject.name)} breaks something", head, rows, marks=marks)
+    return table(f"Where the return of {esc(subject.name)} hits something or breaks a limit", head, rows, marks=marks)
 
 
 def _battery(subject: Subject, home: WayHome) -> str:

@@ -125,8 +125,22 @@ VERDICTS = {
 }
 
 
+PATH_ONLY = (
+    "unjudged",
+    "!",
+    "PATH SAFE",
+    "Every metre of the path keeps every limit. A safe return from all of it is not shown.",
+)
+"""A path without a safe return is never shown as safe."""
+
+
+def verdict_of(safe: bool | None, *, homeless: bool) -> tuple[str, str, str, str]:
+    """Class, sign, word and sentence of a verdict; ``homeless``: the return is not safe, or not judged."""
+    return PATH_ONLY if safe is True and homeless else VERDICTS[safe]
+
+
 def _header(page: Page) -> str:
-    kind, sign, word, words = VERDICTS[page.safe]
+    kind, sign, word, words = verdict_of(page.safe, homeless=page.homeless)
     wrong = [(s, f.message) for s in page.subjects for f in s.verdict.findings]
     wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
     several = len(page.subjects) > 1
@@ -145,7 +159,8 @@ def _header(page: Page) -> str:
 
 def _vehicles(page: Page) -> str:
     if len(page.subjects) > MOST_CARDS:
-        words = [VERDICTS[s.verdict.safe][1] + " " + VERDICTS[s.verdict.safe][2].lower() for s in page.subjects]
+        found = [verdict_of(s.verdict.safe, homeless=s.homeless) for s in page.subjects]
+        words = [f"{sign} {word.lower()}" for _, sign, word, _ in found]
         return f"<section>{tables.vehicles_table(page, words)}</section>"
     return (
         f'<section class="cards" aria-label="Key figures">{"".join(map(_card, page.subjects, range(10**6)))}</section>'
@@ -154,7 +169,7 @@ def _vehicles(page: Page) -> str:
 
 def _card(subject: Subject, index: int) -> str:
     verdict, limits, c = subject.verdict, subject.vehicle.limits, subject.certificate
-    kind, sign, word, _ = VERDICTS[verdict.safe]
+    kind, sign, word, _ = verdict_of(verdict.safe, homeless=subject.homeless)
     low, near = verdict.lowest, verdict.nearest
     figures = [("path", num(verdict.length_m, 0, "m"), _bound_words(subject))]
     if low is not None:

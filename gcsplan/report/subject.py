@@ -56,6 +56,11 @@ class Subject:
         """Seconds to the goal: from the start of the time table, or from the mission's beginning without one."""
         return self.slot.arrive_s if self.slot is not None else self.verdict.arrive_s
 
+    @property
+    def homeless(self) -> bool:
+        """Whether the return was judged and is not safe, or not wholly judged."""
+        return self.home is not None and self.home.safe is not True
+
 
 @dataclass(frozen=True, eq=False)
 class Page:
@@ -69,6 +74,11 @@ class Page:
     notes: tuple[str, ...] = ()
     separation: Separation | None = None
     order: tuple[str, ...] = ()
+
+    @property
+    def homeless(self) -> bool:
+        """Whether the return of any subject was judged and is not safe."""
+        return any(s.homeless for s in self.subjects)
 
     @property
     def safe(self) -> bool | None:

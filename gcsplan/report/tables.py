@@ -25,7 +25,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
     for s, word in zip(page.subjects, verdicts, strict=True):
         verdict, low, near = s.verdict, s.verdict.lowest, s.verdict.nearest
         bound = s.certificate.gap_percent if s.certificate is not None else None
-        home = {True: "safe", False: "not safe", None: "not judged"}[s.home.safe] if s.home is not None else "–"
+        home = {True: "safe", False: "no safe return", None: "not judged"}[s.home.safe] if s.home is not None else "–"
         rows.append(
             (
                 esc(s.name), word, num(verdict.length_m, 0, "m"), num(bound, 2, "%"),
@@ -36,7 +36,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
                 minutes(s.arrive_s), home,
             )
         )  # fmt: skip
-        marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None else "")
+        marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None or s.homeless else "")
     head = ("vehicle|", "verdict|", "path", "gap", "lowest AGL", "nearest zone|", "steepest", "energy", "battery",
             "arrives", "way home|")  # fmt: skip
     return table("Key figures", head, rows, marks=marks)

@@ -329,6 +329,10 @@ def test_the_way_home_is_judged_where_that_is_asked_for(run: Any, folder: Path, 
     file = file_of(folder, "round")  # from the east the hill stands in the way home
     assert run(file, *world, "--rtl-altitude", "120", "-q")[0] == 0
     code, out, _ = run(file, *world, "--rtl-altitude", "120", "--way-home", "-q")
+    assert code == 0
+    [line] = out.splitlines()
+    assert ": warning: way_home: path safe; no safe return from " in line
+    code, out, _ = run(file, *world, "--rtl-altitude", "120", "--require-way-home", "-q")
     assert code == 4
     assert all(": way_home: " in line for line in out.splitlines())
     bare = world[:4] + world[6:]  # without zones: the tower has no top
@@ -336,7 +340,9 @@ def test_the_way_home_is_judged_where_that_is_asked_for(run: Any, folder: Path, 
     _, out, _ = run(file, *world, "--rtl-altitude", "120", "--way-home", "--json")
     document = json.loads(out)
     assert document["verdicts"][0]["way_home"]["safe"] is False
-    assert "way_home" in document["error"]["message"]
+    assert "error" not in document
+    _, out, _ = run(file, *world, "--rtl-altitude", "120", "--require-way-home", "--json")
+    assert "way_home" in json.loads(out)["error"]["message"]
 
 
 def test_a_plans_own_fence_is_held_against_it(run: Any, folder: Path, world: list[str]) -> None:

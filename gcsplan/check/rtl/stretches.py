@@ -115,12 +115,12 @@ def _why(obstacles: Obstacles, row: int, name: str, grade: int, obstacle: Place 
             return "the ground on the way home is unknown to the terrain model"
         place = "" if obstacle is None else f" at {obstacle[0]:.6f}, {obstacle[1]:.6f} ({obstacle[2]:.0f} m AMSL)"
         if grade == CLEAR:
-            return f"the way home meets ground{place}: {top:.0f} m AMSL would clear it"
-        return f"the way home comes nearer to the ground than min_agl_m{place}: {top:.0f} m AMSL would keep it"
+            return f"the return meets ground{place} and would clear it at {top:.0f} m AMSL"
+        return f"the return comes nearer than min_agl_m to ground{place} and would keep it at {top:.0f} m AMSL"
     height = ""
     if math.isinf(top):
-        height = ", which has no top" if math.isinf(bottom) else f", which begins at {bottom:.0f} m AMSL"
-    return f"the way home meets no-fly zone “{name}” or its clearance{height}"
+        height = " (no top)" if math.isinf(bottom) else f" (from {bottom:.0f} m AMSL up)"
+    return f"the return meets no-fly zone “{name}”{height} or its clearance"
 
 
 def _without_doubles(found: list[UnsafeStretch]) -> tuple[UnsafeStretch, ...]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 from gcsplan.check.battery import BatteryHome
+from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, PATH, STILL_NO_RETURN, counted, reach, together_m
 from gcsplan.check.stretch import Place
+from gcsplan.mavlink.mission.return_altitude import setting, settings
+from gcsplan.vehicle import Autopilot
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +53,17 @@ class UnsafeStretch:
         """``item 3`` or ``items 3 to 7``."""
         return f"item {self.from_seq}" if self.from_seq == self.to_seq else f"items {self.from_seq} to {self.to_seq}"
 
+    @property
+    def place_and_why(self) -> str:
+        """``km 1.49 to 3.45 (items 4 to 9): the return meets …``."""
+        until = f" to {self.to_m / 1e3:.2f}" if self.to_m - self.from_m >= 5.0 else ""
+        return f"km {self.from_m / 1e3:.2f}{until} ({self.items}): {self.why}"
+
     def describe(self) -> str:
-        """Describe it in one line."""
-        cure = (
-            "no return altitude is safe from there"
-            if self.lowest_rel_home_m is None
-            else f"{self.lowest_rel_home_m:.0f} m above home would be safe from there"
-        )
-        return f"on the way to {self.items} (km {self.from_m / 1e3:.2f} to {self.to_m / 1e3:.2f}): {self.why}; {cure}"
+        """Where, why, and which altitude would help."""
+        if self.lowest_rel_home_m is None:
+            return f"{self.place_and_why}; no return altitude is safe from there"
+        return f"{self.place_and_why}; safe from there at {self.lowest_rel_home_m:.0f} m above home"
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +122,15 @@ class WayHome:
     ``irregular``: where it is clear but not legal. ``advised_rel_home_m``: the lowest clear altitude, or, if none is
     clear from every point, one that leaves little unsafe; ``rally``: points proposed for that case, to be judged with
     it; ``left``: what stays unsafe even with them. ``profile``: in the order flown.
+
+    ``path_safe`` is the verdict on the path itself. ``set_rel_home_m``: the altitude to set on the vehicle (with
+    ``rally``, if there are any): the judged one if nothing is better, else one that is legal, or clear, from every
+    point; None if nothing could be judged. ``set_leaves_m``: metres of the path that it leaves without a safe return.
     """
 
     vehicle: str
+    autopilot: Autopilot
+    path_safe: bool | None
     parameter: str
     rtl_rel_home_m: float
     assumed: bool
@@ -131,6 +142,8 @@ class WayHome:
     irregular: tuple[UnsafeStretch, ...]
     battery: BatteryHome | None
     advised_rel_home_m: float | None
+    set_rel_home_m: float | None
+    set_leaves_m: float | None
     rally: tuple[RallyPoint, ...]
     left: tuple[UnsafeStretch, ...]
     profile: tuple[ProfilePoint, ...]
@@ -145,9 +158,46 @@ class WayHome:
         return None if self.not_judged else True
 
     @property
-    def unsafe_m(self) -> float:
-        """Metres of the mission from which the return is not clear."""
-        return math.fsum(s.to_m - s.from_m for s in self.unsafe)
+    def no_return_m(self) -> float:
+        """Metres of the mission from which the return is not clear, or the battery is not enough for it."""
+        short = self.battery.short if self.battery is not None else ()
+        return together_m([*((s.from_m, s.to_m) for s in self.unsafe), *short])
+
+    @property
+    def headline(self) -> str:
+        """Both truths in one line: ``path safe; no safe return from 9.5 km of it``."""
+        return f"{PATH[self.path_safe]}; {self._return()}"
+
+    def _return(self) -> str:
+        if self.safe is True:
+            return "safe return from all of it"
+        if self.safe is None:
+            return f"return not judged: {'; '.join(self.not_judged)}"
+        short = self.battery.short if self.battery is not None else ()
+        if self.no_return_m < 0.5:
+            seq = self.unsafe[0].from_seq if self.unsafe else 0 if self.battery is None else self.battery.no_return_seq
+            return f"no safe return from a point of it, at item {seq}"
+        short_m = together_m(short)
+        battery = "" if not short else " (battery)" if not self.unsafe else f" (battery: from {reach(short_m)})"
+        return f"no safe return from {reach(self.no_return_m)} of it{battery}"
+
+    @property
+    def advice(self) -> str:
+        """The parameter and value to set, and what that leaves; empty if there is no value to name."""
+        if self.set_rel_home_m is None:
+            return ""
+        with_points = f", with {counted(len(self.rally), 'rally point')} on board (--rally)" if self.rally else ""
+        left = self.set_leaves_m or 0.0
+        then = "safe return from all of it"
+        if left:
+            then = f"no safe return from {reach(left)} of it{'' if self.rally else ' (battery)'}"
+        elif self.lowest_legal_rel_home_m is not None and self.set_rel_home_m >= self.lowest_legal_rel_home_m:
+            then += ", within all limits"
+        if self.rally and self.battery is not None:
+            then += ", the battery not counted"
+        if self.not_judged:
+            then += ", as far as it was judged"
+        return f"set {setting(self.autopilot, self.set_rel_home_m)}{with_points}: then {then}"
 
     def as_dict(self, *, profile: bool = False) -> dict[str, Any]:
         """Plain values for ``summary.json``; the profile on request."""
@@ -156,6 +206,11 @@ class WayHome:
             "rtl_rel_home_m": self.rtl_rel_home_m,
             "assumed": self.assumed,
             "safe": self.safe,
+            "headline": self.headline,
+            "no_return_m": self.no_return_m,
+            "set_rel_home_m": self.set_rel_home_m,
+            "set": [] if self.set_rel_home_m is None else settings(self.autopilot, self.set_rel_home_m),
+            "set_leaves_m": self.set_leaves_m,
             "lowest_rel_home_m": self.lowest_rel_home_m,
             "highest_rel_home_m": self.highest_rel_home_m,
             "lowest_legal_rel_home_m": self.lowest_legal_rel_home_m,
@@ -175,50 +230,46 @@ class WayHome:
         return out
 
     def rows(self) -> list[tuple[str, str]]:
-        """(label, words) for a table of two columns."""
+        """(label, words) for a table of two columns, below the headline."""
         source = "the autopilot's default" if self.assumed else "as given"
-        rows = [("return altitude", f"{self.rtl_rel_home_m:g} m above home ({self.parameter}, {source})")]
-        if not self.unsafe:
-            rows.append(("the way home", "clear of ground and zones from everywhere on the mission"))
-        else:
-            rows += [("not clear", s.describe()) for s in self.unsafe]
+        out = [("judged at", f"{self.rtl_rel_home_m:g} m above home, {source}")]
+        if self.advice:
+            out.append(("on the vehicle", self.advice))
+        out += [(NO_RETURN, f"from {s.describe()}") for s in self.unsafe]
         if self.irregular:
-            first, km = self.irregular[0], math.fsum(s.to_m - s.from_m for s in self.irregular) / 1e3
-            words = f"{km:.2f} km, first on the way to {first.items} (km {first.from_m / 1e3:.2f}): {first.why}"
-            rows.append(("clear, but not within all limits", words))
-        if self.lowest_rel_home_m is None:
-            rows.append(("lowest that is clear", "none is, from everywhere"))
-            if self.advised_rel_home_m is not None:
-                with_points = f", with {len(self.rally)} rally points" if self.rally else ""
-                left_km = math.fsum(s.to_m - s.from_m for s in self.left) / 1e3
-                rows.append(
-                    (
-                        "least unsafe",
-                        f"{self.advised_rel_home_m:.0f} m above home{with_points}: {left_km:.2f} km are left",
-                    )
-                )
-        else:
-            top = "" if self.highest_rel_home_m is None else f"; not above {self.highest_rel_home_m:.0f} m"
-            rows.append(("lowest that is clear", f"{self.lowest_rel_home_m:.0f} m above home{top}"))
-        if self.lowest_legal_rel_home_m is None:
-            rows.append(("lowest that keeps all limits", "none does, from everywhere"))
-        else:
-            rows.append(("lowest that keeps all limits", f"{self.lowest_legal_rel_home_m:.0f} m above home"))
-        if self.battery is not None:
-            rows.append(("battery for the return", self.battery.describe()))
-        for number, r in enumerate(self.rally, start=1):
-            rows.append(
-                (
-                    f"rally point {number}",
-                    f"{r.lat_deg:.7f}, {r.lon_deg:.7f}, {r.rel_home_m:.0f} m above home: {r.why}, nearest for "
-                    f"{r.serves_m / 1e3:.1f} km",
-                )
+            first, length = self.irregular[0], together_m((s.from_m, s.to_m) for s in self.irregular)
+            words = f"from {reach(length)} the return hits nothing but breaks a limit; first from {first.describe()}"
+            out.append(("outside a limit", words))
+        if self.not_judged and not self.unsafe and self.lowest_rel_home_m is None:
+            return out + self._battery() + [(NOT_JUDGED, words) for words in self.not_judged]
+        out += [
+            ("clear of ground and zones", _altitudes(self.lowest_rel_home_m, self.highest_rel_home_m)),
+            ("within all limits too", _altitudes(self.lowest_legal_rel_home_m, None)),
+            *self._battery(),
+        ]
+        out += [
+            (
+                f"rally point {number}",
+                f"{r.lat_deg:.7f}, {r.lon_deg:.7f}, {r.rel_home_m:.0f} m above home: {r.why}; nearest for "
+                f"{reach(r.serves_m)}",
             )
-        rows += [("left unsafe", s.describe()) for s in self.left]
-        rows += [("not judged", words) for words in self.not_judged]
-        return rows
+            for number, r in enumerate(self.rally, start=1)
+        ]
+        out += [(STILL_NO_RETURN, f"from {s.place_and_why}") for s in self.left]
+        out += [(NOT_JUDGED, words) for words in self.not_judged]
+        return out
+
+    def _battery(self) -> list[tuple[str, str]]:
+        return [] if self.battery is None else [("battery for the return", self.battery.describe())]
 
     def describe(self) -> str:
         """All of `rows` and the notes, one per line."""
-        lines = [f"{label}: {words}" for label, words in self.rows()] + [f"note: {words}" for words in self.notes]
+        lines = [f"{label}: {text}" for label, text in self.rows()] + [f"note: {text}" for text in self.notes]
         return "\n".join(lines)
+
+
+def _altitudes(lowest: float | None, highest: float | None) -> str:
+    if lowest is None:
+        return "no single return altitude is, from all of the path"
+    upper = " or more" if highest is None else f" to {highest:.0f} m"
+    return f"from all of the path at {lowest:.0f} m{upper} above home"

@@ -21,12 +21,13 @@ from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import TERRAIN_ERROR_M
 from gcsplan.check.rtl.model import RULES
-from gcsplan.check.rtl.rally import propose
+from gcsplan.check.rtl.rally import Proposal, propose
 from gcsplan.check.rtl.refinement import CLEAR, LEGAL, Refinement, sizes_m
 from gcsplan.check.rtl.stretches import rel_home, stretches_of
 from gcsplan.check.rtl.sweep import GradedObstacles, Target, obstacles_of_returns
 from gcsplan.check.rtl.trace import MissionTrace, TraceParts, trace_of
 from gcsplan.check.rtl.verdict import ProfilePoint, RallyPoint, UnsafeStretch, WayHome
+from gcsplan.check.rtl.words import together_m
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.autopilots import profile_of
@@ -68,16 +69,20 @@ def way_home(
     trace = trace_of(flight, vehicle, world, terrain_error_m) if verdict.legs else None
     if trace is None or math.isnan(ground):
         why = "the mission could not be followed" if trace is None else "the ground at home is unknown"
-        return _not_judged(vehicle, judged_m, rtl_rel_home_m is None, (lat, lon, mission.home.amsl_m), why)
+        return _not_judged(verdict, vehicle, judged_m, rtl_rel_home_m is None, why)
     home = (lat, lon, ground)
     east, north = (float(x) for x in world.frame.to_plane(lat, lon))
     target = Target(east, north, ground, ground)
     level = ground + judged_m
     refinement = refinement_of(trace, target, vehicle, level)
     lowest, highest = _lowest(refinement, CLEAR, ground)
-    lowest_legal, _ = _lowest(refinement, LEGAL, ground)
+    lowest_legal, highest_legal = _lowest(refinement, LEGAL, ground)
     unsafe = stretches_of(trace, refinement, CLEAR, level, target)
+    irregular = stretches_of(trace, refinement, LEGAL, level, target, but=CLEAR)
     proposal = propose(trace, refinement, target, vehicle, judged_m) if rally and lowest is None else None
+    best_m = judged_m if not unsafe and not irregular else _whole(lowest_legal, highest_legal)
+    if best_m is None:
+        best_m = judged_m if not unsafe else _whole(lowest, highest)
     notes = _notes(vehicle, judged_m, rtl_rel_home_m is None)
     most_amsl = vehicle.limits.max_amsl_m
     if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:
@@ -87,6 +92,8 @@ def way_home(
         notes.append("the terrain is too fine to look at all of it closely: unsafe stretches may be drawn too long")
     return WayHome(
         vehicle=vehicle.name,
+        autopilot=vehicle.autopilot,
+        path_safe=verdict.safe,
         parameter=rule.parameter,
         rtl_rel_home_m=judged_m,
         assumed=rtl_rel_home_m is None,
@@ -95,9 +102,11 @@ def way_home(
         highest_rel_home_m=highest,
         lowest_legal_rel_home_m=lowest_legal,
         unsafe=unsafe,
-        irregular=stretches_of(trace, refinement, LEGAL, level, target, but=CLEAR),
+        irregular=irregular,
         battery=battery_home(verdict, vehicle, home, level),
         advised_rel_home_m=proposal.rel_home_m if proposal else lowest,
+        set_rel_home_m=proposal.rel_home_m if best_m is None and proposal else best_m,
+        set_leaves_m=_left_m(proposal) if best_m is None else _short_m(verdict, vehicle, home, best_m),
         rally=proposal.points if proposal else (),
         left=proposal.left if proposal else (),
         profile=_profile(trace, refinement),
@@ -124,6 +133,24 @@ def _lowest(refinement: Refinement, grade: int, home_amsl_m: float) -> tuple[flo
     level = obstacles.together(refinement.start)
     top = obstacles.highest(level) if math.isfinite(level) else math.inf
     return rel_home(obstacles, level, home_amsl_m), None if math.isinf(top) else top - home_amsl_m - NOISE_M
+
+
+def _whole(lowest_m: float | None, highest_m: float | None) -> float | None:
+    """An altitude to set: the lowest in whole metres, rounded up, or exactly if that is above the highest."""
+    if lowest_m is None:
+        return None
+    whole = float(max(math.ceil(lowest_m - 1e-6), 1))
+    return whole if highest_m is None or whole <= highest_m else lowest_m
+
+
+def _short_m(verdict: Verdict, vehicle: Vehicle, home: Place, rel_home_m: float) -> float:
+    """Metres of the mission from which the battery is not enough for a return at that altitude."""
+    battery = battery_home(verdict, vehicle, home, home[2] + rel_home_m)
+    return 0.0 if battery is None else together_m(battery.short)
+
+
+def _left_m(proposal: Proposal | None) -> float | None:
+    return None if proposal is None else together_m((s.from_m, s.to_m) for s in proposal.left)
 
 
 def _profile(trace: MissionTrace, refinement: Refinement) -> tuple[ProfilePoint, ...]:
@@ -153,16 +180,21 @@ def _notes(vehicle: Vehicle, judged_m: float, assumed: bool) -> list[str]:
     notes = []
     if assumed:
         notes.append(
-            f"the return is judged at {judged_m:g} m above home, the default of {rule.parameter}: give the vehicle's "
-            f"own with rtl_rel_home_m"
+            f"the return is judged at {judged_m:g} m above home, the default of {rule.parameter}: write the vehicle's "
+            f"own as rtl_rel_home_m"
         )
     if not rule.climbs_first:
         notes.append("a plane's return is judged from its flight, not from its take-off and landing")
     return notes
 
 
-def _not_judged(vehicle: Vehicle, judged_m: float, assumed: bool, home: Place, why: str) -> WayHome:
+def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bool, why: str) -> WayHome:
+    home = verdict.mission.home
     return WayHome(
-        vehicle.name, RULES[vehicle.autopilot].parameter, judged_m, assumed, home, None, None, None, (), (), None, None,
-        (), (), (), (why,), tuple(_notes(vehicle, judged_m, assumed)),
+        vehicle=vehicle.name, autopilot=vehicle.autopilot, path_safe=verdict.safe,
+        parameter=RULES[vehicle.autopilot].parameter, rtl_rel_home_m=judged_m, assumed=assumed,
+        home=(home.lat_e7 / 1e7, home.lon_e7 / 1e7, home.amsl_m), lowest_rel_home_m=None, highest_rel_home_m=None,
+        lowest_legal_rel_home_m=None, unsafe=(), irregular=(), battery=None, advised_rel_home_m=None,
+        set_rel_home_m=None, set_leaves_m=None, rally=(), left=(), profile=(), not_judged=(why,),
+        notes=tuple(_notes(vehicle, judged_m, assumed)),
     )  # fmt: skip

@@ -14,24 +14,26 @@ from gcsplan.mavlink.link.numbers import finite, whole
 from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.mission.autopilots import PX4, profile_of
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
+from gcsplan.mavlink.mission.return_altitude import RETURN_PARAMETERS, on_board
 from gcsplan.vehicle import Autopilot
 
 Values = Mapping[str, float]
 
+_RETURN = {autopilot: tuple(p.name for p in known) for autopilot, known in RETURN_PARAMETERS.items()}
 _COPTER = (
-    ("RTL_ALT", "RTL_ALT_M"),  # cm; renamed and in metres since 4.7
+    _RETURN[Autopilot.ARDUCOPTER],
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",),
     ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",),
     ("WPNAV_RADIUS", "WP_RADIUS_M"),  # cm; renamed and in metres since 4.7
 )  # fmt: skip
 _PLANE = (
-    ("RTL_ALTITUDE", "ALT_HOLD_RTL"),  # metres since 4.5; before that ALT_HOLD_RTL in cm
+    _RETURN[Autopilot.ARDUPLANE],
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",),
     ("THR_FAILSAFE",), ("FS_LONG_ACTN",), ("FS_GCS_ENABL",), ("BATT_FS_LOW_ACT",),
     ("WP_RADIUS",), ("NAVL1_PERIOD",), ("NAVL1_DAMPING",),
 )  # fmt: skip
 _PX4 = (
-    ("RTL_RETURN_ALT",), ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
+    _RETURN[Autopilot.PX4], ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
     ("NAV_RCL_ACT",), ("NAV_DLL_ACT",), ("COM_LOW_BAT_ACT",), ("NAV_ACC_RAD",), ("NAV_MC_ALT_RAD",),
 )  # fmt: skip
 GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
@@ -46,7 +48,6 @@ FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
 }
 """Parameters that are read before a fence is sent."""
 
-_RETURN_ALTITUDE = {"RTL_ALT": 0.01, "RTL_ALT_M": 1.0, "ALT_HOLD_RTL": 0.01, "RTL_ALTITUDE": 1.0, "RTL_RETURN_ALT": 1.0}
 _FAILSAFES = {
     "FS_THR_ENABLE": "loss of radio control", "THR_FAILSAFE": "loss of radio control",
     "NAV_RCL_ACT": "loss of radio control", "FS_GCS_ENABLE": "loss of the ground station",
@@ -85,12 +86,17 @@ class _Extent:
 
 
 def judge_parameters(
-    values: Values, mission: Mission, *, rtl_rel_home_m: float | None = None, expected: Values | None = None
+    values: Values,
+    mission: Mission,
+    *,
+    rtl_rel_home_m: float | None = None,
+    advised_rel_home_m: float | None = None,
+    expected: Values | None = None,
 ) -> list[str]:
     """Return in words which ``values`` do not fit ``mission``; nothing is changed on board.
 
-    ``rtl_rel_home_m``: the return altitude that the mission was checked with, m above home. ``expected``: the values
-    that the user expects, by name.
+    ``rtl_rel_home_m``: the return altitude that the mission was checked with, m above home; ``advised_rel_home_m``: the
+    one to set, if that check found it better. ``expected``: the values that the user expects, by name.
     """
     label = profile_of(mission.autopilot).label
     if not values:
@@ -103,7 +109,7 @@ def judge_parameters(
     ]
     found += [f"{name} could not be read, {want:g} is expected" for name, want in (expected or {}).items()
               if name not in values]  # fmt: skip
-    found += _return_altitude(values, rtl_rel_home_m)
+    found += _return_altitude(values, rtl_rel_home_m, advised_rel_home_m)
     found += _fences(values, _extent(mission))
     off = [f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0]
     if off:
@@ -137,15 +143,21 @@ def _bits(value: float) -> int:
     return whole(value, 0, 2**31 - 1) or 0
 
 
-def _return_altitude(values: Values, wanted_m: float | None) -> list[str]:
-    name = next((n for n in _RETURN_ALTITUDE if n in values), None)
-    if name is None:
-        return [] if wanted_m is None else ["the return altitude on board could not be read"]
-    height_m = values[name] * _RETURN_ALTITUDE[name]
-    if wanted_m is None:
+def _return_altitude(values: Values, checked_m: float | None, advised_m: float | None) -> list[str]:
+    parameter = on_board(values)
+    if parameter is None:
+        return [] if checked_m is None else ["the return altitude on board could not be read"]
+    name, height_m = parameter.name, parameter.metres(values[parameter.name])
+    if checked_m is None:
         return [f"after a failsafe it returns at {height_m:g} m above home ({name}); that return was not checked"]
+    wanted_m = checked_m if advised_m is None else advised_m
+    if abs(height_m - checked_m) > _SAME_M:
+        return [
+            f"it returns at {height_m:g} m above home ({name}); the return was checked at {checked_m:g} m: set "
+            f"{parameter.setting(wanted_m)}"
+        ]
     if abs(height_m - wanted_m) > _SAME_M:
-        return [f"it returns at {height_m:g} m above home ({name}); the return was checked at {wanted_m:g} m"]
+        return [f"it returns at {height_m:g} m above home ({name}), as judged: set {parameter.setting(wanted_m)}"]
     return []
 
 

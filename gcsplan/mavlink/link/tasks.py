@@ -61,8 +61,8 @@ class SessionOptions:
     ``discover_s``: seconds to wait for a first heartbeat; ``listen_s``: to listen for rivals after it; ``standby_s``:
     to wait for a vehicle that is booting. ``ground_amsl_m``: DEM altitude at the start, by default the altitude of the
     mission's home. ``timeout_s``: longest time without progress of a transfer (see `Patience`); it also limits
-    ``discover_s`` and ``standby_s``. The parameters on board are compared with ``rtl_rel_home_m`` and
-    ``expected_parameters``.
+    ``discover_s`` and ``standby_s``. The parameters on board are compared with ``rtl_rel_home_m`` (the return altitude
+    that was checked), ``advised_rel_home_m`` (the one to set, if another is better) and ``expected_parameters``.
     """
 
     unchecked: bool = False
@@ -70,6 +70,7 @@ class SessionOptions:
     ignore_position: bool = False
     ground_amsl_m: float | None = None
     rtl_rel_home_m: float | None = None
+    advised_rel_home_m: float | None = None
     expected_parameters: Mapping[str, float] = field(default_factory=dict)
     read_parameters: bool = True
     discover_s: float = 10.0
@@ -198,8 +199,9 @@ def _parameters(
     if mission and options.read_parameters:
         values = yield from parameter_steps(channel, state, GROUPS[task.autopilot], watch, recheck)
         warnings += judge_parameters(
-            values, mission, rtl_rel_home_m=options.rtl_rel_home_m, expected=options.expected_parameters
-        )
+            values, mission, rtl_rel_home_m=options.rtl_rel_home_m, advised_rel_home_m=options.advised_rel_home_m,
+            expected=options.expected_parameters,
+        )  # fmt: skip
     if task.mission_type == FENCE and options.read_parameters:
         values = yield from parameter_steps(channel, state, FENCE_GROUPS[task.autopilot], watch, recheck)
         warnings += judge_fence_parameters(values)

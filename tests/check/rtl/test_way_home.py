@@ -21,6 +21,7 @@ from gcsplan.check.rtl.stretches import rel_home
 from gcsplan.check.rtl.sweep import Target, obstacles_of_returns
 from gcsplan.check.rtl.trace import trace_of
 from gcsplan.check.rtl.way_home import WayHome, refinement_of, way_home
+from gcsplan.check.rtl.words import counted, reach
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import LAND, RTL, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission
@@ -76,7 +77,10 @@ def test_over_flat_ground_any_altitude_is_safe() -> None:
     # Min AGL 60 m and 5 m of error: from the landing column at the goal the return must be at 65 m.
     assert home.lowest_legal_rel_home_m == pytest.approx(65.0, abs=0.2)
     assert [s.from_seq for s in home.irregular] == [4]
-    assert "clear, but not within all limits: 0.00 km, first on the way to item 4" in home.describe()
+    assert "outside a limit: from 0 m the return hits nothing but breaks a limit; first from km 3.00" in home.describe()
+    assert home.headline == "path safe; safe return from all of it"
+    assert "RTL_ALT 6600 (cm)" in home.advice
+    assert home.advice.endswith("then safe return from all of it, within all limits")
 
 
 def test_behind_a_ridge_the_return_must_clear_it() -> None:
@@ -156,7 +160,7 @@ def test_a_wall_without_a_top_leaves_no_altitude_and_rally_points_mend_it() -> N
     assert {s.zone for s in home.unsafe} == {"tower"}
     assert "no top" in home.unsafe[0].why
     assert home.rally
-    assert sum(s.to_m - s.from_m for s in home.left) < 0.3 * home.unsafe_m
+    assert sum(s.to_m - s.from_m for s in home.left) < 0.3 * home.no_return_m
     assert any("RALLY_LIMIT_KM" in n for n in home.notes)
     for item, point in zip(rally_items(home.rally), home.rally, strict=True):
         assert (item.command, item.frame) == (5100, RELATIVE)
@@ -337,6 +341,50 @@ def test_what_cannot_be_followed_is_not_called_safe() -> None:
     nothing = judged(w, replace(m, items=()), rtl=60.0)
     assert nothing.safe is None
     assert nothing.as_dict()["lowest_rel_home_m"] is None
+
+
+@pytest.mark.parametrize(("autopilot", "name"), [(COPTER, "RTL_ALT_M "), (PX4, "RTL_RETURN_ALT ")])
+def test_the_altitude_to_set_is_safe_within_all_limits_and_hardly_higher_than_it_must_be(
+    autopilot: Autopilot, name: str
+) -> None:
+    w = world(ridge, [Zone("lid", Circle(1000.0, 600.0, 150.0), floor=Level(520.0, "amsl"))])
+    m, v = mission(w, OVER, autopilot), vehicle(autopilot, **BARE)
+    home = judged(w, m, v, 40.0)
+    best, legal = home.set_rel_home_m, home.lowest_legal_rel_home_m
+    assert best is not None
+    assert legal is not None
+    assert legal <= best < legal + 1.0
+    assert f"{name}{best:g} (m)" in home.advice
+    set_to = judged(w, m, v, best)
+    assert (set_to.unsafe, set_to.irregular) == ((), ())
+    assert (set_to.set_rel_home_m, set_to.no_return_m) == (best, 0.0)
+
+
+def test_the_headline_tells_path_and_return_and_counts_overlaps_once() -> None:
+    w = world(ridge)
+    v = vehicle(**BARE)
+    home = judged(w, mission(w, OVER), v, 50.0)
+    assert home.headline == "path safe; no safe return from 1.0 km of it"
+    short = replace(v, energy=replace(v.energy, battery_j=450_000.0))
+    low = judged(w, mission(w, OVER), short, 50.0)
+    assert low.battery is not None
+    [(a, b)] = low.battery.short
+    assert low.no_return_m == pytest.approx(max(b, low.unsafe[0].to_m) - min(a, low.unsafe[0].from_m))
+    assert f"(battery: from {(b - a) / 1e3:.1f} km)" in low.headline or f"(battery: from {b - a:.0f} m)" in low.headline
+    assert low.set_leaves_m == pytest.approx(b - a, abs=60.0)  # the climb to a higher return takes energy
+    high = judged(w, mission(w, OVER), short, 130.0)
+    assert high.headline.endswith("km of it (battery)") or high.headline.endswith("m of it (battery)")
+    broken = judged(w, mission(w, OVER), replace(v, limits=replace(v.limits, min_agl_m=45.0)), 50.0)
+    assert broken.headline.startswith("path UNSAFE; no safe return from ")
+    nothing = judged(w, replace(mission(w, OVER), items=()), rtl=60.0)
+    assert nothing.headline.endswith("; return not judged: the mission could not be followed")
+    assert nothing.advice == ""
+
+
+def test_words_know_one_from_many() -> None:
+    assert [counted(n, "rally point") for n in (1, 2)] == ["1 rally point", "2 rally points"]
+    assert [counted(n, "stretch", "stretches") for n in (1, 2)] == ["1 stretch", "2 stretches"]
+    assert [reach(m) for m in (0.4, 340.2, 999.4, 999.6, 9480.0)] == ["0 m", "340 m", "999 m", "1.0 km", "9.5 km"]
 
 
 def test_figures_are_plain_values_and_words() -> None:

@@ -431,6 +431,19 @@ def test_parameters_that_do_not_fit_are_told_in_words(values: dict[str, float], 
     assert words in " / ".join(judge_parameters(values, mission(), rtl_rel_home_m=60.0))
 
 
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"RTL_ALT": 6000.0}, "it returns at 60 m above home (RTL_ALT), as judged: set RTL_ALT 35300 (cm)"),
+        ({"RTL_ALT_M": 60.0}, "it returns at 60 m above home (RTL_ALT_M), as judged: set RTL_ALT_M 353 (m)"),
+        ({"RTL_ALT": 1500.0}, "the return was checked at 60 m: set RTL_ALT 35300 (cm)"),
+    ],
+)
+def test_a_better_return_altitude_is_told_by_the_vehicles_own_name(values: dict[str, float], words: str) -> None:
+    [told] = judge_parameters(values, mission(), rtl_rel_home_m=60.0, advised_rel_home_m=353.0)
+    assert told.endswith(words)
+
+
 def test_a_return_that_nobody_checked_is_told() -> None:
     assert "was not checked" in judge_parameters({"RTL_ALT": 1500.0}, mission())[0]
 

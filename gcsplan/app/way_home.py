@@ -1,0 +1,93 @@
+"""The way home in every command: it is judged here, and here is decided whether it lets a mission fly.
+
+`way_home: required` in the mission file, or `--require-way-home`, refuses a mission whose return is unsafe or not
+judged. Otherwise the return is judged where that is asked for, and reported as a warning. `plan`, `check`, `upload` and
+`rehearse` all ask `lets_fly`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gcsplan.app.model import Plan
+from gcsplan.check.rtl.verdict import WayHome
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import CheckFailed
+from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.world.world import World
+
+MOST_SHOWN = 5
+"""Vehicles that a warning or a refusal names one by one."""
+
+Homes = Mapping[str, WayHome]
+
+
+def is_required(source: MissionFile | None, option: bool) -> bool:
+    """Whether the mission file or ``--require-way-home`` requires a safe return."""
+    return option or (source is not None and source.way_home == "required")
+
+
+def lets_fly(home: WayHome | None, *, required: bool) -> bool:
+    """Whether the way home lets a mission fly: always if it is only reported, else only if it was judged and is safe.
+
+    ``--allow-unjudged`` does not count here: who requires a safe return wants to know of one.
+    """
+    return not required or (home is not None and home.safe is True)
+
+
+def home_of(verdict: Verdict, request: VehicleRequest, world: World, terrain_error_m: float) -> WayHome:
+    """The way home of one mission, from every point of it; takes about a second for 20 km."""
+    from gcsplan.check.rtl.way_home import way_home
+
+    return way_home(
+        verdict, request.vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m
+    )
+
+
+def homes_of(plan: Plan) -> dict[str, WayHome]:
+    """The way home of every vehicle of a plan."""
+    return {v.name: home_of(v.verdict, v.request, plan.world, plan.source.terrain_error_m) for v in plan.vehicles}
+
+
+def judged(plan: Plan, *, asked: bool, option: bool = False) -> dict[str, WayHome]:
+    """The ways home of a plan where they are asked for or required, else none.
+
+    ``option``: ``--require-way-home``. Raises CheckFailed if safe ones are required and one does not pass.
+    """
+    required = is_required(plan.source, option)
+    homes = homes_of(plan) if asked or required else {}
+    require(homes, required=required)
+    return homes
+
+
+def require(homes: Mapping[str, WayHome | None], *, required: bool) -> None:
+    """Raise CheckFailed if the way home of a vehicle does not let it fly; the message says why and what to set."""
+    bad = {name: home for name, home in homes.items() if not lets_fly(home, required=required)}
+    if not bad:
+        return
+    broken = any(home is not None and home.safe is False for home in bad.values())
+    what = (
+        "a safe return is required, and there is none" if broken else "a safe return is required, and it is not judged"
+    )
+    lines = [line for name, home in list(bad.items())[:MOST_SHOWN] for line in _lines(name, home)]
+    if len(bad) > MOST_SHOWN:
+        lines.append(f"… and {len(bad) - MOST_SHOWN} more")
+    raise CheckFailed("\n".join([what, *lines]), reason="violation" if broken else "not_judged")
+
+
+def _lines(name: str, home: WayHome | None) -> list[str]:
+    """The headline, and what to set."""
+    if home is None:
+        return [f"{name}: the return was not judged"]
+    return [f"{name}: {home.headline}", *([f"{name}: {home.advice}"] if home.advice else [])]
+
+
+def warnings(homes: Mapping[str, WayHome | None]) -> list[str]:
+    """A headline for each vehicle whose return is not safe, with what to set; one line for all others of a fleet."""
+    bad = [(name, home) for name, home in homes.items() if home is not None and home.safe is not True]
+    lines: list[str] = []
+    for name, home in bad[:MOST_SHOWN]:
+        lines += _lines(name, home)
+    if len(bad) > MOST_SHOWN:
+        lines.append(f"… and no safe return for {len(bad) - MOST_SHOWN} more of {len(homes)} vehicles")
+    return lines

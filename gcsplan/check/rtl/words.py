@@ -1,0 +1,28 @@
+"""Words that the way home is told in: lengths, counts, labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+PATH = {True: "path safe", False: "path UNSAFE", None: "path not judged in full"}
+NO_RETURN, STILL_NO_RETURN, NOT_JUDGED = "no safe return", "still no safe return", "not judged"
+"""Labels of `rows` that may come several times."""
+
+
+def reach(metres: float) -> str:
+    """A length along the path: ``9.5 km``, ``340 m``."""
+    return f"{metres / 1e3:.1f} km" if metres >= 999.5 else f"{metres:.0f} m"
+
+
+def counted(number: int, one: str, several: str = "") -> str:
+    """``1 rally point``, ``2 rally points``, ``3 stretches``."""
+    return f"{number} {one if number == 1 else several or f'{one}s'}"
+
+
+def together_m(parts: Iterable[tuple[float, float]]) -> float:
+    """The length of intervals that may overlap."""
+    total, until = 0.0, float("-inf")
+    for a, b in sorted(parts):
+        total += max(b - max(a, until), 0.0)
+        until = max(until, b)
+    return total

@@ -1,0 +1,58 @@
+"""The way home on the terminal: a table of the fleet, the rows of one vehicle, and the headlines as warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rich.markup import escape
+
+from gcsplan.app.way_home import warnings
+from gcsplan.check.rtl.verdict import WayHome
+from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN, reach
+from gcsplan.cli.console import _print, _table, aside, console, say
+from gcsplan.mavlink.mission.return_altitude import setting
+
+MOST_ROWS = 8
+"""Rows with one label that are printed; the report and JSON have all of them."""
+
+WORDS = {True: "[green]safe[/]", False: "[bold red]no safe return[/]", None: "[yellow]not judged[/]"}
+
+
+def say_homes(homes: Mapping[str, WayHome]) -> None:
+    """Print one row for each vehicle whose way home was judged, and a warning for each that has no safe one."""
+    if not homes:
+        return
+    columns = [("vehicle", False), ("return at, m", True), ("no safe return from", True), ("way home", False),
+               ("to set on the vehicle", False), ("leaves without", True), ("rally points", True)]  # fmt: skip
+    table = _table("[bold]way home[/]  the autopilot's own return, from every point of the path", columns)
+    for name, home in homes.items():
+        at = f"{home.rtl_rel_home_m:g}" + (" (default)" if home.assumed else "")
+        best = home.set_rel_home_m
+        table.add_row(
+            escape(name), at, reach(home.no_return_m) if home.safe is False else "–", WORDS[home.safe],
+            "–" if best is None else escape(setting(home.autopilot, best)),
+            "–" if not home.set_leaves_m else reach(home.set_leaves_m), str(len(home.rally)) if home.rally else "–",
+        )  # fmt: skip
+    _print(table)
+    say_warnings(homes)
+
+
+def say_home(home: WayHome) -> None:
+    """Print the rows of one way home; of many stretches the first `MOST_ROWS`."""
+    say(f"way home: {home.headline}")
+    seen: dict[str, int] = {}
+    rows = home.rows()
+    for label, words in rows:
+        seen[label] = seen.get(label, 0) + 1
+        bad = label in (NO_RETURN, STILL_NO_RETURN)
+        if seen[label] <= MOST_ROWS:
+            console.print(f"  {label}: {words}", style="red" if bad else None, markup=False)
+    for label, count in seen.items():
+        if count > MOST_ROWS:
+            say(f"  {label}: … and {count - MOST_ROWS} more (all of them: --report, --json)")
+
+
+def say_warnings(homes: Mapping[str, WayHome | None]) -> None:
+    """Print a headline for each vehicle without a safe return; the path's own verdict stands elsewhere."""
+    for line in warnings(homes):
+        aside.print(f"warning: {line}", style="bold yellow", markup=False)
