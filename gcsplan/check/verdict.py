@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from typing import TYPE_CHECKING
@@ -63,6 +64,52 @@ class LegFigures:
     hold_j: float = 0.0
     times: int = 1
     jumped_from: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ItemFigures:
+    """Figures of all stretches that are flown for one item in a row: the chords of a spline, a track and its landing.
+
+    ``kind`` and ``end`` are those of the last one. ``min_agl_m`` and ``climb_deg`` leave columns out; without another
+    stretch the height is NaN, and the angle that of the column.
+    """
+
+    seq: int
+    kind: StretchKind
+    end: Place
+    length_m: float
+    climb_deg: float
+    agl_end_m: float
+    min_agl_m: float
+    zone_clearance_m: float
+    nearest_zone: str
+    energy_j: float
+    time_s: float
+
+
+def by_item(legs: Sequence[LegFigures]) -> Iterator[ItemFigures]:
+    """The figures of each item in the order flown; an item that a jump leads back to comes again."""
+    group: list[LegFigures] = []
+    for leg in legs:
+        if group and (leg.seq != group[-1].seq or leg.jumped_from is not None):
+            yield _together(group)
+            group = []
+        group.append(leg)
+    if group:
+        yield _together(group)
+
+
+def _together(legs: Sequence[LegFigures]) -> ItemFigures:
+    last = legs[-1]
+    flown = [leg for leg in legs if not leg.column]
+    heights = [leg.min_agl_m for leg in flown if not math.isnan(leg.min_agl_m)]
+    near = min((leg for leg in legs if leg.nearest_zone), key=lambda leg: leg.zone_clearance_m, default=last)
+    return ItemFigures(
+        last.seq, last.kind, last.end, math.fsum(leg.length_m for leg in legs),
+        max((leg.climb_deg for leg in flown or legs), key=abs), last.agl_end_m, min(heights, default=math.nan),
+        near.zone_clearance_m, near.nearest_zone, math.fsum(leg.energy_j for leg in legs),
+        math.fsum(leg.time_s for leg in legs),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

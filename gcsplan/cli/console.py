@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from gcsplan.check.verdict import by_item
 from gcsplan.cli.ending import put
 from gcsplan.figures import floored
 
@@ -178,30 +179,34 @@ def _plan_row(v: VehiclePlan, fleet: FleetPlan | None, home: WayHome | None) -> 
 
 
 def verdict_table(name: str, verdict: Verdict, home: WayHome | None = None) -> None:
-    """Print one row for each flown stretch of a mission."""
+    """Print what was found, then one row for each item that is flown, and for each time that a jump leads to it."""
+    title = f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe, home)}"
+    if verdict.findings or verdict.not_judged:
+        console.print(title)
+        console.print(verdict.describe(), style="red" if verdict.findings else "yellow", markup=False)
+        title = ""
     columns = [("item", True), ("", False), ("leg m", True), ("to AMSL m", True), ("AGL m", True),
                ("lowest AGL m", True), ("climb °", True), ("nearest zone m", True), ("energy kJ", True),
                ("time s", True)]  # fmt: skip
     bad = {f.seq for f in verdict.findings}
+    items = list(by_item(verdict.legs))
     rows = [
         (
-            str(leg.seq), leg.kind, number(leg.length_m), number(leg.end[2], 1), least(leg.agl_end_m, 1),
-            "–" if leg.column else least(leg.min_agl_m, 1), number(leg.climb_deg, 1),
-            f"{least(leg.zone_clearance_m)} {escape(leg.nearest_zone)}" if leg.nearest_zone else "–",
-            number(leg.energy_j / 1000, 1), number(leg.time_s),
+            str(item.seq), item.kind, number(item.length_m), number(item.end[2], 1), least(item.agl_end_m, 1),
+            least(item.min_agl_m, 1), number(item.climb_deg, 1),
+            f"{least(item.zone_clearance_m)} {escape(item.nearest_zone)}" if item.nearest_zone else "–",
+            number(item.energy_j / 1000, 1), number(item.time_s),
         )
-        for leg in verdict.legs
+        for item in items
     ]  # fmt: skip
     for shown in (10, 9, 8):  # on a narrow terminal leave out time and energy; the limits matter more
-        table = _table(f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe, home)}", columns[:shown])
-        for leg, row in zip(verdict.legs, rows, strict=True):
-            table.add_row(*row[:shown], style="red" if leg.seq in bad else None)
+        table = _table(title, columns[:shown])
+        for item, row in zip(items, rows, strict=True):
+            table.add_row(*row[:shown], style="red" if item.seq in bad else None)
         if _width(table) <= console.width:
             break
     _print(table)
     say_notes(verdict.notes)
-    if verdict.findings or verdict.not_judged:
-        console.print(verdict.describe(), style="red" if verdict.findings else "yellow", markup=False)
 
 
 def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -207,6 +208,43 @@ def test_a_table_the_nearest_misses_and_a_profile_are_shown(run: Any, folder: Pa
         assert words in out
     assert "UNSAFE" not in out
     assert all(line.startswith("note: ") for line in err.splitlines())
+
+
+def rows_of(table: str) -> list[list[str]]:
+    """The cells of the rows that begin with an item's number."""
+    return [
+        line.replace("\u2009", "").split()
+        for line in table.splitlines()
+        if re.match(r" *\d+ +(takeoff|cruise|land|loiter|rtl) ", line)
+    ]
+
+
+def test_a_spline_is_one_row_however_many_chords_it_has(run: Any, folder: Path, world: list[str]) -> None:
+    file = file_of(folder, "spline")
+    _, out, _ = run(file, *world, "--json")
+    (verdict,) = json.loads(out)["verdicts"]
+    seqs = [leg["seq"] for leg in verdict["legs"]]
+    spline = max(seqs, key=seqs.count)
+    chords = [leg for leg in verdict["legs"] if leg["seq"] == spline]
+    assert len(chords) > 10
+    _, out, _ = run(file, *world)
+    rows = rows_of(out)
+    assert [int(row[0]) for row in rows] == list(dict.fromkeys(seqs))
+    row = next(row for row in rows if int(row[0]) == spline)
+    assert float(row[2]) == pytest.approx(sum(leg["length_m"] for leg in chords), abs=0.51)
+    assert float(row[5]) == pytest.approx(min(leg["min_agl_m"] for leg in chords), abs=0.11)
+    assert float(row[-1]) == pytest.approx(sum(leg["time_s"] for leg in chords), abs=0.51)
+
+
+def test_findings_stand_before_the_table(run: Any, folder: Path, world: list[str]) -> None:
+    code, out, _ = run(file_of(folder, "through_zone"), *world)
+    assert code == 4
+    lines = out.splitlines()
+    finding = next(k for k, line in enumerate(lines) if "inside no-fly zone" in line)
+    head = next(k for k, line in enumerate(lines) if "leg m" in line)
+    assert lines[0].endswith("UNSAFE")
+    assert 0 < finding < head
+    assert out.count("UNSAFE") == 1
 
 
 def test_json_holds_every_leg_and_miss_with_places_to_a_centimetre(run: Any, folder: Path, world: list[str]) -> None:
