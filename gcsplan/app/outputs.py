@@ -17,7 +17,7 @@ from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import write_kml
 from gcsplan.export.profile import write_profile
-from gcsplan.export.rows import ItemRow, Track
+from gcsplan.export.rows import ItemRow, Track, WayPoint
 from gcsplan.export.summary import write_summary
 from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
@@ -27,6 +27,7 @@ from gcsplan.mavlink.mission.mission import MissionItem
 if TYPE_CHECKING:
     from gcsplan.app.upload_job import JobResult
     from gcsplan.check.rtl.verdict import WayHome
+    from gcsplan.world.geoid import GeoidGrid
 
 Homes: TypeAlias = "Mapping[str, WayHome]"
 
@@ -43,7 +44,7 @@ def outputs_of(
     ``homes``: vehicle name to its way home if that was judged; the summary then contains it. ``fences``: vehicle name
     to its fence items, for the `.plan`. With ``rally``, the `.plan` also contains the proposed rally points.
     """
-    tracks = [_track(v) for v in plan.vehicles]
+    tracks = [_track(v, plan.source.geoid) for v in plan.vehicles]
     frame, zones = plan.world.frame, plan.world.airspace.zones
     files = {}
     for v in plan.vehicles:
@@ -231,9 +232,16 @@ def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[
     return rows
 
 
-def _track(v: VehiclePlan) -> Track:
+def _track(v: VehiclePlan, geoid: GeoidGrid | None) -> Track:
     legs = v.verdict.legs
     places = np.array([legs[0].start, *(leg.end for leg in legs)])
     commands = {seq: command_name(item.command) for seq, item in enumerate(v.mission.wire_items())}
     labels = ("home", *(f"{leg.seq} {commands.get(leg.seq, '')}".strip() for leg in legs))
-    return Track(v.name, places[:, 0], places[:, 1], places[:, 2], labels)
+    above = [None] * len(places) if geoid is None else geoid.height_m(places[:, 0], places[:, 1]).tolist()
+    home = 0 if v.verdict.mission.first_seq == 1 else None
+    points: list[WayPoint | None] = [WayPoint("home", home, None if home is None else commands[0], 0.0, above[0])]
+    for i, leg in enumerate(legs):
+        goes_on = i + 1 < len(legs) and legs[i + 1].seq == leg.seq  # on a circle, or down a column
+        point = WayPoint(labels[i + 1], leg.seq, commands.get(leg.seq), leg.agl_end_m, above[i + 1])
+        points.append(None if goes_on else point)
+    return Track(v.name, places[:, 0], places[:, 1], places[:, 2], labels, tuple(points))

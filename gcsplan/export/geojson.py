@@ -7,6 +7,7 @@ that cross the antimeridian are cut there (section 3.1.9).
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -14,33 +15,55 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.export.rows import Track, outline_deg
+from gcsplan.export.rows import Track, WayPoint, outline_deg
+from gcsplan.figures import floored
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level, Zone
 
 Position = list[float]
 
+HEIGHTS = "the third coordinate is metres above mean sea level (AMSL), not above the ellipsoid"
+THIRD = {"third_coordinate": "amsl_m"}
+DECIMALS = 2
+"""Of heights, metres."""
+
 
 def write_geojson(name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame) -> str:
     """The GeoJSON text of a mission called ``name``: a FeatureCollection; the same input gives the same bytes.
 
-    Positions are longitude, latitude, and for tracks and way points AMSL metres, which a way point repeats in
-    ``amsl_m``. A zone's floor and ceiling are the mission file's ``floor_agl_m``, ``floor_amsl_m``, ``ceiling_agl_m``,
-    ``ceiling_amsl_m``.
+    Positions are longitude, latitude, and for tracks and way points AMSL metres, although RFC 7946 has heights above
+    the ellipsoid: `HEIGHTS` and each feature's ``third_coordinate`` say so. A way point has its item's ``number`` and
+    ``command``, ``amsl_m``, ``agl_m``, and ``ellipsoidal_m`` if a geoid grid is known. A zone's floor and ceiling are
+    the mission file's ``floor_agl_m``, ``floor_amsl_m``, ``ceiling_agl_m``, ``ceiling_amsl_m``.
     """
     features: list[dict[str, Any]] = []
     for track in tracks:
-        features.append(_feature(_line(track), {"kind": "track", "vehicle": track.vehicle}))
+        features.append(_feature(_line(track), {"kind": "track", "vehicle": track.vehicle, **THIRD}))
     for track in tracks:
-        for index, label in enumerate(track.labels):
-            if label:
-                lon, lat, amsl = _position(track.lon_deg[index], track.lat_deg[index], track.amsl_m[index])
-                about = {"kind": "waypoint", "vehicle": track.vehicle, "name": label, "amsl_m": amsl}
-                features.append(_feature({"type": "Point", "coordinates": [lon, lat, amsl]}, about))
+        for index, point in enumerate(track.waypoints):
+            if point is not None:
+                place = _position(track.lon_deg[index], track.lat_deg[index], track.amsl_m[index])
+                about = {"kind": "waypoint", "vehicle": track.vehicle, **_figures(point, float(track.amsl_m[index]))}
+                features.append(_feature({"type": "Point", "coordinates": place}, about))
     for zone in zones:
         about = {"kind": "no_fly", "name": zone.name, **_levels(zone)}
         features.append(_feature(_area(outline_deg(zone, frame)), about))
-    return json.dumps({"type": "FeatureCollection", "name": name, "features": features}, ensure_ascii=False) + "\n"
+    document = {"type": "FeatureCollection", "name": name, "heights": HEIGHTS, "features": features}
+    return json.dumps(document, ensure_ascii=False) + "\n"
+
+
+def _figures(point: WayPoint, amsl_m: float) -> dict[str, Any]:
+    """The properties of a way point; those that are not known are left out."""
+    about = {
+        "name": point.name,
+        "number": point.number,
+        "command": point.command,
+        "amsl_m": round(amsl_m, DECIMALS),
+        "agl_m": floored(point.agl_m, DECIMALS) if math.isfinite(point.agl_m) else None,
+        "ellipsoidal_m": None if point.geoid_m is None else round(amsl_m + point.geoid_m, DECIMALS),
+        **THIRD,
+    }
+    return {key: value for key, value in about.items() if value is not None}
 
 
 def _feature(geometry: dict[str, Any], properties: dict[str, Any]) -> dict[str, Any]:
@@ -56,7 +79,7 @@ def _levels(zone: Zone) -> dict[str, float]:
 
 def _position(lon_deg: float, lat_deg: float, amsl_m: float | None = None) -> Position:
     place = [round(float(lon_deg), 7), round(float(lat_deg), 7)]
-    return place if amsl_m is None else [*place, round(float(amsl_m), 2)]
+    return place if amsl_m is None else [*place, round(float(amsl_m), DECIMALS)]
 
 
 def _unwrapped(lon_deg: Floats) -> Floats:

@@ -35,11 +35,27 @@ class ItemRow:
     time_s: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class WayPoint:
+    """A point of a track that an item ends at: its name, wire number, command, and heights.
+
+    ``number`` and ``command`` are None for a home that is no item. ``agl_m`` is NaN over unknown ground. ``geoid_m`` is
+    the geoid's height above the ellipsoid there, None if no geoid grid is known.
+    """
+
+    name: str
+    number: int | None
+    command: str | None
+    agl_m: float
+    geoid_m: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """The line that one vehicle flies: (N,) degrees and AMSL metres, N >= 2, straight between neighbours.
 
-    ``labels`` (N,) has a word for each point (its item's command), empty for points that are not items.
+    ``labels`` (N,) has a word for each point (its item's command), empty for points that are not items. ``waypoints``
+    (N,) has the figures of the points that an item ends at, None for the others.
     """
 
     vehicle: str
@@ -47,6 +63,7 @@ class Track:
     lon_deg: Floats
     amsl_m: Floats
     labels: tuple[str, ...] = field(default=())
+    waypoints: tuple[WayPoint | None, ...] = field(default=())
 
     def __post_init__(self) -> None:
         columns = [np.asarray(getattr(self, name), float) for name in ("lat_deg", "lon_deg", "amsl_m")]
@@ -57,6 +74,8 @@ class Track:
             raise ValueError(f"a track is finite; that of {self.vehicle} is not")
         if self.labels and len(self.labels) != len(columns[0]):
             raise ValueError(f"{len(columns[0])} points need as many labels, given {len(self.labels)}")
+        if self.waypoints and len(self.waypoints) != len(columns[0]):
+            raise ValueError(f"{len(columns[0])} points need as many way points, given {len(self.waypoints)}")
         for name, column in zip(("lat_deg", "lon_deg", "amsl_m"), columns, strict=True):
             object.__setattr__(self, name, column)
         if not self.labels:

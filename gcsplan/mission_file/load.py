@@ -169,7 +169,7 @@ class _Reading:
             name=name, path=self.file, stem=self.file.stem, frame=frame, surface=ground.surface, zones=ground.zones,
             airspace_scale=ground.scale, vehicles=ground.vehicles, arrival=arrival, planner=planner,
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
-            notes=tuple(dict.fromkeys(self.notes)), way_home=way_home,
+            notes=tuple(dict.fromkeys(self.notes)), way_home=way_home, geoid=site.terrain.geoid,
         )  # fmt: skip
         return replace(source, wider=partial(site.wider, source), reaching=self._reaching)
 

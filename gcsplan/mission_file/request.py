@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.frame import Frame
+from gcsplan.world.geoid import GeoidGrid
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Zone
 
@@ -86,9 +87,9 @@ class MissionFile:
     the outputs; ``notes`` are for the user. ``wider(margin_m, most_cells)`` returns the same file with more terrain
     loaded: that far around all terminals, at least twice as far as here, or as far as there is terrain; None if that
     takes more cells, or if there is no more. ``level`` counts the widenings; the terrain of each contains that of the
-    one before. ``way_home``: whether a safe return is required, or only reported where it is judged.
-    ``reaching(places)`` reads the same content again, with terrain for these places (latitude, longitude)
-    too.
+    one before. ``reaching(places)`` reads the same content again, with terrain for these places (latitude, longitude)
+    too. ``way_home``: whether a safe return is required, or only reported where it is judged. ``geoid`` is the grid
+    that the terrain was converted with, if it is ellipsoidal.
     """
 
     name: str
@@ -110,3 +111,4 @@ class MissionFile:
     level: int = 0
     way_home: ReturnRule = "reported"
     reaching: Callable[[Sequence[tuple[float, float]]], MissionFile] | None = None
+    geoid: GeoidGrid | None = None

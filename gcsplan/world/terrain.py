@@ -68,6 +68,10 @@ class Terrain(Protocol):
     def is_flat(self) -> bool:
         """True if the ground has one height everywhere."""
 
+    @property
+    def geoid(self) -> GeoidGrid | None:
+        """The geoid grid that ellipsoidal heights are converted with; None if there is none."""
+
     def extent(self, frame: Frame, box: Box) -> Box:
         """A box of the plane that holds all of the terrain, as far as the plane reaches; ``box`` is the mission's."""
 
@@ -128,6 +132,10 @@ class _RasterTerrain:
     @property
     def is_flat(self) -> bool:
         return False
+
+    @property
+    def geoid(self) -> GeoidGrid | None:
+        return self._geoid
 
     def extent(self, frame: Frame, box: Box) -> Box:
         return self._mosaic.extent(frame, box)
@@ -197,6 +205,10 @@ class _LocalTerrain:
     @property
     def is_flat(self) -> bool:
         return not self._spec.peaks
+
+    @property
+    def geoid(self) -> GeoidGrid | None:
+        return None
 
     def extent(self, frame: Frame, box: Box) -> Box:
         return -FARTHEST_M, -FARTHEST_M, FARTHEST_M, FARTHEST_M

@@ -19,7 +19,7 @@ from pyproj import Geod
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import DRAWN_TOP_M, write_kml
 from gcsplan.export.profile import write_profile
-from gcsplan.export.rows import ItemRow, Track, outline_deg
+from gcsplan.export.rows import ItemRow, Track, WayPoint, outline_deg
 from gcsplan.export.summary import ORDER, write_summary
 from gcsplan.mission_file.zone_draft import place_zones
 from gcsplan.mission_file.zone_reader import read_zones
@@ -35,6 +35,7 @@ TRACK = Track(
     np.array([-84.38, -84.37, -84.36000001]),
     np.array([300.0, 412.345, 500.125]),
     ("TAKEOFF", "", "WAYPOINT <2> & more"),
+    (WayPoint("TAKEOFF", 1, "take-off", 0.0), None, WayPoint("WAYPOINT <2> & more", 3, "waypoint", 65.2599, -33.25)),
 )
 SQUARE = Polygon(np.array([[0.0, 0.0], [1000.0, 0.0], [1000.0, 800.0], [0.0, 800.0]]))
 ZONES = (
@@ -81,6 +82,8 @@ def test_a_zero_has_no_sign_and_a_comma_in_a_name_is_quoted() -> None:
 def test_a_track_that_is_none_is_refused(lat: list[float], lon: list[float], labels: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match=r"track|labels"):
         Track("a", np.array(lat), np.array(lon), np.array(lat), labels)
+    with pytest.raises(ValueError, match="way points"):
+        Track("a", np.zeros(2), np.zeros(2), np.zeros(2), (), (None,))
 
 
 @settings(max_examples=draws(60))
@@ -179,6 +182,14 @@ def test_the_geojson_holds_tracks_and_points_with_their_altitudes() -> None:
     points = features(text, "waypoint")
     assert [p["properties"]["name"] for p in points] == ["TAKEOFF", "WAYPOINT <2> & more"]
     assert points[0]["geometry"] == {"type": "Point", "coordinates": [-84.38, 36.6, 300.0]}
+    assert "metres above mean sea level" in json.loads(text)["heights"]
+    for feature in (line, *points):
+        assert feature["properties"]["third_coordinate"] == "amsl_m"
+    assert [{k: p["properties"].get(k) for k in ("number", "command", "agl_m", "ellipsoidal_m")} for p in points] == [
+        {"number": 1, "command": "take-off", "agl_m": 0.0, "ellipsoidal_m": None},
+        {"number": 3, "command": "waypoint", "agl_m": 65.25, "ellipsoidal_m": 466.88},
+    ]
+    assert points[1]["properties"]["amsl_m"] == points[1]["geometry"]["coordinates"][2] == 500.12
 
 
 def test_zones_of_the_geojson_carry_the_mission_files_own_keys() -> None:
