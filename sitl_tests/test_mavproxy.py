@@ -6,13 +6,16 @@ import importlib.util
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from gcsplan.app.shifts import CUTTING, shift_of
 from gcsplan.errors import GcsplanError
+from gcsplan.mavlink.files.formats import write_waypoints
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.compare import compare, faults
@@ -30,25 +33,56 @@ COPTER, PX4 = Autopilot.ARDUCOPTER, Autopilot.PX4
 
 
 @contextmanager
-def mavproxy(master: str, folder: Path, *more: str) -> Iterator[subprocess.Popen[bytes]]:
-    """Run MAVProxy in ``folder`` until the context ends."""
+def mavproxy(master: str, folder: Path, *more: str, typed: bool = False) -> Iterator[subprocess.Popen[bytes]]:
+    """Run MAVProxy in ``folder`` until the context ends; ``typed``: commands may be written to its standard input."""
     script = next(
         p for base in map(Path, sys.path) for p in (base / "bin" / "mavproxy.py", base / "mavproxy.py") if p.is_file()
     )
     command = [
-        sys.executable, str(script), f"--master={master}", "--daemon", "--non-interactive", "--default-modules=wp",
-        f"--state-basedir={folder}", "--source-system=250", *more,
+        sys.executable, str(script), f"--master={master}", "--default-modules=wp",
+        *([] if typed else ["--daemon", "--non-interactive"]), f"--state-basedir={folder}", "--source-system=250",
+        *more,
     ]  # fmt: skip
     environment = {**os.environ, "MAVLINK20": "1", "HOME": str(folder)}
     with (folder / "mavproxy.txt").open("wb") as said:
-        process = subprocess.Popen(
-            command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=said, stderr=said
-        )
+        source = subprocess.PIPE if typed else subprocess.DEVNULL
+        process = subprocess.Popen(command, cwd=folder, env=environment, stdin=source, stdout=said, stderr=said)
         try:
             yield process
         finally:
             process.kill()
+            if process.stdin is not None:
+                process.stdin.close()
             process.wait(10.0)
+
+
+def test_what_mavproxy_loads_itself_is_named_as_its_writing(tmp_path: Path) -> None:
+    """MAVProxy's own ``wp load`` cuts degrees: nothing but positions differs, by a centimetre, and it is named."""
+    mission = a_mission(COPTER, 60)
+    file = tmp_path / "uav1.waypoints"
+    file.write_bytes(write_waypoints(mission).encode())
+    board = a_vehicle(COPTER)
+    with (
+        SimServer([board], "udpin:127.0.0.1:0") as server,
+        mavproxy(server.url_for_gcs, tmp_path, typed=True) as process,
+    ):
+        deadline = time.monotonic() + 60.0
+
+        def until(done: Callable[[], bool]) -> None:
+            while not done() and time.monotonic() < deadline:
+                time.sleep(0.2)
+
+        until(lambda: "online system" in (tmp_path / "mavproxy.txt").read_text(errors="replace"))
+        assert process.stdin is not None
+        process.stdin.write(f"wp load {file}\n".encode())
+        process.stdin.flush()
+        until(lambda: len(board.items()) == len(mission.wire_items()))
+    said = (tmp_path / "mavproxy.txt").read_text(errors="replace")
+    found = faults(compare(mission.wire_items(), board.items(), COPTER))
+    shift = shift_of(mission, board.items(), found)
+    assert shift is not None, said
+    assert shift.sender == CUTTING
+    assert shift.most_m < 0.016
 
 
 @pytest.mark.parametrize(

@@ -70,10 +70,14 @@ def order_of(
 
 
 def _judge_again(job: UploadJob) -> session.Judge | None:
-    """The check of the mission that was read back, since the vehicle will fly what it holds."""
-    if job.world is None or job.vehicle is None or job.verdict is None:
+    return None if job.verdict is None else judge_on_board(job, allow_unjudged=job.verdict.safe is None)
+
+
+def judge_on_board(job: UploadJob, *, allow_unjudged: bool) -> session.Judge | None:
+    """The check of the mission that was read back, since the vehicle will fly what it holds; None without a world."""
+    if job.world is None or job.vehicle is None:
         return None
-    world, vehicle, first = job.world, job.vehicle, job.verdict
+    world, vehicle = job.world, job.vehicle
 
     def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
         # Home on board is where the vehicle is now, but the altitudes count from the planned start.
@@ -81,7 +85,7 @@ def _judge_again(job: UploadJob) -> session.Judge | None:
             replace(read_back, home=job.mission.home), vehicle, world, rtl_rel_home_m=job.rtl_rel_home_m,
             terrain_error_m=job.terrain_error_m, tuning=Tuning.of(values),
         )  # fmt: skip
-        if verdict.safe is True or (verdict.safe is None and first.safe is None):
+        if verdict.safe is True or (verdict.safe is None and allow_unjudged):
             return None
         return verdict.describe()
 

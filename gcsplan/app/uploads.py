@@ -18,12 +18,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from gcsplan.app.checking import Checked, split_name
+from gcsplan.app.checking import Checked, check_files, split_name
 from gcsplan.app.fencing import not_fenced, upload_fences
 from gcsplan.app.model import Plan
 from gcsplan.app.rollback import rolled_back
 from gcsplan.app.upload_job import LINK, SIM, JobResult, ProgressCall, UploadJob, UploadOptions
-from gcsplan.app.upload_orders import order_of, report_end
+from gcsplan.app.upload_orders import judge_on_board, order_of, report_end
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
 from gcsplan.figures import counted
@@ -103,13 +103,14 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
     missing = [c.vehicle.name for c in checked if c.vehicle.name not in to]
     if missing:
         raise UsageError(f"--to {word} says nothing of {', '.join(missing)}")
-    return [
-        UploadJob(
-            c.vehicle.name, to[c.vehicle.name], c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m,
-            c.terrain_error_m, way_home=c.way_home,
-        )
-        for c in checked
-    ]  # fmt: skip
+    return [_job(c, to[c.vehicle.name]) for c in checked]
+
+
+def _job(c: Checked, url: str) -> UploadJob:
+    return UploadJob(
+        c.vehicle.name, url, c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m, c.terrain_error_m,
+        way_home=c.way_home,
+    )  # fmt: skip
 
 
 def unchecked_job(argument: str, url: str, sysid: int) -> UploadJob:
@@ -282,19 +283,42 @@ def require_file(file: Path) -> None:
         raise InputError("there is no such file", where=str(file))
 
 
-def verify_file(file: Path, url: str, sysid: int, *, timeout_s: float = 60.0) -> JobResult:
-    """Compare a file with the mission on board; nothing is written to the vehicle."""
+def verify_file(
+    argument: str, url: str, sysid: int = 1, *, source: MissionFile | None = None, tolerance_m: float | None = None,
+    timeout_s: float = 60.0,
+) -> JobResult:  # fmt: skip
+    """Compare a file with the mission on board; nothing is written to the vehicle.
+
+    With ``source`` the argument may be NAME=FILE, and what is on board is judged in its world, for its vehicle (whose
+    number holds in place of ``sysid``). ``tolerance_m``: positions that are at most so far away are no difference.
+    """
+    from gcsplan.app import shifts
     from gcsplan.mavlink.link import session
 
+    shifts.require_tolerance(tolerance_m, judged=source is not None)
+    file = Path(argument) if source is None else split_name(argument)[1]
     require_file(file)
+    checked = None if source is None else check_files(source, [argument])[0]
     with _open(url) as link:
-        autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
-        read = read_mission_file(file, autopilot=autopilot)
-        mission = replace(read.mission, sysid=sysid)
-        job = UploadJob(file.stem, link.url, mission)
-        options = session.SessionOptions(listen_s=LISTEN_S, timeout_s=timeout_s)
-        done = _result(job, session.verify_mission(link, mission, options=options))
-    return replace(done, warnings=(*read.notes, *done.warnings))
+        if checked is not None:
+            job, notes = _job(checked, link.url), checked.notes
+        else:
+            autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
+            read = read_mission_file(file, autopilot=autopilot)
+            job, notes = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid)), read.notes
+        options = session.SessionOptions(
+            listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,
+            read_parameters=checked is not None,
+        )  # fmt: skip
+        judge = judge_on_board(job, allow_unjudged=False)
+        result = session.verify_mission(link, job.mission, options=options, judge=judge)
+        result, shifted, cure = shifts.within(result, job.mission, tolerance_m)
+        done = _result(job, result)
+    if checked is not None and done.verified and not shifted:
+        shifted = "what is on board is judged again: safe"
+    warnings = (*([shifted] if shifted else []), *notes, *done.warnings)
+    details = dict(done.details or {}) | {"warnings": list(warnings)}
+    return replace(done, message=done.message + cure if done.message else "", warnings=warnings, details=details)
 
 
 def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) -> int:

@@ -24,6 +24,7 @@ from gcsplan.cli.options import (
     TypeOption,
     UncheckedSysidOption,
     UnjudgedOption,
+    UnlessMissionSysidOption,
     WayHomeOption,
 )
 from gcsplan.errors import UsageError
@@ -117,19 +118,44 @@ def upload(
 
 
 def verify(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The .waypoints or .plan that should be on board.")],
+    file: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="The .waypoints or .plan that should be on board; with --mission also NAME=FILE (the vehicle's name).",
+        ),
+    ],
     to: ToOption,
-    sysid: SysidOption = 1,
+    mission: Annotated[
+        Path | None,
+        typer.Option(metavar="MISSION.yaml", help="Mission file in whose world what is on board is judged again."),
+    ] = None,
+    tolerance_m: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance-m",
+            metavar="M",
+            help="With --mission: take positions this far away, in metres, if what is on board is safe [default: 0]",
+        ),
+    ] = None,
+    sysid: UnlessMissionSysidOption = None,
     timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Check that exactly this file is on board: read the mission back and compare; nothing else is sent."""
-    from gcsplan.app import uploads
+    """Check that exactly this file is on board: read the mission back and compare; the vehicle keeps what it has.
+
+    With --mission what is on board is also judged, as a whole, with the vehicle's parameters: exit 4 if it is not safe.
+    """
+    from gcsplan.app import checking, pipeline, shifts, uploads
     from gcsplan.cli.console import upload_table
     from gcsplan.export.outdir import require_settled
 
-    require_settled([file])
-    done = uploads.verify_file(file, to, sysid, timeout_s=timeout)
+    if mission is not None and sysid is not None:
+        raise UsageError("--sysid goes without --mission: with it the vehicle's number is the mission file's")
+    shifts.require_tolerance(tolerance_m, judged=mission is not None)
+    require_settled([checking.split_name(file)[1]])
+    source = None if mission is None else pipeline.load_mission(mission)
+    done = uploads.verify_file(file, to, sysid or 1, source=source, tolerance_m=tolerance_m, timeout_s=timeout)
     if as_json:
         emit(done.as_dict(), uploads.failure([done]))
     else:

@@ -61,6 +61,10 @@ UncheckedSysidOption = Annotated[
     int | None,
     typer.Option("--sysid", metavar="N", min=1, max=255, help="With --unchecked: its system id [default: 1]"),
 ]
+UnlessMissionSysidOption = Annotated[
+    int | None,
+    typer.Option("--sysid", metavar="N", min=1, max=255, help="Without --mission: its system id [default: 1]"),
+]
 ListenOption = Annotated[
     str, typer.Option(metavar="URL", help="udpin:HOST:PORT or tcpin:HOST:PORT listens, udpout:HOST:PORT speaks first.")
 ]

@@ -70,7 +70,7 @@ def objections(
     """Return the reasons against sending, each a word and a text, and the warnings; arguments as in `preflight`."""
     against: list[tuple[str, str]] = []
     warnings: list[str] = []
-    _identity(state, autopilot, against, warnings)
+    identity(state, autopilot, against, warnings)
     _readiness(state, allow_armed, against, warnings)
     _abilities(state, items, autopilot, mission_type, against, warnings)
     if start is not None and not ignore_position:
@@ -79,7 +79,8 @@ def objections(
     return against, warnings
 
 
-def _identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnings: list[str]) -> None:
+def identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnings: list[str]) -> None:
+    """Add to ``against`` and ``warnings`` what speaks against its being the one vehicle with that autopilot."""
     if state.sources > 1:
         against.append(("ambiguous", rivals_words(state)))
     row = profile_of(autopilot)

@@ -76,6 +76,11 @@ class Recheck:
         self._ask_at = -math.inf
 
     @property
+    def watch(self) -> Watch:
+        """What follows the vehicle's messages."""
+        return self._watch
+
+    @property
     def texts(self) -> tuple[str, ...]:
         """The vehicle's status texts."""
         return tuple(self._watch.texts)

@@ -27,9 +27,10 @@ def outcome_word(outcome: Outcome) -> OutcomeWord:
 class UploadResult:
     """The result for one list and one vehicle.
 
-    ``verified`` is True only if the list was read back whole, equals the sent list as the autopilot stores it, and
-    passed the caller's check again. ``reason``: the outcome in words. ``on_board``: what the vehicle holds, if that is
-    not the sent list. ``read_back``: in wire order; ``mission``: the same as a Mission (missions only).
+    ``verified`` is True only if the list was read back whole, equals the sent list as the autopilot stores it, but for
+    differences that are excused, and passed the caller's check again. ``reason``: the outcome in words. ``on_board``:
+    what the vehicle holds, if that is not the sent list. ``read_back``: in wire order; ``mission``: the same as a
+    Mission (missions only).
     ``failed_check``: why the read-back fails the check. ``simulated``: the caller says that the vehicle is simulated.
     ``changed``: one word for how the vehicle changed since it was checked (armed, moved, ambiguous, …), ``change``: the
     same as a sentence; nothing was sent after the change was seen. ``state``: the vehicle's state when it was found.

@@ -18,6 +18,7 @@ from gcsplan.mavlink.link.preflight import (
     Reasons,
     apart_m,
     distance_m,
+    identity,
     objections,
     preflight,
     rivals_words,
@@ -240,13 +241,25 @@ def looking_at(channel: Channel, options: SessionOptions) -> Steps[tuple[Vehicle
 
 
 def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
-    """Read the list and compare it with the task's; nothing is written."""
+    """Read the list and compare it with the task's; nothing is written.
+
+    With a judge the parameters are read too, since they decide where the vehicle turns.
+    """
     state, recheck = yield from looking_at(channel, task.options)
+    warnings: list[str] = []
+    values: dict[str, float] = {}
+    if task.judge is not None:
+        against: Reasons = []
+        identity(state, task.autopilot, against, warnings)
+        if against:
+            raise VehicleRefused(f"not compared: {against[0][1]}", where=f"vehicle {task.sysid}", reason=against[0][0])
+        noted, values = yield from _parameters(channel, task, state, recheck.watch, recheck)
+        warnings += noted
     started = channel.link.clock()
     read = yield from reading(channel, state, task.mission_type, task.options, recheck)
     differences = tuple(compare(task.items, read.items, task.autopilot, task.mission_type))
     settled = Settled(Accepted(read.opaque_id), not faults(differences), differences, read.items, "", 1, read.retries)
-    return result_of(task, channel, settled, channel.link.clock() - started, [], recheck.texts)
+    return result_of(task, channel, settled, channel.link.clock() - started, warnings, recheck.texts, values)
 
 
 def clearing(

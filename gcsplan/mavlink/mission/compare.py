@@ -25,7 +25,7 @@ YAW_TOLERANCE_DEG = 1e-3
 class Difference:
     """One number that differs from the expected one; ``seq`` is -1 for the list as a whole.
 
-    ``excused``: harmless and reported nevertheless (the vehicle's own home).
+    ``excused``: harmless and reported nevertheless (the vehicle's own home, a position within a tolerance).
     """
 
     seq: int
@@ -38,10 +38,11 @@ class Difference:
 
     def __str__(self) -> str:
         place = f"item {self.seq} ({self.what})" if self.seq >= 0 else "the list"
-        if self.excused:
+        if self.excused and self.field == "home":
             return f"{place}: {self.field} is the vehicle's own, {self.read}; planned {self.sent}"
         kept = "" if self.expected == self.sent else f" (kept as {self.expected})"
-        return f"{place}: {self.field}: sent {self.sent}{kept}, read back {self.read}"
+        within = ", within the tolerance" if self.excused else ""
+        return f"{place}: {self.field}: sent {self.sent}{kept}, read back {self.read}{within}"
 
 
 def compare(

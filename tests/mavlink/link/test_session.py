@@ -505,6 +505,26 @@ def test_what_was_uploaded_is_downloaded_verified_and_cleared(autopilot: Autopil
     assert len(board.items()) <= 1
 
 
+def test_what_is_on_board_is_judged_with_the_vehicles_own_parameters() -> None:
+    board, sent, heard = vehicle(PX4), mission(PX4), []
+
+    def judge(read: Mission, values: Mapping[str, float]) -> str | None:
+        heard.append((read, dict(values)))
+        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 10.0 else None
+
+    with air(board) as link:
+        upload_mission(link, sent, options=OPTIONS).raise_for_outcome()
+        result = verify_mission(link, sent, options=replace(OPTIONS, read_parameters=True), judge=judge)
+        assert not result.verified
+        assert isinstance(result.error(), CheckFailed)
+        with pytest.raises(VehicleRefused, match="written for ArduCopter, and the vehicle is PX4") as caught:
+            verify_mission(link, mission(COPTER), options=OPTIONS, judge=judge)
+    ((read, values),) = heard
+    assert [i.wire for i in read.wire_items()] == [i.wire for i in board.items()]
+    assert values["NAV_MC_ALT_RAD"] == pytest.approx(0.8)
+    assert caught.value.reason == "wrong_autopilot"
+
+
 def test_an_empty_vehicle_gives_an_empty_mission() -> None:
     with air(vehicle()) as link:
         assert download_mission(link, 1, COPTER, options=OPTIONS).items == ()
