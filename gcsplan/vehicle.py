@@ -8,6 +8,31 @@ from enum import StrEnum
 
 from gcsplan.world.limits import Limits
 
+DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG = 30.0, 80.0
+"""ArduCopter's largest lean angle: its default, and the most that it accepts."""
+
+LEAN_DEG_PER_M_S = 3.0
+"""Lean that an ArduCopter needs for 1 m/s of cruise speed, against its drag: its speed was measured to end near 10 m/s
+with 30° and near 15 m/s with 45°, whatever was commanded. An airframe with less drag is faster."""
+
+
+def lean_for_deg(speed_m_s: float) -> float:
+    """The lean angle that an ArduCopter needs for a cruise speed, about."""
+    return LEAN_DEG_PER_M_S * speed_m_s
+
+
+def fastest_at_m_s(lean_deg: float) -> float:
+    """The fastest cruise speed that an ArduCopter's lean angle allows, about."""
+    return lean_deg / LEAN_DEG_PER_M_S
+
+
+def lean_words(lean_deg: float) -> str:
+    """The parameter of the lean angle with its value, for every version of ArduCopter."""
+    return (
+        f"ATC_ANGLE_MAX {lean_deg:g} (degrees, since ArduPilot 4.7) or ANGLE_MAX {100.0 * lean_deg:g} (hundredths of a "
+        f"degree, before)"
+    )
+
 
 class Autopilot(StrEnum):
     """The autopilot that a mission is written for."""
@@ -46,7 +71,8 @@ class Vehicle:
     just above the ground. ``leg_jerk_m_s3`` is the jerk of the S-curves that ArduPilot flies its legs with; it bounds
     the speed on a short leg. An acceleration of ``inf`` is an instant change of speed, a corner acceleration of ``inf``
     a sharp corner at full speed. A climb or descent rate of ``inf`` means that the cruise speed is the speed in space,
-    whatever the slope: the ideal vehicle of the papers.
+    whatever the slope: the ideal vehicle of the papers. ``lean_angle_deg`` is an ArduCopter's largest lean angle, which
+    has bounded ``speed_max_m_s`` already; None: it bounds nothing.
     """
 
     name: str
@@ -65,6 +91,7 @@ class Vehicle:
     land_m_s: float = 0.5
     vertical_accel_m_s2: float = 1.0
     leg_jerk_m_s3: float = math.inf
+    lean_angle_deg: float | None = None
 
     @property
     def lays_curves(self) -> bool:

@@ -11,6 +11,7 @@ from gcsplan.check.judge import judge
 from gcsplan.check.tuning import Tuning
 from gcsplan.errors import GcsplanError, VehicleRefused
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.vehicle import fastest_at_m_s
 
 if TYPE_CHECKING:
     from gcsplan.app.upload_job import ProgressCall, UploadJob, UploadOptions
@@ -77,9 +78,16 @@ def judge_on_board(job: UploadJob, *, allow_unjudged: bool) -> session.Judge | N
     """The check of the mission that was read back, since the vehicle will fly what it holds; None without a world."""
     if job.world is None or job.vehicle is None:
         return None
+    from gcsplan.mavlink.link.parameters import lean_shortage
+
     world, vehicle = job.world, job.vehicle
+    planned_m_s = job.mission.commanded_m_s
+    if vehicle.lean_angle_deg is not None:
+        planned_m_s = min(planned_m_s, fastest_at_m_s(vehicle.lean_angle_deg))
 
     def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
+        if vehicle.lean_angle_deg is not None and (short := lean_shortage(values, planned_m_s)):
+            return short
         # Home on board is where the vehicle is now, but the altitudes count from the planned start.
         verdict = judge(
             replace(read_back, home=job.mission.home), vehicle, world, rtl_rel_home_m=job.rtl_rel_home_m,

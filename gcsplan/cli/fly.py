@@ -37,16 +37,25 @@ def sim(
         from gcsplan.app.pipeline import load_mission
 
         stands = [
-            (r.vehicle.sysid, r.vehicle.autopilot, r.start_deg, r.start[2]) for r in load_mission(mission).vehicles
+            (r.vehicle.sysid, r.vehicle.autopilot, r.start_deg, r.start[2], r.vehicle.lean_angle_deg)
+            for r in load_mission(mission).vehicles
         ]
     elif autopilot is None or autopilot in list(Autopilot):
         kind = Autopilot(autopilot or Autopilot.ARDUCOPTER)
-        stands = [(sysid or 1, kind, (36.6, -84.38), 471.0)]  # a valley of the sample terrain
+        stands = [(sysid or 1, kind, (36.6, -84.38), 471.0, None)]  # a valley of the sample terrain
     else:
         raise UsageError(f"--autopilot {autopilot}: one of {', '.join(Autopilot)} is wanted")
     vehicles = [
-        LoopbackVehicle(number, kind, lat_deg=place[0], lon_deg=place[1], amsl_m=amsl_m, misbehave=trouble)
-        for number, kind, place, amsl_m in stands
+        LoopbackVehicle(
+            number,
+            kind,
+            lat_deg=place[0],
+            lon_deg=place[1],
+            amsl_m=amsl_m,
+            misbehave=trouble,
+            parameters={} if lean_deg is None else {"ANGLE_MAX": 100.0 * lean_deg},
+        )
+        for number, kind, place, amsl_m, lean_deg in stands
     ]
 
     def ready(server: SimServer) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from gcsplan.fleet.order import WITHIN_S
 from gcsplan.fleet.timing import Course, Route, speed_for
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, Vehicle, lean_for_deg, lean_words
 
 Hold = Literal["ground", "gate", "none"]
 Longer = Callable[[str, float], Route | None]
@@ -25,8 +25,8 @@ LONGEST_HOLD_S = 65535.0
 
 LONGER_TRIES = 4
 
-# ArduCopter leans no further than ANGLE_MAX (hundredths of a degree), which limits the speed, m/s (as measured).
-COPTER_CAPS = ((10.0, 3000), (15.0, 4500))
+WITHIN_LEAN_DEG = 0.01
+"""Degrees by which a lean angle may fall short, since speeds are float32 numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,11 +167,12 @@ def _float32_range(low: float, high: float) -> tuple[float, float]:
 def _speed_notes(vehicle: Vehicle, speed_m_s: float) -> list[str]:
     if vehicle.autopilot is not Autopilot.ARDUCOPTER:
         return []
-    over = [(cap, angle) for cap, angle in COPTER_CAPS if speed_m_s > cap]
-    if not over:
+    lean_deg = math.ceil(lean_for_deg(speed_m_s) - WITHIN_LEAN_DEG)
+    if lean_deg <= DEFAULT_LEAN_DEG:
         return []
-    cap, angle = over[-1]
-    return [
-        f"{speed_m_s:.2f} m/s needs an ANGLE_MAX above {angle}, with which ArduCopter flies about {cap:g} m/s at most "
-        "and would arrive late"
-    ]
+    if lean_deg > LARGEST_LEAN_DEG:
+        return [
+            f"{speed_m_s:.2f} m/s needs a lean of more than {LARGEST_LEAN_DEG:g}°, which is ArduCopter's largest: a "
+            f"vehicle that flies this mission arrives late"
+        ]
+    return [f"{speed_m_s:.2f} m/s needs a lean of about {lean_deg}°: set {lean_words(lean_deg)} before it flies"]

@@ -232,6 +232,8 @@ class VehicleKeys(LimitKeys):
     """Launch heading of a fixed wing; if absent, the planner chooses one."""
     speed_m_s: Annotated[list[Speed], Field(min_length=2, max_length=2)] = [3.0, 15.0]
     """Slowest and fastest cruise speed."""
+    lean_angle_deg: Annotated[float, Field(ge=10.0, le=80.0)] | None = None
+    """ArduCopter's largest lean (`ATC_ANGLE_MAX`): 3° for each m/s of cruise; if absent 30, so 10 m/s at most."""
     climb_m_s: Speed = 2.5
     """Fastest climb rate; slows steep legs."""
     descent_m_s: Speed = 1.5

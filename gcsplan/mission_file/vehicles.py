@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 from gcsplan.errors import Problem
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.mission_file.schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest
-from gcsplan.vehicle import Autopilot, Energy, Vehicle
+from gcsplan.vehicle import (
+    DEFAULT_LEAN_DEG,
+    LARGEST_LEAN_DEG,
+    Autopilot,
+    Energy,
+    Vehicle,
+    fastest_at_m_s,
+    lean_for_deg,
+    lean_words,
+)
 from gcsplan.world.limits import Limits
 
 ERRORS = {"horizontal_clearance_m": 30.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
@@ -89,6 +98,36 @@ def make_vehicle(
         speed_min_m_s=slow, speed_max_m_s=fast, turn_radius_m=keys.turn_radius_m,
         energy=Energy(**keys.energy.model_dump()), link=keys.link,
         **(_wing_motion(keys, limits) if keys.turn_radius_m > 0.0 else _motion(keys, notes, local=local)),
+    )  # fmt: skip
+
+
+def within_lean(
+    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Problem], notes: list[str], *, local: bool
+) -> Vehicle:
+    """``vehicle`` with the speeds that its lean angle allows, and a note if that is less than its keys want.
+
+    In local metres (the papers' worlds) an absent key is no bound.
+    """
+    lean_deg = keys.lean_angle_deg
+    if vehicle.autopilot is not Autopilot.ARDUCOPTER:
+        if lean_deg is not None:
+            words = f"is ArduCopter's alone: leave it out for {vehicle.autopilot}, given {lean_deg:g}"
+            problems.append(Problem(f"{where}.lean_angle_deg", words))
+        return vehicle
+    if lean_deg is None and local:
+        return vehicle
+    leans_deg = DEFAULT_LEAN_DEG if lean_deg is None else lean_deg
+    most, wanted = fastest_at_m_s(leans_deg), vehicle.speed_max_m_s
+    if wanted > most:
+        needs_deg = math.ceil(lean_for_deg(wanted) - 1e-6)
+        angle = f"a lean of {leans_deg:g}°" + (", ArduCopter's default," if lean_deg is None else " (lean_angle_deg)")
+        cure = "" if needs_deg > LARGEST_LEAN_DEG else (
+            f"; for {wanted:g} m/s write lean_angle_deg: {needs_deg}, and set {lean_words(needs_deg)}"
+        )  # fmt: skip
+        notes.append(f"{vehicle.name}: planned with {most:g} m/s, not {wanted:g}: {angle} allows about that{cure}")
+    return replace(
+        vehicle, lean_angle_deg=leans_deg, speed_max_m_s=min(wanted, most),
+        speed_min_m_s=min(vehicle.speed_min_m_s, most),
     )  # fmt: skip
 
 

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, lean_for_deg
+
+
+def _set_up(mission: Mission) -> dict[str, float]:
+    """The parameters that a copter of this mission has: it leans as far as its speed needs."""
+    if mission.autopilot is not Autopilot.ARDUCOPTER:
+        return {}
+    lean_deg = min(max(DEFAULT_LEAN_DEG, math.ceil(lean_for_deg(mission.commanded_m_s))), LARGEST_LEAN_DEG)
+    return {"ANGLE_MAX": 100.0 * lean_deg}
 
 
 @contextmanager
@@ -21,6 +31,7 @@ def loopback_fleet(missions: Sequence[Mission]) -> Iterator[str]:
             lon_deg=mission.home.lon_e7 / 1e7,
             amsl_m=mission.home.amsl_m,
             name=mission.name,
+            parameters=_set_up(mission),
         )
         for mission in missions
     ]

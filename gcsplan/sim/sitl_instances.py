@@ -13,6 +13,7 @@ from pathlib import Path
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.sim.outcome import Part
+from gcsplan.vehicle import DEFAULT_LEAN_DEG
 
 _BASE_PORT = 5760
 _FIRST_INSTANCE, _LAST_INSTANCE = 20, 900
@@ -41,7 +42,9 @@ def parameters_of(part: Part) -> dict[str, float]:
         "WPNAV_SPEED": 100.0 * v.speed_max_m_s, "WPNAV_SPEED_UP": 100.0 * v.climb_m_s,
         "WPNAV_SPEED_DN": 100.0 * v.descent_m_s, "LAND_SPEED": 100.0 * v.land_m_s,
     }  # fmt: skip
-    if v.speed_max_m_s > FAST_M_S:
+    if v.lean_angle_deg is not None and v.lean_angle_deg > DEFAULT_LEAN_DEG:
+        given["ANGLE_MAX"] = 100.0 * v.lean_angle_deg
+    elif v.speed_max_m_s > FAST_M_S:
         given["ANGLE_MAX"] = FAST_ANGLE_CD
     if part.rtl_rel_home_m is not None:
         given["RTL_ALT"] = 100.0 * part.rtl_rel_home_m

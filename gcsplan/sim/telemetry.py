@@ -41,6 +41,8 @@ class Telemetry:
     def __init__(self, vehicle: LoopbackVehicle) -> None:
         self._vehicle = vehicle
         self.parameters = Parameters(vehicle.autopilot, vehicle.sysid)
+        for name, value in vehicle.parameters.items():
+            self.parameters.set_from_wire(name, value)
         vehicle.mode = _FIRST_MODE[vehicle.autopilot]
         self._began: float | None = None
         self._by_id: dict[int, Callable[[float], Message]] = {

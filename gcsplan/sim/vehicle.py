@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from gcsplan.mavlink.mission.mission import MISSION, Home, MissionItem
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, MissionMessage, Packet, Request, RequestList
@@ -32,7 +32,7 @@ class LoopbackVehicle:
     """One vehicle that stands on the ground and stores a mission, a fence and rally points.
 
     ``lat_deg``, ``lon_deg``, ``amsl_m``: its position, which is also its home. ``boot_s``: seconds after being switched
-    on for which it answers NO_SPACE (ArduPilot) or nothing (PX4).
+    on for which it answers NO_SPACE (ArduPilot) or nothing (PX4). ``parameters``: those that differ from the defaults.
     """
 
     def __init__(
@@ -47,9 +47,10 @@ class LoopbackVehicle:
         misbehave: Misbehaviour | None = None,
         boot_s: float = 0.0,
         name: str = "",
+        parameters: Mapping[str, float] | None = None,
     ) -> None:
         self.address = Address(sysid, compid)
-        self.autopilot = autopilot
+        self.autopilot, self.parameters = autopilot, dict(parameters or {})
         self.name = name or f"vehicle {sysid}"
         self.misbehave = misbehave or Misbehaviour()
         self.mode = 0  # custom mode, as last set by a ground station

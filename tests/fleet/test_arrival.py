@@ -424,13 +424,14 @@ def test_speeds_are_float32_within_the_range() -> None:
     assert fixed.slowest_m_s == fixed.fastest_m_s == float(np.float32(3.3))
 
 
-def test_speeds_that_a_level_arducopter_does_not_reach_are_told() -> None:
+def test_speeds_that_need_more_lean_than_arducopters_default_are_told() -> None:
     def notes(speed: float, **more: Any) -> str:
         return " ".join(schedule([crew("a", 300, speed_max_m_s=speed, **more)], "none").slots[0].notes)
 
     assert notes(10.0) == ""
-    assert "ANGLE_MAX above 3000" in notes(12.0)
-    assert "ANGLE_MAX above 4500" in notes(16.0)
+    assert "12.00 m/s needs a lean of about 36°: set ATC_ANGLE_MAX 36 (degrees, since ArduPilot 4.7)" in notes(12.0)
+    assert "ANGLE_MAX 4800 (hundredths of a degree, before)" in notes(16.0)
+    assert "a lean of more than 80°" in notes(27.0)
     assert notes(16.0, autopilot=Autopilot.PX4) == ""
 
 

@@ -15,7 +15,7 @@ from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.mission.autopilots import PX4, profile_of
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
 from gcsplan.mavlink.mission.return_altitude import RETURN_PARAMETERS, on_board
-from gcsplan.vehicle import Autopilot
+from gcsplan.vehicle import DEFAULT_LEAN_DEG, Autopilot, fastest_at_m_s, lean_for_deg
 
 Values = Mapping[str, float]
 
@@ -25,6 +25,7 @@ _COPTER = (
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",),
     ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",),
     ("WPNAV_RADIUS", "WP_RADIUS_M"),  # cm; renamed and in metres since 4.7
+    ("ANGLE_MAX", "ATC_ANGLE_MAX"),  # hundredths of a degree; renamed and in degrees since 4.7
 )  # fmt: skip
 _PLANE = (
     _RETURN[Autopilot.ARDUPLANE],
@@ -48,6 +49,8 @@ FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
 }
 """Parameters that are read before a fence is sent."""
 
+_LEAN_ANGLE = {"ANGLE_MAX": 0.01, "ATC_ANGLE_MAX": 1.0}
+_SAME_DEG = 0.05
 _FAILSAFES = {
     "FS_THR_ENABLE": "loss of radio control", "THR_FAILSAFE": "loss of radio control",
     "NAV_RCL_ACT": "loss of radio control", "FS_GCS_ENABLE": "loss of the ground station",
@@ -77,6 +80,23 @@ def parameter_name(message: Any) -> str:
     """Return the name in a PARAM_VALUE."""
     name = message.param_id
     return name if isinstance(name, str) else bytes(name).split(b"\0")[0].decode(errors="replace")
+
+
+def lean_shortage(values: Values, speed_m_s: float) -> str:
+    """Return in words by how much the lean angle on board is too small for a speed, and the cure; empty if it is not.
+
+    Empty, too, if it was not read.
+    """
+    name = next((n for n in _LEAN_ANGLE if math.isfinite(values.get(n, math.nan))), None)
+    needs_deg = lean_for_deg(speed_m_s)
+    if name is None or values[name] * _LEAN_ANGLE[name] >= needs_deg - _SAME_DEG:
+        return ""
+    leans_deg = values[name] * _LEAN_ANGLE[name]
+    return (
+        f"{name} is {values[name]:g} on board: it leans by {leans_deg:g}° at most, which allows about "
+        f"{fastest_at_m_s(leans_deg):.3g} m/s, and {speed_m_s:.3g} m/s are commanded: set {name} "
+        f"{math.ceil(needs_deg - _SAME_DEG) / _LEAN_ANGLE[name]:g}, or plan with lean_angle_deg: {leans_deg:g}"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +131,7 @@ def judge_parameters(
               if name not in values]  # fmt: skip
     found += _return_altitude(values, rtl_rel_home_m, advised_rel_home_m)
     found += _fences(values, _extent(mission))
+    found += _lean(values, mission)
     off = [f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0]
     if off:
         found.append("no failsafe action on board for " + ", ".join(off))
@@ -159,6 +180,18 @@ def _return_altitude(values: Values, checked_m: float | None, advised_m: float |
     if abs(height_m - wanted_m) > _SAME_M:
         return [f"it returns at {height_m:g} m above home ({name}), as judged: set {parameter.setting(wanted_m)}"]
     return []
+
+
+def _lean(values: Values, mission: Mission) -> list[str]:
+    speed_m_s = mission.commanded_m_s
+    if mission.autopilot is not Autopilot.ARDUCOPTER or lean_for_deg(speed_m_s) <= DEFAULT_LEAN_DEG + _SAME_DEG:
+        return []
+    if not any(name in values for name in _LEAN_ANGLE):
+        needs_deg = math.ceil(lean_for_deg(speed_m_s) - _SAME_DEG)
+        words = f"the largest lean angle on board could not be read: {speed_m_s:.3g} m/s need about {needs_deg}°"
+        return [words]
+    short = lean_shortage(values, speed_m_s)
+    return [short] if short else []
 
 
 def _fences(values: Values, extent: _Extent) -> list[str]:

@@ -133,8 +133,8 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     failed = task.judge(task.mission, values) if task.mission and task.judge and values else None
     if failed is not None:
         raise VehicleRefused(
-            f"with this vehicle's parameters the mission is not safe, and nothing was sent; plan it with more "
-            f"track_error_m, or set the parameters:\n{failed}",
+            f"with this vehicle's parameters the mission cannot be flown as it was judged, and nothing was sent; plan "
+            f"it for them (more track_error_m, another lean_angle_deg), or set them:\n{failed}",
             where=f"vehicle {task.sysid}",
             reason="parameters",
         )

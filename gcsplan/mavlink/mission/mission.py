@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.mission.commands import WAYPOINT
+from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, WAYPOINT
 from gcsplan.vehicle import Autopilot
 
 # Frames (MAV_FRAME). The _INT frames 5, 6, 11 mean the same as 0, 3, 10: both are read, 0, 3, 10 are written.
@@ -114,6 +114,12 @@ class Mission:
     def first_seq(self) -> int:
         """Wire seq of ``items[0]``: 1 where home is item 0, else 0."""
         return 1 if self.autopilot.is_ardupilot else 0
+
+    @property
+    def commanded_m_s(self) -> float:
+        """The fastest cruise that its items command, m/s; 0 if they command none."""
+        speeds = (i.params[1] for i in self.items if i.command == DO_CHANGE_SPEED and i.params[0] in (0.0, 1.0))
+        return max((speed for speed in speeds if 0.0 < speed < math.inf), default=0.0)
 
     def wire_items(self) -> tuple[MissionItem, ...]:
         """Return all items in wire order: seq is the index."""
