@@ -92,8 +92,9 @@ def _runs(stretches: Sequence[Stretch], ends: Floats) -> Iterator[tuple[int, int
 def _stops(s: Stretch, after: Stretch, ends: Floats, ends_after: Floats) -> bool:
     if s.hold_s > 0.0 or s.kind != after.kind or _upright(s, ends) or _upright(after, ends_after):
         return True
-    # Between stretches that do not meet something is flown that is not known.
-    return math.dist(ends[1], ends_after[0]) > SAME_M and math.dist(*ends_after) > 0.0
+    # Between stretches that do not meet something is flown that is not known; but from its circles a climb-out flies to
+    # the point over their middle, which is a stretch without a length.
+    return math.dist(ends[1], ends_after[0]) > SAME_M and (math.dist(*ends_after) > 0.0 or after.hold_s > 0.0)
 
 
 def _upright(s: Stretch, ends: Floats) -> bool:

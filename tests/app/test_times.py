@@ -81,6 +81,13 @@ CASES: dict[str, Any] = {
         ],
         "arrival": {"mode": "together", "arrive_s": 260, "separation_m": 30},
     },
+    "a wing that returns": FLAT | {
+        "limits": {"min_agl_m": 40, "max_climb_deg": 10, "track_error_m": 10},
+        "vehicles": [
+            _craft("back", 1, autopilot="arduplane", speed_m_s=[12, 20], turn_radius_m=100, end="rtl",
+                   rtl_rel_home_m=150, start={"east_m": 0, "north_m": 0}, goal={"east_m": 3000, "north_m": 0}),
+        ],
+    },
     "a paper's": MISSIONS / "papers" / "ib-abc-sequence.yaml",
 }  # fmt: skip
 
