@@ -507,6 +507,12 @@ def test_out_of_a_bowl_it_climbs_in_circles() -> None:
     assert [item.command for item in flown.items[:3]] == [22, 31, 178]
     verdict = judge(flown, craft, where)
     assert not [f for f in verdict.findings if f.seq <= 4], verdict.describe()
+    # It climbs out at one speed, the circles included; then the path begins.
+    before = verdict.legs[: next(i for i, leg in enumerate(verdict.legs) if leg.on_path)]
+    places = np.array([before[0].start, *(leg.end for leg in before)])
+    line = where.frame.to_plane(places[:, 0], places[:, 1])
+    flat_m = float(np.hypot(*np.diff(line, axis=0).T).sum())
+    assert math.fsum(leg.time_s for leg in before) == pytest.approx(flat_m / craft.speed_max_m_s, rel=1e-3)
 
 
 # -- on the wire -----------------------------------------------------------------------------------------------------
