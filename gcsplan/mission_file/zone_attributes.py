@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 from gcsplan.errors import Problem
@@ -57,8 +58,35 @@ _SHARED = re.compile(
 _SEEMS_A_LIMIT = re.compile(
     r"floor|ceil|lower|upper|altitude|height|elev|vertical|limit|radius|buffer|(?<![a-z])(?:alt|agl|amsl|msl)(?![a-z])"
 )
+_LIKE_A_LEVEL = re.compile(
+    r"\d\s*(?:M|F|['\u2019\u2032])|FL\s*\d|^\s*(?:GND|SFC|GROUND|SURFACE|UNL\w*)\s*$", re.ASCII | re.IGNORECASE
+)
+"""A quick look at values, most of which are no levels."""
+
 _OPENAIP_CODES = {"unit": {0: "M", 1: "FT", 6: "FL"}, "referencedatum": {0: "GND", 1: "MSL", 2: "STD"}}
 """The numbers with which openAIP's files name units and references."""
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What the table says of an attribute's name: ``own`` is a key of mission files, ``limit`` a floor or ceiling."""
+
+    lower: str
+    own: bool
+    limit: re.Match[str] | None
+    shared: bool
+    used: bool
+    seems_a_limit: bool
+
+
+@lru_cache(maxsize=4096)  # features repeat their attributes' names
+def meaning_of(key: str) -> Meaning:
+    """What the table says of a name, whatever its case, spaces and signs."""
+    lower = key.lower()
+    plain = re.sub(r"[^a-z0-9]", "", lower)
+    limit, shared = _LIMIT.fullmatch(plain), bool(_SHARED.fullmatch(plain))
+    used = limit is not None or shared or lower in (*NAMES, RADIUS)
+    return Meaning(lower, plain in OWN, limit, shared, used, bool(_SEEMS_A_LIMIT.search(lower)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +98,9 @@ class Attribute:
     where: str
 
     @property
-    def plain(self) -> str:
-        """The name without case, spaces and signs, as the table has it."""
-        return re.sub(r"[^a-z0-9]", "", self.key.lower())
+    def meaning(self) -> Meaning:
+        """What the table says of its name."""
+        return meaning_of(self.key)
 
     def __str__(self) -> str:
         return f"{self.key[:40]} {repr(self.value)[:60]}"
@@ -92,13 +120,20 @@ class Said:
 
 def read_attributes(given: Sequence[Attribute], name: str, problems: list[Problem]) -> Said | None:
     """What the attributes say; ``name`` is for a zone without one. None, and ``problems``, if they cannot be read."""
-    given = [a for a in given if a.value is not None and not (isinstance(a.value, str) and not a.value.strip())]
-    reading = _Reading(_name(given) or name, problems)
+    known: list[Attribute] = []
+    ignored: list[Attribute] = []
+    for a in given:
+        if a.value is None or (isinstance(a.value, str) and not a.value.strip()):
+            continue
+        meaning = meaning_of(a.key)
+        if meaning.used:
+            known.append(a)
+        elif meaning.seems_a_limit or _reads_as_level(a.value):
+            ignored.append(a)
+    reading = _Reading(_name(known) or name, problems)
     before = len(problems)
-    radius_m = reading.radius_m([a for a in given if a.key.lower() == RADIUS])
-    bounds = reading.bounds(given)
-    used = [id(a) for a in given if a.key.lower() in (*NAMES, RADIUS) or _used(a)]
-    ignored = [a for a in given if id(a) not in used and _seems_a_limit(a)]
+    radius_m = reading.radius_m([a for a in known if a.meaning.lower == RADIUS])
+    bounds = reading.bounds(known)
     if ignored:
         reading.remarks.append((NOT_READ, ", ".join(str(a) for a in ignored[:6]) + (", …" if len(ignored) > 6 else "")))
     if len(problems) > before:
@@ -128,20 +163,14 @@ def is_number(value: Any) -> bool:
 
 def _name(given: Sequence[Attribute]) -> str:
     """The name: the first in the table's order, and of its spellings the one in lower case."""
-    named = [a for a in given if a.key.lower() in NAMES]
-    best = min(named, key=lambda a: (NAMES.index(a.key.lower()), a.key != a.key.lower()), default=None)
+    named = [a for a in given if a.meaning.lower in NAMES]
+    best = min(named, key=lambda a: (NAMES.index(a.meaning.lower), a.key != a.meaning.lower), default=None)
     return "" if best is None else str(best.value).strip()
 
 
-def _used(attribute: Attribute) -> bool:
-    return bool(_LIMIT.fullmatch(attribute.plain) or _SHARED.fullmatch(attribute.plain))
-
-
-def _seems_a_limit(attribute: Attribute) -> bool:
-    if _SEEMS_A_LIMIT.search(attribute.key.lower()):
-        return True
+def _reads_as_level(value: Any) -> bool:
     try:
-        return isinstance(attribute.value, str) and bool(read_level(attribute.value))
+        return isinstance(value, str) and bool(_LIKE_A_LEVEL.search(value)) and bool(read_level(value))
     except LevelError:
         return False
 
@@ -170,8 +199,8 @@ class _Reading:
         return None
 
     def bounds(self, given: Sequence[Attribute]) -> Bounds:
-        shared = [str(a.value) for a in given if _SHARED.fullmatch(a.plain)]
-        limits = [(a, match) for a in given if (match := _LIMIT.fullmatch(a.plain))]
+        shared = [str(a.value) for a in given if a.meaning.shared]
+        limits = [(a, match) for a in given if (match := a.meaning.limit) is not None]
         levels: dict[str, float] = {}
         for bound in ("floor", "ceiling"):
             own = [(a, match) for a, match in limits if BOUNDS[match["bound"]] == bound]
@@ -203,7 +232,7 @@ class _Reading:
             if bound == "ceiling" and level == Level(0.0, "agl"):
                 self._wrong(attribute, "is a ceiling at the ground, and the zone would lie wholly under ground")
                 return {}
-            if attribute.plain not in OWN and level != Level(0.0, "agl"):
+            if not attribute.meaning.own and level != Level(0.0, "agl"):
                 self.read_as.append(f"{attribute}: {bound} at {level}")
             return {f"{bound}_{level.datum}_m": level.value_m}
         if level is Limit.PRESSURE:
@@ -215,7 +244,7 @@ class _Reading:
     def _level(self, attribute: Attribute, words: Sequence[str], shared: Sequence[str]) -> Level | Limit | None:
         value = attribute.value
         try:
-            if isinstance(value, str) and attribute.plain in OWN:
+            if isinstance(value, str) and attribute.meaning.own:
                 value = as_figure(value)
             if isinstance(value, dict):
                 value, more = _parts(value)

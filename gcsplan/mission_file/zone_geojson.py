@@ -94,10 +94,10 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
 
 def _attributes(properties: dict[str, Any], geometry: dict[str, Any], where: str) -> list[Attribute]:
     """Those of the feature, and those of its ``layer``, where ED-318 has the limits of a zone."""
-    given = [Attribute(key, value, f"{where}.properties.{key}") for key, value in properties.items()]
+    given = [Attribute(key, value, f"{where}.properties.{key[:80]}") for key, value in properties.items()]
     layer = geometry.get("layer")
     if isinstance(layer, dict):
-        given += [Attribute(key, value, f"{where}.geometry.layer.{key}") for key, value in layer.items()]
+        given += [Attribute(key, value, f"{where}.geometry.layer.{key[:80]}") for key, value in layer.items()]
     return given
 
 

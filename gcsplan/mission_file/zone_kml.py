@@ -174,5 +174,5 @@ def _extended_data(placemark: Any, where: str) -> list[Attribute]:
             key = element.get("name", "")
             texts = [element] if _kind(element) == "SimpleData" else [e for e in element if _kind(e) == "value"]
             text = next((e.text or "" for e in texts), "").strip()
-            given.append(Attribute(key, as_figure(text) if key.lower() == RADIUS else text, f"{where}.{key}"))
+            given.append(Attribute(key, as_figure(text) if key.lower() == RADIUS else text, f"{where}.{key[:80]}"))
     return given
