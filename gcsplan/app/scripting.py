@@ -220,7 +220,9 @@ def upload(
     options = UploadOptions(
         allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s
     )
-    return uploads.run_jobs(uploads.jobs_of(planned, targets, homes), options, progress, simulator=loopback_fleet)
+    return uploads.run_jobs(
+        uploads.jobs_of(planned, targets, homes, bool(homes)), options, progress, simulator=loopback_fleet
+    )
 
 
 def rehearse(

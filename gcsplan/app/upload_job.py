@@ -37,7 +37,7 @@ class UploadOptions:
 class UploadJob:
     """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own).
 
-    ``way_home`` is None unless it was judged.
+    ``way_home`` is None unless it was judged. ``home_required``: a vehicle that returns at another altitude is refused.
     """
 
     name: str
@@ -50,6 +50,7 @@ class UploadJob:
     terrain_error_m: float = 0.0
     fence: Fence | None = None
     way_home: WayHome | None = None
+    home_required: bool = False
 
 
 @dataclass(frozen=True, eq=False)

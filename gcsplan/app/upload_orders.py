@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from gcsplan.app.way_home import against_on_board
 from gcsplan.check.judge import judge
 from gcsplan.check.tuning import Tuning
 from gcsplan.errors import GcsplanError, VehicleRefused
@@ -67,15 +68,21 @@ def order_of(
         timeout_s=options.timeout_s,
         listen_s=listen_s,
     )
-    return session.UploadOrder(link, job.mission, job.verdict, settings, _judge_again(job), progress)
+    return session.UploadOrder(link, job.mission, job.verdict, settings, _judge_again(job, simulated), progress)
 
 
-def _judge_again(job: UploadJob) -> session.Judge | None:
-    return None if job.verdict is None else judge_on_board(job, allow_unjudged=job.verdict.safe is None)
+def _judge_again(job: UploadJob, simulated: bool) -> session.Judge | None:
+    if job.verdict is None:
+        return None
+    return judge_on_board(job, allow_unjudged=job.verdict.safe is None, simulated=simulated)
 
 
-def judge_on_board(job: UploadJob, *, allow_unjudged: bool) -> session.Judge | None:
-    """The check of the mission that was read back, since the vehicle will fly what it holds; None without a world."""
+def judge_on_board(job: UploadJob, *, allow_unjudged: bool, simulated: bool = False) -> session.Judge | None:
+    """The check of the mission that was read back, since the vehicle will fly what it holds; None without a world.
+
+    It is asked before anything is sent too, with the vehicle's parameters. A simulated vehicle's return altitude is
+    nobody's, so it is not held against a required return.
+    """
     if job.world is None or job.vehicle is None:
         return None
     from gcsplan.mavlink.link.parameters import lean_shortage
@@ -88,6 +95,10 @@ def judge_on_board(job: UploadJob, *, allow_unjudged: bool) -> session.Judge | N
     def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
         if vehicle.lean_angle_deg is not None and (short := lean_shortage(values, planned_m_s)):
             return short
+        if job.home_required and job.way_home is not None and not simulated:
+            against = against_on_board(job.way_home, values)
+            if against is not None:
+                return against
         # Home on board is where the vehicle is now, but the altitudes count from the planned start.
         verdict = judge(
             replace(read_back, home=job.mission.home), vehicle, world, rtl_rel_home_m=job.rtl_rel_home_m,

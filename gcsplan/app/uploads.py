@@ -80,14 +80,20 @@ def _url(text: str, word: str) -> str:
 
 
 def jobs_of(
-    plan: Plan, where: Mapping[str, str], homes: Mapping[str, WayHome] = MappingProxyType({})
+    plan: Plan,
+    where: Mapping[str, str],
+    homes: Mapping[str, WayHome] = MappingProxyType({}),
+    home_required: bool = False,
 ) -> list[UploadJob]:
-    """The upload jobs of a plan; vehicles without a target are left out. ``homes``: ways home that were judged."""
+    """The upload jobs of a plan; vehicles without a target are left out.
+
+    ``homes``: ways home that were judged; ``home_required``: they must be safe.
+    """
     source = plan.source
     return [
         UploadJob(
             v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
-            source.terrain_error_m, way_home=homes.get(v.name),
+            source.terrain_error_m, way_home=homes.get(v.name), home_required=home_required,
         )
         for v in plan.vehicles if v.name in where
     ]  # fmt: skip
@@ -109,7 +115,7 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
 def _job(c: Checked, url: str) -> UploadJob:
     return UploadJob(
         c.vehicle.name, url, c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m, c.terrain_error_m,
-        way_home=c.way_home,
+        way_home=c.way_home, home_required=c.home_required,
     )  # fmt: skip
 
 

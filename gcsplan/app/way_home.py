@@ -13,13 +13,15 @@ from gcsplan.app.model import Plan
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
+from gcsplan.mavlink.mission.return_altitude import on_board
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.world.world import World
 
 MOST_SHOWN = 5
 """Vehicles that a warning or a refusal names one by one."""
 
-Homes = Mapping[str, WayHome]
+SAME_M = 0.5
+"""Return altitudes that differ by no more than this, m, count as the same."""
 
 
 def is_required(source: MissionFile | None, option: bool) -> bool:
@@ -80,6 +82,20 @@ def _lines(name: str, home: WayHome | None) -> list[str]:
     if home is None:
         return [f"{name}: the return was not judged"]
     return [f"{name}: {home.headline}", *([f"{name}: {home.advice}"] if home.advice else [])]
+
+
+def against_on_board(home: WayHome, values: Mapping[str, float]) -> str | None:
+    """Why a required return is not the one that a vehicle with these parameters would fly; None if it is."""
+    parameter = on_board(values)
+    if parameter is None:
+        return "a safe return is required, and the return altitude on board could not be read"
+    height_m = parameter.metres(values[parameter.name])
+    if abs(height_m - home.rtl_rel_home_m) <= SAME_M:
+        return None
+    return (
+        f"a safe return is required; it was judged at {home.rtl_rel_home_m:g} m above home, and this vehicle returns "
+        f"at {height_m:g} m: set {parameter.setting(home.rtl_rel_home_m)}"
+    )
 
 
 def warnings(homes: Mapping[str, WayHome | None]) -> list[str]:

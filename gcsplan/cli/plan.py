@@ -100,7 +100,7 @@ def plan(
     """
     from gcsplan.app import outputs, pipeline
     from gcsplan.app.gate import GateTime
-    from gcsplan.app.way_home import judged
+    from gcsplan.app.way_home import is_required, judged
     from gcsplan.cli.console import plan_table, release_table, remark, say_notes_of, upload_table
     from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
@@ -134,7 +134,8 @@ def plan(
         homes = judged(planned, asked=report or way_home or rally, option=require_way_home)
         jobs: list[UploadJob] = []
         if upload or fence or fence_infinite:
-            jobs = uploads.jobs_of(planned, targets or dict.fromkeys((v.name for v in planned.vehicles), ""), homes)
+            where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
+            jobs = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home))
         fence_notes: list[tuple[str, str]] = []
         if fence or fence_infinite:  # a fence that the mission would breach is refused before anything is written
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)

@@ -13,6 +13,7 @@ import yaml
 import gcsplan
 from gcsplan.cli import main as cli
 from gcsplan.errors import CheckFailed
+from gcsplan.sim import parameters
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
@@ -144,6 +145,25 @@ def test_where_a_safe_return_is_required_nothing_flyable_is_left_and_nothing_is_
     with pytest.raises(CheckFailed):
         gcsplan.rehearse(planned)
     assert not flyable(tmp_path / "script")
+
+
+@pytest.mark.parametrize("way", ["plan", "upload"])
+def test_a_vehicle_that_returns_at_another_altitude_than_the_required_one_is_refused_before_anything_is_sent(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planned: Path, way: str
+) -> None:
+    mission = write(tmp_path, rtl_rel_home_m=200.0, way_home="required")
+    for centimetres, expected in ((1500, 5), (20000, 0)):
+        monkeypatch.setitem(parameters._TABLES[Autopilot.ARDUCOPTER], "RTL_ALT", parameters._i(centimetres))
+        with SimServer([board()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+            url = server.url_for_gcs
+            call = ["plan", mission, "--upload", url] if way == "plan" else \
+                   ["upload", planned, "--mission", mission, "--to", url]  # fmt: skip
+            code, text, _ = run(*call)
+            assert code == expected, text
+            assert bool(server.vehicles[0].items()) == (expected == 0)
+        assert ("judged at 200 m above home, and this vehicle returns at 15 m: set RTL_ALT 20000 (cm)" in text) == (
+            expected == 5
+        )
 
 
 def test_what_was_judged_is_not_called_unchecked_and_the_vehicles_own_name_is_told(run: Any, tmp_path: Path) -> None:
