@@ -105,5 +105,5 @@ def warnings(homes: Mapping[str, WayHome | None]) -> list[str]:
     for name, home in bad[:MOST_SHOWN]:
         lines += _lines(name, home)
     if len(bad) > MOST_SHOWN:
-        lines.append(f"… and no safe return for {len(bad) - MOST_SHOWN} more of {len(homes)} vehicles")
+        lines.append(f"… and {len(bad) - MOST_SHOWN} more of {len(homes)} vehicles: no safe return, or not judged")
     return lines

@@ -78,7 +78,7 @@ def legend(page: Page, relief: Relief) -> str:
     zone = '<li><i class="swatch zone"></i>no-fly zone</li>' if page.world.airspace.zones else ""
     homes = ""
     if any(s.home is not None and s.home.unsafe for s in page.subjects):
-        homes = '<li><i class="swatch nowhere"></i>no safe way home from here</li>'
+        homes = '<li><i class="swatch nowhere"></i>no safe return from here</li>'
     if any(s.home is not None and s.home.rally for s in page.subjects):
         homes += '<li><i class="dot rally"></i>rally point proposed</li>'
     return (
@@ -168,7 +168,7 @@ def _no_return_svg(home: WayHome | None, line: Line, extent: Extent) -> str:
             xy = extent.units(line.east_m[mine], line.north_m[mine])
             points = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy)
             paths.append(
-                f'<polyline class="nohome" points="{points}"><title>no safe way home: {esc(s.why)}</title></polyline>'
+                f'<polyline class="nohome" points="{points}"><title>no safe return: {esc(s.why)}</title></polyline>'
             )
     return "".join(paths)
 
