@@ -32,7 +32,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "figures": set(),
     "native": set(),
-    "world": {"arrays", "errors", "native"},
+    "world": {"arrays", "errors", "figures", "native"},
     "vehicle": WORLD,
     "logs": {"arrays", "errors", "figures"},
     "optimisers": {"arrays", "errors"},
