@@ -112,7 +112,7 @@ def bench_terrain(
     from rich.console import Console
 
     from gcsplan.bench import terrain, terrain_report
-    from gcsplan.cli.console import remark
+    from gcsplan.cli.console import RESULTS, remark
 
     try:
         budgets = [float(s) for s in seconds.split(",")]
@@ -123,7 +123,7 @@ def bench_terrain(
         kept_only=kept, long=minute, errors=errors, count=count, tell=remark, gap_percent=gap,
         without=without or (),
     )  # fmt: skip
-    Console(width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
+    Console(file=RESULTS, width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
 
 
 @bench_app.command("everyday", short_help="A working day's missions, beside a visibility graph.")

@@ -28,6 +28,7 @@ from gcsplan.cli.options import (
     WayHomeOption,
 )
 from gcsplan.errors import UsageError
+from gcsplan.figures import counted
 
 
 def upload(
@@ -180,7 +181,7 @@ def download(
     if as_json:
         emit({"file": str(out), "items": items})
     else:
-        say(f"{items} item{'' if items == 1 else 's'} written to {out}")
+        say(f"{counted(items, 'item')} written to {out}")
 
 
 def clear(
