@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import math
+import os
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -148,7 +149,8 @@ def gdal(path: Path, other: str = "") -> Iterator[Any]:
 
     ``other``: the driver for a file that is no GeoTIFF, if the file's name does not decide it.
     """
-    import rasterio
+    with _quiet_proj():
+        import rasterio
     from rasterio.errors import NotGeoreferencedWarning
 
     with (
@@ -160,6 +162,21 @@ def gdal(path: Path, other: str = "") -> Iterator[Any]:
             warnings.simplefilter("ignore", category)
         with rasterio.open(path.resolve(), driver=_driver(path, other)) as dataset:
             yield dataset
+
+
+@contextmanager
+def _quiet_proj() -> Iterator[None]:
+    """Keep the PROJ inside rasterio from writing to standard error, as it does for units in damaged headers.
+
+    It reads the variable once, when rasterio is imported. The PROJ of pyproj is another one, and reports by exceptions.
+    """
+    given = os.environ.get("PROJ_DEBUG")
+    os.environ.setdefault("PROJ_DEBUG", "0")
+    try:
+        yield
+    finally:
+        if given is None:
+            os.environ.pop("PROJ_DEBUG", None)
 
 
 def _driver(path: Path, other: str) -> str:

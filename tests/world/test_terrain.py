@@ -926,3 +926,25 @@ def test_a_mission_too_wide_for_the_polynomial_is_refused(tmp_path: Path) -> Non
     with pytest.raises(InputError, match="too wide"):
         load(path, frame=frame, box=(-250e3, -250e3, 250e3, 250e3))
     assert math.isfinite(load(path, frame=frame, box=(-20e3, -20e3, 20e3, 20e3)).ground_at(0.0, 0.0))
+
+
+def test_a_unit_that_proj_does_not_know_is_no_line_of_a_library(tmp_path: Path) -> None:
+    good, odd = tmp_path / "good.tif", tmp_path / "odd.tif"
+    profile = {"driver": "GTiff", "height": 3, "width": 3, "count": 1, "dtype": "float32", "crs": "EPSG:4326"}
+    with rasterio.open(good, "w", transform=Affine(0.01, 0.0, 8.0, 0.0, -0.01, 47.0), **profile) as dataset:
+        dataset.write(np.ones((1, 3, 3), np.float32))
+    header = good.read_bytes()
+    for key, known, unknown in ((2048, 4326, 33510), (2054, 9102, 65422)):  # the system, and the unit of its angles
+        before = struct.pack("<HHHH", key, 0, 1, known)
+        assert header.count(before) == 1
+        header = header.replace(before, struct.pack("<HHHH", key, 0, 1, unknown))
+    odd.write_bytes(header)
+    code = (
+        "import sys; from gcsplan.world.frame import Frame; from gcsplan.world.terrain import *; "
+        "spec = TerrainSpec(dem=(sys.argv[1],), vertical_datum='EGM96', crs='EPSG:4326'); "
+        "print(load_terrain(spec, Frame(46.985, 8.015), (-9.0, -9.0, 9.0, 9.0), where='').ground_m.shape)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(odd)], capture_output=True, text=True, timeout=60.0, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
