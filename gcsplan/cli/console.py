@@ -154,7 +154,7 @@ def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[T
     return tables
 
 
-def _plan_row(v: VehiclePlan, fleet: FleetPlan | None, home: WayHome | None) -> dict[str, str]:
+def _plan_row(v: VehiclePlan, fleet: FleetPlan | None, home: WayHome | None = None) -> dict[str, str]:
     verdict = v.verdict
     slot = None if fleet is None else fleet.slot(v.name)
     held = f" + {slot.hold_s:.0f} at the gate" if slot and slot.hold_s > 0 else ""
