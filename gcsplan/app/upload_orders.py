@@ -71,7 +71,7 @@ def order_of(
     return session.UploadOrder(link, job.mission, job.verdict, settings, _judge_again(job, simulated), progress)
 
 
-def _judge_again(job: UploadJob, simulated: bool) -> session.Judge | None:
+def _judge_again(job: UploadJob, simulated: bool = False) -> session.Judge | None:
     if job.verdict is None:
         return None
     return judge_on_board(job, allow_unjudged=job.verdict.safe is None, simulated=simulated)

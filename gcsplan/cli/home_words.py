@@ -22,18 +22,21 @@ def say_homes(homes: Mapping[str, WayHome]) -> None:
     """Print one row for each vehicle whose way home was judged, and a warning for each that has no safe one."""
     if not homes:
         return
-    columns = [("vehicle", False), ("return at, m", True), ("no safe return from", True), ("way home", False),
-               ("to set on the vehicle", False), ("leaves without", True), ("rally points", True)]  # fmt: skip
+    columns = [("vehicle", False), ("return at, m", True), ("way home", False), ("unsafe from", True),
+               ("to set, m", True), ("then unsafe from", True), ("rally points", True)]  # fmt: skip
     table = _table("[bold]way home[/]  the autopilot's own return, from every point of the path", columns)
     for name, home in homes.items():
         at = f"{home.rtl_rel_home_m:g}" + (" (default)" if home.assumed else "")
         best = home.set_rel_home_m
         table.add_row(
-            escape(name), at, reach(home.no_return_m) if home.safe is False else "–", WORDS[home.safe],
-            "–" if best is None else escape(setting(home.autopilot, best)),
-            "–" if not home.set_leaves_m else reach(home.set_leaves_m), str(len(home.rally)) if home.rally else "–",
+            escape(name), at, WORDS[home.safe], reach(home.no_return_m) if home.safe is False else "–",
+            "–" if best is None else f"{best:g}", "–" if not home.set_leaves_m else reach(home.set_leaves_m),
+            str(len(home.rally)) if home.rally else "–",
         )  # fmt: skip
     _print(table)
+    known = dict.fromkeys((h.autopilot, h.set_rel_home_m) for h in homes.values() if h.set_rel_home_m is not None)
+    for autopilot, best in known:
+        say(f"{best:g} m above home: {setting(autopilot, best)}")
     say_warnings(homes)
 
 

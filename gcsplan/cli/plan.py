@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -104,7 +105,7 @@ def plan(
     from gcsplan.cli.console import plan_table, release_table, remark, say_notes_of, upload_table
     from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
-    from gcsplan.export.outdir import add_output, can_hold, settle_outputs, write_outputs, write_whole
+    from gcsplan.export.outdir import add_output, settle_outputs
 
     directory = Path(mission.stem) if out is None else out
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
@@ -148,14 +149,7 @@ def plan(
     except (InputError, NoMission, CheckFailed):
         _retire(directory)
         raise
-    pictures = {} if png is None else _pictures(planned, png, each)
-    # Pictures of this plan inside its directory belong to its outputs, and are written and removed with them.
-    beside = [file for file in pictures if can_hold(directory, file)]
-    in_the_way = write_outputs(directory, {**files, **{file.name: pictures.pop(file) for file in beside}})
-    for file, content in pictures.items():
-        write_whole(file, content)
-    if in_the_way:
-        remark(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
+    _write(directory, files, {} if png is None else _pictures(planned, png, each))
     if not as_json:
         plan_table(planned, homes)
         say_homes(homes)
@@ -209,6 +203,19 @@ def _retire(directory: Path) -> None:
             remark(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
     except InputError as error:  # the reason why there is no mission matters more
         remark(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
+
+
+def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes]) -> None:
+    """Write the outputs and the pictures; those inside the directory are written and removed with its outputs."""
+    from gcsplan.cli.console import remark
+    from gcsplan.export.outdir import can_hold, write_outputs, write_whole
+
+    beside = [file for file in pictures if can_hold(directory, file)]
+    in_the_way = write_outputs(directory, {**files, **{file.name: pictures.pop(file) for file in beside}})
+    for file, content in pictures.items():
+        write_whole(file, content)
+    if in_the_way:
+        remark(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
 
 
 def _say_files(directory: Path, files: list[str]) -> None:
