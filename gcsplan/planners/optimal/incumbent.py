@@ -12,7 +12,7 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.planner import straight_bound
 from gcsplan.planners.optimal.corridor import PinnedTrack
-from gcsplan.planners.problem import Problem, Progress, Solution, Step
+from gcsplan.planners.problem import Problem, Progress, Solution, Step, straight_way_m
 from gcsplan.planners.profile.climb_laps import with_laps
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
@@ -26,6 +26,8 @@ HOPE = 1.5
 a path of its kind so far."""
 NEARER = 0.45
 """Part of the wanted gap down to which cheap searches that mostly help still run, and which a bound tries first."""
+ROUNDING_M = 0.2
+"""Added to the highest altitude of better paths, m."""
 STEEP = 0.15
 """Rise of a path, as a part of its track's length, from which it counts as steep: one cap for the whole track says
 little then, since a zone that is passed low must be flown around, and one that is passed high need not."""
@@ -45,6 +47,8 @@ class Incumbent:
         """(N,) which points of the best path are terminals; None if that is not known."""
         self.cost = math.inf
         self.bound = straight_bound(problem) * (1.0 - 1e-12)
+        self.track_m = straight_way_m(problem) * (1.0 - 1e-12)
+        """A lower bound of the track length of every path better than the best."""
         self.first_s = math.inf
         self.proved_infeasible = False
         """Whether it is proved that there is no path."""
@@ -136,7 +140,9 @@ class Incumbent:
         self.tell("bound")
 
     def raise_track_bound(self, track_m: float) -> None:
-        """Raise the lower bound to the least cost of paths whose tracks are at least ``track_m`` metres long."""
+        """Raise the lower bound to the least cost of paths whose tracks are at least ``track_m`` metres long, as those
+        of all paths are that are better than the best."""
+        self.track_m = max(self.track_m, track_m)
         self.raise_bound(self.least(track_m))
 
     def least(self, track_m: float) -> float:
@@ -151,6 +157,19 @@ class Incumbent:
         """The least metres climbed and descended in all by a path that reaches the altitude ``touched_m`` AMSL."""
         least = sum(abs(b - a) for a, b in pairwise(self.known_m))
         return least + 2.0 * max(touched_m - max(self.known_m), 0.0)
+
+    def highest(self, else_m: float) -> float:
+        """An upper bound, metres AMSL, of the altitude of every path better than the best, which has only so much
+        left to climb; ``else_m`` if none is known."""
+        p = self.problem
+        if self.best is None or (p.objective == "energy" and p.vertical_j_per_m == 0.0):
+            return else_m
+        if p.objective == "energy":
+            climbed_m = (self.cost - p.horizontal_j_per_m * self.track_m) / p.vertical_j_per_m
+        else:
+            climbed_m = math.sqrt(max(self.cost**2 - self.track_m**2, 0.0))
+        spare_m = max(climbed_m - self.rise(-math.inf), 0.0)
+        return min(max(self.known_m) + 0.5 * spare_m + ROUNDING_M, else_m)
 
     def longest(self, else_m: float) -> float:
         """An upper bound, metres, of the track length of every path better than the best; ``else_m`` if none is

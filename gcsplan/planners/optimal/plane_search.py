@@ -45,7 +45,9 @@ class PlaneSearch:
         self.problem = problem = incumbent.problem if problem is None else problem
         limits = problem.limits
         top_m = limits.max_amsl_m
-        self.top_m = above_all(problem) if top_m is None else top_m - limits.altitude_error_m
+        top_m = above_all(problem) if top_m is None else top_m - limits.altitude_error_m
+        self.top_m = incumbent.highest(top_m)
+        """Highest altitude AMSL of the paths that are searched: the ceiling, or what better paths can climb to."""
         places = terminals_of(problem)
         heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
         ends = [End(*place, z) for place, z in zip(places, heights, strict=True)]
@@ -98,9 +100,16 @@ class PlaneSearch:
         for leg in self.legs:
             leg.flood(slack)
             if math.isinf(leg.length_m):
-                self.incumbent.proved_infeasible = True
+                self._prove_nothing_better()
                 return False
         return True
+
+    def _prove_nothing_better(self) -> None:
+        """Note that there is no better path, or no path at all."""
+        if self.incumbent.best is None:
+            self.incumbent.proved_infeasible = True
+        else:
+            self.incumbent.raise_bound(math.inf)
 
     def reach_longest(self) -> bool:
         """Flood the legs as far as tracks lead that are no longer than the best path, if there is one. Returns False if

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
+if TYPE_CHECKING:
+    from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
+
 FAR, MUCH = 5e-3, 5e-2
 """Gaps, as parts: beyond which other sources of paths are tried; and beyond which small worlds are searched before time
 is spent on a bound."""
@@ -34,8 +38,8 @@ MOST_CELLS = 50_000
 
 
 NAMES = (
-    "straight", "outlines", "track_bound", "cap_search", "corridor_first", "lattice_first", "roadmap_first",
-    "roadmap_near", "fine_tracks", "detours", "bound_corridor", "contour_climb", "lattice",
+    "straight", "outlines", "outline_bound", "track_bound", "cap_search", "corridor_first", "lattice_first",
+    "roadmap_first", "roadmap_near", "fine_tracks", "detours", "bound_corridor", "contour_climb", "lattice",
     "local_roadmap", "cap_pairs", "length_bound", "altitude_intervals", "refinement",
 )  # fmt: skip
 """The names of all searches; which of them a mission has depends on its objective and limits."""
@@ -62,6 +66,7 @@ class Searches:
     def __init__(self, incumbent: Incumbent) -> None:
         self.incumbent, self.problem = incumbent, incumbent.problem
         self._straight: Obstruction | None = None
+        self._outlines: OutlineTracks | None = None
         self._plane: PlaneSearch | None = None
 
     @property
@@ -96,6 +101,7 @@ class Searches:
         rows = [
             Search("straight", 1.0, lambda: self._straight is None, of(2e-3, 0.0), self._fly_straight),
             Search("outlines", 1.0, self._has_outlines, of(3e-3, 2e-3), self._look_at_outlines),
+            Search("outline_bound", 0.9, self._has_high_zones, of(3e-3, 1e-3), self._bound_by_high_zones, again=True),
         ]
         if band:
             return [
@@ -173,7 +179,16 @@ class Searches:
 
         limits = self.problem.limits
         top_m = above_all(self.problem) if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
-        OutlineTracks(self.incumbent, top_m).look()
+        self._outlines = OutlineTracks(self.incumbent, top_m)
+        self._outlines.look()
+
+    def _has_high_zones(self) -> bool:
+        """Whether there are zones over which the best path can lead, but no better one."""
+        return self.incumbent.best is not None and self._outlines is not None and bool(self._outlines.too_high().any())
+
+    def _bound_by_high_zones(self) -> None:
+        assert self._outlines is not None
+        self._outlines.bound_lower_paths()
 
     def _bound_tracks(self) -> None:
         if self.plane.flood(SLACKS[0]):

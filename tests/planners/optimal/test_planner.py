@@ -12,11 +12,13 @@ from gcsplan.app.pipeline import load_mission, world_of
 from gcsplan.app.pipeline import plan as plan_mission
 from gcsplan.app.problems import make_problem
 from gcsplan.errors import InputError
+from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Solution, Via
 from gcsplan.planners.registry import get, names
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
+from gcsplan.world.path import Path
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.support.paths import MISSIONS
@@ -72,6 +74,41 @@ def test_straight_line_where_nothing_stands_in_the_way() -> None:
     assert len(s.path.points) == 2
     assert s.stopped_by == "gap"
     assert s.lower_bound == pytest.approx(1600.0)
+
+
+@pytest.mark.parametrize("objective", ["length", "energy"])
+@pytest.mark.parametrize("ceiling", [None, Level(300.0, "amsl"), Level(300.0, "agl")])
+def test_a_cylinder_too_high_to_fly_over_is_as_one_without_a_top(objective: str, ceiling: Level | None) -> None:
+    zone = Zone("tower", Circle(1000.0, 1000.0, 150.0), None, ceiling)
+    s = solve(problem(ground(0.0), (zone,), climbing(30.0), objective=objective))
+    assert s.stopped_by == "gap"
+    assert s.path.length_m == pytest.approx(tangent_length(800.0, 150.0), rel=1e-3)
+
+
+def test_a_cylinder_that_is_cheaper_to_fly_over_is_flown_over() -> None:
+    zone = Zone("tower", Circle(1000.0, 1000.0, 600.0), None, Level(120.0, "amsl"))
+    s = solve(problem(ground(0.0), (zone,), climbing(60.0)))
+    assert s.path.length_m < tangent_length(800.0, 600.0)
+    assert float(s.path.points[:, 2].max()) == pytest.approx(120.0, abs=0.1)
+
+
+@pytest.mark.parametrize("objective", ["length", "energy"])
+def test_no_better_path_is_higher_than_the_incumbent_says(objective: str) -> None:
+    rng = np.random.default_rng(5)
+    p = problem(ground(0.0), start=(200.0, 1000.0, 20.0), goal=(1800.0, 1000.0, 55.0), objective=objective)
+    p = replace(p, vertical_j_per_m=30.0, horizontal_j_per_m=10.0)
+    incumbent = Incumbent(p)
+    assert incumbent.highest(500.0) == 500.0
+    middle = np.column_stack([rng.uniform(200.0, 1800.0, 2000), rng.uniform(800.0, 1200.0, 2000),
+                              rng.uniform(20.0, 900.0, 2000)])  # fmt: skip
+    paths = [np.array([p.start, m, p.goal]) for m in middle]
+    costs = np.array([p.cost(Path(q)) for q in paths])
+    for cost in np.quantile(costs, [0.02, 0.3, 0.9]).tolist():
+        incumbent.best, incumbent.cost = paths[0], cost
+        highest = incumbent.highest(math.inf)
+        better = middle[costs < cost, 2]
+        assert better.max() <= highest
+        assert highest <= better.max() + 0.2 * (better.max() - 55.0) + 15.0  # and it says something
 
 
 @pytest.mark.parametrize("clearance_m", [0.0, 40.0])

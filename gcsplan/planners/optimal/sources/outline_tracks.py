@@ -67,8 +67,7 @@ class OutlineTracks:
             return
         if tracks:
             self._hints = tracks
-            length_m = sum(float(np.hypot(*np.diff(t, axis=0).T).sum()) for t in tracks)
-            incumbent.raise_track_bound(length_m * (1.0 - 1e-9))
+            incumbent.raise_track_bound(_length_m(tracks))
         zones = len(self.under)
         root = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
         laps = incumbent.climbs and incumbent.laps
@@ -76,6 +75,22 @@ class OutlineTracks:
         if laps and math.isfinite(incumbent.cost):
             roots.insert(0, replace(root, most_m=(incumbent.cost - incumbent.bound,) * 2))
         DetourSearch(incumbent, self.terminals, False).run(roots, TRACKS, first=False, laps=laps)
+
+    def too_high(self) -> Bools:
+        """(zones,) which zones can be passed over, but by no path that is better than the best."""
+        _, over = _sides(self.problem.airspace.zones, self.incumbent, self.incumbent.highest(math.inf))
+        return self.over & ~over & ~self.under
+
+    def bound_lower_paths(self) -> None:
+        """Raise the bound to the shortest track around the zones that are too high for better paths, too."""
+        try:
+            tracks = self._tracks(self.too_high() | ~(self.under | self.over), outer=False)
+        except Exhausted:
+            return
+        if tracks is None:
+            self.incumbent.raise_bound(math.inf)
+        else:
+            self.incumbent.raise_track_bound(_length_m(tracks))
 
     def _tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
         """The shortest track of each leg past the zones ``which`` (zones,); None if a leg has none. ``outer``: outlines
@@ -95,6 +110,11 @@ class OutlineTracks:
                 return None
             tracks.append(found.points)
         return tracks
+
+
+def _length_m(tracks: list[Floats]) -> float:
+    """The length of all tracks together, rounded down."""
+    return sum(float(np.hypot(*np.diff(t, axis=0).T).sum()) for t in tracks) * (1.0 - 1e-9)
 
 
 def _sides(zones: tuple[Zone, ...], incumbent: Incumbent, top_m: float) -> tuple[Bools, Bools]:
