@@ -95,7 +95,9 @@ def test_zones_are_a_mix_that_covers_no_start_and_no_goal(main: list[NamedProble
 
 def test_everyday_missions_are_problems_too() -> None:
     few = problems("everyday", 1, count=1)
-    assert [p.group for p in few] == [k for k in everyday_missions.KINDS if k != "vias"]
+    assert {p.group for p in few} <= set(everyday_missions.KINDS) - {"vias"}
+    assert len(few) >= 10
+    assert not any(p.problem.via for p in few)  # over the sample, some missions have vias, too
     all_of_them = {p.name: key_of(p.problem) for p in problems("everyday", 1)}
     assert len(set(all_of_them.values())) == len(all_of_them) > 80  # polygons count in a key, too
     assert {p.name: key_of(p.problem) for p in few}.items() <= all_of_them.items()
