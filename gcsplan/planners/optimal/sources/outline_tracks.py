@@ -19,11 +19,13 @@ from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.navmesh.outlines import Solids
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
-from gcsplan.planners.problem import terminals_of
+from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.zones import Zone
 
 TRACKS = 24
 """Most tracks that are tried."""
+HARDLY_M = 0.1
+"""Zones that lack less than this to be passed under or over count as passable, m."""
 HAIR_M, HAIR_BENT_M = 2e-3, 0.07
 """Metres kept from outlines for rounding; and where the terrain model's lines are curved in the plane, as in the exact
 check."""
@@ -38,7 +40,8 @@ class OutlineTracks:
         places = terminals_of(self.problem)
         heights = [*(v.amsl_m for v in self.problem.via), self.problem.goal[2]]
         self.legs = [(a, b, z) for (a, b), z in zip(pairwise(places), heights, strict=True) if math.dist(a, b) > 1e-3]
-        self.under, self.over = _sides(self.problem.airspace.zones, incumbent, top_m)
+        self.under, self._tops_m = _sides(self.problem)
+        self.over = self._tops_m <= top_m + HARDLY_M
         self._solids: dict[bool, Solids] = {}
         self._hints: list[Floats] = []
         """The tracks of the bound. Outlines are refined along them, so that paths find slits that coarse ones shut."""
@@ -78,8 +81,7 @@ class OutlineTracks:
 
     def too_high(self) -> Bools:
         """(zones,) which zones can be passed over, but by no path that is better than the best."""
-        _, over = _sides(self.problem.airspace.zones, self.incumbent, self.incumbent.highest(math.inf))
-        return self.over & ~over & ~self.under
+        return self.over & ~self.under & (self._tops_m > self.incumbent.highest(math.inf) + HARDLY_M)
 
     def bound_lower_paths(self) -> None:
         """Raise the bound to the shortest track around the zones that are too high for better paths, too."""
@@ -117,23 +119,23 @@ def _length_m(tracks: list[Floats]) -> float:
     return sum(float(np.hypot(*np.diff(t, axis=0).T).sum()) for t in tracks) * (1.0 - 1e-9)
 
 
-def _sides(zones: tuple[Zone, ...], incumbent: Incumbent, top_m: float) -> tuple[Bools, Bools]:
-    """(zones,) which zones can perhaps be passed under, and which over, at some place."""
-    limits, surface = incumbent.problem.limits, incumbent.problem.airspace.surface
+def _sides(problem: Problem) -> tuple[Bools, Floats]:
+    """(zones,) which zones can perhaps be passed under at some place, and the least altitude AMSL over each, inf over
+    those without a top."""
+    limits, surface, zones = problem.limits, problem.airspace.surface, problem.airspace.zones
     high = float(np.nanmax(surface.ground_m)) if any(_over_ground(z) for z in zones) else 0.0
     low = float(np.nanmin(surface.ground_m))
     lowest = limits.min_agl_m + limits.altitude_error_m
-    under, over = np.zeros(len(zones), np.bool_), np.zeros(len(zones), np.bool_)
+    under, tops_m = np.zeros(len(zones), np.bool_), np.full(len(zones), math.inf)
     for k, zone in enumerate(zones):
         if zone.floor is not None:
             room = zone.floor.value_m - limits.altitude_error_m - lowest
             # A floor AGL and the lowest legal altitude count from the same ground, except for ground within clearance.
-            beside = high - low if incumbent.problem.airspace.beside_m(limits) > 0.0 else 0.0
-            under[k] = room - (low if zone.floor.datum == "amsl" else -beside) >= -0.1
+            beside = high - low if problem.airspace.beside_m(limits) > 0.0 else 0.0
+            under[k] = room - (low if zone.floor.datum == "amsl" else -beside) >= -HARDLY_M
         if zone.ceiling is not None:
-            top = zone.ceiling.value_m + limits.altitude_error_m + (low if zone.ceiling.datum == "agl" else 0.0)
-            over[k] = top <= top_m + 0.1
-    return under, over
+            tops_m[k] = zone.ceiling.value_m + limits.altitude_error_m + (low if zone.ceiling.datum == "agl" else 0.0)
+    return under, tops_m
 
 
 def _over_ground(zone: Zone) -> bool:
