@@ -72,7 +72,8 @@ def least(value: float | None, decimals: int = 0, unit: str = "") -> str:
     return number(None if value is None else floored(value, decimals), decimals, unit)
 
 
-def _table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
+def new_table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
+    """A table without rows; ``columns``: name, and whether it is right-aligned."""
     table = Table(
         title=title, title_justify="left", box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0)
     )
@@ -86,7 +87,7 @@ def _width(table: Table) -> int:
     return console.measure(table, options=console.options.update(width=WIDEST)).maximum
 
 
-def _print(table: Table) -> None:
+def print_table(table: Table) -> None:
     """Print the whole table, even if a narrow terminal breaks its lines: a verdict must not be cut off."""
     width = _width(table)
     wide = console if width <= console.width else Console(file=RESULTS, highlight=False, soft_wrap=True, width=width)
@@ -104,15 +105,15 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome]) -> None:
     """Print a plan: a column for each vehicle, values beside their limits; a row for each in a large fleet."""
     rows = [_plan_row(v, plan.fleet, homes.get(v.name)) for v in plan.vehicles]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
-    table = _table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
+    table = new_table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
     for row in rows:
         table.add_row(*row.values())
     if len(rows) > 4 and _width(table) <= console.width:
-        _print(table)
+        print_table(table)
     else:
         each = next((n for n in (4, 3, 2) if all(_width(t) <= console.width for t in _columns(title, rows, n))), 1)
         for table in _columns(title, rows, each):
-            _print(table)
+            print_table(table)
     _say_fleet(plan)
     say_notes(plan.notes)
     say_notes_of([(v.name, n) for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)])
@@ -147,7 +148,7 @@ def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[T
     tables = []
     for first in range(0, len(rows), each):
         some = rows[first : first + each]
-        table = _table("" if first else title, [("", False), *((row["vehicle"], True) for row in some)])
+        table = new_table("" if first else title, [("", False), *((row["vehicle"], True) for row in some)])
         for name in list(rows[0])[1:]:
             table.add_row(name, *(row[name] for row in some))
         tables.append(table)
@@ -200,12 +201,12 @@ def verdict_table(name: str, verdict: Verdict, home: WayHome | None = None) -> N
         for item in items
     ]  # fmt: skip
     for shown in (10, 9, 8):  # on a narrow terminal leave out time and energy; the limits matter more
-        table = _table(title, columns[:shown])
+        table = new_table(title, columns[:shown])
         for item, row in zip(items, rows, strict=True):
             table.add_row(*row[:shown], style="red" if item.seq in bad else None)
         if _width(table) <= console.width:
             break
-    _print(table)
+    print_table(table)
     say_notes(verdict.notes)
 
 
@@ -214,7 +215,7 @@ def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
     sent = title == "upload"
     columns = [("vehicle", False), ("link", False), ("items", True), *([("outcome", False)] if sent else []),
                ("read back", False), ("s", True), ("retries", True)]  # fmt: skip
-    table = _table(f"[bold]{title}[/]", columns)
+    table = new_table(f"[bold]{title}[/]", columns)
     for d in results:
         outcome_words = {"accepted": "[green]accepted[/]", "withdrawn": "[yellow]withdrawn[/]"}.get(
             d.outcome, f"[bold red]{d.outcome}[/]"
@@ -223,7 +224,7 @@ def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
         link = escape(d.url) + (" [bold yellow]simulated[/]" if d.simulated else "")
         outcome = [outcome_words] if sent else []  # a comparison sends nothing
         table.add_row(escape(d.vehicle), link, str(d.items), *outcome, verified, number(d.seconds, 2), str(d.retries))
-    _print(table)
+    print_table(table)
     say_notes_of([(d.vehicle, w) for d in results for w in d.warnings])
     for d in results:
         if d.message:
@@ -236,11 +237,11 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
         return
     ready = {d.vehicle for d in results if d.verified and not d.code}
     columns = [("vehicle", False), ("release, T+ s", True), ("at the goal, T+ s", True), ("", False)]
-    table = _table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
+    table = new_table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
     for slot in sorted(plan.fleet.slots, key=lambda s: s.depart_s):
         state = "" if slot.name in ready else "[bold red]not ready[/]"
         table.add_row(escape(slot.name), number(slot.depart_s, 1), number(slot.arrive_s, 1), state)
-    _print(table)
+    print_table(table)
     if gate is not None:
         say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")
 
@@ -288,7 +289,7 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
 
 def planners_table(rows: Sequence[Mapping[str, object]]) -> None:
     """Print the planners, one per row."""
-    table = _table("planners", [("name", False)])
+    table = new_table("planners", [("name", False)])
     for name in ("what it does", "paper", "defaults"):
         table.add_column(name)
     for row in rows:
@@ -310,7 +311,7 @@ def remark(message: str) -> None:
 
 def rows_table(title: str, rows: Sequence[Mapping[str, str]], *, left: Sequence[str] = ("vehicle",)) -> None:
     """Print rows of words by column name; columns in ``left`` are left-aligned, the others right-aligned."""
-    table = _table(title, [(name, name not in left) for name in rows[0]])
+    table = new_table(title, [(name, name not in left) for name in rows[0]])
     for row in rows:
         table.add_row(*row.values())
-    _print(table)
+    print_table(table)

@@ -9,7 +9,7 @@ from rich.markup import escape
 from gcsplan.app.way_home import warnings
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN, reach
-from gcsplan.cli.console import _print, _table, aside, console, say
+from gcsplan.cli.console import aside, console, new_table, print_table, say
 from gcsplan.mavlink.mission.return_altitude import setting
 
 MOST_ROWS = 8
@@ -24,7 +24,7 @@ def say_homes(homes: Mapping[str, WayHome]) -> None:
         return
     columns = [("vehicle", False), ("return at, m", True), ("way home", False), ("unsafe from", True),
                ("to set, m", True), ("then unsafe from", True), ("rally points", True)]  # fmt: skip
-    table = _table("[bold]way home[/]  the autopilot's own return, from every point of the path", columns)
+    table = new_table("[bold]way home[/]  the autopilot's own return, from every point of the path", columns)
     for name, home in homes.items():
         at = f"{home.rtl_rel_home_m:g}" + (" (default)" if home.assumed else "")
         best = home.set_rel_home_m
@@ -33,7 +33,7 @@ def say_homes(homes: Mapping[str, WayHome]) -> None:
             "–" if best is None else f"{best:g}", "–" if not home.set_leaves_m else reach(home.set_leaves_m),
             str(len(home.rally)) if home.rally else "–",
         )  # fmt: skip
-    _print(table)
+    print_table(table)
     known = dict.fromkeys((h.autopilot, h.set_rel_home_m) for h in homes.values() if h.set_rel_home_m is not None)
     for autopilot, best in known:
         say(f"{best:g} m above home: {setting(autopilot, best)}")
