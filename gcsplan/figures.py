@@ -1,7 +1,8 @@
 """How numbers are rounded and counted for people: one rule for each kind of number, in every table, page and file.
 
 A least value (a height above ground, a distance to a zone or between vehicles, what is left of a limit, a lower bound)
-is rounded down, so that it is never shown better than it is. Every other number is rounded to the nearest.
+is rounded down, so that it is never shown better than it is. What must at least be set or reached, to be safe, is
+rounded up. Every other number is rounded to the nearest.
 """
 
 from __future__ import annotations
@@ -19,6 +20,11 @@ def floored(value: float, decimals: int) -> float:
     return math.floor(scaled + NOISE) / power if abs(scaled) < 1e15 else value
 
 
-def counted(count: int, noun: str) -> str:
-    """A count with its noun: ``1 item``, ``2 items``."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
+def raised(value: float, decimals: int) -> float:
+    """What must at least be set or reached, rounded up to ``decimals``; NaN and infinity are themselves."""
+    return -floored(-value, decimals)
+
+
+def counted(count: int, noun: str, several: str = "") -> str:
+    """A count with its noun: ``1 item``, ``2 items``, ``3 stretches`` (``several``)."""
+    return f"{count} {noun if count == 1 else several or f'{noun}s'}"

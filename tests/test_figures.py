@@ -22,7 +22,7 @@ from gcsplan.cli import console
 from gcsplan.cli import main as cli
 from gcsplan.export.profile import write_profile
 from gcsplan.export.summary import write_summary
-from gcsplan.figures import counted, floored
+from gcsplan.figures import counted, floored, raised
 from gcsplan.report import markup
 from gcsplan.sim.outcome import Performance, _row
 from tests.support.paths import DATA
@@ -54,6 +54,13 @@ def test_a_least_value_is_never_shown_better_than_it_is_nor_a_digit_worse(value:
     text = f"{shown:,.{decimals}f}".replace("-0" if shown == 0 else "\0", "0")
     assert console.least(value, decimals).replace("\u2009", ",").lstrip("-") == text.lstrip("-")
     assert markup.least(value, decimals).replace(markup.THIN, ",").lstrip("-") == text.lstrip("-")
+
+
+def test_what_must_at_least_be_set_is_rounded_up() -> None:
+    assert [raised(v, 0) for v in (291.4, 291.0, 291.0 + 1e-9)] == [292.0, 291.0, 291.0]
+    assert raised(-3.26, 1) == -3.2
+    assert math.isnan(raised(math.nan, 0))
+    assert raised(math.inf, 0) == math.inf
 
 
 def test_a_height_that_the_nearest_number_flatters_is_the_same_everywhere() -> None:

@@ -8,7 +8,8 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.rtl.verdict import WayHome
-from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, STILL_NO_RETURN, counted
+from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, STILL_NO_RETURN
+from gcsplan.figures import counted, raised
 from gcsplan.report.chart import Axes, chart_html
 from gcsplan.report.markup import esc, num, place, table, tools
 from gcsplan.report.plan_view import COLOURS
@@ -144,7 +145,7 @@ def _stretches(subject: Subject, home: WayHome) -> str:
                 (
                     esc(s.items), kind, f"{num(s.from_m / 1000, 2)} – {num(s.to_m / 1000, 2, 'km')}", esc(s.why),
                     place(*s.obstacle[:2]) + f", {num(s.obstacle[2], 0, 'm AMSL')}" if s.obstacle else "–",
-                    num(s.lowest_rel_home_m, 0, "m") if s.lowest_rel_home_m is not None else "none",
+                    num(raised(s.lowest_rel_home_m, 1), 1, "m") if s.lowest_rel_home_m is not None else "none",
                 )
             )  # fmt: skip
             marks.append("close" if stretches is home.irregular else "bad")

@@ -13,6 +13,7 @@ from gcsplan.check.rtl.sweep import Target
 from gcsplan.check.rtl.trace import MissionTrace
 from gcsplan.check.rtl.verdict import UnsafeStretch
 from gcsplan.check.stretch import Place
+from gcsplan.figures import raised
 
 ROUND_M = 0.1
 LOOKED_AT = 500
@@ -115,8 +116,10 @@ def _why(obstacles: Obstacles, row: int, name: str, grade: int, obstacle: Place 
             return "the ground on the way home is unknown to the terrain model"
         place = "" if obstacle is None else f" at {obstacle[0]:.6f}, {obstacle[1]:.6f} ({obstacle[2]:.0f} m AMSL)"
         if grade == CLEAR:
-            return f"the return meets ground{place} and would clear it at {top:.0f} m AMSL"
-        return f"the return comes nearer than min_agl_m to ground{place} and would keep it at {top:.0f} m AMSL"
+            return f"the return meets ground{place} and would clear it at {raised(top, 0):.0f} m AMSL"
+        return (
+            f"the return comes nearer than min_agl_m to ground{place} and would keep it at {raised(top, 0):.0f} m AMSL"
+        )
     height = ""
     if math.isinf(top):
         height = " (no top)" if math.isinf(bottom) else f" (from {bottom:.0f} m AMSL up)"

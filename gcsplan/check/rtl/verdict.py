@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from gcsplan.check.battery import BatteryHome
-from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, PATH, STILL_NO_RETURN, counted, reach, together_m
+from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, PATH, STILL_NO_RETURN, reach, together_m
 from gcsplan.check.stretch import Place
+from gcsplan.figures import counted, floored, raised
 from gcsplan.mavlink.mission.return_altitude import setting, settings
 from gcsplan.vehicle import Autopilot
 
@@ -63,7 +64,7 @@ class UnsafeStretch:
         """Where, why, and which altitude would help."""
         if self.lowest_rel_home_m is None:
             return f"{self.place_and_why}; no return altitude is safe from there"
-        return f"{self.place_and_why}; safe from there at {self.lowest_rel_home_m:.0f} m above home"
+        return f"{self.place_and_why}; safe from there at {raised(self.lowest_rel_home_m, 1):g} m above home"
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,5 +272,5 @@ class WayHome:
 def _altitudes(lowest: float | None, highest: float | None) -> str:
     if lowest is None:
         return "no single return altitude is, from all of the path"
-    upper = " or more" if highest is None else f" to {highest:.0f} m"
-    return f"from all of the path at {lowest:.0f} m{upper} above home"
+    upper = " or more" if highest is None else f" to {floored(highest, 1):g} m"
+    return f"from all of the path at {raised(lowest, 1):g} m{upper} above home"

@@ -30,6 +30,7 @@ from gcsplan.check.rtl.verdict import ProfilePoint, RallyPoint, UnsafeStretch, W
 from gcsplan.check.rtl.words import together_m
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import Verdict
+from gcsplan.figures import floored, raised
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
@@ -87,7 +88,8 @@ def way_home(
     most_amsl = vehicle.limits.max_amsl_m
     if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:
         most_m = most_amsl - vehicle.limits.altitude_error_m - ground
-        notes.append(f"a return at {lowest:.0f} m above home rises above max_amsl_m, which leaves {most_m:.0f} m")
+        leaves = f"which leaves {floored(most_m, 0):.0f} m"
+        notes.append(f"a return at {raised(lowest, 1):g} m above home rises above max_amsl_m, {leaves}")
     if refinement.stopped_early:
         notes.append("the terrain is too fine to look at all of it closely: unsafe stretches may be drawn too long")
     return WayHome(

@@ -1,4 +1,4 @@
-"""Words that the way home is told in: lengths, counts, labels."""
+"""Words that the way home is told in: lengths and labels."""
 
 from __future__ import annotations
 
@@ -12,11 +12,6 @@ NO_RETURN, STILL_NO_RETURN, NOT_JUDGED = "no safe return", "still no safe return
 def reach(metres: float) -> str:
     """A length along the path: ``9.5 km``, ``340 m``."""
     return f"{metres / 1e3:.1f} km" if metres >= 999.5 else f"{metres:.0f} m"
-
-
-def counted(number: int, one: str, several: str = "") -> str:
-    """``1 rally point``, ``2 rally points``, ``3 stretches``."""
-    return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 
 def together_m(parts: Iterable[tuple[float, float]]) -> float:

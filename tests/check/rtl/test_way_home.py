@@ -21,7 +21,8 @@ from gcsplan.check.rtl.stretches import rel_home
 from gcsplan.check.rtl.sweep import Target, obstacles_of_returns
 from gcsplan.check.rtl.trace import trace_of
 from gcsplan.check.rtl.way_home import WayHome, refinement_of, way_home
-from gcsplan.check.rtl.words import counted, reach
+from gcsplan.check.rtl.words import reach
+from gcsplan.figures import counted
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import LAND, RTL, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission
