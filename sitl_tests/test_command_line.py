@@ -9,6 +9,8 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.vehicle import Autopilot
 from sitl_tests.peers import MavsdkVehicle, item_of
@@ -40,6 +42,7 @@ def gcsplan(*words: str, cwd: Path) -> tuple[int, dict[str, Any], str]:
     return done.returncode, json.loads(done.stdout), done.stderr
 
 
+@pytest.mark.slow
 def test_a_plan_reaches_mavsdk_vehicles_with_the_same_wire_numbers(tmp_path: Path) -> None:
     (tmp_path / "field.yaml").write_text(textwrap.dedent(MISSION))
     with MavsdkVehicle(sysid=1) as one, MavsdkVehicle(sysid=2) as two:

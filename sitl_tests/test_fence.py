@@ -40,6 +40,7 @@ def a_fence(autopilot: Autopilot) -> Fence:
     return fence
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
 def test_a_fence_arrives_at_a_mavsdk_vehicle_and_reads_back(
     autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch

@@ -53,6 +53,7 @@ def wires(rows: list[Row]) -> list[bytes]:
 # ── as a vehicle ──────────────────────────────────────────────────────────────────────────────────────────────────
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
 def test_every_item_arrives_at_a_mavsdk_vehicle_with_the_same_numbers(autopilot: Autopilot) -> None:
     mission = a_mission(autopilot, 60, sysid=7)
@@ -79,6 +80,7 @@ def test_odd_numbers_arrive_at_a_mavsdk_vehicle_bit_by_bit() -> None:
         assert wires(vehicle.received()) == [item.wire for item in mission.wire_items()]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("asked_in_haste")
 def test_all_three_lists_of_a_mavsdk_vehicle_are_kept_apart() -> None:
     mission = a_mission(PX4, 12)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -17,6 +17,8 @@ import gcsplan
 
 ROOT = Path(gcsplan.__file__).parent
 MODULES = sorted(ROOT.rglob("*.py"))
+
+pytestmark = pytest.mark.xdist_group("house")  # one process reads the modules, not three
 
 # The packages from the bottom up. Each may import what stands in its set, and itself; a module in none is a mistake.
 WORLD = {"arrays", "errors", "figures", "native", "world"}
@@ -106,9 +108,15 @@ def knows_metres_alone(path: Path) -> bool:
     return parts[0] in ("planners", "optimisers", "fleet")
 
 
-def imported(tree: ast.AST, package: tuple[str, ...]) -> Iterator[str]:
-    """Dotted names of all that is imported anywhere in ``tree``, inside functions and for types alone, too."""
-    for node in ast.walk(tree):
+@cache
+def nodes_of(path: Path) -> list[ast.AST]:
+    """All nodes of a module. Reading them takes most of these tests' time, so it is done once."""
+    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
+def imported(nodes: Iterable[ast.AST], package: tuple[str, ...]) -> Iterator[str]:
+    """Dotted names of all that ``nodes`` import, inside functions and for types alone, too."""
+    for node in nodes:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -121,7 +129,7 @@ def imported(tree: ast.AST, package: tuple[str, ...]) -> Iterator[str]:
 @cache
 def imports_of(path: Path) -> frozenset[str]:
     package = ("gcsplan", *path.relative_to(ROOT).parts[:-1])
-    return frozenset(imported(ast.parse(path.read_text(encoding="utf-8")), package))
+    return frozenset(imported(nodes_of(path), package))
 
 
 def own(name: str) -> str | None:
@@ -136,8 +144,8 @@ def own_imports(path: Path) -> frozenset[str]:
     return frozenset(module for name in imports_of(path) if (module := own(name)) is not None)
 
 
-def identifiers(tree: ast.AST) -> Iterator[str]:
-    for node in ast.walk(tree):
+def identifiers(nodes: Iterable[ast.AST]) -> Iterator[str]:
+    for node in nodes:
         for key in ("id", "attr", "arg", "name", "asname"):
             value = getattr(node, key, None)
             if isinstance(value, str):
@@ -191,8 +199,7 @@ def test_circles_are_seen() -> None:
 
 def test_the_front_door_opens_without_the_heavy_rooms() -> None:
     tree = ast.parse((ROOT / "__init__.py").read_text(encoding="utf-8"))
-    at_once = ast.Module([n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)], [])
-    roots = {name.split(".")[0] for name in imported(at_once, ("gcsplan",))}
+    roots = {name.split(".")[0] for name in imported(tree.body, ("gcsplan",))}
     assert roots <= set(sys.stdlib_module_names) | {"__future__"}
 
 
@@ -200,7 +207,7 @@ def test_the_front_door_opens_without_the_heavy_rooms() -> None:
 def test_planners_and_airspace_know_metres_alone(path: Path) -> None:
     roots = {module.split(".")[0] for module in imports_of(path)}
     assert roots & {"pyproj", "rasterio", "pymavlink"} == set()
-    names = set(identifiers(ast.parse(path.read_text(encoding="utf-8"))))
+    names = set(identifiers(nodes_of(path)))
     assert sorted(n for n in names if any(word in n.lower() for word in DEGREES)) == []
 
 
@@ -227,7 +234,7 @@ def test_no_module_has_grown_into_two() -> None:
 
 def functions(path: Path) -> Iterator[tuple[str, int]]:
     """Every function of a module, methods and inner ones too, with its lines; of a command those of its body."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes_of(path):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             begins = node.body[min(1, len(node.body) - 1)] if name_of(path) in TABLES else node
             yield node.name, (node.end_lineno or 0) - begins.lineno + 1
@@ -287,7 +294,7 @@ def test_the_house_is_described() -> None:
     ],
 )
 def test_imports_are_seen_however_they_are_written(source: str, found: set[str]) -> None:
-    assert set(imported(ast.parse(source), ("gcsplan", "mavlink"))) == found
+    assert set(imported(ast.walk(ast.parse(source)), ("gcsplan", "mavlink"))) == found
 
 
 def test_own_modules_are_told_from_names_and_from_others() -> None:
@@ -301,7 +308,7 @@ def test_own_modules_are_told_from_names_and_from_others() -> None:
 
 def test_degrees_are_seen_in_every_kind_of_name() -> None:
     for source in ("lat_deg = 1", "x.home_lat_e7", "def f(lon_deg): pass", "f(lat_deg=1)", "def lon_e7(): pass"):
-        assert any(word in name for name in identifiers(ast.parse(source)) for word in DEGREES), source
+        assert any(word in name for name in identifiers(ast.walk(ast.parse(source))) for word in DEGREES), source
 
 
 if __name__ == "__main__":

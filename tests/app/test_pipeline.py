@@ -125,6 +125,7 @@ def test_the_energy_objective_spends_no_more_than_the_shortest_way() -> None:
     assert summary_of(energy)["vehicles"][0]["lower_bound_m"] is None
 
 
+@pytest.mark.slow
 def test_a_world_in_local_metres_is_planned_like_any_other() -> None:
     text = """
 version: 1

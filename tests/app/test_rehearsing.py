@@ -270,6 +270,7 @@ def test_a_vehicle_that_will_not_arm_is_given_up_with_its_own_words(
         rehearse_sitl(parts, planned.world, Terms(), seats)
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_falls_silent_in_the_air_is_a_dead_link(planned: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sitl, "_SILENT_S", 0.3)
     parts = one(planned)

@@ -91,7 +91,7 @@ CASES: dict[str, Any] = {
     "a paper's": MISSIONS / "papers" / "ib-abc-sequence.yaml",
 }  # fmt: skip
 
-SLOW = {"fleet-4"}
+SLOW = {"fleet-4", "a paper's"}
 
 
 @cache

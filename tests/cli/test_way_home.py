@@ -92,6 +92,7 @@ def test_a_return_that_is_reported_is_a_warning_with_one_headline_in_every_comma
     assert "UNSAFE" not in text
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("how", ["file", "option"])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_return_that_is_required_decides_the_same_way_in_every_command(

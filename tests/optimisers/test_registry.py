@@ -96,6 +96,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_ones(name: st
     assert first.x.tobytes() != other.x.tobytes()
 
 
+@pytest.mark.first_quick
 @every
 @pytest.mark.parametrize("function", [pytest.param("f1", marks=pytest.mark.slow), "f7"])
 def test_it_beats_random_search_of_equal_evaluations_or_its_row_says_why_not(name: str, function: str) -> None:

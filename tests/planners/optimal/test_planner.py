@@ -225,6 +225,7 @@ def test_climb_limit_is_kept_by_climbing_early_and_by_a_longer_way() -> None:
     assert s.path.length_m > 1150.0
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("error_m", [0.0, 2.0])
 def test_a_zone_as_high_as_the_ceiling_is_passed_over_at_just_that_height(error_m: float) -> None:
     lid = Zone("lid", Circle(1000.0, 1000.0, 300.0), None, Level(100.0, "amsl"))
