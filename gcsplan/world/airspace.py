@@ -49,7 +49,7 @@ from gcsplan.world._work_arrays import work_arrays
 from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
-from gcsplan.world.tube import Band, Reaches, Tube, make_tube
+from gcsplan.world.tube import ZONE_ROOM_M, Band, Reaches, Tube, make_tube
 from gcsplan.world.zones import Polygon, Zone
 
 __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
@@ -301,6 +301,10 @@ class Airspace:
     def beside_m(self, limits: Limits) -> float:
         """Horizontal distance to keep from zones on every side, metres of the plane: clearance plus track error."""
         return (limits.horizontal_clearance_m + limits.track_error_m) * self.scale
+
+    def beside_over_ground_m(self, limits: Limits) -> float:
+        """The same for zones with a level above ground, as far as a `Tube` counts them: never less."""
+        return Reaches.of(limits, self._field, self.scale).far_m + ZONE_ROOM_M
 
     def _violations(
         self, legs: Legs, limits: Limits, climb_deg: Floats, worst: Floats, hit: Indices, hit_at: Floats

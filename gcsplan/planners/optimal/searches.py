@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.governor import Search, Size
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.level_world import in_window
+from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane_search import SLACKS, PlaneSearch
 from gcsplan.planners.optimal.sources.bound_corridor import follow
 from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
@@ -101,11 +103,13 @@ class Searches:
         rows = [
             Search("straight", 1.0, lambda: self._straight is None, of(2e-3, 0.0), self._fly_straight),
             Search("outlines", 1.0, self._has_outlines, of(3e-3, 2e-3), self._look_at_outlines),
-            Search("outline_bound", 0.9, self._has_high_zones, of(3e-3, 1e-3), self._bound_by_high_zones, again=True),
+            Search(
+                "outline_bound", 0.9, self._has_ceilings, self._size_of_overflights, self._bound_overflights, again=True
+            ),
         ]
         if band:
             return [
-                *rows[:1],
+                *rows,
                 Search("track_bound", 1.0, lambda: i.bound < i.cost, nodes(1.0), self._bound_tracks),
                 Search("lattice", 0.5, lambda: True, of(1.0, 0.0), self._search_lattice),
             ]
@@ -178,17 +182,33 @@ class Searches:
         from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks  # shapely: many missions need none
 
         limits = self.problem.limits
-        top_m = above_all(self.problem) if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
+        highest_m = float(np.nanmax(self.problem.airspace.surface.ground_m))
+        most_m = [*([] if limits.max_amsl_m is None else [limits.max_amsl_m]),
+                  *([] if limits.max_agl_m is None else [highest_m + limits.max_agl_m])]  # fmt: skip
+        top_m = min(most_m) - limits.altitude_error_m if most_m else above_all(self.problem)
         self._outlines = OutlineTracks(self.incumbent, top_m)
         self._outlines.look()
 
-    def _has_high_zones(self) -> bool:
-        """Whether there are zones over which the best path can lead, but no better one."""
-        return self.incumbent.best is not None and self._outlines is not None and bool(self._outlines.too_high().any())
+    def _has_ceilings(self) -> bool:
+        """Whether there are zones that can be passed over, and not under."""
+        outlines = self._outlines
+        return (
+            self.incumbent.best is not None and outlines is not None and bool((outlines.over & ~outlines.under).any())
+        )
 
-    def _bound_by_high_zones(self) -> None:
+    def _size_of_overflights(self) -> Size:
+        from gcsplan.planners.optimal.bounds.overflight import MOST_CASES
+
         assert self._outlines is not None
-        self._outlines.bound_lower_paths()
+        zones = int((self._outlines.over & ~self._outlines.under).sum())
+        return 5e-3 * (1 + min(zones, MOST_CASES)), 60.0
+
+    def _bound_overflights(self) -> None:
+        from gcsplan.planners.optimal.bounds.overflight import Overflight  # shapely, as above
+
+        assert self._outlines is not None
+        with contextlib.suppress(Exhausted):
+            Overflight(self.incumbent, self._outlines).look()
 
     def _bound_tracks(self) -> None:
         if self.plane.flood(SLACKS[0]):

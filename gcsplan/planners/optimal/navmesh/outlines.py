@@ -203,14 +203,21 @@ class Solids:
     """Zones that no track may enter, and the shortest tracks around them; zones that one track met are known to the
     next search.
 
-    ``outer``: for paths, which keep ``hair_m`` more from every zone; else for bounds, which keep that much less. Raises
-    Exhausted if the meshes, or the work, would be too large.
+    ``outer``: for paths, which keep ``hair_m`` (zones,) more from each zone; else for bounds, which keep that much
+    less. Raises Exhausted if the meshes, or the work, would be too large.
     """
 
     def __init__(
-        self, zones: Iterable[Zone], reach_m: float, scale: float, hair_m: float, budget: Budget, *, outer: bool
+        self,
+        zones: Sequence[Zone],
+        reach_m: float,
+        scale: float,
+        hair_m: Sequence[float],
+        budget: Budget,
+        *,
+        outer: bool,
     ) -> None:
-        self.outlines = [Outline(zone, reach_m, scale, outer, hair_m) for zone in zones]
+        self.outlines = [Outline(z, reach_m, scale, outer, hair) for z, hair in zip(zones, hair_m, strict=True)]
         self._budget = budget
         self._tree = shapely.STRtree(shapely.box(*np.array([o.bounds for o in self.outlines]).reshape(-1, 4).T))
         self._known: set[int] = set()

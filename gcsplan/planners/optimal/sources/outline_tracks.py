@@ -16,7 +16,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.corridor import PinnedTrack, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.navmesh.outlines import Solids
+from gcsplan.planners.optimal.navmesh.outlines import Outline, Solids
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import Problem, terminals_of
@@ -40,8 +40,8 @@ class OutlineTracks:
         places = terminals_of(self.problem)
         heights = [*(v.amsl_m for v in self.problem.via), self.problem.goal[2]]
         self.legs = [(a, b, z) for (a, b), z in zip(pairwise(places), heights, strict=True) if math.dist(a, b) > 1e-3]
-        self.under, self._tops_m = _sides(self.problem)
-        self.over = self._tops_m <= top_m + HARDLY_M
+        self.under, self.tops_m = _sides(self.problem)
+        self.over = self.tops_m <= top_m + HARDLY_M
         self._solids: dict[bool, Solids] = {}
         self._hints: list[Floats] = []
         """The tracks of the bound. Outlines are refined along them, so that paths find slits that coarse ones shut."""
@@ -79,28 +79,28 @@ class OutlineTracks:
             roots.insert(0, replace(root, most_m=(incumbent.cost - incumbent.bound,) * 2))
         DetourSearch(incumbent, self.terminals, False).run(roots, TRACKS, first=False, laps=laps)
 
-    def too_high(self) -> Bools:
-        """(zones,) which zones can be passed over, but by no path that is better than the best."""
-        return self.over & ~self.under & (self._tops_m > self.incumbent.highest(math.inf) + HARDLY_M)
+    def walls(self) -> Bools:
+        """(zones,) which zones can be passed neither over nor under by a path that is better than the best."""
+        too_high = self.over & (self.tops_m > self.incumbent.highest(math.inf) + HARDLY_M)
+        return (too_high & ~self.under) | ~(self.under | self.over)
 
-    def bound_lower_paths(self) -> None:
-        """Raise the bound to the shortest track around the zones that are too high for better paths, too."""
-        try:
-            tracks = self._tracks(self.too_high() | ~(self.under | self.over), outer=False)
-        except Exhausted:
-            return
-        if tracks is None:
-            self.incumbent.raise_bound(math.inf)
-        else:
-            self.incumbent.raise_track_bound(_length_m(tracks))
+    def tracks(self, which: Bools) -> list[Floats] | None:
+        """The shortest track of each leg around the zones ``which`` (zones,), for bounds; None if a leg has none.
+        Raises Exhausted."""
+        return self._tracks(which, outer=False)
+
+    def outline(self, zone: int) -> Outline:
+        """A zone's outline for bounds."""
+        return self._solids[False].outlines[zone]
 
     def _tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
         """The shortest track of each leg past the zones ``which`` (zones,); None if a leg has none. ``outer``: outlines
         for paths instead of bounds. Raises Exhausted."""
         if outer not in self._solids:
             air, limits = self.problem.airspace, self.problem.limits
-            hair_m = HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M
-            reach_m = air.beside_m(limits)
+            reach_m, wider_m = air.beside_m(limits), air.beside_over_ground_m(limits) if outer else 0.0
+            hair_m = [HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M] * len(air.zones)
+            hair_m = [h + max(wider_m - reach_m, 0.0) * _over_ground(z) for h, z in zip(hair_m, air.zones, strict=True)]
             solids = Solids(air.zones, reach_m, air.scale, hair_m, self.incumbent.budget, outer=outer)
             for hint in self._hints:
                 solids.look_along(hint, which)

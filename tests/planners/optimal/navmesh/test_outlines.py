@@ -58,7 +58,8 @@ def test_bound_and_path_enclose_the_visibility_graphs_track(seed: int) -> None:
     except Unreachable:
         pytest.skip("the zones enclose a place")
     found = [
-        Solids(zones, reach_m, 1.0, 2e-3, Budget.endless(), outer=o).shortest(*places, every) for o in (False, True)
+        Solids(zones, reach_m, 1.0, [2e-3] * len(zones), Budget.endless(), outer=o).shortest(*places, every)
+        for o in (False, True)
     ]
     assert found[0] is not None
     assert found[1] is not None
@@ -141,7 +142,7 @@ def test_what_would_be_too_large_is_left_alone(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(outlines, "MOST_CORNERS", 10)
     zones = [Zone("disc", Circle(0.0, 0.0, 300.0))]
     with pytest.raises(Exhausted):
-        Solids(zones, 0.0, 1.0, 2e-3, Budget.endless(), outer=True).shortest(
+        Solids(zones, 0.0, 1.0, [2e-3] * len(zones), Budget.endless(), outer=True).shortest(
             (-1e3, 0.0), (1e3, 0.0), np.ones(1, np.bool_)
         )
     assert plan(mission(zones, 33.0)).lower_bound is not None  # the lattice finds a bound where the outlines do not
