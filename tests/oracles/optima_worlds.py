@@ -303,7 +303,7 @@ def climbs(rng: np.random.Generator) -> Case | None:
     return mission(rng, "climbs", ground, found, limits)
 
 
-def storeys(rng: np.random.Generator) -> Case | None:
+def levels(rng: np.random.Generator) -> Case | None:
     """Zones in mid-air over hills, with climb and descent limits: in some places no path fits below a zone, in others
     none above it."""
     ground = hills(rng, float(rng.uniform(60.0, 200.0)))
@@ -318,7 +318,7 @@ def storeys(rng: np.random.Generator) -> Case | None:
     found = [replace(z, shape=replace(z.shape, radius_m=2.0 * z.shape.radius_m)) if isinstance(z.shape, Circle) else z
              for z in found]  # fmt: skip
     limits = Limits(15.0, max_amsl_m=15.0 + float(rng.uniform(0.7, 1.3)) * top, **angles(rng))
-    return mission(rng, "storeys", ground, found, limits)
+    return mission(rng, "levels", ground, found, limits)
 
 
 def bands(rng: np.random.Generator) -> Case | None:
@@ -450,7 +450,7 @@ def pockets(rng: np.random.Generator) -> Case | None:
 FAMILIES: dict[str, Callable[[np.random.Generator], Case | None]] = {
     f.__name__: f
     for f in (
-        discs, fences, cylinders, mountains, passes, climbs, storeys, bands, clearances, rasters, stops, borders,
+        discs, fences, cylinders, mountains, passes, climbs, levels, bands, clearances, rasters, stops, borders,
         pockets,
     )
 }  # fmt: skip

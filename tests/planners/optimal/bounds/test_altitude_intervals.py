@@ -33,7 +33,7 @@ EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 # --- altitudes carried from one interval to the next ----------------------------------------------------------------
 
 
-def random_storeys(rng: np.random.Generator, rows: int, cols: int) -> AltitudeIntervals:
+def random_intervals(rng: np.random.Generator, rows: int, cols: int) -> AltitudeIntervals:
     """One or two intervals over most cells; start and goal in opposite corners; all altitudes multiples of 10 m."""
     cell, low, high = [], [], []
     goal = rows * cols - 1
@@ -66,7 +66,7 @@ def random_storeys(rng: np.random.Generator, rows: int, cols: int) -> AltitudeIn
 @pytest.mark.parametrize("seed", range(8))
 def test_what_is_carried_on_is_the_least_of_all_ways(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    s = random_storeys(rng, 5, 6)
+    s = random_intervals(rng, 5, 6)
     n = len(s.cell)
     own, most = rng.uniform(0.0, 10.0, n).round(), rng.uniform(5.0, 15.0, n).round()
     sources = np.flatnonzero(s.cell == 0)
@@ -134,12 +134,12 @@ def shortest(
 
 
 @pytest.mark.draws
-def test_storeys_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
+def test_intervals_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
     found = above = 0
     seeds = range(0 if effort.full else 16, 30)
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        s = random_storeys(rng, *rng.integers(3, 9, 2).tolist())
+        s = random_intervals(rng, *rng.integers(3, 9, 2).tolist())
         climb, descent = rng.choice([0.2, 0.4, 1.0], 2)
         length, way = shortest(s, climb, descent)
         if math.isinf(length):
@@ -163,7 +163,7 @@ def test_storeys_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
 
 @pytest.mark.parametrize("free", ["neither", "start", "goal"])
 @pytest.mark.parametrize("limited", ["both", "climb"])
-def test_climbing_out_from_under_a_storey_takes_its_length(free: str, limited: str) -> None:
+def test_climbing_out_from_under_a_ceiling_takes_its_length(free: str, limited: str) -> None:
     """A single row: below 10 m for 40 cells, above 50 m for the next 40, at a slope of 0.1."""
     cols = 80
     at = np.arange(cols)
@@ -197,7 +197,7 @@ def world(zones: list[Zone], heights: Floats, limits: Limits, start: Place, goal
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_every_altitude_that_is_legal_in_a_cell_lies_in_one_of_its_storeys(seed: int) -> None:
+def test_every_altitude_that_is_legal_in_a_cell_lies_in_one_of_its_intervals(seed: int) -> None:
     rng = np.random.default_rng(seed)
     heights = 60.0 * rng.random((13, 13))
     zones = []
@@ -242,7 +242,7 @@ def test_every_altitude_that_is_legal_in_a_cell_lies_in_one_of_its_storeys(seed:
     assert many >= 5
 
 
-def ridge_behind_a_low_storey() -> tuple[Leg, Problem]:
+def ridge_behind_a_low_ceiling() -> tuple[Leg, Problem]:
     """Below 60 m for 1 km, and 100 m behind that a ridge 300 m high across the whole map, at a slope of 0.1."""
     rows, cols = 13, 61
     heights = np.zeros((rows, cols))
@@ -256,8 +256,8 @@ def ridge_behind_a_low_storey() -> tuple[Leg, Problem]:
     return leg, leg.problem
 
 
-def test_a_ridge_right_behind_a_low_storey_is_farther_than_the_plane_tells() -> None:
-    leg, problem = ridge_behind_a_low_storey()
+def test_a_ridge_right_behind_a_low_ceiling_is_farther_than_the_plane_tells() -> None:
+    leg, problem = ridge_behind_a_low_ceiling()
     for slack in (0.0, 1.3):  # the first flood finds how far the second must reach
         leg.flood(slack)
     # The climb from 60 m to 310 m takes 2500 m, but the ridge is 100 m away: laps along it are a solution.
