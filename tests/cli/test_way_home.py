@@ -80,6 +80,7 @@ def planned(run: Any, tmp_path: Path) -> Path:
     return tmp_path / "first" / "uav1.plan"
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_return_that_is_reported_is_a_warning_with_one_headline_in_every_command(
     run: Any, tmp_path: Path, planned: Path, command: str

@@ -24,8 +24,9 @@ from gcsplan.world.zones import Zone
 
 TRACKS = 24
 """Most tracks that are tried."""
-HARDLY_M = 0.1
-"""Zones that lack less than this to be passed under or over count as passable, m."""
+HARDLY_M, TOUCH_M = 0.1, 1e-4
+"""Zones that lack less than this to be passed under or over count as passable, m: `HARDLY_M` where a level or a limit
+counts from the ground, `TOUCH_M` for rounding where both count from mean sea level."""
 HAIR_M, HAIR_BENT_M = 2e-3, 0.07
 """Metres kept from outlines for rounding; and where the terrain model's lines are curved in the plane, as in the exact
 check."""
@@ -41,7 +42,9 @@ class OutlineTracks:
         heights = [*(v.amsl_m for v in self.problem.via), self.problem.goal[2]]
         self.legs = [(a, b, z) for (a, b), z in zip(pairwise(places), heights, strict=True) if math.dist(a, b) > 1e-3]
         self.under, self.tops_m = _sides(self.problem)
-        self.over = self.tops_m <= top_m + HARDLY_M
+        over_ground = [z.ceiling is not None and z.ceiling.datum == "agl" for z in self.problem.airspace.zones]
+        by_ground = np.array(over_ground, np.bool_) | (self.problem.limits.max_agl_m is not None)
+        self.over = self.tops_m <= top_m + np.where(by_ground, HARDLY_M, TOUCH_M)
         self._solids: dict[bool, Solids] = {}
         self._hints: list[Floats] = []
         """The tracks of the bound. Outlines are refined along them, so that paths find slits that coarse ones shut."""
