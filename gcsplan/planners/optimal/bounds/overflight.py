@@ -103,7 +103,10 @@ class Overflight:
     def look(self) -> None:
         """Raise the bound to the least cost of a path that is better than the best; then look for a path along the way
         of that bound, if it leads over a zone. Raises Exhausted."""
-        incumbent = self.incumbent
+        incumbent, outlines = self.incumbent, self.outlines
+        around = self._cases(outlines.walls() | (outlines.over & ~outlines.under), frozenset())
+        if around and around[0].least <= incumbent.bound:
+            return  # a path around all zones is one of the cases, so no case raises the bound
         case = self._lowest()
         incumbent.raise_bound(incumbent.cost if case is None else case.least)
         if case is not None and case.over:
