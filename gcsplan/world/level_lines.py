@@ -61,6 +61,11 @@ class Crossings:
     top_m: Floats
     begins: Bools
 
+    def take(self, which: Bools) -> Crossings:
+        """The crossings that are True in ``which``."""
+        names = ("line", "zone", "s0_m", "s1_m", "bottom_m", "top_m", "begins")
+        return Crossings(*(getattr(self, name)[which] for name in names))
+
 
 @dataclass(frozen=True, eq=False)
 class Swept:

@@ -9,7 +9,7 @@ min AGL does not apply, because the aircraft is about to land.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from gcsplan.check.rtl.obstacles import GROUND, MAX_AGL, MAX_AMSL, Obstacles
 from gcsplan.check.rtl.trace import MissionTrace, TraceParts
 from gcsplan.vehicle import Vehicle
 from gcsplan.world import level_lines
+from gcsplan.world.airspace import Legs
+from gcsplan.world.limits import Limits
+from gcsplan.world.zones import Level
 
 GROUPS = 6
 """Most groups into which lines home of similar width are put; each group is judged with its greatest width."""
@@ -96,7 +99,10 @@ def obstacles_of_returns(
         if rule.climbs_first:
             found.ground(some, met, low[some], cone[some], np.full(len(some), np.inf))
             i = some[at.line]
-            found.zones(i, at, low[i], np.where(at.begins, -np.inf, cone[i]))
+            found.zones(i, at, low[i], cone[i])
+            spots = some[np.unique(at.line[at.begins])]
+            if len(spots):
+                _climbs_on_the_spot(found, trace, sides, limits, spots, regions, float(extra[spots].max()))
         else:
             found.ground(some, met, -np.inf, *_climbs(met, low[some], reach[some] + about_m, climb))
             i = some[at.line]
@@ -121,6 +127,41 @@ def obstacles_of_returns(
         every = np.arange(n)
         found.ceiling(every, np.full(n, limits.max_amsl_m - limits.altitude_error_m), MAX_AMSL, (1,))
     return GradedObstacles(*found.by_grade(), found.cost)
+
+
+def _climbs_on_the_spot(
+    found: _Builder,
+    trace: MissionTrace,
+    sides: TraceParts,
+    limits: Limits,
+    spots: Indices,
+    regions: Floats,
+    wide_m: float,
+) -> None:
+    """Add the zones that returns meet while they climb, which they may begin anywhere on each part of ``spots``.
+
+    A zone's ceiling above ground elsewhere on the line home does not count here. Where the part itself is clear of
+    ground and zones under the exact check, a zone that stands on the ground is below it, and not in the way.
+    """
+    air, parts = trace.world.airspace, sides.take(spots)
+    ends = regions[spots, :2]
+    own = trace.track_m[parts.stretch]
+    middle = ends.mean(axis=1)
+    at = level_lines.over(air, middle, middle, limits, wide_m, level_lines.Swept(ends, own * air.scale)).crossings
+    low, _ = trace.heights(parts)
+    clear = air.clear(
+        Legs(
+            trace.points(parts.start)[:, :3],
+            trace.points(parts.end)[:, :3],
+            np.zeros(len(spots), np.bool_),
+            limits.track_error_m + own,
+            limits.altitude_error_m + trace.altitude_m[parts.stretch],
+        ),
+        replace(limits, min_agl_m=0.0, max_amsl_m=None, max_agl_m=None, max_climb_deg=90.0, max_descent_deg=90.0),
+    )
+    stands = np.array([z.floor is None or z.floor == Level(0.0, "agl") for z in air.zones])
+    met = at.take(~(stands[at.zone] & (clear & trace.straight(parts))[at.line]))
+    found.zones(spots[met.line], met, low[met.line], np.full(len(met.line), -np.inf))
 
 
 def _swept(trace: MissionTrace, sides: TraceParts, target: Target) -> tuple[Floats, Floats]:

@@ -65,6 +65,10 @@ class MissionTrace:
         band = self.altitude_m[parts.stretch]
         return low - band, high + band
 
+    def straight(self, parts: TraceParts) -> Bools:
+        """(N,) whether each part is one straight piece, without a vertex within."""
+        return np.searchsorted(self.u, parts.start, "right") >= np.searchsorted(self.u, parts.end, "left")
+
     def place(self, u: float) -> Place:
         """Latitude, longitude and AMSL of a place on the trace."""
         east, north, amsl, _ = self.points(np.array([u]))[0].tolist()

@@ -140,6 +140,26 @@ def test_a_zone_over_the_way_bounds_the_return_from_above() -> None:
     assert high.unsafe[0].from_m == pytest.approx(800.0, abs=5.0)
 
 
+def test_over_a_zone_on_a_slope_the_climb_counts_the_ceiling_there_alone() -> None:
+    # The ground, and with it the zone's ceiling, rises towards home. The flight passes 3 m above the ceiling under it,
+    # lower than the ceiling nearer home; the return climbs on the spot above all of it.
+    def slope(east: Floats, north: Floats) -> Floats:
+        return 300.0 + 0.1 * np.clip(1500.0 - east, 0.0, 3000.0) + 0.0 * north
+
+    shape, v = Circle(800.0, 0.0, 200.0), vehicle(**BARE)
+    quarry = Zone("quarry", shape, ceiling=Level(50.0, "agl"))
+    w = world(slope, [quarry])
+    m = mission(w, [(0, 0, 58), (1500, 0, -92), (2000, 0, -92)])
+    assert judge(m, v, w).safe is True
+    assert judged(w, m, v, 20.0).unsafe == ()
+    low = mission(w, [(0, 0, 40), (1500, 0, -110), (2000, 0, -110)])  # through the zone
+    assert {s.zone for s in judged(w, low, v, 20.0).unsafe} == {"quarry"}
+    shelf = Zone("shelf", shape, Level(70.0, "agl"), Level(120.0, "agl"))  # passed under
+    under = world(slope, [shelf])
+    assert judge(m, v, under).safe is True
+    assert {s.zone for s in judged(under, m, v, 150.0).unsafe} == {"shelf"}
+
+
 def test_a_column_must_not_climb_into_a_zone_and_home_may_lie_under_one() -> None:
     lid = Zone("lid", Circle(0.0, 0.0, 50.0), floor=Level(400.0, "amsl"))
     w = world(300.0, [lid])
