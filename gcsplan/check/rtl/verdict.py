@@ -191,7 +191,7 @@ class WayHome:
         left = self.set_leaves_m or 0.0
         then = "safe return from all of it"
         if left:
-            then = f"no safe return from {reach(left)} of it{'' if self.rally else ' (battery)'}"
+            then = f"no safe return from {reach(left)} of it{'' if self.rally or self.left else ' (battery)'}"
         elif self.lowest_legal_rel_home_m is not None and self.set_rel_home_m >= self.lowest_legal_rel_home_m:
             then += ", within all limits"
         if self.rally and self.battery is not None:

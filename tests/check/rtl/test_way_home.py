@@ -160,6 +160,16 @@ def test_over_a_zone_on_a_slope_the_climb_counts_the_ceiling_there_alone() -> No
     assert {s.zone for s in judged(under, m, v, 150.0).unsafe} == {"shelf"}
 
 
+def test_what_stays_unsafe_without_rally_points_is_not_called_a_matter_of_the_battery() -> None:
+    w = world(300.0, [Zone("lid", Circle(1000.0, 0.0, 100.0), floor=Level(340.0, "amsl"))])
+    home = judged(w, mission(w, [(0, 0, 20), (1000, 0, 20)]), vehicle(**BARE), 60.0)
+    left = home.left or home.unsafe
+    assert left
+    told = replace(home, rally=(), left=left, set_rel_home_m=60.0, set_leaves_m=200.0)
+    assert told.advice.endswith("then no safe return from 200 m of it")
+    assert replace(told, left=()).advice.endswith("then no safe return from 200 m of it (battery)")
+
+
 def test_a_column_must_not_climb_into_a_zone_and_home_may_lie_under_one() -> None:
     lid = Zone("lid", Circle(0.0, 0.0, 50.0), floor=Level(400.0, "amsl"))
     w = world(300.0, [lid])
