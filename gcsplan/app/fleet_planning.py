@@ -83,7 +83,8 @@ def fleet_of(
             f"the gates open from T+0 = {gate.start:%Y-%m-%d %H:%M:%S} UTC on: a vehicle that comes to its gate after "
             f"its second waits there for nearly a day; release each by its time, {SLACK_S:g} s are to spare"
         )
-    return flown, FleetPlan(plan.mode, plan.order, plan.interval_s, tuple(slots), motions, found, tuple(notes))
+    start = None if gate is None else gate.start
+    return flown, FleetPlan(plan.mode, plan.order, plan.interval_s, tuple(slots), motions, found, tuple(notes), start)
 
 
 def crew_of(v: VehiclePlan, world: World) -> Crew:

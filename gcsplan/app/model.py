@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.arrival import Slot
@@ -67,7 +68,8 @@ class VehiclePlan:
 class FleetPlan:
     """The time table of all vehicles. ``slots`` and ``motions`` are in the order of the plan's vehicles.
 
-    ``order`` is the order of arrival. ``separation`` is None for a single vehicle.
+    ``order`` is the order of arrival. ``separation`` is None for a single vehicle. ``start_utc``: the common start, if
+    it is a time of day.
     """
 
     mode: str
@@ -77,6 +79,7 @@ class FleetPlan:
     motions: tuple[TimedPath, ...]
     separation: Separation | None = None
     notes: tuple[str, ...] = ()
+    start_utc: datetime | None = None
 
     def slot(self, name: str) -> Slot:
         """The slot of a vehicle."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from gcsplan import __version__
 from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
+from gcsplan.arrays import Floats
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import write_kml
@@ -44,7 +45,8 @@ def outputs_of(
     ``homes``: vehicle name to its way home if that was judged; the summary then contains it. ``fences``: vehicle name
     to its fence items, for the `.plan`. With ``rally``, the `.plan` also contains the proposed rally points.
     """
-    tracks = [_track(v, plan.source.geoid) for v in plan.vehicles]
+    slots = {s.name: s for s in plan.fleet.slots} if plan.fleet is not None else {}
+    tracks = [_track(v, plan.source.geoid, slots.get(v.name)) for v in plan.vehicles]
     frame, zones = plan.world.frame, plan.world.airspace.zones
     files = {}
     for v in plan.vehicles:
@@ -53,9 +55,9 @@ def outputs_of(
         files[f"{v.name}.plan"] = write_plan(
             v.mission, vehicle=v.request.vehicle, fence=fences.get(v.name, ()), rally=points
         )
-    files["mission.kml"] = write_kml(plan.source.name, tracks, zones, frame)
+    start = None if plan.fleet is None else plan.fleet.start_utc
+    files["mission.kml"] = write_kml(plan.source.name, tracks, zones, frame, start)
     files["mission.geojson"] = write_geojson(plan.source.name, tracks, zones, frame)
-    slots = {s.name: s for s in plan.fleet.slots} if plan.fleet is not None else {}
     files["profile.csv"] = write_profile(
         [row for v in plan.vehicles for row in item_rows(v.name, v.verdict, slots.get(v.name))]
     )
@@ -232,16 +234,29 @@ def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[
     return rows
 
 
-def _track(v: VehiclePlan, geoid: GeoidGrid | None) -> Track:
+def _track(v: VehiclePlan, geoid: GeoidGrid | None, slot: Slot | None) -> Track:
     legs = v.verdict.legs
     places = np.array([legs[0].start, *(leg.end for leg in legs)])
     commands = {seq: command_name(item.command) for seq, item in enumerate(v.mission.wire_items())}
-    labels = ("home", *(f"{leg.seq} {commands.get(leg.seq, '')}".strip() for leg in legs))
     above = [None] * len(places) if geoid is None else geoid.height_m(places[:, 0], places[:, 1]).tolist()
+    reached, left = _times(v.verdict, slot)
     home = 0 if v.verdict.mission.first_seq == 1 else None
-    points: list[WayPoint | None] = [WayPoint("home", home, None if home is None else commands[0], 0.0, above[0])]
+    command = None if home is None else commands[0]
+    points: list[WayPoint | None] = [WayPoint("home", home, command, 0.0, above[0], float(left[0]))]
     for i, leg in enumerate(legs):
         goes_on = i + 1 < len(legs) and legs[i + 1].seq == leg.seq  # on a circle, or down a column
-        point = WayPoint(labels[i + 1], leg.seq, commands.get(leg.seq), leg.agl_end_m, above[i + 1])
+        name = f"{leg.seq} {commands.get(leg.seq, '')}".strip()
+        point = WayPoint(name, leg.seq, commands.get(leg.seq), leg.agl_end_m, above[i + 1], float(left[i + 1]))
         points.append(None if goes_on else point)
-    return Track(v.name, places[:, 0], places[:, 1], places[:, 2], labels, tuple(points))
+    return Track(v.name, places[:, 0], places[:, 1], places[:, 2], tuple(points), reached, left)
+
+
+def _times(verdict: Verdict, slot: Slot | None) -> tuple[Floats, Floats]:
+    """(N + 1,) when the vehicle comes to home and to the end of each of N legs, and when it goes on, as in `item_rows`.
+
+    The rounds of a jump come one after the other, so a planned mission, which has none, is what these are for.
+    """
+    depart_s = 0.0 if slot is None else slot.depart_s
+    left = depart_s + np.array([0.0, *verdict.clock_s(slot)])
+    flying = [leg.time_s * leg.times - (leg.hold_s if math.isfinite(leg.hold_s) else 0.0) for leg in verdict.legs]
+    return np.append(left[0], np.minimum(left[1:], left[:-1] + flying)), left

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.export.rows import Track, WayPoint, outline_deg
+from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, outline_deg
 from gcsplan.figures import floored
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level, Zone
@@ -24,8 +24,6 @@ Position = list[float]
 
 HEIGHTS = "the third coordinate is metres above mean sea level (AMSL), not above the ellipsoid"
 THIRD = {"third_coordinate": "amsl_m"}
-DECIMALS = 2
-"""Of heights, metres."""
 
 
 def write_geojson(name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame) -> str:
@@ -58,9 +56,9 @@ def _figures(point: WayPoint, amsl_m: float) -> dict[str, Any]:
         "name": point.name,
         "number": point.number,
         "command": point.command,
-        "amsl_m": round(amsl_m, DECIMALS),
-        "agl_m": floored(point.agl_m, DECIMALS) if math.isfinite(point.agl_m) else None,
-        "ellipsoidal_m": None if point.geoid_m is None else round(amsl_m + point.geoid_m, DECIMALS),
+        "amsl_m": round(amsl_m, HEIGHT_DECIMALS),
+        "agl_m": floored(point.agl_m, HEIGHT_DECIMALS) if math.isfinite(point.agl_m) else None,
+        "ellipsoidal_m": None if point.geoid_m is None else round(amsl_m + point.geoid_m, HEIGHT_DECIMALS),
         **THIRD,
     }
     return {key: value for key, value in about.items() if value is not None}
@@ -79,7 +77,7 @@ def _levels(zone: Zone) -> dict[str, float]:
 
 def _position(lon_deg: float, lat_deg: float, amsl_m: float | None = None) -> Position:
     place = [round(float(lon_deg), 7), round(float(lat_deg), 7)]
-    return place if amsl_m is None else [*place, round(float(amsl_m), DECIMALS)]
+    return place if amsl_m is None else [*place, round(float(amsl_m), HEIGHT_DECIMALS)]
 
 
 def _unwrapped(lon_deg: Floats) -> Floats:

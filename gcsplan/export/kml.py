@@ -1,15 +1,22 @@
-"""`mission.kml` (KML 2.2, OGC 07-147r2): tracks at their altitude and no-fly zones as solids, for a 3-D viewer."""
+"""`mission.kml` (KML 2.2, OGC 07-147r2, with Google's gx): what is flown, and no-fly zones as solids, for a 3-D viewer.
+
+KML knows times of day alone, and a mission mostly has none: times are seconds from the common start, in the balloon of
+each way point. Only a plan that starts at a time of day also has a moving marker for each vehicle (``gx:Track``).
+"""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime, timedelta
 from xml.sax.saxutils import escape
 
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.export.rows import Track, extent_words, outline_deg
+from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, extent_words, outline_deg
+from gcsplan.figures import floored
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level, Zone
 
@@ -17,38 +24,97 @@ TRACK_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff
 DRAWN_TOP_M = 300.0
 """Metres above the highest track up to which a zone without a ceiling is drawn."""
 
+TILT_DEG, FARTHER, NEAREST_M = 50.0, 1.2, 400.0
+"""A view is this much off the vertical, from this many diagonals of what it shows away, or this far if that is more."""
+
+SAME_TIME_S = 0.05
+"""A vehicle that is at a place no longer than this does not wait there."""
+
+BALLOON = (
+    "<![CDATA[<b>$[vehicle], $[name]</b><table><tr><td>item</td><td>$[number]</td></tr>"
+    "<tr><td>command</td><td>$[command]</td></tr><tr><td>AMSL, m</td><td>$[amsl_m]</td></tr>"
+    "<tr><td>above ground, m</td><td>$[agl_m]</td></tr><tr><td>time, s after the start</td><td>$[time_s]</td></tr>"
+    "</table>]]>"
+)
+"""The balloon of a way point, with the fields of its ExtendedData."""
+
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 """The characters that XML 1.0 does not allow (complement of production 2, Char)."""
 
 
-def write_kml(name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame) -> str:
+def write_kml(
+    name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame, start: datetime | None = None
+) -> str:
     """The KML text of a mission called ``name``; the same input gives the same bytes.
 
     Heights are AMSL (``absolute``); zones with an AGL level follow the ground (``relativeToGround``). A zone is drawn
-    as a solid from the ground to its ceiling, or, if it has a floor, as the two faces floor and ceiling.
+    as a solid from the ground to its ceiling, or, if it has a floor, as the two faces floor and ceiling. ``start``: the
+    time of day from which the tracks' times count, if there is one.
     """
     top_m = max((float(t.amsl_m.max()) for t in tracks), default=0.0) + DRAWN_TOP_M
+    outlines = [outline_deg(zone, frame) for zone in zones]
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
-        '<kml xmlns="http://www.opengis.net/kml/2.2">',
+        '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">',
         "<Document>",
         f"<name>{_text(name)}</name>",
-        *(
-            f'<Style id="track{i}"><LineStyle><color>{colour}</color><width>3</width></LineStyle>'
-            f"<PolyStyle><color>40{colour[2:]}</color></PolyStyle></Style>"
-            for i, colour in enumerate(TRACK_COLOURS)
-        ),
+        "<open>1</open>",
+        *_look_at(_everything(tracks, outlines), frame),
+        *(line for number, colour in enumerate(TRACK_COLOURS) for line in _styles(number, colour)),
         '<Style id="zone"><LineStyle><color>ff0000ff</color></LineStyle>'
         "<PolyStyle><color>600000ff</color></PolyStyle></Style>",
     ]
     for number, track in enumerate(tracks):
-        lines += _track(track, f"#track{number % len(TRACK_COLOURS)}")
+        lines += _track(track, number % len(TRACK_COLOURS), frame, start)
     if zones:
         lines += ["<Folder>", "<name>no-fly zones</name>"]
-        for zone in zones:
-            lines += _zone(zone, outline_deg(zone, frame), top_m)
+        for zone, outline in zip(zones, outlines, strict=True):
+            lines += _zone(zone, outline, top_m)
         lines.append("</Folder>")
     return "\n".join([*lines, "</Document>", "</kml>"]) + "\n"
+
+
+def _everything(tracks: Sequence[Track], outlines: Sequence[Floats]) -> Floats:
+    """(N, 3) degrees and AMSL of what the document shows: the tracks, or the zones if there are none."""
+    if tracks:
+        return np.vstack([_places(t) for t in tracks])
+    return np.vstack([np.column_stack([o, np.zeros(len(o))]) for o in outlines]) if outlines else np.zeros((0, 3))
+
+
+def _places(track: Track) -> Floats:
+    return np.column_stack([track.lat_deg, track.lon_deg, track.amsl_m])
+
+
+def _look_at(places: Floats, frame: Frame, *, along: bool = False) -> Iterable[str]:
+    """The view of (N, 3) places from the south, or, ``along``, in the direction from the first to the last."""
+    if not len(places):
+        return
+    plane = frame.to_plane(places[:, 0], places[:, 1])
+    low, high = plane.min(axis=0), plane.max(axis=0)
+    lat, lon = (float(x) for x in frame.to_degrees(*(0.5 * (low + high))))
+    amsl = 0.5 * float(places[:, 2].min() + places[:, 2].max())
+    away = max(FARTHER * float(np.hypot(*(high - low))), NEAREST_M)
+    heading = math.degrees(math.atan2(*(plane[-1] - plane[0]))) % 360.0 if along else 0.0
+    yield (
+        f"<LookAt><longitude>{lon:.7f}</longitude><latitude>{lat:.7f}</latitude><altitude>{amsl:.2f}</altitude>"
+        f"<heading>{heading:.1f}</heading><tilt>{TILT_DEG:g}</tilt><range>{away:.0f}</range>"
+        "<altitudeMode>absolute</altitudeMode></LookAt>"
+    )
+
+
+def _styles(number: int, colour: str) -> Iterable[str]:
+    """The styles of one colour: the track, and its way points, whose names stand beside them only under the pointer."""
+    yield (
+        f'<Style id="track{number}"><LineStyle><color>{colour}</color><width>3</width></LineStyle>'
+        f"<PolyStyle><color>40{colour[2:]}</color></PolyStyle></Style>"
+    )
+    for state, icon, label in (("normal", 0.6, 0), ("highlight", 0.9, 1)):
+        yield (
+            f'<Style id="point{number}-{state}"><IconStyle><color>{colour}</color><scale>{icon}</scale></IconStyle>'
+            f"<LabelStyle><scale>{label}</scale></LabelStyle><BalloonStyle><text>{BALLOON}</text></BalloonStyle></Style>"
+        )
+    pairs = (f"<Pair><key>{s}</key><styleUrl>#point{number}-{s}</styleUrl></Pair>" for s in ("normal", "highlight"))
+    yield f'<StyleMap id="point{number}">{"".join(pairs)}</StyleMap>'
 
 
 def _text(words: str) -> str:
@@ -63,22 +129,64 @@ def _place(lat_deg: float, lon_deg: float, height_m: float) -> str:
     return f"{lon_deg:.7f},{lat_deg:.7f},{height_m:.2f}"
 
 
-def _track(track: Track, style: str) -> Iterable[str]:
+def _track(track: Track, style: int, frame: Frame, start: datetime | None) -> Iterable[str]:
     name = _text(track.vehicle)
     yield "<Folder>"
     yield f"<name>{name}</name>"
-    yield f"<Placemark><name>{name}</name><styleUrl>{style}</styleUrl>"
+    yield from _look_at(_places(track), frame, along=True)
+    yield f"<Placemark><name>{name}</name><styleUrl>#track{style}</styleUrl>"
     yield "<LineString><extrude>1</extrude><altitudeMode>absolute</altitudeMode>"
     yield f"<coordinates>{_coordinates(track.lat_deg, track.lon_deg, track.amsl_m)}</coordinates>"
     yield "</LineString></Placemark>"
-    points = zip(track.labels, track.lat_deg, track.lon_deg, track.amsl_m, strict=True)
-    for label, lat, lon, amsl in points:
-        if label:
-            yield (
-                f"<Placemark><name>{_text(label)}</name><Point><altitudeMode>absolute</altitudeMode>"
-                f"<coordinates>{_place(lat, lon, amsl)}</coordinates></Point></Placemark>"
-            )
+    if start is not None and track.left_s is not None:
+        yield from _moving(track, style, start)
+    shown: set[int | None] = set()
+    for point, lat, lon, amsl in zip(track.waypoints, track.lat_deg, track.lon_deg, track.amsl_m, strict=False):
+        if point is None or (point.number in shown and point.number is not None):
+            continue  # a jump leads back to an item that has its place already
+        shown.add(point.number)
+        yield (
+            f"<Placemark><name>{_text(point.name)}</name><styleUrl>#point{style}</styleUrl>"
+            f"<ExtendedData>{_fields(track, point, float(amsl))}</ExtendedData>"
+            f"<Point><altitudeMode>absolute</altitudeMode><coordinates>{_place(lat, lon, amsl)}</coordinates></Point>"
+            "</Placemark>"
+        )
     yield "</Folder>"
+
+
+def _fields(track: Track, point: WayPoint, amsl_m: float) -> str:
+    """What the balloon of a way point shows."""
+    agl = f"{floored(point.agl_m, HEIGHT_DECIMALS):.{HEIGHT_DECIMALS}f}" if math.isfinite(point.agl_m) else "unknown"
+    values = {
+        "vehicle": track.vehicle,
+        "number": "none" if point.number is None else str(point.number),
+        "command": point.command or "none",
+        "amsl_m": f"{amsl_m:.{HEIGHT_DECIMALS}f}",
+        "agl_m": agl,
+        "time_s": "unknown" if point.time_s is None else f"{point.time_s:.1f}",
+    }
+    return "".join(f'<Data name="{key}"><value>{_text(value)}</value></Data>' for key, value in values.items())
+
+
+def _moving(track: Track, style: int, start: datetime) -> Iterable[str]:
+    """The track with the time of day at each point, and at the end of each wait."""
+    assert track.reached_s is not None
+    assert track.left_s is not None
+    rows: list[tuple[float, str]] = []
+    points = np.column_stack([track.lon_deg, track.lat_deg, track.amsl_m]).tolist()
+    for (lon, lat, amsl), reached, left in zip(points, track.reached_s.tolist(), track.left_s.tolist(), strict=True):
+        coord = f"{lon:.7f} {lat:.7f} {amsl:.2f}"
+        rows.append((reached, coord))
+        if left - reached > SAME_TIME_S:
+            rows.append((left, coord))
+    yield f"<Placemark><name>{_text(track.vehicle)} in time</name><styleUrl>#track{style}</styleUrl><gx:Track>"
+    yield "<altitudeMode>absolute</altitudeMode>"
+    for seconds, _ in rows:
+        at = start.astimezone(UTC) + timedelta(seconds=seconds)
+        yield f"<when>{at.isoformat(timespec='milliseconds').removesuffix('+00:00')}Z</when>"
+    for _, coord in rows:
+        yield f"<gx:coord>{coord}</gx:coord>"
+    yield "</gx:Track></Placemark>"
 
 
 def _zone(zone: Zone, ring: Floats, top_m: float) -> Iterable[str]:

@@ -11,6 +11,9 @@ from gcsplan.arrays import Floats
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Zone
 
+HEIGHT_DECIMALS = 2
+"""Of heights on a map, metres."""
+
 CIRCLE_CORNERS = 72
 OUTLINE_MARGIN_M = 0.02
 """Metres that a circle's outline stays outside the circle, to contain it after rounding to 1e-7 degrees (11 mm)."""
@@ -40,7 +43,8 @@ class WayPoint:
     """A point of a track that an item ends at: its name, wire number, command, and heights.
 
     ``number`` and ``command`` are None for a home that is no item. ``agl_m`` is NaN over unknown ground. ``geoid_m`` is
-    the geoid's height above the ellipsoid there, None if no geoid grid is known.
+    the geoid's height above the ellipsoid there, None if no geoid grid is known. ``time_s``: when its item is done,
+    with its hold, seconds from the common start; None if that is not known.
     """
 
     name: str
@@ -48,22 +52,25 @@ class WayPoint:
     command: str | None
     agl_m: float
     geoid_m: float | None = None
+    time_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
     """The line that one vehicle flies: (N,) degrees and AMSL metres, N >= 2, straight between neighbours.
 
-    ``labels`` (N,) has a word for each point (its item's command), empty for points that are not items. ``waypoints``
-    (N,) has the figures of the points that an item ends at, None for the others.
+    ``waypoints`` (N,) has the figures of the points that an item ends at, None for the others. ``reached_s``,
+    ``left_s`` (N,): when the vehicle comes to each point and when it goes on, seconds from the common start; None if
+    that is not known.
     """
 
     vehicle: str
     lat_deg: Floats
     lon_deg: Floats
     amsl_m: Floats
-    labels: tuple[str, ...] = field(default=())
     waypoints: tuple[WayPoint | None, ...] = field(default=())
+    reached_s: Floats | None = None
+    left_s: Floats | None = None
 
     def __post_init__(self) -> None:
         columns = [np.asarray(getattr(self, name), float) for name in ("lat_deg", "lon_deg", "amsl_m")]
@@ -72,14 +79,10 @@ class Track:
             raise ValueError(f"a track has at least two points in columns of equal length, given shapes {shapes}")
         if not all(np.isfinite(c).all() for c in columns):
             raise ValueError(f"a track is finite; that of {self.vehicle} is not")
-        if self.labels and len(self.labels) != len(columns[0]):
-            raise ValueError(f"{len(columns[0])} points need as many labels, given {len(self.labels)}")
         if self.waypoints and len(self.waypoints) != len(columns[0]):
             raise ValueError(f"{len(columns[0])} points need as many way points, given {len(self.waypoints)}")
         for name, column in zip(("lat_deg", "lon_deg", "amsl_m"), columns, strict=True):
             object.__setattr__(self, name, column)
-        if not self.labels:
-            object.__setattr__(self, "labels", ("",) * len(columns[0]))
 
 
 def outline_deg(zone: Zone, frame: Frame) -> Floats:

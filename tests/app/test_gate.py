@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import re
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from itertools import pairwise
 
 import pytest
 import yaml
 
 from gcsplan.app.gate import SLACK_S, GateTime
 from gcsplan.app.model import Plan
-from gcsplan.app.outputs import summary_of
+from gcsplan.app.outputs import outputs_of, summary_of
 from gcsplan.app.pipeline import plan
 from gcsplan.errors import InputError, UsageError
 from gcsplan.mavlink.mission import commands as cmd
@@ -25,6 +30,28 @@ def planned(**vehicle: object) -> Plan:
     arrival = {"mode": "sequence", "order": ["west", "south"], "interval_s": 30, "separation_m": 30}
     text = yaml.safe_dump(CROSS | {"vehicles": vehicles, "arrival": arrival})
     return plan(load_mission("fleet.yaml", text=text), gate_utc=START)
+
+
+def test_the_markers_of_the_kml_move_by_the_time_table_from_the_common_start() -> None:
+    done = planned()
+    files = outputs_of(done)
+    assert "gx:Track" not in outputs_of(replace(done, fleet=replace(done.fleet, start_utc=None)))["mission.kml"]
+    rows = list(csv.DictReader(io.StringIO(files["profile.csv"])))
+    assert done.fleet is not None
+    for name, marker in zip(
+        ("west", "south"), re.findall("<gx:Track>.*?</gx:Track>", files["mission.kml"], re.S), strict=True
+    ):
+        when = [datetime.fromisoformat(text) for text in re.findall("<when>(.*?)</when>", marker)]
+        assert len(re.findall("<gx:coord>", marker)) == len(when)
+        assert when == sorted(when)
+        after = [(at - START).total_seconds() for at in when]
+        slot = done.fleet.slot(name)
+        assert after[0] == pytest.approx(slot.depart_s, abs=2e-3)
+        for row in rows:
+            if row["vehicle"] == name and row["time_s"]:
+                assert min(abs(float(row["time_s"]) - t) for t in after) < 0.01
+        assert min(abs(slot.arrive_s - t) for t in after) < 0.01
+        assert max(b - a for a, b in pairwise(after)) >= slot.hold_s - 0.01  # it stands at its gate
 
 
 @pytest.mark.parametrize(

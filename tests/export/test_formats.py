@@ -6,7 +6,10 @@ import csv
 import io
 import json
 import math
+import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +37,13 @@ TRACK = Track(
     np.array([36.6, 36.61234567, 36.62]),
     np.array([-84.38, -84.37, -84.36000001]),
     np.array([300.0, 412.345, 500.125]),
-    ("TAKEOFF", "", "WAYPOINT <2> & more"),
-    (WayPoint("TAKEOFF", 1, "take-off", 0.0), None, WayPoint("WAYPOINT <2> & more", 3, "waypoint", 65.2599, -33.25)),
+    (
+        WayPoint("TAKEOFF", 1, "take-off", 0.0, time_s=12.0),
+        None,
+        WayPoint("WAYPOINT <2> & more", 3, "waypoint", 65.2599, -33.25, 180.25),
+    ),
+    np.array([12.0, 90.0, 150.25]),
+    np.array([12.0, 90.0, 180.25]),
 )
 SQUARE = Polygon(np.array([[0.0, 0.0], [1000.0, 0.0], [1000.0, 800.0], [0.0, 800.0]]))
 ZONES = (
@@ -44,6 +52,7 @@ ZONES = (
     Zone("airfield", SQUARE, Level(50.0, "agl"), Level(900.5, "amsl")),
 )
 KML = "{http://www.opengis.net/kml/2.2}"
+GX = "{http://www.google.com/kml/ext/2.2}"
 WGS84 = Geod(ellps="WGS84")
 
 
@@ -76,14 +85,12 @@ def test_a_zero_has_no_sign_and_a_comma_in_a_name_is_quoted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lat", "lon", "labels"),
-    [([1.0], [1.0], ()), ([1.0, 2.0], [1.0], ()), ([1.0, math.nan], [1.0, 2.0], ()), ([1.0, 2.0], [1.0, 2.0], ("a",))],
+    ("lat", "lon", "waypoints"),
+    [([1.0], [1.0], ()), ([1.0, 2.0], [1.0], ()), ([1.0, math.nan], [1.0, 2.0], ()), ([1.0, 2.0], [1.0, 2.0], (None,))],
 )
-def test_a_track_that_is_none_is_refused(lat: list[float], lon: list[float], labels: tuple[str, ...]) -> None:
-    with pytest.raises(ValueError, match=r"track|labels"):
-        Track("a", np.array(lat), np.array(lon), np.array(lat), labels)
-    with pytest.raises(ValueError, match="way points"):
-        Track("a", np.zeros(2), np.zeros(2), np.zeros(2), (), (None,))
+def test_a_track_that_is_none_is_refused(lat: list[float], lon: list[float], waypoints: tuple[None, ...]) -> None:
+    with pytest.raises(ValueError, match=r"track|way points"):
+        Track("a", np.array(lat), np.array(lon), np.array(lat), waypoints)
 
 
 @settings(max_examples=draws(60))
@@ -121,8 +128,111 @@ def test_the_kml_holds_tracks_points_and_zones_where_they_are() -> None:
     ]  # fmt: skip
     points = [p for p in root.iter(KML + "Placemark") if p.find(KML + "Point") is not None]
     assert [p.findtext(KML + "name") for p in points] == ["TAKEOFF", "WAYPOINT <2> & more"]
-    styles = {"#" + str(s.get("id")) for s in root.iter(KML + "Style")}
-    assert {u.text for u in root.iter(KML + "styleUrl")} <= styles
+
+
+def test_a_balloon_tells_number_command_heights_and_time_of_its_way_point() -> None:
+    root = ET.fromstring(write_kml("m", [TRACK], ZONES, FRAME))
+    told = [
+        {d.get("name"): d.findtext(KML + "value") for d in p.iter(KML + "Data")}
+        for p in root.iter(KML + "Placemark")
+        if p.find(KML + "Point") is not None
+    ]
+    keys = ("vehicle", "number", "command", "amsl_m", "agl_m", "time_s")
+    assert told == [
+        dict(zip(keys, ("uav1", "1", "take-off", "300.00", "0.00", "12.0"), strict=True)),
+        dict(zip(keys, ("uav1", "3", "waypoint", "500.12", "65.25", "180.2"), strict=True)),
+    ]
+    balloon = root.findtext(f".//{KML}BalloonStyle/{KML}text") or ""
+    assert set(re.findall(r"\$\[(\w+)\]", balloon)) == {"name", *told[0]}
+    void = replace(TRACK, waypoints=(None, None, WayPoint("x", 2, "y", math.nan)))
+    fields = ET.fromstring(write_kml("m", [void], [], FRAME)).iter(KML + "Data")
+    assert {d.get("name"): d.findtext(KML + "value") for d in fields} == {
+        "vehicle": "uav1", "number": "2", "command": "y", "amsl_m": "500.12", "agl_m": "unknown", "time_s": "unknown",
+    }  # fmt: skip
+
+
+def test_an_item_has_one_placemark_whatever_it_is_flown_as() -> None:
+    again = replace(TRACK, waypoints=(TRACK.waypoints[0], TRACK.waypoints[2], TRACK.waypoints[2]))
+    for track in (TRACK, again):
+        root = ET.fromstring(write_kml("m", [track], [], FRAME))
+        points = [p for p in root.iter(KML + "Placemark") if p.find(KML + "Point") is not None]
+        assert [p.findtext(KML + "name") for p in points] == ["TAKEOFF", "WAYPOINT <2> & more"]
+
+
+def test_the_document_and_each_track_have_a_view_of_all_that_they_show() -> None:
+    other = replace(TRACK, vehicle="uav2", lat_deg=TRACK.lat_deg + 0.1)
+    root = ET.fromstring(write_kml("m", [TRACK, other], ZONES, FRAME))
+    views = list(root.iter(KML + "LookAt"))
+    assert len(views) == 3
+    for view, places in zip(views, ([TRACK, other], [TRACK], [other]), strict=True):
+        lat, lon, away = (float(view.findtext(KML + k) or "nan") for k in ("latitude", "longitude", "range"))
+        assert view.findtext(KML + "altitudeMode") == "absolute"
+        for track in places:
+            for a, b in zip(track.lat_deg, track.lon_deg, strict=True):
+                assert WGS84.inv(lon, lat, b, a)[2] <= 0.5 * away
+    north_east = float(views[1].findtext(KML + "heading") or "nan")
+    assert north_east == pytest.approx(WGS84.inv(-84.38, 36.6, -84.36, 36.62)[0], abs=1.0)
+    wide = ET.fromstring(write_kml("m", [], ZONES, FRAME)).find(f".//{KML}LookAt")
+    assert wide is not None
+
+
+def test_a_marker_moves_only_where_the_mission_has_a_time_of_day() -> None:
+    assert "gx:Track" not in write_kml("m", [TRACK], ZONES, FRAME)
+    start = datetime(2026, 11, 21, 18, 30, tzinfo=UTC)
+    root = ET.fromstring(write_kml("m", [TRACK], ZONES, FRAME, start))
+    (track,) = root.iter(GX + "Track")
+    when = [e.text for e in track.iter(KML + "when")]
+    places = [[float(x) for x in (e.text or "").split()] for e in track.iter(GX + "coord")]
+    assert when == [f"2026-11-21T18:{m}Z" for m in ("30:12.000", "31:30.000", "32:30.250", "33:00.250")]
+    assert places == [
+        [-84.38, 36.6, 300.0], [-84.37, 36.6123457, 412.35], [-84.36, 36.62, 500.12], [-84.36, 36.62, 500.12],
+    ]  # fmt: skip
+    assert "gx:Track" not in write_kml("m", [replace(TRACK, reached_s=None, left_s=None)], [], FRAME, start)
+
+
+CHILDREN = {
+    "kml": ["Document"],
+    "Document": ["name", "open", "LookAt", "Style", "StyleMap", "Folder"],
+    "Folder": ["name", "LookAt", "Placemark"],
+    "Placemark": [
+        "name", "description", "styleUrl", "ExtendedData", "Point", "LineString", "Polygon", "MultiGeometry", "Track",
+    ],
+    "LookAt": ["longitude", "latitude", "altitude", "heading", "tilt", "range", "altitudeMode"],
+    "Style": ["IconStyle", "LabelStyle", "LineStyle", "PolyStyle", "BalloonStyle"],
+    "StyleMap": ["Pair"], "Pair": ["key", "styleUrl"],
+    "IconStyle": ["color", "scale"], "LabelStyle": ["scale"], "LineStyle": ["color", "width"], "PolyStyle": ["color"],
+    "BalloonStyle": ["text"], "ExtendedData": ["Data"], "Data": ["value"],
+    "Point": ["altitudeMode", "coordinates"], "LineString": ["extrude", "altitudeMode", "coordinates"],
+    "Polygon": ["extrude", "altitudeMode", "outerBoundaryIs"], "outerBoundaryIs": ["LinearRing"],
+    "LinearRing": ["coordinates"], "MultiGeometry": ["Polygon"], "Track": ["altitudeMode", "when", "coord"],
+}  # fmt: skip
+"""The children of our KML's elements, in the order of ogckml22.xsd and kml22gx.xsd; Style and StyleMap take turns."""
+
+
+def test_elements_stand_in_the_order_of_the_schema() -> None:
+    start = datetime(2026, 11, 21, 18, 30, tzinfo=UTC)
+    root = ET.fromstring(write_kml("m", [TRACK], ZONES, FRAME, start))
+    seen = set()
+    for element in root.iter():
+        tag = element.tag.split("}")[1]
+        assert element.tag.startswith(GX if tag in ("Track", "coord") else KML)
+        children = [c.tag.split("}")[1] for c in element]
+        order = CHILDREN.get(tag, [])
+        assert set(children) <= set(order), tag
+        ranks = [order.index("Style" if c == "StyleMap" else c) for c in children]
+        assert ranks == sorted(ranks), (tag, children)
+        seen.add(tag)
+    assert set(CHILDREN) <= seen
+    ids = [e.get("id") for e in root.iter() if e.get("id")]
+    assert len(ids) == len(set(ids))
+    assert {u.text for u in root.iter(KML + "styleUrl")} <= {f"#{i}" for i in ids}
+
+
+def test_a_hundred_vehicles_make_a_file_that_viewers_open() -> None:
+    points = tuple(WayPoint(f"{n} NAV_WAYPOINT", n, "NAV_WAYPOINT", 60.0, None, 10.0 * n) for n in range(50))
+    places = np.linspace(36.6, 36.7, 50)
+    tracks = [Track(f"uav{n}", places, places - 121.0, 1e3 * places, points) for n in range(100)]
+    assert len(write_kml("m", tracks, [], FRAME)) < 100 * 50 * 700
 
 
 def test_zones_stand_in_the_kml_from_floor_to_ceiling() -> None:
@@ -152,7 +262,7 @@ def test_zones_stand_in_the_kml_from_floor_to_ceiling() -> None:
 @given(st.text())
 def test_no_name_breaks_the_kml(name: str) -> None:
     zone = Zone(name, Circle(0.0, 0.0, 10.0))
-    track = Track(name, TRACK.lat_deg, TRACK.lon_deg, TRACK.amsl_m, (name, "x", "x"))
+    track = Track(name, TRACK.lat_deg, TRACK.lon_deg, TRACK.amsl_m, (WayPoint(name, 1, name, 0.0), None, None))
     text = write_kml(name, [track], [zone], FRAME)
     root = ET.fromstring(text.encode("utf-8"))
     said = root.findtext(f"{KML}Document/{KML}name") or ""
