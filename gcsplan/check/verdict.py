@@ -71,7 +71,8 @@ class ItemFigures:
     """Figures of all stretches that are flown for one item in a row: the chords of a spline, a track and its landing.
 
     ``kind`` and ``end`` are those of the last one. ``min_agl_m`` and ``climb_deg`` leave columns out; without another
-    stretch the height is NaN, and the angle that of the column.
+    stretch the height is NaN, and the angle that of the column. ``stretches``: how many they are; ``times``: how often
+    they are flown in a row; energy and time are those of one pass.
     """
 
     seq: int
@@ -81,17 +82,21 @@ class ItemFigures:
     climb_deg: float
     agl_end_m: float
     min_agl_m: float
+    max_agl_m: float
     zone_clearance_m: float
     nearest_zone: str
     energy_j: float
     time_s: float
+    column: bool
+    stretches: int
+    times: int
 
 
 def by_item(legs: Sequence[LegFigures]) -> Iterator[ItemFigures]:
     """The figures of each item in the order flown; an item that a jump leads back to comes again."""
     group: list[LegFigures] = []
     for leg in legs:
-        if group and (leg.seq != group[-1].seq or leg.jumped_from is not None):
+        if group and (leg.jumped_from is not None or (leg.seq, leg.times) != (group[-1].seq, group[-1].times)):
             yield _together(group)
             group = []
         group.append(leg)
@@ -103,12 +108,13 @@ def _together(legs: Sequence[LegFigures]) -> ItemFigures:
     last = legs[-1]
     flown = [leg for leg in legs if not leg.column]
     heights = [leg.min_agl_m for leg in flown if not math.isnan(leg.min_agl_m)]
+    tops = [leg.max_agl_m for leg in legs if not math.isnan(leg.max_agl_m)]
     near = min((leg for leg in legs if leg.nearest_zone), key=lambda leg: leg.zone_clearance_m, default=last)
     return ItemFigures(
         last.seq, last.kind, last.end, math.fsum(leg.length_m for leg in legs),
         max((leg.climb_deg for leg in flown or legs), key=abs), last.agl_end_m, min(heights, default=math.nan),
-        near.zone_clearance_m, near.nearest_zone, math.fsum(leg.energy_j for leg in legs),
-        math.fsum(leg.time_s for leg in legs),
+        max(tops, default=math.nan), near.zone_clearance_m, near.nearest_zone, math.fsum(leg.energy_j for leg in legs),
+        math.fsum(leg.time_s for leg in legs), not flown, len(legs), last.times,
     )  # fmt: skip
 
 

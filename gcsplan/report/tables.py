@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gcsplan.check.verdict import LegFigures
+from gcsplan.check.verdict import LegFigures, by_item
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.report.markup import THIN, esc, least, minutes, num, place, table
 from gcsplan.report.plan_view import zone_heights
@@ -43,23 +43,26 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
 
 
 def legs_table(subject: Subject) -> str:
-    """Each flown stretch: its end, heights, climb angle, nearest zone, energy and time."""
+    """Each item in the order flown: its end, heights, climb angle, nearest zone, energy and time."""
     bad = {f.seq for f in subject.verdict.findings}
     battery = subject.vehicle.energy.battery_j
-    used, rows, marks = 0.0, [], []
-    for leg, clock in zip(subject.verdict.legs, subject.verdict.clock_s(subject.slot), strict=True):
-        used += leg.energy_j * leg.times
-        name = f"{leg.seq} {leg.kind}" + (f" ×{THIN}{leg.times}" if leg.times > 1 else "")
-        near = f"{least(leg.zone_clearance_m, 0, 'm')} {esc(leg.nearest_zone)}" if leg.nearest_zone else "–"
+    clock = subject.verdict.clock_s(subject.slot)
+    used, flown, rows, marks = 0.0, 0, [], []
+    for item in by_item(subject.verdict.legs):
+        used += item.energy_j * item.times
+        flown += item.stretches
+        name = f"{item.seq} {item.kind}" + (f" ×{THIN}{item.times}" if item.times > 1 else "")
+        near = f"{least(item.zone_clearance_m, 0, 'm')} {esc(item.nearest_zone)}" if item.nearest_zone else "–"
         rows.append(
             (
-                esc(name), num(leg.length_m, 0, "m"), num(leg.end[2], 1, "m"), least(leg.agl_end_m, 1, "m"),
-                "column" if leg.column else least(leg.min_agl_m, 1, "m"),
-                num(leg.max_agl_m, 1, "m"), num(leg.climb_deg, 1, "°"), near, num(leg.energy_j / 1000.0, 1, "kJ"),
-                num(100.0 * used / battery, 1, "%") if battery else "–", num(leg.time_s, 0, "s"), minutes(clock),
+                esc(name), num(item.length_m, 0, "m"), num(item.end[2], 1, "m"), least(item.agl_end_m, 1, "m"),
+                "column" if item.column else least(item.min_agl_m, 1, "m"),
+                num(item.max_agl_m, 1, "m"), num(item.climb_deg, 1, "°"), near, num(item.energy_j / 1000.0, 1, "kJ"),
+                num(100.0 * used / battery, 1, "%") if battery else "–", num(item.time_s, 0, "s"),
+                minutes(clock[flown - 1]),
             )
         )  # fmt: skip
-        marks.append("bad" if leg.seq in bad else "")
+        marks.append("bad" if item.seq in bad else "")
     head = ("to item|", "length", "AMSL there", "AGL there", "lowest AGL", "highest AGL", "climb", "nearest zone|",
             "energy", "battery used", "time", "since take-off")  # fmt: skip
     return table(f"Legs of {esc(subject.name)}, in the order flown", head, rows, marks=marks)

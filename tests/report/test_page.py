@@ -29,7 +29,7 @@ from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Rules, separation
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import Order
-from gcsplan.report import fleet_view, markup
+from gcsplan.report import fleet_view, markup, tables
 from gcsplan.report.chart import Axes, ticks
 from gcsplan.report.page import BARE_DEM, render_check, render_page
 from gcsplan.report.picture import draw, figures
@@ -209,6 +209,17 @@ def test_the_legs_of_the_table_are_those_of_the_verdict() -> None:
 
 
 # -- verdicts -----------------------------------------------------------------------------------------------------
+
+
+def test_an_item_that_is_flown_in_many_chords_is_one_row_of_the_table() -> None:
+    subject = small_page().subjects[0]
+    chords = []
+    for leg in subject.verdict.legs:
+        part = replace(leg, length_m=leg.length_m / 4.0, energy_j=leg.energy_j / 4.0, time_s=leg.time_s / 4.0)
+        chords += [leg] if leg.column else [replace(part, min_agl_m=leg.min_agl_m + 5.0 * k) for k in (3, 0, 1, 2)]
+    cut = replace(subject, verdict=replace(subject.verdict, legs=tuple(chords)))
+    assert len(chords) > len(subject.verdict.legs)
+    assert tables.legs_table(cut) == tables.legs_table(subject)
 
 
 def test_a_broken_limit_is_told_at_the_top_and_marked_where_it_is() -> None:
