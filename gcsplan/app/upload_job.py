@@ -72,10 +72,14 @@ class JobResult:
     details: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The result for JSON, fixed keys first; of the others, those with a value."""
+        """The result for JSON, fixed keys first; of the others, those with a value.
+
+        ``details`` are the session's; what was said since, in ``message`` and ``warnings``, stands in their place.
+        """
         fixed = {
             "url": self.url, "outcome": self.outcome, "verified": self.verified, "simulated": self.simulated,
             "items": self.items, "seconds": self.seconds, "retries": self.retries,
         }  # fmt: skip
-        more = {"message": self.message, "warnings": list(self.warnings)} | dict(self.details or {})
+        said = {"message": self.message, "warnings": list(self.warnings)}
+        more = said | dict(self.details or {}) | said
         return fixed | {key: value for key, value in more.items() if value and key not in fixed}

@@ -323,8 +323,7 @@ def verify_file(
     if checked is not None and done.verified and not shifted:
         shifted = "what is on board is judged again: safe"
     warnings = (*([shifted] if shifted else []), *notes, *done.warnings)
-    details = dict(done.details or {}) | {"warnings": list(warnings)}
-    return replace(done, message=done.message + cure if done.message else "", warnings=warnings, details=details)
+    return replace(done, message=done.message + cure if done.message else "", warnings=warnings)
 
 
 def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) -> int:

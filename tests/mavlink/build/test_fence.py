@@ -490,7 +490,9 @@ def test_plan_and_upload_send_the_fence_where_that_is_asked_for(run: Any) -> Non
         to = ("--to", server.url_for_gcs)
         code, out, _ = run("upload", "out/uav1.plan", *to, "--mission", "m.yaml", "--fence", "--json")
         assert code == 0
-        assert json.loads(out)["vehicles"][0]["fence"]["verified"] is True
+        (told,) = json.loads(out)["vehicles"]
+        assert told["fence"]["verified"] is True
+        assert "a fence of 1 item is on board too, read back and compared" in told["warnings"]
         (circle,) = board.items(FENCE)
         assert circle.params[0] == 150.0
         # Over the shed it flies legally, and a fence without a height would turn it round.
