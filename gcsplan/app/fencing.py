@@ -2,7 +2,8 @@
 
 A fence that the mission would breach makes the vehicle turn round in the air. So a fence is made only after the whole
 flight as the autopilot flies it, from the ground at the start to the ground at the goal, was found to keep the track
-error and the clearance from every area of the fence.
+error and the clearance from every area of the fence: first with the mission file's values, and again with the vehicle's
+parameters before the mission is sent.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
 from gcsplan.check.plane_legs import legs_in_plane
+from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, Verdict
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
 from gcsplan.figures import counted
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
 
 ROUNDING_M = 0.15
 
-__all__ = ["Fence", "breaches", "fence_for", "not_fenced", "own_fence", "upload_fences", "with_fences"]
+__all__ = ["Fence", "against_fence", "breaches", "fence_for", "not_fenced", "own_fence", "upload_fences", "with_fences"]
 
 
 def fence_for(
@@ -51,17 +53,16 @@ def fence_for(
     """
     fence = fence_of(world.airspace.zones, world.frame, mission.autopilot, infinite=infinite)
     try:
-        areas = areas_of([profile_of(mission.autopilot).stored(item) for item in fence.items], world.frame)
+        areas = _areas(fence, mission, world)
     except InputError as error:  # areas_of reads the items as stored, rounded to centimetres
         raise InputError(
             f"the fence would not be stored as it was made ({error.message}): a zone is too thin for it; widen the "
             "zone, or send no fence",
             where=vehicle.name,
         ) from None
-    named = [replace(a, name=z.name) for a, z in zip(areas, fence.zones, strict=True)]
-    found = breaches(named, mission, vehicle, world, rtl_rel_home_m=rtl_rel_home_m)
+    found = breaches(areas, mission, vehicle, world, rtl_rel_home_m=rtl_rel_home_m)
     if found:
-        lines = "\n".join(f"  {f.message}" for f in found)
+        lines = _lines(found)
         cure = (
             "leave out --fence-infinite: those zones have a height, and a fence has none"
             if infinite
@@ -73,13 +74,38 @@ def fence_for(
     return fence
 
 
+def _areas(fence: Fence, mission: Mission, world: World) -> list[Area]:
+    """The areas of ``fence`` as the autopilot stores them, each with its zone's name."""
+    areas = areas_of([profile_of(mission.autopilot).stored(item) for item in fence.items], world.frame)
+    return [replace(a, name=z.name) for a, z in zip(areas, fence.zones, strict=True)]
+
+
+def _lines(found: Sequence[Finding]) -> str:
+    return "\n".join(f"  {f.message}" for f in found)
+
+
+def against_fence(job: UploadJob, read_back: Mission, rtl_rel_home_m: float | None, tuning: Tuning) -> str | None:
+    """Why the vehicle would breach the job's fence as it flies with the parameters that were read; None if not."""
+    if job.fence is None or not job.fence.items or job.vehicle is None or job.world is None:
+        return None
+    areas = _areas(job.fence, read_back, job.world)
+    found = breaches(areas, read_back, job.vehicle, job.world, rtl_rel_home_m=rtl_rel_home_m, tuning=tuning)
+    return f"the mission would breach its own fence:\n{_lines(found)}" if found else None
+
+
 def breaches(
-    areas: Sequence[Area], mission: Mission, vehicle: Vehicle, world: World, *, rtl_rel_home_m: float | None = None
+    areas: Sequence[Area],
+    mission: Mission,
+    vehicle: Vehicle,
+    world: World,
+    *,
+    rtl_rel_home_m: float | None = None,
+    tuning: Tuning = DEFAULTS,
 ) -> list[Finding]:
     """Findings where the flight of ``mission`` enters an exclusion area, or leaves an inclusion area, of a fence.
 
     The flight is widened by its track error and keeps the horizontal clearance from exclusion areas, as from zones. An
-    aircraft must be inside every inclusion area.
+    aircraft must be inside every inclusion area. ``tuning``: where the autopilot turns, if that was read on board.
     """
     out = [Zone(a.name, shape) for a in areas if not a.inclusion for shape in a.shapes]
     found: list[Finding] = []
@@ -88,23 +114,28 @@ def breaches(
         # A fence is a zone rounded to the precision of its items, so that much is taken off the clearance.
         clearance_m = max(0.0, vehicle.limits.horizontal_clearance_m - ROUNDING_M)
         craft = replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=clearance_m))
-        verdict = judge(mission, craft, fenced, rtl_rel_home_m=rtl_rel_home_m)
+        verdict = judge(mission, craft, fenced, rtl_rel_home_m=rtl_rel_home_m, tuning=tuning)
         found += [
             replace(f, kind="fence", message=f.message.replace("inside no-fly zone", "inside the fence's area"))
             for f in verdict.findings
             if f.kind == "zone"
         ]
     inside = [a for a in areas if a.inclusion]
-    return found + (_outside(inside, mission, vehicle, world, rtl_rel_home_m) if inside else [])
+    return found + (_outside(inside, mission, vehicle, world, rtl_rel_home_m, tuning) if inside else [])
 
 
 def _outside(
-    areas: Sequence[Area], mission: Mission, vehicle: Vehicle, world: World, rtl_rel_home_m: float | None
+    areas: Sequence[Area],
+    mission: Mission,
+    vehicle: Vehicle,
+    world: World,
+    rtl_rel_home_m: float | None,
+    tuning: Tuning,
 ) -> list[Finding]:
     """One finding for each inclusion area that the flight, as `judge` follows it, leaves: the first leg that does."""
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(i) for i in mission.items))
     flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
-    round_corners(flight, stored, vehicle, world.frame)
+    round_corners(flight, stored, vehicle, world.frame, tuning)
     flown = [*flight.stretches, *flight.instead]
     if not flown:
         return []

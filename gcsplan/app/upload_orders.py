@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from gcsplan.app.fencing import against_fence
 from gcsplan.app.way_home import against_on_board
 from gcsplan.check.judge import judge
 from gcsplan.check.tuning import Tuning
 from gcsplan.errors import GcsplanError, VehicleRefused
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.return_altitude import return_on_board_m
 from gcsplan.vehicle import fastest_at_m_s
 
 if TYPE_CHECKING:
@@ -80,8 +82,8 @@ def _judge_again(job: UploadJob, simulated: bool = False) -> session.Judge | Non
 def judge_on_board(job: UploadJob, *, allow_unjudged: bool, simulated: bool = False) -> session.Judge | None:
     """The check of the mission that was read back, since the vehicle will fly what it holds; None without a world.
 
-    It is asked before anything is sent too, with the vehicle's parameters. A simulated vehicle's return altitude is
-    nobody's, so it is not held against a required return.
+    It is asked before the mission is sent too, with the vehicle's parameters: where it turns, and how high it returns,
+    for an RTL item. A simulated vehicle's return altitude is nobody's, so the mission file's counts there.
     """
     if job.world is None or job.vehicle is None:
         return None
@@ -100,12 +102,14 @@ def judge_on_board(job: UploadJob, *, allow_unjudged: bool, simulated: bool = Fa
             if against is not None:
                 return against
         # Home on board is where the vehicle is now, but the altitudes count from the planned start.
+        flown, tuning = replace(read_back, home=job.mission.home), Tuning.of(values)
+        returns_m = None if simulated else return_on_board_m(values)
+        rtl_rel_home_m = job.rtl_rel_home_m if returns_m is None else returns_m
         verdict = judge(
-            replace(read_back, home=job.mission.home), vehicle, world, rtl_rel_home_m=job.rtl_rel_home_m,
-            terrain_error_m=job.terrain_error_m, tuning=Tuning.of(values),
-        )  # fmt: skip
+            flown, vehicle, world, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=job.terrain_error_m, tuning=tuning
+        )
         if verdict.safe is True or (verdict.safe is None and allow_unjudged):
-            return None
+            return against_fence(job, flown, rtl_rel_home_m, tuning)
         return verdict.describe()
 
     return again

@@ -13,7 +13,7 @@ from gcsplan.app.model import Plan
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
-from gcsplan.mavlink.mission.return_altitude import on_board
+from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.world.world import World
 
@@ -86,10 +86,10 @@ def _lines(name: str, home: WayHome | None) -> list[str]:
 
 def against_on_board(home: WayHome, values: Mapping[str, float]) -> str | None:
     """Why a required return is not the one that a vehicle with these parameters would fly; None if it is."""
+    height_m = return_on_board_m(values)
     parameter = on_board(values)
-    if parameter is None:
+    if height_m is None or parameter is None:
         return "a safe return is required, and the return altitude on board could not be read"
-    height_m = parameter.metres(values[parameter.name])
     if abs(height_m - home.rtl_rel_home_m) <= SAME_M:
         return None
     return (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -166,6 +167,36 @@ def test_a_vehicle_that_returns_at_another_altitude_than_the_required_one_is_ref
         assert ("judged at 200 m above home, and this vehicle returns at 15 m: set RTL_ALT 20000 (cm)" in text) == (
             expected == 5
         )
+
+
+@pytest.mark.parametrize("told", [{}, {"RTL_ALT": math.nan}], ids=["nothing", "no number"])
+def test_a_vehicle_that_does_not_tell_its_return_altitude_gets_no_mission_that_requires_one(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: dict[str, float]
+) -> None:
+    mission = write(tmp_path, rtl_rel_home_m=200.0, way_home="required")
+    table = {name: parameters._r(value) for name, value in told.items()}
+    monkeypatch.setitem(parameters._TABLES, Autopilot.ARDUCOPTER, table)
+    with SimServer([board()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        code, text, _ = run("plan", mission, "--upload", server.url_for_gcs)
+        assert (code, server.vehicles[0].items()) == (5, ()), text
+        assert "the return altitude on board could not be read" in text
+        assert run("plan", write(tmp_path, rtl_rel_home_m=200.0), "--upload", server.url_for_gcs)[0] == 0
+
+
+def test_an_rtl_item_is_judged_at_the_altitude_of_the_vehicle_before_it_is_sent(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The mission itself returns over the hill. At 15 m above home, as the vehicle is set, it would meet it.
+    mission = tmp_path / "back.yaml"
+    vehicle = UAV1 | {"rtl_rel_home_m": 200.0, "end": "rtl"}
+    mission.write_text(yaml.safe_dump(HILL | {"vehicles": [vehicle]}))
+    for centimetres, expected in ((1500, 5), (20000, 0)):
+        monkeypatch.setitem(parameters._TABLES[Autopilot.ARDUCOPTER], "RTL_ALT", parameters._i(centimetres))
+        with SimServer([board()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+            code, text, _ = run("plan", mission, "--upload", server.url_for_gcs)
+            assert (code, bool(server.vehicles[0].items())) == (expected, expected == 0), text
+            assert ("(rtl): too low above ground" in text) == (expected == 5)
+    assert run("plan", mission, "--upload", "sim")[0] == 0  # nobody has set a simulated vehicle's altitude
 
 
 def test_what_was_judged_is_not_called_unchecked_and_the_vehicles_own_name_is_told(run: Any, tmp_path: Path) -> None:

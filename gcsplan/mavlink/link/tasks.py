@@ -130,11 +130,11 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     ))  # fmt: skip
     against, values = yield from _parameters(channel, task, state, watch, recheck)
     warnings += against
-    failed = task.judge(task.mission, values) if task.mission and task.judge and values else None
+    failed = task.judge(task.mission, values) if task.mission and task.judge and options.read_parameters else None
     if failed is not None:
         raise VehicleRefused(
-            f"with this vehicle's parameters the mission cannot be flown as it was judged, and nothing was sent; plan "
-            f"it for them (more track_error_m, another lean_angle_deg), or set them:\n{failed}",
+            f"with this vehicle's parameters the mission cannot be flown as it was judged, and it was not sent; plan "
+            f"it for them (more track_error_m, another lean_angle_deg or rtl_rel_home_m), or set them:\n{failed}",
             where=f"vehicle {task.sysid}",
             reason="parameters",
         )

@@ -7,7 +7,7 @@ A vehicle answers to one of the names, which tells its version; without a vehicl
 from __future__ import annotations
 
 import math
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
 from gcsplan.vehicle import Autopilot
@@ -52,6 +52,16 @@ RETURN_PARAMETERS: dict[Autopilot, tuple[ReturnParameter, ...]] = {
 def on_board(names: Container[str]) -> ReturnParameter | None:
     """The parameter that a vehicle has, by the names that it answered to; None if it answered to none."""
     return next((p for known in RETURN_PARAMETERS.values() for p in known if p.name in names), None)
+
+
+def return_on_board_m(values: Mapping[str, float]) -> float | None:
+    """The return altitude above home, m, of parameters that were read; None if it was not read, or is no altitude.
+
+    ArduPlane's -1 keeps the altitude at which the return begins.
+    """
+    parameter = on_board(values)
+    height_m = math.nan if parameter is None else parameter.metres(values[parameter.name])
+    return height_m if math.isfinite(height_m) and height_m >= 0.0 else None
 
 
 def setting(autopilot: Autopilot, rel_home_m: float) -> str:

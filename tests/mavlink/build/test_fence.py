@@ -16,6 +16,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gcsplan.app import fencing, uploads
+from gcsplan.app.upload_orders import judge_on_board
 from gcsplan.check.judge import judge
 from gcsplan.cli import main as cli
 from gcsplan.errors import CheckFailed, InputError
@@ -239,6 +240,29 @@ def test_a_fence_that_the_mission_flies_over_is_refused_by_name() -> None:
         fencing.fence_for(mission, craft, where, infinite=True)
     assert refused.value.reason == "fence"
     assert "yard" not in str(refused.value)
+
+
+def test_a_vehicle_whose_parameters_would_cut_a_corner_into_the_fence_is_refused_the_mission() -> None:
+    # The flight turns left above the shed's ceiling, 40 m outside it; with WPNAV_RADIUS 100 m it cuts the corner over
+    # the shed, which is legal, and which a fence without a height would end.
+    shed = Zone("shed", Circle(2940, 60, 20), None, Level(40, "agl"))
+    where, craft = world(zones=[shed]), vehicle(horizontal_clearance_m=30)
+    path = FlightPath(np.array([[0.0, 0, 420], [3000, 0, 420], [3000, 3000, 420]]))
+    mission = build_mission(path, where, craft, (36.6, -84.3), Order())
+    job = replace(
+        job_of("uav1", 1, "udpout:127.0.0.1:9", mission, craft, where),
+        fence=fencing.fence_for(mission, craft, where, infinite=True),
+    )
+    again = judge_on_board(job, allow_unjudged=False)
+    assert again is not None
+    assert again(mission, {"WPNAV_RADIUS": 200.0}) is None
+    wide = again(mission, {"WPNAV_RADIUS": 10000.0})
+    assert wide is not None
+    assert "shed" in wide
+    assert "breach its own fence" in wide
+    bare = judge_on_board(replace(job, fence=None), allow_unjudged=False)
+    assert bare is not None
+    assert bare(mission, {"WPNAV_RADIUS": 10000.0}) is None
 
 
 @pytest.mark.parametrize(("east", "north"), [(0.0, 90.0), (6000.0, 900.0)])
