@@ -52,7 +52,7 @@ class Energy:
     """Energy model of the krill paper, Table 1: R1 joules per vertical metre, up or down, R2 per horizontal metre.
 
     ``hover_w`` is the power for hovering. With ``battery_j`` None, the capacity is not judged. ``reserve`` is the part
-    of the battery that must be left at the end.
+    of the battery that must be left at the end. ``battery_v`` is its nominal voltage, which only tells energies in mAh.
     """
 
     vertical_j_per_m: float = 120.0
@@ -60,6 +60,7 @@ class Energy:
     hover_w: float = 0.0
     battery_j: float | None = None
     reserve: float = 0.2
+    battery_v: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

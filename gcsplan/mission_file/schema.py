@@ -29,6 +29,9 @@ LEAST = 1e-3
 """Smallest speed, acceleration, or battery capacity in J: a division by less has no useful bound."""
 
 
+MOST_VOLTS = 10_000.0
+
+
 def _no_trifle(value: float) -> float:
     if value < LEAST:
         raise ValueError(f"must be at least {LEAST:g}, given {value:g}")
@@ -201,6 +204,8 @@ class EnergyKeys(Keys):
     """Power of hovering; counts during a hold."""
     battery_j: Annotated[float, Field(gt=0.0, le=1e15), AfterValidator(_no_trifle)] | None = None
     """Energy of the full battery; if absent, the battery is not judged."""
+    battery_v: Annotated[float, Field(gt=0.0, le=MOST_VOLTS)] | None = None
+    """Nominal voltage of the battery: a capacity in mAh needs it, and with it energies are shown in mAh, too."""
     reserve: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.2
     """Part of the battery that must be left at the end, 0 to 1."""
 

@@ -15,11 +15,12 @@ from functools import cache
 from typing import Any, NamedTuple, TypeGuard, get_args
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.schema import Keys, MissionKeys, shown
+from gcsplan.mission_file.schema import MOST_VOLTS, Keys, MissionKeys, shown
+from gcsplan.units import FOOT, KM_PER_HOUR, KNOT, MILLIAMPERE_HOUR, MINUTE, NAUTICAL_MILE, WATT_HOUR, Unit
 
 UNITS = {
     "_j_per_m": "J/m", "_m_s3": "m/s³", "_m_s2": "m/s²", "_m_s": "m/s", "_percent": "%", "_deg": "°", "_mb": "MB",
-    "_m": "m", "_s": "s", "_j": "J", "_w": "W",
+    "_m": "m", "_s": "s", "_j": "J", "_w": "W", "_v": "V",
 }  # fmt: skip
 """Symbol of each unit, by the end of a key; longer ends first, since ``climb_m_s`` also ends in ``_s``."""
 
@@ -27,24 +28,15 @@ VOLTS = "_v"
 """End of the key beside a charge in mAh: the battery's nominal voltage."""
 
 
-class Other(NamedTuple):
-    """A unit that is converted: its symbol, and its size in the key's own unit (of a charge: for 1 V)."""
-
-    symbol: str
-    size: float
-
-
-OTHERS: Mapping[str, Mapping[str, Other]] = {
-    "_m": {"_ft": Other("ft", 0.3048), "_nm": Other("NM", 1852.0)},
-    "_m_s": {"_kt": Other("kt", 1852.0 / 3600.0), "_kmh": Other("km/h", 1.0 / 3.6)},
-    "_s": {"_min": Other("min", 60.0)},
-    "_j": {"_wh": Other("Wh", 3600.0), "_mah": Other("mAh", 3.6)},
+OTHERS: Mapping[str, Mapping[str, Unit]] = {
+    "_m": {"_ft": FOOT, "_nm": NAUTICAL_MILE},
+    "_m_s": {"_kt": KNOT, "_kmh": KM_PER_HOUR},
+    "_s": {"_min": MINUTE},
+    "_j": {"_wh": WATT_HOUR, "_mah": MILLIAMPERE_HOUR},
 }
 """The units that are understood, by the end of the key's own name and by the end that replaces it."""
 
 CHARGE = "_mah"
-
-MOST_VOLTS = 10_000.0
 
 MOST_NOTES = 20
 """Most notes on conversions; more are counted."""
@@ -58,7 +50,7 @@ class Written(NamedTuple):
     end: str
 
     @property
-    def other(self) -> Other:
+    def other(self) -> Unit:
         """The unit that it is written in."""
         return OTHERS[self.own][self.end]
 
@@ -150,12 +142,19 @@ class _Walk:
         for key, value in raw.items():
             if key in others:
                 self._convert(others[key], key, raw, plain, where)
-            elif key in charges:
-                if charges[key] not in raw:
-                    self.problems.append(Problem(where + key, f"counts with {charges[key]} only"))
-            else:
+            elif key in charges and charges[key] not in raw and not self._is_charged(charges[key], raw, others):
+                names = ", ".join(_names_of(others[charges[key]]))
+                self.problems.append(
+                    Problem(where + key, f"counts with the battery's capacity only: give one of {names}")
+                )
+            elif key not in charges or charges[key] not in raw or _is_voltage(value):
                 plain[key] = self._inside(inner[key], value, where + key) if key in inner else value
         return plain
+
+    @staticmethod
+    def _is_charged(charge: str, raw: Mapping[str, Any], others: Mapping[str, Written]) -> bool:
+        """Whether the capacity that goes with a voltage is there, in any unit."""
+        return any(name in raw for name in _names_of(others[charge]))
 
     def _inside(self, kind: type[Keys], value: Any, place: str) -> Any:
         """A section, or a list with sections in it; anything else is left for the reader to refuse."""
@@ -179,7 +178,7 @@ class _Walk:
         if written.end == CHARGE:
             beside = _volts_of(written)
             volt = raw.get(beside)
-            if not _is_number(volt) or not 0.0 < volt <= MOST_VOLTS:
+            if not _is_voltage(volt):
                 given = "" if volt is None else f", given {shown(volt)}"
                 words = f"needs {beside}, the nominal voltage: a number above 0 and at most {MOST_VOLTS:g}{given}"
                 self.problems.append(Problem(place, words))
@@ -209,6 +208,15 @@ def _section_in(annotation: Any) -> type[Keys] | None:
 def _siblings(written: Written) -> set[str]:
     stem = written.key.removesuffix(written.own)
     return {stem + end for end in OTHERS[written.own]}
+
+
+def _names_of(written: Written) -> list[str]:
+    """A key's own name and its names in other units."""
+    return [written.key, *(name for name, w in other_names([written.key]).items() if w.key == written.key)]
+
+
+def _is_voltage(value: Any) -> TypeGuard[float]:
+    return _is_number(value) and 0.0 < value <= MOST_VOLTS
 
 
 def _volts_of(written: Written) -> str:

@@ -12,12 +12,13 @@ from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from enum import Enum
 
+from gcsplan.units import FOOT
 from gcsplan.world.zones import Level
 
 LARGEST_M = 1e6
 """A height or radius above this, m, is a mistake."""
 
-FOOT_M = Decimal("0.3048")
+FOOT_M = Decimal(str(FOOT.size))
 PRESSURE = "STD"
 
 UNITS = (

@@ -21,6 +21,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.units import FOOT
 from gcsplan.world.datum import RasterCRS, VerticalDatum, take_apart
 
 Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
@@ -41,7 +42,8 @@ LOWEST_M, HIGHEST_M = -500.0, 9000.0
 
 UNITS_M = {
     "": 1.0, "m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0,
-    "ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "international foot": 0.3048, "ft (international)": 0.3048,
+    "ft": FOOT.size, "foot": FOOT.size, "feet": FOOT.size, "international foot": FOOT.size,
+    "ft (international)": FOOT.size,
     "us-ft": 1200 / 3937, "us_ft": 1200 / 3937, "ftus": 1200 / 3937, "foot_us": 1200 / 3937,
     "us survey foot": 1200 / 3937, "us survey feet": 1200 / 3937, "us foot": 1200 / 3937,
     "dm": 0.1, "decimetre": 0.1, "decimeter": 0.1, "cm": 0.01, "centimetre": 0.01, "centimeter": 0.01,

@@ -81,12 +81,13 @@ def test_every_key_with_a_convertible_unit_has_its_other_names_and_none_is_a_key
     ],
 )
 def test_a_value_is_converted_as_its_unit_is_defined(section: str, stem: str, own: str, end: str):
-    raw = {stem + end: 7.5} | ({"battery_v": 22.2} if end == "_mah" else {})
+    volts = {"battery_v": 22.2} if end == "_mah" else {}  # the model keeps it, to show energies in mAh
+    raw = {stem + end: 7.5} | volts
     wrapped = {"vehicle": {"vehicles": [raw]}, "energy": {"vehicles": [{"energy": raw}]}}.get(section, {section: raw})
     converted = in_own_units(wrapped, "").raw
     found = converted[section] if section in converted else converted["vehicles"][0]
     found = found["energy"] if section == "energy" else found
-    assert found == {stem + own: pytest.approx(SIZES[end](7.5), rel=1e-12)}
+    assert found == {stem + own: pytest.approx(SIZES[end](7.5), rel=1e-12)} | volts
 
 
 def test_every_unit_is_held_against_its_definition():
@@ -181,8 +182,12 @@ def test_one_of_two_speeds_is_reported_at_its_place():
         ({"battery_mah": 5000}, "battery_mah", "needs battery_v, the nominal voltage: a number above 0"),
         ({"battery_mah": 5000, "battery_v": 0}, "battery_mah", "given 0"),
         ({"battery_mah": 5000, "battery_v": "6S"}, "battery_mah", "given the text '6S'"),
-        ({"battery_v": 22.2}, "battery_v", "counts with battery_mah only"),
-        ({"battery_wh": 90, "battery_v": 22.2}, "battery_v", "counts with battery_mah only"),
+        (
+            {"battery_v": 22.2},
+            "battery_v",
+            "counts with the battery's capacity only: give one of battery_j, battery_wh",
+        ),
+        ({"battery_wh": 90, "battery_v": 0}, "battery_v", "0"),
         ({"battery_wh": 90, "battery_j": 324_000}, "battery_wh", "stands as battery_j too"),
         ({"horizontal_j_per_ft": 30}, "horizontal_j_per_ft", "did you mean horizontal_j_per_m (in J/m)?"),
         ({"hover_kw": 0.4}, "hover_kw", "did you mean hover_w (in W)?"),
