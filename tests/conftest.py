@@ -24,6 +24,7 @@ _BY_THE_CLOCK = Budget.deadline_s
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    os.environ.pop("GCSPLAN_UNITS", None)  # the suite reads the words of the default
     effort.full = config.getoption("markexpr") != "not slow"
     settings.register_profile("fixed", derandomize=True, deadline=None, max_examples=effort.draws(100))
     settings.load_profile("fixed")

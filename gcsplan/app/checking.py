@@ -23,6 +23,7 @@ from gcsplan.mavlink.mission.commands import LOITER_TIME, LOITER_TO_ALT, LOITER_
 from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
+from gcsplan.units import METRIC, Told, Units, told
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import FARTHEST_M
 from gcsplan.world.world import World
@@ -299,15 +300,15 @@ def passes(c: Checked, *, allow_unjudged: bool) -> bool:
     return path and lets_fly(c.way_home, required=c.home_required)
 
 
-def finding_lines(c: Checked, *, allow_unjudged: bool = False) -> list[str]:
+def finding_lines(c: Checked, *, allow_unjudged: bool = False, units: Units = METRIC) -> list[str]:
     """One line per finding, ``file:item: kind: message``, in the format of compilers and linters.
 
     A way home that is only reported is one line, ``file:item: warning: way_home: message``.
     """
-    lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(f.message)}" for f in c.verdict.findings]
+    lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(told(f.message, units))}" for f in c.verdict.findings]
     if not allow_unjudged:
         lines += [f"{c.file}:{_item_in(w)}: not_judged: {_without_item(w)}" for w in c.verdict.not_judged]
-    return lines + home_lines(c)
+    return lines + [told(line, units) for line in home_lines(c)]
 
 
 def home_lines(c: Checked) -> list[str]:
@@ -320,11 +321,14 @@ def home_lines(c: Checked) -> list[str]:
     if not home.unsafe and battery is not None and battery.no_return_seq is not None:
         first = battery.no_return_seq
     if lets_fly(home, required=c.home_required):
-        return [f"{c.file}:{first}: warning: way_home: {home.headline}"]
-    lines = [f"{c.file}:{first}: way_home: {home.headline}" + (f"; {home.advice}" if home.advice else "")]
-    lines += [f"{c.file}:{s.from_seq}: way_home: no safe return from {s.describe()}" for s in home.unsafe]
+        return [Told("{}:{}: warning: way_home: {}", c.file, first, home.headline)]
+    advice = Told("; {}", home.advice) if home.advice else ""
+    lines: list[str] = [Told("{}:{}: way_home: {}{}", c.file, first, home.headline, advice)]
+    lines += [
+        Told("{}:{}: way_home: no safe return from {}", c.file, s.from_seq, s.describe()) for s in home.unsafe
+    ]  # fmt: skip
     if battery is not None and battery.short:
-        lines.append(f"{c.file}:{battery.no_return_seq or 0}: way_home: {battery.describe()}")
+        lines.append(Told("{}:{}: way_home: {}", c.file, battery.no_return_seq or 0, battery.describe()))
     lines += [f"{c.file}:{_item_in(w)}: not_judged: the way home: {_without_item(w)}" for w in home.not_judged]
     return lines
 

@@ -27,6 +27,7 @@ from gcsplan.figures import counted
 from gcsplan.mavlink.build.fence import Area, Fence, areas_of, fence_of
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
+from gcsplan.units import Quantity, Told
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.world import World
@@ -115,13 +116,15 @@ def breaches(
         clearance_m = max(0.0, vehicle.limits.horizontal_clearance_m - ROUNDING_M)
         craft = replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=clearance_m))
         verdict = judge(mission, craft, fenced, rtl_rel_home_m=rtl_rel_home_m, tuning=tuning)
-        found += [
-            replace(f, kind="fence", message=f.message.replace("inside no-fly zone", "inside the fence's area"))
-            for f in verdict.findings
-            if f.kind == "zone"
-        ]
+        found += [replace(f, kind="fence", message=_of_fence(f.message)) for f in verdict.findings if f.kind == "zone"]
     inside = [a for a in areas if a.inclusion]
     return found + (_outside(inside, mission, vehicle, world, rtl_rel_home_m, tuning) if inside else [])
+
+
+def _of_fence(message: str) -> str:
+    """The message on a zone, as one on an area of the fence."""
+    old, new = "inside no-fly zone", "inside the fence's area"
+    return message.exchanged(old, new) if isinstance(message, Told) else message.replace(old, new)
 
 
 def _outside(
@@ -147,8 +150,8 @@ def _outside(
             leg = int(np.argmax(beyond_m > 0.0))
             s, short_m = flown[plane.owner[leg]], float(beyond_m[leg])
             lat, lon, amsl = s.end
-            by = f" (by {short_m:.1f} m)" if math.isfinite(short_m) else ", which is far away"
-            words = f"item {s.seq} ({s.kind}): leaves the fence's area “{area.name}”{by}"
+            by = Told(" (by {})", Quantity(short_m, "distance", 1)) if math.isfinite(short_m) else ", which is far away"
+            words = Told("item {} ({}): leaves the fence's area “{}”{}", s.seq, s.kind, area.name, by)
             by_m = short_m if math.isfinite(short_m) else math.nan
             found.append(Finding(s.seq, "fence", words, lat, lon, amsl, -by_m, 0.0, by_m, "m", area.name))
     return found

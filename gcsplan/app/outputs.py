@@ -24,6 +24,7 @@ from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.units import METRIC, Units
 
 if TYPE_CHECKING:
     from gcsplan.app.upload_job import JobResult
@@ -71,11 +72,13 @@ def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
     return rally_items(home.rally)
 
 
-def report_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = MappingProxyType({})) -> str:
+def report_of(
+    plan: Plan, results: Sequence[JobResult] = (), homes: Homes = MappingProxyType({}), units: Units = METRIC
+) -> str:
     """``report.html``: one page that needs no network."""
     from gcsplan.app.report_page import render
 
-    return render(plan, results, homes)
+    return render(plan, results, homes, units)
 
 
 def figures_of(plan: Plan) -> dict[str, bytes]:

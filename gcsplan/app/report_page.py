@@ -9,14 +9,19 @@ from gcsplan.app.upload_job import JobResult
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report.page import render_page
 from gcsplan.report.subject import Certificate, Page, Subject
+from gcsplan.units import METRIC, Units
 
 
-def render(plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None) -> str:
+def render(
+    plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None, units: Units = METRIC
+) -> str:
     """The report of ``plan`` as HTML text, with the results of its uploads. ``homes``: vehicle name to its way home."""
-    return render_page(page_of_plan(plan, results, homes))
+    return render_page(page_of_plan(plan, results, homes, units))
 
 
-def page_of_plan(plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None) -> Page:
+def page_of_plan(
+    plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None, units: Units = METRIC
+) -> Page:
     """The page of a plan, with the results of its uploads and the way home of each vehicle named in ``homes``."""
     uploads = {d.vehicle: d.as_dict() for d in results}
     source, fleet = plan.source, plan.fleet
@@ -43,5 +48,5 @@ def page_of_plan(plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[s
         )  # fmt: skip
     return Page(
         source.name, plan.world, tuple(subjects), dict(source.inputs), tuple(facts), tuple(dict.fromkeys(plan.notes)),
-        fleet.separation if fleet is not None else None, fleet.order if fleet is not None else (),
+        fleet.separation if fleet is not None else None, fleet.order if fleet is not None else (), units,
     )  # fmt: skip

@@ -19,7 +19,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from gcsplan.app import outputs, uploads
 from gcsplan.app import way_home as returns
@@ -33,11 +33,14 @@ from gcsplan.errors import CheckFailed, UsageError
 from gcsplan.export.outdir import retire_outputs, settle_outputs, steady, write_outputs, write_whole
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, load_mission
+from gcsplan.units import units_of
 
 if TYPE_CHECKING:
     from gcsplan.sim.outcome import Rehearsal
 
 __all__ = ["check", "rehearse", "report", "upload", "write"]
+
+UnitsName = Literal["metric", "imperial", "aviation"]
 
 Source = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
 """A mission of `load_mission`, or anything that `load_mission` accepts."""
@@ -113,12 +116,14 @@ def write(
     report: bool = False,
     way_home: bool = False,
     allow_unjudged: bool = False,
+    units: UnitsName = "metric",
 ) -> list[Path]:
     """Write what ``gcsplan plan -o FOLDER`` writes, the same bytes, whole or not at all; returns the files' paths.
 
     The files are `.waypoints` and `.plan` for each vehicle, `mission.kml`, `mission.geojson`, `profile.csv` and
     `summary.json`; with ``report`` also `report.html`. ``way_home``, and ``report`` too, adds to the summary how each
-    vehicle returns from every point, which takes about a second for 20 km.
+    vehicle returns from every point, which takes about a second for 20 km. ``units`` are those of the report; all other
+    files are in SI.
 
     Outputs of an earlier plan in ``folder`` are removed; any other file in the way is moved to its ``previous/``.
     Raises CheckFailed if a verdict does not pass (with ``allow_unjudged``, what could not be judged passes), or if the
@@ -140,6 +145,7 @@ def write(
         ...     [file.name for file in write(planned, folder)]
         ['uav1.waypoints', 'uav1.plan', 'mission.kml', 'mission.geojson', 'profile.csv', 'summary.json']
     """
+    system = units_of(units)
     settle_outputs(folder)
     try:
         require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
@@ -149,7 +155,7 @@ def write(
         raise
     files = outputs.outputs_of(planned, homes)
     if report:
-        files["report.html"] = outputs.report_of(planned, (), homes)
+        files["report.html"] = outputs.report_of(planned, (), homes, system)
     write_outputs(folder, files)
     return [Path(folder) / name for name in files]
 
@@ -160,12 +166,14 @@ def report(
     *,
     results: Sequence[JobResult] = (),
     way_home: bool = True,
+    units: UnitsName = "metric",
 ) -> str:
     """The report of a plan as HTML text: map, profiles and tables on one page that needs no network.
 
     With ``file`` the report is also written there, whole or not at all (UTF-8). ``results`` of `upload` are shown on
     the page. ``way_home``: the return of each vehicle from every point is judged and shown, which takes about a second
-    for 20 km. Raises InputError if ``file`` cannot be written.
+    for 20 km. ``units`` are those of its numbers. Raises InputError if ``file`` cannot be written, UsageError for units
+    that are not known.
 
     Examples:
         >>> from gcsplan import plan, report
@@ -179,7 +187,8 @@ def report(
         >>> report(planned, way_home=False).startswith("<!DOCTYPE html>")
         True
     """
-    text = outputs.report_of(planned, results, returns.homes_of(planned) if way_home else {})
+    system = units_of(units)
+    text = outputs.report_of(planned, results, returns.homes_of(planned) if way_home else {}, system)
     if file is not None:
         write_whole(Path(file), text)
     return text

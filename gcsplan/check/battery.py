@@ -18,6 +18,7 @@ from gcsplan.check.geodesy import flat_m
 from gcsplan.check.rtl.model import RULES
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
+from gcsplan.units import Quantity, Symbol, Told
 from gcsplan.vehicle import Vehicle
 
 HALVINGS = 50
@@ -77,19 +78,20 @@ class BatteryHome:
             "short": [list(part) for part in self.short],
         }
 
-    def describe(self) -> str:
+    def describe(self) -> Told:
         """Describe it in one line."""
         usable = 100.0 * self.usable_j / self.battery_j
         if self.point_of_no_return is None or self.no_return_m is None:
-            return (
-                f"enough from everywhere: flight and return use {self.most_percent:.0f} % at most, from km "
-                f"{self.most_m / 1e3:.2f}; {usable:.0f} % may be used"
-            )
-        return (
-            f"point of no return at km {self.no_return_m / 1e3:.2f} (item {self.no_return_seq}, "
-            f"{self.point_of_no_return[0]:.6f}, {self.point_of_no_return[1]:.6f}): from beyond it "
-            f"flight and return use up to {self.most_percent:.0f} %, and {usable:.0f} % may be used"
-        )
+            return Told(
+                "enough from everywhere: flight and return use {:.0f} % at most, from {} {}; {:.0f} % may be used",
+                self.most_percent, Symbol("far"), Quantity(self.most_m, "far", 2, bare=True), usable,
+            )  # fmt: skip
+        return Told(
+            "point of no return at {} {} (item {}, {:.6f}, {:.6f}): from beyond it flight and return use up to {:.0f} "
+            "%, and {:.0f} % may be used",
+            Symbol("far"), Quantity(self.no_return_m, "far", 2, bare=True), self.no_return_seq,
+            *self.point_of_no_return[:2], self.most_percent, usable,
+        )  # fmt: skip
 
 
 def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m: float) -> BatteryHome | None:

@@ -25,6 +25,7 @@ from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.units import Joules, Quantity, Told, measured
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Violation
 from gcsplan.world.frame import EARTH_RADIUS_M, FARTHEST_M
@@ -126,10 +127,10 @@ def _is_too_far(stretch: Stretch, world: World) -> bool:
 
 def _too_far(s: Stretch) -> Finding:
     lat, lon, amsl = s.end
-    message = (
-        f"item {s.seq} ({s.kind}): goes to {lat:.6f}, {lon:.6f}, {amsl:.1f} m AMSL: too far from the mission's terrain "
-        f"to be judged"
-    )
+    message = Told(
+        "item {} ({}): goes to {:.6f}, {:.6f}, {}: too far from the mission's terrain to be judged",
+        s.seq, s.kind, lat, lon, Quantity(amsl, "amsl", 1),
+    )  # fmt: skip
     return Finding(s.seq, "coverage", message, lat, lon, amsl, math.nan, math.nan, math.nan, "m")
 
 
@@ -224,10 +225,14 @@ def _findings(
         lat, lon = (float(x) for x in world.frame.to_degrees(v.east_m, v.north_m))
         name = world.airspace.zones[zone].name if zone >= 0 else ""
         what = WORDS[kind] + (f" “{name}” or its clearance" if name else "")
-        numbers = f": {v.value:.2f} {v.unit}, limit {v.limit:.2f} {v.unit}" if kind not in ("coverage", "zone") else ""
-        by = f" (by {v.by:.2f} {v.unit})" if kind != "coverage" else ""
+        value, limit, over = (measured(number, kind, v.unit) for number in (v.value, v.limit, v.by))
+        numbers = Told(": {}, limit {}", value, limit) if kind not in ("coverage", "zone") else ""
+        by = Told(" (by {})", over) if kind != "coverage" else ""
         way = s.kind if s.jumped_from is None else f"{s.kind}, after the jump at item {s.jumped_from}"
-        message = f"item {s.seq} ({way}): {what}{numbers}{by} at {lat:.6f}, {lon:.6f}, {v.amsl_m:.1f} m AMSL"
+        message = Told(
+            "item {} ({}): {}{}{} at {:.6f}, {:.6f}, {}",
+            s.seq, way, what, numbers, by, lat, lon, Quantity(v.amsl_m, "amsl", 1),
+        )  # fmt: skip
         found.append(Finding(s.seq, kind, message, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name))
     return found
 
@@ -240,10 +245,10 @@ def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict
     verdict = replace(verdict, battery_used_percent=100.0 * used / energy.battery_j)
     last = verdict.legs[-1]
     if used > usable:
-        message = (
-            f"battery: the flight needs {used:.0f} J and {usable:.0f} J may be used "
-            f"({energy.battery_j:.0f} J less {100 * energy.reserve:g} % reserve)"
-        )
+        message = Told(
+            "battery: the flight needs {} and {} may be used ({} less {:g} % reserve)",
+            Joules(used), Joules(usable), Joules(energy.battery_j), 100 * energy.reserve,
+        )  # fmt: skip
         finding = _finding(last.seq, "battery", message, used, usable, used - usable, "J")
         return replace(verdict, findings=(*verdict.findings, finding))
     power_w = _power_w(verdict, vehicle, flight)

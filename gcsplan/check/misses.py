@@ -11,6 +11,7 @@ import numpy as np
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.stretch import Stretch
 from gcsplan.figures import floored
+from gcsplan.units import Kind, Quantity, Rounding, Told
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Legs, Violation
 from gcsplan.world.world import World
@@ -39,19 +40,29 @@ class Miss:
     amsl_m: float
     zone: str = ""
 
-    def describe(self) -> str:
+    def describe(self) -> Told:
         """Describe it in one line."""
-        what = f"{WORDS[self.kind]}{f' {self.zone}' if self.zone else ''}"
         left = (
-            f"{floored(self.room, 1):.1f} {self.unit} to spare"
+            Told("{} to spare", self._number(self.room, "down"))
             if self.room >= 0.0
-            else f"broken by {-self.room:.1f} {self.unit}"
+            else Told("broken by {}", self._number(-self.room, "near"))
         )
-        value = floored(self.value, 1) if self.kind in LEAST else self.value
-        return (
-            f"{what}: {value:.1f} {self.unit} of {self.limit:g}, {left}, item {self.seq} "
-            f"({self.lat_deg:.6f}, {self.lon_deg:.6f}, {self.amsl_m:.0f} m AMSL)"
-        )
+        limit = Quantity(self.limit, self._measured, None, bare=True) if self.unit == "m" else f"{self.limit:g}"
+        return Told(
+            "{}{}: {} of {}, {}, item {} ({:.6f}, {:.6f}, {})",
+            WORDS[self.kind], f" {self.zone}" if self.zone else "",
+            self._number(self.value, "down" if self.kind in LEAST else "near"), limit, left, self.seq,
+            self.lat_deg, self.lon_deg, Quantity(self.amsl_m, "amsl", 0),
+        )  # fmt: skip
+
+    @property
+    def _measured(self) -> Kind:
+        return "distance" if self.kind == "zone" else "height"
+
+    def _number(self, value: float, rounding: Rounding) -> Quantity | str:
+        if self.unit == "m":
+            return Quantity(value, self._measured, 1, rounding)
+        return f"{floored(value, 1) if rounding == 'down' else value:.1f} {self.unit}"
 
 
 WORDS = {

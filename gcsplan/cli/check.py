@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcsplan.cli.ending import complain, emit, printable
-from gcsplan.cli.options import JsonOption, RequireWayHomeOption, UnjudgedOption, WayHomeOption
+from gcsplan.cli.options import JsonOption, RequireWayHomeOption, UnitsName, UnitsOption, UnjudgedOption, WayHomeOption
 from gcsplan.errors import InputError, UsageError
 
 if TYPE_CHECKING:
     from gcsplan.app.checking import Batch, Checked, Returns
     from gcsplan.mission_file.from_options import WorldOptions
+    from gcsplan.units import Units
 
 Number = float | None
 
@@ -59,6 +60,7 @@ def check(
     ] = None,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
+    units: UnitsOption = UnitsName.METRIC,
     allow_unjudged: UnjudgedOption = False,
     quiet: Annotated[
         bool, typer.Option("-q", "--quiet", help="Only findings, one a line: file:item: message. Nothing if all pass.")
@@ -80,6 +82,7 @@ def check(
     """
     from gcsplan.app import checking, outputs
     from gcsplan.export.outdir import steady
+    from gcsplan.units import units_of
 
     given: dict[str, object] = {
         "--dem": dem, "--vertical-datum": vertical_datum, "--geoid-grid": geoid_grid, "--crs": crs,
@@ -97,7 +100,7 @@ def check(
         batch = make(files, given, checking.Returns(way_home, require_way_home))
     failed = checking.failure(batch.checked, allow_unjudged=allow_unjudged, unreadable=batch.unreadable)
     if report is not None:
-        _report(batch, report)
+        _report(batch, report, units_of(units))
     if as_json:
         verdicts = [outputs.verdict_of(str(c.file), c.verdict) | checking.more_of(c) for c in batch.checked]
         document = {"name": batch.name, "inputs": dict(batch.inputs), "notes": list(batch.notes), "verdicts": verdicts}
@@ -105,9 +108,9 @@ def check(
         for _, error in batch.unreadable:
             complain(error)
     elif quiet:
-        _say_findings(batch, allow_unjudged)
+        _say_findings(batch, allow_unjudged, units_of(units))
     else:
-        _say_all(batch)
+        _say_all(batch, units_of(units))
     raise typer.Exit(0 if failed is None else int(failed["code"]))
 
 
@@ -174,39 +177,41 @@ def _place(text: str) -> tuple[float, float]:
     return lat, lon
 
 
-def _say_all(batch: Batch) -> None:
+def _say_all(batch: Batch, units: Units) -> None:
     from gcsplan.cli.console import say, say_notes, verdict_table
     from gcsplan.cli.home_words import say_home, say_warnings
     from gcsplan.export.profile_text import profile_lines
+    from gcsplan.units import told
 
     say_notes(batch.notes)
     for c in batch.checked:
         say_notes(c.notes)
-        verdict_table(f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})", c.verdict, c.way_home)
+        name = f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})"
+        verdict_table(name, c.verdict, c.way_home, units=units, energy=c.vehicle.energy)
         for miss in c.verdict.misses:
-            say(miss.describe())
-        for line in profile_lines(c.verdict, c.world):
+            say(told(miss.describe(), units))
+        for line in profile_lines(c.verdict, c.world, units):
             say(line)
         if c.way_home is not None:
-            say_home(c.way_home)
-    say_warnings({str(c.file): c.way_home for c in batch.checked})
+            say_home(c.way_home, units)
+    say_warnings({str(c.file): c.way_home for c in batch.checked}, units)
     for _, error in batch.unreadable:
         complain(error)
 
 
-def _say_findings(batch: Batch, allow_unjudged: bool) -> None:
+def _say_findings(batch: Batch, allow_unjudged: bool, units: Units) -> None:
     from gcsplan.app.checking import finding_lines
     from gcsplan.cli.console import remark, say
 
     for c in batch.checked:
-        for line in finding_lines(c, allow_unjudged=allow_unjudged):
+        for line in finding_lines(c, allow_unjudged=allow_unjudged, units=units):
             say(printable(line))
     for argument, error in batch.unreadable:
         for problem in error.problems:
             remark(printable(f"{problem}" if problem.where.startswith(argument) else f"{argument}: {problem}"))
 
 
-def _report(batch: Batch, file: Path) -> None:
+def _report(batch: Batch, file: Path, units: Units) -> None:
     from gcsplan.export.outdir import write_whole
     from gcsplan.report.page import render_check
 
@@ -215,5 +220,7 @@ def _report(batch: Batch, file: Path) -> None:
         raise InputError("a report shows files of one area; none could be judged, or they lie too far apart")
     notes = [*batch.notes, *(f"not read, and not on this page: {error}" for _, error in batch.unreadable)]
     homes = [c.way_home for c in batch.checked]
-    page = render_check(batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=notes, homes=homes)
+    page = render_check(
+        batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=notes, homes=homes, units=units
+    )
     write_whole(file, page)

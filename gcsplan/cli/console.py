@@ -15,6 +15,7 @@ from rich.table import Table
 from gcsplan.check.verdict import by_item
 from gcsplan.cli.ending import put
 from gcsplan.figures import floored
+from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, told
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.check.verdict import Verdict
     from gcsplan.mavlink.protocol.machine import Progress as Transfer
+    from gcsplan.vehicle import Energy
 
 PLAIN_WIDTH = 130  # columns of a log file or a pipe, whose width is unknown
 WIDEST = 100_000
@@ -60,16 +62,20 @@ for screen in (console, aside):
         screen.width = PLAIN_WIDTH
 
 
-def number(value: float | None, decimals: int = 0, unit: str = "") -> str:
-    """A number for a table; a dash if there is none."""
+def number(value: float | None, decimals: int = 0, unit: Unit | None = None) -> str:
+    """A number for a table, converted from SI to ``unit``, which the column names; a dash if there is none."""
     if value is None or not math.isfinite(value):
         return "–"
-    return f"{value:,.{decimals}f}{unit}".replace(",", "\u2009")
+    if unit is not None:
+        value, decimals = unit.of(value), unit.decimals(decimals)
+    return f"{value:,.{decimals}f}".replace(",", "\u2009")
 
 
-def least(value: float | None, decimals: int = 0, unit: str = "") -> str:
-    """A least value as in `number`, but rounded down."""
-    return number(None if value is None else floored(value, decimals), decimals, unit)
+def least(value: float | None, decimals: int = 0, unit: Unit | None = None) -> str:
+    """A least value as in `number`, but rounded down, after it is converted."""
+    if value is None or unit is None:
+        return number(None if value is None else floored(value, decimals), decimals)
+    return number(floored(unit.of(value), unit.decimals(decimals)), unit.decimals(decimals))
 
 
 def new_table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
@@ -101,9 +107,11 @@ def verdict_word(safe: bool | None, home: WayHome | None = None) -> str:
     return {True: "[green]safe[/]", False: "[bold red]UNSAFE[/]", None: "[yellow]not judged[/]"}[safe]
 
 
-def plan_table(plan: Plan, homes: Mapping[str, WayHome]) -> None:
+def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) -> None:
     """Print a plan: a column for each vehicle, values beside their limits; a row for each in a large fleet."""
-    rows = [_plan_row(v, plan.fleet, homes.get(v.name)) for v in plan.vehicles]
+    rows = [_plan_row(v, plan.fleet, homes.get(v.name), units) for v in plan.vehicles]
+    if all(row["energy, mAh"] == "–" for row in rows):  # a mission without a battery's voltage has no charges
+        rows = [{name: words for name, words in row.items() if name != "energy, mAh"} for row in rows]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
     table = new_table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
     for row in rows:
@@ -114,7 +122,7 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome]) -> None:
         each = next((n for n in (4, 3, 2) if all(_width(t) <= console.width for t in _columns(title, rows, n))), 1)
         for table in _columns(title, rows, each):
             print_table(table)
-    _say_fleet(plan)
+    _say_fleet(plan, units)
     say_notes(plan.notes)
     say_notes_of([(v.name, n) for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)])
     if plan.fleet is not None:
@@ -124,7 +132,7 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome]) -> None:
         console.print("[yellow]bare DEM: trees, masts and wires are not in it[/]")
 
 
-def _say_fleet(plan: Plan) -> None:
+def _say_fleet(plan: Plan, units: Units) -> None:
     """Print how the fleet arrives, and the least distance between two of its vehicles."""
     fleet, arrival = plan.fleet, plan.source.arrival
     if fleet is None or len(fleet.slots) < 2:
@@ -135,12 +143,14 @@ def _say_fleet(plan: Plan) -> None:
     closest = fleet.closest
     if fleet.separation is None:
         return
-    needed = f" of {arrival.separation_m:g} m asked" if arrival is not None else ""
+    unit = units.distance
+    needed = f" of {unit.stated(arrival.separation_m)} {unit.symbol} asked" if arrival is not None else ""
     if closest is None:
         say("separation: no two vehicles are in the air at the same time")
     else:
         a, b = closest.vehicles
-        say(f"separation: {floored(closest.distance_m, 1):.1f} m{needed}, {a} and {b} at T+{closest.time_s:.1f} s")
+        near = f"{floored(unit.of(closest.distance_m), unit.decimals(1)):.{unit.decimals(1)}f} {unit.symbol}"
+        say(f"separation: {near}{needed}, {a} and {b} at T+{duration(closest.time_s, 1)}")
 
 
 def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[Table]:
@@ -155,48 +165,61 @@ def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[T
     return tables
 
 
-def _plan_row(v: VehiclePlan, fleet: FleetPlan | None, home: WayHome | None = None) -> dict[str, str]:
-    verdict = v.verdict
+def _plan_row(
+    v: VehiclePlan, fleet: FleetPlan | None, home: WayHome | None = None, units: Units = METRIC
+) -> dict[str, str]:
+    """The words of one vehicle by name; times have tenths in a fleet, whose order may hang on them."""
+    verdict, energy = v.verdict, v.request.vehicle.energy
     slot = None if fleet is None else fleet.slot(v.name)
-    held = f" + {slot.hold_s:.0f} at the gate" if slot and slot.hold_s > 0 else ""
+    tenths = 1 if fleet is not None and len(fleet.slots) > 1 else 0
+    held = f" + {duration(slot.hold_s)} at the gate" if slot and slot.hold_s > 0 else ""
     lowest, nearest = verdict.lowest, verdict.nearest
     limits = v.request.vehicle.limits
     climb = f" of {limits.max_climb_deg:g}" if limits.max_climb_deg < 90 else ""
     return {
         "vehicle": v.name,
         "items": str(len(v.mission.wire_items())),
-        "length, m": number(verdict.length_m),
+        f"length, {units.path.symbol}": number(verdict.length_m, 0, units.path),
         "above the bound, %": number(v.gap_percent, 2),
-        "energy, kJ": number(verdict.energy_j / 1000),
+        "energy, kJ": number(verdict.energy_j, 0, KILOJOULE),
+        "energy, Wh": number(verdict.energy_j, 0, WATT_HOUR),
+        "energy, mAh": number(verdict.energy_j, 0, charge(energy.battery_v)) if energy.battery_v else "–",
         "battery, %": number(verdict.battery_used_percent),
-        "lowest AGL, m": f"{least(lowest.min_agl_m, 1)} of {limits.min_agl_m:g}" if lowest else "–",
-        "nearest zone, m": f"{least(nearest.zone_clearance_m, 1)} {escape(nearest.nearest_zone)}" if nearest else "–",
+        f"lowest AGL, {units.height.symbol}": (
+            f"{least(lowest.min_agl_m, 1, units.height)} of {units.height.stated(limits.min_agl_m)}" if lowest else "–"
+        ),
+        f"nearest zone, {units.distance.symbol}": (
+            f"{least(nearest.zone_clearance_m, 1, units.distance)} {escape(nearest.nearest_zone)}" if nearest else "–"
+        ),
         "steepest, °": f"{number(verdict.max_climb_deg, 1)}{climb}",
-        "speed, m/s": number(v.speed_m_s, 2),
-        "departs, s": number(slot.depart_s if slot else 0.0, 1) + held,
-        "arrives, s": number(slot.arrive_s if slot else verdict.arrive_s, 1),
+        f"speed, {units.speed.symbol}": number(v.speed_m_s, 2, units.speed),
+        "departs": duration(slot.depart_s if slot else 0.0, tenths) + held,
+        "arrives": duration(slot.arrive_s if slot else verdict.arrive_s, tenths),
         "verdict": verdict_word(verdict.safe, home),
     }
 
 
-def verdict_table(name: str, verdict: Verdict, home: WayHome | None = None) -> None:
+def verdict_table(
+    name: str, verdict: Verdict, home: WayHome | None = None, *, units: Units = METRIC, energy: Energy | None = None
+) -> None:
     """Print what was found, then one row for each item that is flown, and for each time that a jump leads to it."""
     title = f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe, home)}"
     if verdict.findings or verdict.not_judged:
         console.print(title)
-        console.print(verdict.describe(), style="red" if verdict.findings else "yellow", markup=False)
+        console.print(told(verdict.describe(), units), style="red" if verdict.findings else "yellow", markup=False)
         title = ""
-    columns = [("item", True), ("", False), ("leg m", True), ("to AMSL m", True), ("AGL m", True),
-               ("lowest AGL m", True), ("climb °", True), ("nearest zone m", True), ("energy kJ", True),
-               ("time s", True)]  # fmt: skip
+    height, near = units.height, units.distance
+    columns = [("item", True), ("", False), (f"leg {units.leg.symbol}", True), (f"AMSL {height.symbol}", True),
+               (f"AGL {height.symbol}", True), (f"low AGL {height.symbol}", True), ("climb °", True),
+               (f"nearest zone {near.symbol}", True), ("energy kJ", True), ("time", True)]  # fmt: skip
     bad = {f.seq for f in verdict.findings}
     items = list(by_item(verdict.legs))
     rows = [
         (
-            str(item.seq), item.kind, number(item.length_m), number(item.end[2], 1), least(item.agl_end_m, 1),
-            least(item.min_agl_m, 1), number(item.climb_deg, 1),
-            f"{least(item.zone_clearance_m)} {escape(item.nearest_zone)}" if item.nearest_zone else "–",
-            number(item.energy_j / 1000, 1), number(item.time_s),
+            str(item.seq), item.kind, number(item.length_m, 0, units.leg), number(item.end[2], 1, height),
+            least(item.agl_end_m, 1, height), least(item.min_agl_m, 1, height), number(item.climb_deg, 1),
+            f"{least(item.zone_clearance_m, 0, near)} {escape(item.nearest_zone)}" if item.nearest_zone else "–",
+            number(item.energy_j, 1, KILOJOULE), duration(item.time_s),
         )
         for item in items
     ]  # fmt: skip
@@ -207,7 +230,18 @@ def verdict_table(name: str, verdict: Verdict, home: WayHome | None = None) -> N
         if _width(table) <= console.width:
             break
     print_table(table)
+    if verdict.legs:
+        used = "" if verdict.battery_used_percent is None else f", {verdict.battery_used_percent:.0f} % of the battery"
+        words = energy_words(verdict.energy_j, None if energy is None else energy.battery_v)
+        length = f"{number(verdict.length_m, 0, units.path)} {units.path.symbol}"
+        say(f"path {length}; whole flight {duration(verdict.time_s)}, {words}{used}")
     say_notes(verdict.notes)
+
+
+def energy_words(joules: float, volts: float | None = None) -> str:
+    """An energy in every unit that it has: ``2 737 kJ, 760 Wh``, with a voltage ``34 245 mAh``, too."""
+    units = (KILOJOULE, WATT_HOUR, *([charge(volts)] if volts else []))
+    return ", ".join(f"{number(joules, 0, unit)} {unit.symbol}" for unit in units)
 
 
 def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
@@ -236,11 +270,11 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
     if plan.fleet is None or len(plan.fleet.slots) < 2:
         return
     ready = {d.vehicle for d in results if d.verified and not d.code}
-    columns = [("vehicle", False), ("release, T+ s", True), ("at the goal, T+ s", True), ("", False)]
+    columns = [("vehicle", False), ("release, T+", True), ("at the goal, T+", True), ("", False)]
     table = new_table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
     for slot in sorted(plan.fleet.slots, key=lambda s: s.depart_s):
         state = "" if slot.name in ready else "[bold red]not ready[/]"
-        table.add_row(escape(slot.name), number(slot.depart_s, 1), number(slot.arrive_s, 1), state)
+        table.add_row(escape(slot.name), duration(slot.depart_s, 1), duration(slot.arrive_s, 1), state)
     print_table(table)
     if gate is not None:
         say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")

@@ -8,9 +8,10 @@ from rich.markup import escape
 
 from gcsplan.app.way_home import warnings
 from gcsplan.check.rtl.verdict import WayHome
-from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN, reach
+from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN
 from gcsplan.cli.console import aside, console, new_table, print_table, say
 from gcsplan.mavlink.mission.return_altitude import setting
+from gcsplan.units import Quantity, Reach, Units, told
 
 MOST_ROWS = 8
 """Rows with one label that are printed; the report and JSON have all of them."""
@@ -18,44 +19,53 @@ MOST_ROWS = 8
 WORDS = {True: "[green]safe[/]", False: "[bold red]no safe return[/]", None: "[yellow]not judged[/]"}
 
 
-def say_homes(homes: Mapping[str, WayHome]) -> None:
+def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
     """Print one row for each vehicle whose way home was judged, and a warning for each that has no safe one."""
     if not homes:
         return
-    columns = [("vehicle", False), ("return at, m", True), ("way home", False), ("unsafe from", True),
-               ("to set, m", True), ("then unsafe from", True), ("rally points", True)]  # fmt: skip
+    unit = units.height
+    columns = [("vehicle", False), (f"return at, {unit.symbol}", True), ("way home", False), ("unsafe from", True),
+               (f"to set, {unit.symbol}", True), ("then unsafe from", True), ("rally points", True)]  # fmt: skip
     table = new_table("[bold]way home[/]  the autopilot's own return, from every point of the path", columns)
     for name, home in homes.items():
-        at = f"{home.rtl_rel_home_m:g}" + (" (default)" if home.assumed else "")
+        at = unit.stated(home.rtl_rel_home_m) + (" (default)" if home.assumed else "")
         best = home.set_rel_home_m
         table.add_row(
-            escape(name), at, WORDS[home.safe], reach(home.no_return_m) if home.safe is False else "–",
-            "–" if best is None else f"{best:g}", "–" if not home.set_leaves_m else reach(home.set_leaves_m),
+            escape(name), at, WORDS[home.safe], Reach(home.no_return_m).text(units) if home.safe is False else "–",
+            "–" if best is None else _at_least(best, units),
+            "–" if not home.set_leaves_m else Reach(home.set_leaves_m).text(units),
             str(len(home.rally)) if home.rally else "–",
         )  # fmt: skip
     print_table(table)
     known = dict.fromkeys((h.autopilot, h.set_rel_home_m) for h in homes.values() if h.set_rel_home_m is not None)
     for autopilot, best in known:
-        say(f"{best:g} m above home: {setting(autopilot, best)}")
-    say_warnings(homes)
+        say(f"{_at_least(best, units)} {unit.symbol} above home: {setting(autopilot, best)}")
+    say_warnings(homes, units)
 
 
-def say_home(home: WayHome) -> None:
+def _at_least(rel_home_m: float, units: Units) -> str:
+    """A return altitude to set, in the units of people; the parameter's own value stands beside it."""
+    if units.height.size == 1.0:
+        return units.height.stated(rel_home_m)
+    return Quantity(rel_home_m, "height", 1, "up", trimmed=True, bare=True).text(units)
+
+
+def say_home(home: WayHome, units: Units) -> None:
     """Print the rows of one way home; of many stretches the first `MOST_ROWS`."""
-    say(f"way home: {home.headline}")
+    say(f"way home: {told(home.headline, units)}")
     seen: dict[str, int] = {}
     rows = home.rows()
     for label, words in rows:
         seen[label] = seen.get(label, 0) + 1
         bad = label in (NO_RETURN, STILL_NO_RETURN)
         if seen[label] <= MOST_ROWS:
-            console.print(f"  {label}: {words}", style="red" if bad else None, markup=False)
+            console.print(f"  {label}: {told(words, units)}", style="red" if bad else None, markup=False)
     for label, count in seen.items():
         if count > MOST_ROWS:
             say(f"  {label}: … and {count - MOST_ROWS} more (all of them: --report, --json)")
 
 
-def say_warnings(homes: Mapping[str, WayHome | None]) -> None:
+def say_warnings(homes: Mapping[str, WayHome | None], units: Units) -> None:
     """Print a headline for each vehicle without a safe return; the path's own verdict stands elsewhere."""
     for line in warnings(homes):
-        aside.print(f"warning: {line}", style="bold yellow", markup=False)
+        aside.print(f"warning: {told(line, units)}", style="bold yellow", markup=False)

@@ -23,6 +23,8 @@ from gcsplan.cli.options import (
     ToOption,
     TypeOption,
     UncheckedSysidOption,
+    UnitsName,
+    UnitsOption,
     UnjudgedOption,
     UnlessMissionSysidOption,
     WayHomeOption,
@@ -48,6 +50,7 @@ def upload(
     sysid: UncheckedSysidOption = None,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
+    units: UnitsOption = UnitsName.METRIC,
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
@@ -69,6 +72,7 @@ def upload(
     from gcsplan.cli.home_words import say_warnings
     from gcsplan.export.outdir import require_settled, steady
     from gcsplan.sim.loopback import loopback_fleet
+    from gcsplan.units import units_of
 
     if (mission is None) == (not unchecked):
         raise UsageError("give either --mission FILE, in whose world the files are checked, or --unchecked")
@@ -92,13 +96,14 @@ def upload(
         if not as_json:
             for c in checked:
                 say_notes(c.notes)
-                verdict_table(f"{c.file} as {c.vehicle.name}", c.verdict, c.way_home)
+                name = f"{c.file} as {c.vehicle.name}"
+                verdict_table(name, c.verdict, c.way_home, units=units_of(units), energy=c.vehicle.energy)
         verdicts = {c.vehicle.name: c.verdict for c in checked}
         pipeline.require_passing(verdicts, allow_unjudged=allow_unjudged)
         homes = {c.vehicle.name: c.way_home for c in checked}
         returns.require(homes, required=returns.is_required(source, require_way_home))
         if not as_json:
-            say_warnings(homes)
+            say_warnings(homes, units_of(units))
         jobs = uploads.jobs_of_files(source, checked, to)
         if fence or fence_infinite:
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)

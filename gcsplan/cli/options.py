@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from gcsplan.units import AVIATION, IMPERIAL, METRIC
 
 LINKS = "udpout:HOST:PORT sends, udpin:HOST:PORT listens, tcp:HOST:PORT, /dev/ttyUSB0,57600."
 MISBEHAVIOURS = (
@@ -14,6 +17,25 @@ MISBEHAVIOURS = (
     "refuse (an item), refuse_code, no_space, armed, seed"
 )
 
+
+class UnitsName(StrEnum):
+    """What ``--units`` may be."""
+
+    METRIC = METRIC.name
+    IMPERIAL = IMPERIAL.name
+    AVIATION = AVIATION.name
+
+
+UnitsOption = Annotated[
+    UnitsName,
+    typer.Option(
+        "--units",
+        envvar="GCSPLAN_UNITS",
+        metavar="NAME",
+        help="Of tables, findings and report: metric, imperial (ft, mi, mph) or aviation (ft, NM, kt). Other files, "
+        "JSON and notes stay in SI.",
+    ),
+]
 MissionArgument = Annotated[Path, typer.Argument(metavar="MISSION.yaml", help="The mission file.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
 UnjudgedOption = Annotated[

@@ -20,6 +20,8 @@ from gcsplan.cli.options import (
     PlaceOption,
     RequireWayHomeOption,
     TimeoutOption,
+    UnitsName,
+    UnitsOption,
     UnjudgedOption,
     WayHomeOption,
 )
@@ -87,6 +89,7 @@ def plan(
             help="Also draw map and profiles to this picture; into a directory: each figure as a picture of its own.",
         ),
     ] = None,
+    units: UnitsOption = UnitsName.METRIC,
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
@@ -106,7 +109,9 @@ def plan(
     from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.export.outdir import add_output, settle_outputs
+    from gcsplan.units import units_of
 
+    system = units_of(units)
     directory = Path(mission.stem) if out is None else out
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     each = _require_options(planner, objective, png, directory)
@@ -143,7 +148,7 @@ def plan(
         fences = {job.name: job.fence.items for job in jobs if job.fence is not None}
         files = outputs.outputs_of(planned, homes, fences, rally=rally)
         if report:
-            files["report.html"] = outputs.report_of(planned, (), homes)
+            files["report.html"] = outputs.report_of(planned, (), homes, system)
     except UsageError:
         raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
@@ -151,8 +156,8 @@ def plan(
         raise
     _write(directory, files, {} if png is None else _pictures(planned, png, each))
     if not as_json:
-        plan_table(planned, homes)
-        say_homes(homes)
+        plan_table(planned, homes, system)
+        say_homes(homes, system)
         say_notes_of(fence_notes)
         _say_files(directory, list(files))
     results: list[JobResult] = []
@@ -164,7 +169,7 @@ def plan(
         try:
             add_output(directory, "upload.json", outputs.upload_text(planned, results, homes))
             if report:
-                add_output(directory, "report.html", outputs.report_of(planned, results, homes))
+                add_output(directory, "report.html", outputs.report_of(planned, results, homes, system))
         except InputError as error:  # the outcome of the upload matters more
             remark(f"note: what became of the upload is not written: {error}")
         if not as_json:

@@ -8,13 +8,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcsplan.cli.ending import emit, talking
-from gcsplan.cli.options import JsonOption, MissionArgument, RequireWayHomeOption, UnjudgedOption, WayHomeOption
+from gcsplan.cli.options import (
+    JsonOption,
+    MissionArgument,
+    RequireWayHomeOption,
+    UnitsName,
+    UnitsOption,
+    UnjudgedOption,
+    WayHomeOption,
+)
 from gcsplan.errors import UsageError
-from gcsplan.figures import floored
+from gcsplan.units import Quantity, duration, told, units_of
 
 if TYPE_CHECKING:
     from gcsplan.app.model import Plan
     from gcsplan.sim.outcome import Rehearsal
+    from gcsplan.units import Units
 
 
 def rehearse(
@@ -54,6 +63,7 @@ def rehearse(
     ] = False,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
+    units: UnitsOption = UnitsName.METRIC,
     allow_unjudged: UnjudgedOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -101,24 +111,24 @@ def rehearse(
         judged = {"way_home": {name: home.as_dict() for name, home in homes.items()}} if homes else {}
         emit({"name": source.name} | result.as_dict() | judged, failure)
     else:
-        _show(planned, result)
+        _show(planned, result, units_of(units))
         say_notes(result.notes)
-        for line in _ending(result):
+        for line in _ending(result, units_of(units)):
             say(line)
-        say_homes(homes)
+        say_homes(homes, units_of(units))
     raise typer.Exit(error.exit_code if error is not None else 0)
 
 
-def _show(planned: Plan, result: Rehearsal) -> None:
+def _show(planned: Plan, result: Rehearsal, units: Units) -> None:
     """Print a row for each vehicle."""
     from gcsplan.cli.console import rows_table
 
     by = "built-in simulator" if result.simulator == "gcsplan" else "ArduCopter SITL"
     runs = f", {result.runs} runs" if result.runs > 1 else ""
-    rows_table(f"rehearsal of {planned.source.name}  {by}{runs}", result.rows())
+    rows_table(f"rehearsal of {planned.source.name}  {by}{runs}", result.rows(units))
 
 
-def _ending(result: Rehearsal) -> list[str]:
+def _ending(result: Rehearsal, units: Units) -> list[str]:
     """Order, separation and violations in words."""
     lines = []
     kept = f" in {result.order_kept_runs} of {result.runs} runs" if result.runs > 1 else ""
@@ -126,15 +136,15 @@ def _ending(result: Rehearsal) -> list[str]:
         lines.append(f"order of arrival {', '.join(result.terms.order)}: kept{kept}")
     if result.closest is not None:
         a, b = result.closest.names
-        apart_m = floored(result.closest.distance_m, 1)
-        least = f"least separation {apart_m:.1f} m ({a} and {b}, at {result.closest.time_s:.0f} s)"
+        apart = Quantity(result.closest.distance_m, "distance", 1, "down").text(units)
+        least = f"least separation {apart} ({a} and {b}, at T+{duration(result.closest.time_s, 1)})"
         if result.terms.separation_m is not None:
             kept = f", kept in {result.separation_kept_runs} of {result.runs} runs" if result.runs > 1 else ""
-            least += f" of {result.terms.separation_m:g} m asked{kept}"
+            least += f" of {Quantity(result.terms.separation_m, 'distance', None).text(units)} asked{kept}"
         lines.append(least)
     if result.runs > 1 and result.p95_s is not None:
         lines.append(f"95 % of all arrivals lie within {result.p95_s:.2f} s of the plan")
-    lines += [f"violation: {b.describe(result.runs)}" for b in result.breaches]
+    lines += [f"violation: {told(b.describe(result.runs), units)}" for b in result.breaches]
     lines += [f"not flown: {what}" for what in result.not_judged]
     lines.append(
         {True: "flown as planned", False: "VIOLATIONS were found", None: "not everything was flown"}[result.safe]

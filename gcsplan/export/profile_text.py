@@ -7,12 +7,15 @@ import math
 import numpy as np
 
 from gcsplan.check.verdict import Verdict
+from gcsplan.units import METRIC, Quantity, Units
 from gcsplan.world.world import World
 
 GROUND, TRACK, BOTH, UNKNOWN = "█", "•", "▒", "?"
 
 
-def profile_lines(verdict: Verdict, world: World, *, columns: int = 72, rows: int = 10) -> list[str]:
+def profile_lines(
+    verdict: Verdict, world: World, units: Units = METRIC, *, columns: int = 72, rows: int = 10
+) -> list[str]:
     """``rows`` lines that begin with the altitude AMSL, and one below with the track length; none if nothing is flown.
 
     In each column, ground is filled up to its highest sample, the path is drawn at its altitude, and ``▒`` marks a cell
@@ -50,6 +53,7 @@ def profile_lines(verdict: Verdict, world: World, *, columns: int = 72, rows: in
                 cells.append(BOTH if fill else TRACK)
             else:
                 cells.append(GROUND if fill else UNKNOWN if unknown else " ")
-        lines.append(f"{0.5 * (above + below):7.0f} {''.join(cells)}".rstrip())
-    lines.append(f"{'m AMSL':>7} 0{f'{total_m / 1000.0:.2f} km':>{columns - 1}}")
+        lines.append(f"{units.height.of(0.5 * (above + below)):7.0f} {''.join(cells)}".rstrip())
+    length = Quantity(total_m, "far", 2).text(units)
+    lines.append(f"{units.amsl.symbol:>7} 0{length:>{columns - 1}}")
     return lines

@@ -13,20 +13,28 @@ from gcsplan.arrays import Floats
 from gcsplan.report.marks import Mark, marks_html
 from gcsplan.report.markup import esc, num
 from gcsplan.report.relief import nice_step
+from gcsplan.units import Unit, duration
 
 UNITS = 10_000.0
+TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600)
+"""Seconds between the ticks of a time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """The range of a chart; its curves are SVG paths in units of 1/10000 of its width and height."""
+    """The range of a chart, in SI; its curves are SVG paths in units of 1/10000 of its width and height.
+
+    Ticks are round numbers of ``x_unit`` and ``y_unit``; an ``x_unit`` of None is a time, with ticks as h:mm:ss.
+    """
 
     x0: float
     x1: float
     y0: float
     y1: float
-    x_label: str
-    y_label: str
+    x_name: str
+    y_name: str
+    x_unit: Unit | None
+    y_unit: Unit
 
     def xy(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """(N, 2) in units, y down, limited to three chart heights beyond the chart."""
@@ -55,26 +63,45 @@ class Axes:
 
 def chart_html(name: str, axes: Axes, shapes: Sequence[str], marks: Sequence[Mark], words: str, tall: float) -> str:
     """The figure ``name``; ``words`` describe it for a reader who cannot see it; ``tall`` is height over width."""
-    xs, ys = ticks(axes.x0, axes.x1, 8), ticks(axes.y0, axes.y1, 6)
+    (xs, across_words), (ys, up_words) = (
+        _ticks(axes.x0, axes.x1, 8, axes.x_unit),
+        _ticks(axes.y0, axes.y1, 6, axes.y_unit),
+    )
+    size = "" if axes.x_unit is None else f' data-size="{axes.x_unit.size!r}"'
+    x_label = f"{axes.x_name}, {'h:mm:ss' if axes.x_unit is None else axes.x_unit.symbol}"
+    y_label = ", ".join(word for word in (axes.y_name, axes.y_unit.symbol) if word)
     grid = "".join(
         f'<path class="grid" d="M{u:.0f} 0V10000"/>' for u in axes.xy(xs, np.full(len(xs), axes.y0))[:, 0]
     ) + "".join(f'<path class="grid y" d="M0 {v:.0f}H10000"/>' for v in axes.xy(np.full(len(ys), axes.x0), ys)[:, 1])
     across = "".join(
-        f'<span style="left:{100 * (x - axes.x0) / (axes.x1 - axes.x0):.3f}%">{_tick(x, xs)}</span>' for x in xs
+        f'<span style="left:{100 * (x - axes.x0) / (axes.x1 - axes.x0):.3f}%">{word}</span>'
+        for x, word in zip(xs, across_words, strict=True)
     )
     up = "".join(
-        f'<span style="top:{100 * (axes.y1 - y) / (axes.y1 - axes.y0):.3f}%">{_tick(y, ys)}</span>' for y in ys
+        f'<span style="top:{100 * (axes.y1 - y) / (axes.y1 - axes.y0):.3f}%">{word}</span>'
+        for y, word in zip(ys, up_words, strict=True)
     )
     return (
         f'<figure class="chart" id="{esc(name)}" data-x0="{axes.x0!r}" data-x1="{axes.x1!r}" data-y0="{axes.y0!r}" '
-        f'data-y1="{axes.y1!r}" data-unit="{esc(axes.x_label.rsplit(", ", 1)[-1])}">'
-        f'<div class="ylabel">{esc(axes.y_label)}</div>'
+        f'data-y1="{axes.y1!r}"{size}>'
+        f'<div class="ylabel">{esc(y_label)}</div>'
         f'<div class="yticks" aria-hidden="true">{up}</div>'
         f'<div class="view plot"><svg viewBox="0 0 10000 10000" preserveAspectRatio="none" role="img" '
         f'aria-label="{esc(words)}"><g class="grids">{grid}</g>{"".join(shapes)}<path class="cursor" d=""/></svg>'
         f'<div class="marks">{marks_html(marks, tall)}</div></div>'
-        f'<div class="xticks" aria-hidden="true">{across}</div><div class="xlabel">{esc(axes.x_label)}</div></figure>'
+        f'<div class="xticks" aria-hidden="true">{across}</div><div class="xlabel">{esc(x_label)}</div></figure>'
     )
+
+
+def _ticks(low: float, high: float, wanted: int, unit: Unit | None) -> tuple[Floats, list[str]]:
+    """About ``wanted`` places with round numbers of ``unit``, in SI, and their words."""
+    if unit is None:
+        about_s, hour = (high - low) / wanted, TIME_STEPS[-1]
+        step = next((s for s in TIME_STEPS if s >= about_s), hour * math.ceil(about_s / hour))
+        at = np.asarray(step * np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1), float)
+        return at, [duration(t) for t in at.tolist()]
+    every = ticks(unit.of(low), unit.of(high), wanted)
+    return np.asarray(every * unit.size), [_tick(v, every) for v in every]
 
 
 def ticks(low: float, high: float, wanted: int) -> Floats:

@@ -11,9 +11,10 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.report.chart import Axes, chart_html
-from gcsplan.report.markup import esc, least, num, table, tools
+from gcsplan.report.markup import esc, least, num, stated, table, tools
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.subject import Page
+from gcsplan.units import Units, duration
 
 INSTANTS = 600
 MOST_PAIRS = 6
@@ -39,7 +40,7 @@ def fleet_html(page: Page, charts: dict[str, object]) -> str:
         + _schedule(page, motions)
         + "<h3>Way flown over time</h3>"
         + tools("distance")
-        + _distance_chart(motions, times, charts)
+        + _distance_chart(motions, times, charts, page.units)
         + "<h3>Separation over time</h3>"
         + tools("separation")
         + _separation_chart(page, motions, times, charts)
@@ -79,10 +80,10 @@ def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
         rows.append(
             (
                 f'<i class="swatch t{i % COLOURS}"></i>{esc(motion.name)}', str(order.get(motion.name, "–")),
-                num(motion.begin_s, 1, "s"), num(slot.hold_s if slot else None, 0, "s"),
-                num(slot.speed_m_s if slot else None, 2, "m/s"), num(motion.arrive_s, 1, "s"),
-                "in the air" if motion.ends_in_air else num(motion.end_s, 1, "s"),
-                num(float(flown_m(motion, np.array([motion.end_s]))[0]), 0, "m"),
+                duration(motion.begin_s, 1), duration(slot.hold_s if slot else None),
+                num(slot.speed_m_s if slot else None, 2, page.units.speed), duration(motion.arrive_s, 1),
+                "in the air" if motion.ends_in_air else duration(motion.end_s, 1),
+                num(float(flown_m(motion, np.array([motion.end_s]))[0]), 0, page.units.path),
             )
         )  # fmt: skip
     head = (
@@ -95,7 +96,7 @@ def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
         "on the ground",
         "horizontal way",
     )
-    return table("Schedule: seconds since the fleet's common start", head, rows)
+    return table("Schedule: times since the fleet's common start, h:mm:ss", head, rows)
 
 
 def separation_words(page: Page) -> str:
@@ -103,27 +104,30 @@ def separation_words(page: Page) -> str:
     found = page.separation
     if found is None:
         return ""
-    needed = f"{num(found.rules.separation_m, 1, 'm')} asked, {num(found.rules.needed_m, 1, 'm')} needed in the model"
+    unit = page.units.distance
+    needed = f"{stated(found.rules.separation_m, unit)} asked, {stated(found.rules.needed_m, unit)} needed in the model"
     if found.least is None:
         return f"No two vehicles are ever in the air at the same time ({needed})."
     a, b = found.least.vehicles
-    near = f"{least(found.least.distance_m, 1, 'm')} at {num(found.least.time_s, 1, 's')}"
+    near = f"{least(found.least.distance_m, 1, unit)} at {duration(found.least.time_s, 1)}"
     word = "kept" if found.safe else "<b>broken</b>"
     return f"Separation {word}: {esc(a)} and {esc(b)} come nearest, {near} ({needed}; exact, not sampled)."
 
 
-def _distance_chart(motions: Sequence[tuple[int, TimedPath]], times: Floats, charts: dict[str, object]) -> str:
-    ways = [flown_m(m, times) / 1000.0 for _, m in motions]
+def _distance_chart(
+    motions: Sequence[tuple[int, TimedPath]], times: Floats, charts: dict[str, object], units: Units
+) -> str:
+    ways = [flown_m(m, times) for _, m in motions]
     longest = max(float(np.nanmax(w)) for w in ways)
-    axes = Axes(float(times[0]), float(times[-1]), 0.0, 1.05 * max(longest, 1e-3), "time, s", "way flown, km")
+    axes = Axes(float(times[0]), float(times[-1]), 0.0, 1.05 * max(longest, 1.0), "time", "way flown", None, units.far)
     shapes = [axes.line(times, w, f"track t{i % COLOURS}") for (i, _), w in zip(motions, ways, strict=True)]
     marks = []
     for i, m in motions:
-        y = float(flown_m(m, np.array([min(max(m.arrive_s, m.begin_s), m.end_s)]))[0]) / 1000.0
-        tip = f"{m.name} reaches its goal after {num(m.arrive_s, 1, 's')}"
+        y = float(flown_m(m, np.array([min(max(m.arrive_s, m.begin_s), m.end_s)]))[0])
+        tip = f"{m.name} reaches its goal after {duration(m.arrive_s, 1)}"
         marks.append(axes.mark(m.arrive_s, y, f"goal t{i % COLOURS}", m.name, tip, 1))
-    charts["distance"] = _numbers(times, [(m.name, "km", 3, w) for (_, m), w in zip(motions, ways, strict=True)])
-    words = f"Way flown over time by {len(motions)} vehicles, from {num(times[0], 0, 's')} to {num(times[-1], 0, 's')}"
+    charts["distance"] = _numbers(times, [(m.name, "far", 3, w) for (_, m), w in zip(motions, ways, strict=True)])
+    words = f"Way flown over time by {len(motions)} vehicles, from {duration(times[0])} to {duration(times[-1])}"
     return chart_html("distance", axes, shapes, marks, words, TALL)
 
 
@@ -138,24 +142,25 @@ def _separation_chart(
     nearest = np.full(len(times), np.nan)
     nearest[some] = np.nanmin(every[:, some], axis=0)
     needed_m = page.separation.rules.needed_m if page.separation is not None else None
+    unit = page.units.distance
     high = max(float(np.nanmax(nearest)), 1.4 * (needed_m or 0.0), 1.0)
-    axes = Axes(float(times[0]), float(times[-1]), 0.0, 1.08 * high, "time, s", "apart, m")
-    shapes, numbers = [], [("nearest two", "m", 1, nearest)]
+    axes = Axes(float(times[0]), float(times[-1]), 0.0, 1.08 * high, "time", "apart", None, unit)
+    shapes, numbers = [], [("nearest two", "distance", 1, nearest)]
     if needed_m:
         ends, zero = [times[0], times[-1]], [0.0, 0.0]
         shapes += [axes.area(ends, zero, [needed_m, needed_m], "below"), axes.line(ends, [needed_m, needed_m], "floor")]
     if len(pairs) <= MOST_PAIRS:
         shapes += [axes.line(times, d, "pair") for _, _, d in pairs]
-        numbers += [(f"{a[1].name} – {b[1].name}", "m", 1, d) for a, b, d in pairs]
+        numbers += [(f"{a[1].name} – {b[1].name}", "distance", 1, d) for a, b, d in pairs]
     shapes.append(axes.line(times, nearest, "nearest"))
     at = int(np.nanargmin(nearest))
     a, b, _ = pairs[int(np.nanargmin(every[:, at]))]
-    label = f"{least(float(nearest[at]), 1, 'm')}"
-    tip = f"{a[1].name} and {b[1].name} are nearest at {num(float(times[at]), 1, 's')}: about {label}"
+    label = least(float(nearest[at]), 1, unit)
+    tip = f"{a[1].name} and {b[1].name} are nearest at {duration(float(times[at]), 1)}: about {label}"
     kind = "broken" if needed_m and nearest[at] < needed_m - 1e-6 else "tight"
     marks = [axes.mark(float(times[at]), float(nearest[at]), kind, label, tip, 0)]
     charts["separation"] = _numbers(times, numbers)
-    words = f"Distance of the nearest two vehicles over time; {tip}; asked for: {num(needed_m, 0, 'm')}"
+    words = f"Distance of the nearest two vehicles over time; {tip}; asked for: {num(needed_m, 1, unit)}"
     key = (
         '<ul class="legend"><li><i class="stroke nearest"></i>nearest two</li>'
         + ('<li><i class="stroke pair"></i>each pair</li>' if len(pairs) <= MOST_PAIRS else "")
@@ -168,10 +173,10 @@ def _separation_chart(
 def _numbers(times: Floats, series: Sequence[tuple[str, str, int, Floats]]) -> dict[str, object]:
     """The numbers that the page's script shows of a chart under the pointer."""
     return {
-        "x": [round(float(t), 2) for t in times], "xunit": "s",
+        "x": [round(float(t), 2) for t in times], "xunit": "time",
         "series": [
             {"name": name, "unit": unit, "decimals": decimals,
-             "y": [None if math.isnan(v) else round(float(v), decimals) for v in y]}
+             "y": [None if math.isnan(v) else round(float(v), 3) for v in y]}
             for name, unit, decimals, y in series
         ],
     }  # fmt: skip

@@ -9,13 +9,14 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, STILL_NO_RETURN
-from gcsplan.figures import counted, raised
-from gcsplan.report.chart import Axes, chart_html
-from gcsplan.report.markup import esc, num, place, table, tools
+from gcsplan.figures import counted
+from gcsplan.report.chart import chart_html
+from gcsplan.report.markup import at_least, energy, esc, num, place, stated, table, tools
 from gcsplan.report.plan_view import COLOURS
-from gcsplan.report.profile_view import unit_of
+from gcsplan.report.profile_view import along_axes
 from gcsplan.report.samples import Line
 from gcsplan.report.subject import Page, Subject
+from gcsplan.units import Units, told
 
 TALL = 0.3
 
@@ -26,7 +27,7 @@ MOST_LINES = 4
 def home_lines(page: Page) -> str:
     """Lines for the page's head on ways home that are unsafe or not judged; one line for all if there are many."""
     several = len(page.subjects) > 1
-    lines = [(s, line) for s in page.subjects if (line := _home_line(s, several))]
+    lines = [(s, line) for s in page.subjects if (line := _home_line(s, several, page.units))]
     if len(lines) <= MOST_LINES:
         return "".join(line for _, line in lines)
     names = ", ".join(esc(s.name) for s, _ in lines[:MOST_LINES])
@@ -34,16 +35,16 @@ def home_lines(page: Page) -> str:
     return f'<p class="bare bad">{text}: see <a href="#home">the way home</a></p>'
 
 
-def _home_line(subject: Subject, several: bool) -> str:
+def _home_line(subject: Subject, several: bool, units: Units) -> str:
     """The headline for the page's head if the way home is unsafe or not judged; empty otherwise."""
     home = subject.home
     if home is None or home.safe is True:
         return ""
     who = f"{esc(subject.name)}: " if several else ""
-    cure = f": {esc(home.advice)}" if home.advice else ""
+    cure = f": {esc(told(home.advice, units))}" if home.advice else ""
     bad = " bad" if home.safe is False else ""
     see = 'see <a href="#home">the way home</a>'
-    return f'<p class="bare{bad}"><b>{who}{esc(home.headline)}</b>{cure}; {see}</p>'
+    return f'<p class="bare{bad}"><b>{who}{esc(told(home.headline, units))}</b>{cure}; {see}</p>'
 
 
 def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object]) -> str:
@@ -51,28 +52,29 @@ def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object
     parts = []
     for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
         if subject.home is not None:
-            parts.append(_one(subject, subject.home, line, i, charts, open_=i < 1))
+            parts.append(_one(subject, subject.home, line, i, charts, page.units, open_=i < 1))
     return f'<section id="home"><h2>The way home after a failsafe</h2>{"".join(parts)}</section>' if parts else ""
 
 
 def _one(
-    subject: Subject, home: WayHome, line: Line | None, index: int, charts: dict[str, object], *, open_: bool
-) -> str:
+    subject: Subject, home: WayHome, line: Line | None, index: int, charts: dict[str, object], units: Units, *,
+    open_: bool,
+) -> str:  # fmt: skip
     chart = ""
     if line is not None and home.profile:
         name = f"home-{index}"
-        chart = tools(name) + _chart(name, subject, home, line, index, charts) + _legend(home)
+        chart = tools(name) + _chart(name, subject, home, line, index, charts, units) + _legend(home)
     listed = "".join(f"<li>{esc(n)}</li>" for n in (*home.not_judged, *home.notes))
     return (
-        f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: {esc(home.headline)}</summary>"
-        f"{chart}{_facts(home)}{_stretches(subject, home)}{_battery(subject, home)}"
+        f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: {esc(told(home.headline, units))}</summary>"
+        f"{chart}{_facts(home, units)}{_stretches(subject, home, units)}{_battery(subject, home)}"
         + (f"<ul>{listed}</ul>" if listed else "")
         + "</details>"
     )
 
 
-def _facts(home: WayHome) -> str:
-    rows = home.rows()
+def _facts(home: WayHome, units: Units) -> str:
+    rows = [(a, told(words, units)) for a, words in home.rows()]
     listed = [(esc(a), esc(words)) for a, words in rows if a not in (NO_RETURN, NOT_JUDGED, STILL_NO_RETURN)]
     left = "".join(f"<li>{esc(words)}</li>" for a, words in rows if a == STILL_NO_RETURN)
     title = f"No safe return even so: {counted(len(home.left), 'stretch', 'stretches')}"
@@ -81,9 +83,10 @@ def _facts(home: WayHome) -> str:
     return table(caption, ("what|", "found|"), listed) + folded
 
 
-def _chart(name: str, subject: Subject, home: WayHome, line: Line, index: int, charts: dict[str, object]) -> str:
-    unit, unit_name = unit_of(line)
-    x = np.array([(p.from_m, p.to_m) for p in home.profile]).ravel() / unit
+def _chart(
+    name: str, subject: Subject, home: WayHome, line: Line, index: int, charts: dict[str, object], units: Units
+) -> str:
+    x = np.array([(p.from_m, p.to_m) for p in home.profile]).ravel()
     clear, legal = (
         np.repeat([np.nan if v is None else v for v in values], 2)
         for values in ([p.clear_amsl_m for p in home.profile], [p.legal_amsl_m for p in home.profile])
@@ -92,22 +95,24 @@ def _chart(name: str, subject: Subject, home: WayHome, line: Line, index: int, c
     known = np.concatenate([line.amsl_m, line.ground_m[np.isfinite(line.ground_m)], [level], clear[np.isfinite(clear)],
                             legal[np.isfinite(legal)]])  # fmt: skip
     low, high = float(known.min()), float(known.max())
-    room, long = 0.06 * max(high - low, 1.0), max(line.length_m / unit, 1e-3)
-    axes = Axes(-0.012 * long, 1.012 * long, low - room, high + 1.6 * room, f"along the track, {unit_name}", "m AMSL")
-    run = line.run_m / unit
+    room, long = 0.06 * max(high - low, 1.0), max(line.length_m, 1e-3)
+    axes = along_axes(line, low - room, high + 1.6 * room, units)
+    run = line.run_m
     shapes = [axes.area(run, np.full(len(run), -np.inf), line.ground_m, "ground")]
     for s in home.unsafe:
-        ends = [s.from_m / unit, max(s.to_m / unit, s.from_m / unit + 0.002 * long)]
-        shapes.append(axes.area(ends, [-np.inf, -np.inf], [np.inf, np.inf], "nowhere", f"no safe return: {s.why}"))
+        ends = [s.from_m, max(s.to_m, s.from_m + 0.002 * long)]
+        shapes.append(
+            axes.area(ends, [-np.inf, -np.inf], [np.inf, np.inf], "nowhere", f"no safe return: {told(s.why, units)}")
+        )
     shapes += [
         axes.line(x, legal, "legal"), axes.line(x, clear, "clear"),
         axes.line([0.0, long], [level, level], "level"),
         axes.line(run, line.amsl_m, f"track t{index % COLOURS}"),
     ]  # fmt: skip
-    tip = f"the return flies at {num(level, 1, 'm AMSL')}, or higher where it begins higher"
-    marks = [axes.mark(0.08 * long, level, "tag", f"return at {num(home.rtl_rel_home_m, 0, 'm')}", tip, 1)]
-    charts[name] = _numbers(x, clear, legal, np.interp(x, run, line.amsl_m), level, unit_name)
-    words = f"Return altitude needed along the way of {subject.name}, beside {num(level, 0, 'm AMSL')} that is set"
+    tip = f"the return flies at {num(level, 1, units.amsl)}, or higher where it begins higher"
+    marks = [axes.mark(0.08 * long, level, "tag", f"return at {stated(home.rtl_rel_home_m, units.height)}", tip, 1)]
+    charts[name] = _numbers(x, clear, legal, np.interp(x, run, line.amsl_m), level, line.length_m > 2000.0)
+    words = f"Return altitude needed along the way of {subject.name}, beside {num(level, 0, units.amsl)} that is set"
     return chart_html(name, axes, shapes, marks, words, TALL)
 
 
@@ -121,7 +126,7 @@ def _legend(home: WayHome) -> str:
     )
 
 
-def _numbers(x: Floats, clear: Floats, legal: Floats, amsl: Floats, level: float, unit: str) -> dict[str, object]:
+def _numbers(x: Floats, clear: Floats, legal: Floats, amsl: Floats, level: float, far: bool) -> dict[str, object]:
     def tenths(values: Floats) -> list[float | None]:
         return [round(float(v), 1) if np.isfinite(v) else None for v in values]
 
@@ -132,20 +137,22 @@ def _numbers(x: Floats, clear: Floats, legal: Floats, amsl: Floats, level: float
         ("legal from", legal),
     )
     return {
-        "x": [round(float(v), 3) for v in x], "xunit": unit, "xname": "along the track", "xdecimals": 2,
-        "series": [{"name": n, "unit": "m AMSL", "decimals": 1, "y": tenths(y)} for n, y in series],
+        "x": [round(float(v), 1) for v in x], "xunit": "far" if far else "distance", "xname": "along the track",
+        "xdecimals": 2 if far else 0,
+        "series": [{"name": n, "unit": "amsl", "decimals": 1, "y": tenths(y)} for n, y in series],
     }  # fmt: skip
 
 
-def _stretches(subject: Subject, home: WayHome) -> str:
+def _stretches(subject: Subject, home: WayHome, units: Units) -> str:
     rows, marks = [], []
     for kind, stretches in (("no safe return", home.unsafe), ("outside a limit", home.irregular)):
         for s in stretches:
             rows.append(
                 (
-                    esc(s.items), kind, f"{num(s.from_m / 1000, 2)} – {num(s.to_m / 1000, 2, 'km')}", esc(s.why),
-                    place(*s.obstacle[:2]) + f", {num(s.obstacle[2], 0, 'm AMSL')}" if s.obstacle else "–",
-                    num(raised(s.lowest_rel_home_m, 1), 1, "m") if s.lowest_rel_home_m is not None else "none",
+                    esc(s.items), kind, f"{num(units.far.of(s.from_m), 2)} – {num(s.to_m, 2, units.far)}",
+                    esc(told(s.why, units)),
+                    place(*s.obstacle[:2]) + f", {num(s.obstacle[2], 0, units.amsl)}" if s.obstacle else "–",
+                    at_least(s.lowest_rel_home_m, 1, units.height) if s.lowest_rel_home_m is not None else "none",
                 )
             )  # fmt: skip
             marks.append("close" if stretches is home.irregular else "bad")
@@ -164,8 +171,8 @@ def _battery(subject: Subject, home: WayHome) -> str:
     for leg in battery.legs:
         rows.append(
             (
-                f"{leg.seq} {esc(leg.kind)}", num(leg.energy_j / 1000, 1, "kJ"), num(leg.used_percent, 1, "%"),
-                num(leg.return_j / 1000, 1, "kJ"), num(leg.with_return_percent, 1, "%"),
+                f"{leg.seq} {esc(leg.kind)}", energy(leg.energy_j, 1), num(leg.used_percent, 1, "%"),
+                energy(leg.return_j, 1), num(leg.with_return_percent, 1, "%"),
             )
         )  # fmt: skip
         marks.append("bad" if leg.with_return_percent is not None and leg.with_return_percent > may else "")

@@ -6,9 +6,10 @@ import html
 import json
 import math
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
-from gcsplan.figures import floored
+from gcsplan.figures import floored, raised
+from gcsplan.units import KILOJOULE, WATT_HOUR, Unit, charge
 
 THIN, UNIT_GAP = "\u202f", "\u202f"
 _DIRECTION = frozenset("\u200e\u200f\u061c\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
@@ -26,32 +27,49 @@ def esc(text: object) -> str:
     return html.escape(plain(text), quote=True)
 
 
-def num(value: float | None, decimals: int = 0, unit: str = "") -> str:
-    """A number with its unit; a dash if there is none."""
+def num(value: float | None, decimals: int = 0, unit: str | Unit = "") -> str:
+    """A number with its unit, converted from SI if that is a `Unit`; a dash if there is none."""
     if value is None or not math.isfinite(value):
         return "–"
+    if isinstance(unit, Unit):
+        value, decimals, unit = unit.of(value), unit.decimals(decimals), unit.symbol
     text = f"{value:,.{decimals}f}".replace(",", THIN)
     if float(f"{value:.{decimals}f}") == 0.0:
         text = text.lstrip("-")
     return text + (("" if unit == "°" else UNIT_GAP) + unit if unit else "")
 
 
-def least(value: float | None, decimals: int = 1, unit: str = "") -> str:
-    """A least value as in `num`, but rounded down."""
+def least(value: float | None, decimals: int = 1, unit: str | Unit = "") -> str:
+    """A least value as in `num`, but rounded down, after it is converted."""
+    return _rounded(floored, value, decimals, unit)
+
+
+def at_least(value: float | None, decimals: int = 1, unit: str | Unit = "") -> str:
+    """What must at least be set or reached, as in `num`, but rounded up."""
+    return _rounded(raised, value, decimals, unit)
+
+
+def _rounded(
+    rounding: Callable[[float, int], float], value: float | None, decimals: int, unit: str | Unit
+) -> str:  # fmt: skip
     if value is None or not math.isfinite(value):
         return "–"
-    return num(floored(value, decimals), decimals, unit)
+    if isinstance(unit, Unit):
+        value, decimals, unit = unit.of(value), unit.decimals(decimals), unit.symbol
+    return num(rounding(value, decimals), decimals, unit)
 
 
-def minutes(seconds: float | None) -> str:
-    """A time in the form 12 min 34 s."""
-    if seconds is None or not math.isfinite(seconds):
+def stated(value: float, unit: Unit) -> str:
+    """A value that was given, such as a limit, with the digits it has."""
+    return f"{unit.stated(value)}{UNIT_GAP}{unit.symbol}"
+
+
+def energy(joules: float | None, decimals: int = 0, volts: float | None = None) -> str:
+    """An energy in kJ and Wh, and in mAh where the battery's voltage is known."""
+    units = (KILOJOULE, WATT_HOUR, *([charge(volts)] if volts else []))
+    if joules is None or not math.isfinite(joules):
         return "–"
-    whole = round(seconds)
-    sign, whole = ("-", -whole) if whole < 0 else ("", whole)
-    hours, rest = divmod(whole, 3600)
-    words = f"{rest // 60}{UNIT_GAP}min {rest % 60:02d}{UNIT_GAP}s" if whole >= 60 else f"{whole}{UNIT_GAP}s"
-    return sign + (f"{hours}{UNIT_GAP}h " if hours else "") + words
+    return " · ".join(num(joules, 0 if unit.symbol == "mAh" else decimals, unit) for unit in units)
 
 
 def place(lat_deg: float, lon_deg: float) -> str:

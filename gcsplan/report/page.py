@@ -20,13 +20,14 @@ from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report import tables
 from gcsplan.report.fleet_view import fleet_html
 from gcsplan.report.home_view import home_html, home_lines
-from gcsplan.report.markup import data_block, esc, least, minutes, num, place, tools
+from gcsplan.report.markup import data_block, energy, esc, least, num, place, stated, tools
 from gcsplan.report.plan_view import COLOURS, map_html
-from gcsplan.report.profile_view import profile_html, profile_legend, unit_of
+from gcsplan.report.profile_view import profile_html, profile_legend
 from gcsplan.report.relief import Relief, extent_of, relief_of
 from gcsplan.report.samples import MOST_SAMPLES, Line, Passage, line_of, passages
 from gcsplan.report.scene_data import exaggeration, zone_meshes
 from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check
+from gcsplan.units import KILOJOULE, METRIC, Unit, Units, duration, told
 from gcsplan.world.world import World
 
 __all__ = ["render_check", "render_page"]
@@ -47,13 +48,14 @@ def render_check(
     inputs: Mapping[str, object],
     notes: Sequence[str] = (),
     homes: Sequence[WayHome | None] = (),
+    units: Units = METRIC,
 ) -> str:
     """The report of files that were checked in ``world``, as HTML text.
 
     ``inputs`` are those of a mission file, or a surface's ``info``; if ``bare_dem`` is true, the page says so.
-    ``homes`` are the ways home of ``checked``, in the same order, None if not judged.
+    ``homes`` are the ways home of ``checked``, in the same order, None if not judged. ``units``: of the page's numbers.
     """
-    return render_page(page_of_check(title, world, checked, inputs=inputs, notes=notes, homes=homes))
+    return render_page(page_of_check(title, world, checked, inputs=inputs, notes=notes, homes=homes, units=units))
 
 
 def render_page(page: Page) -> str:
@@ -62,7 +64,7 @@ def render_page(page: Page) -> str:
     lines = [line_of(s.verdict, page.world, s.vehicle.limits, samples=samples, slot=s.slot) for s in page.subjects]
     drawn = [line for line in lines if line is not None]
     zones, surface = page.world.airspace.zones, page.world.airspace.surface
-    relief = relief_of(page.world, extent_of(drawn, zones, surface))
+    relief = relief_of(page.world, extent_of(drawn, zones, surface), page.units.height)
     found = [
         passages(line, zones, _reach_m(subject)) if line is not None else []
         for subject, line in zip(page.subjects, lines, strict=True)
@@ -79,6 +81,7 @@ def render_page(page: Page) -> str:
         "zones": zone_meshes(zones, surface, relief, drawn),
         "exaggeration": exaggeration(relief, drawn),
         "charts": charts,
+        "units": page.units.as_dict(),
     }
     body = "".join(
         (
@@ -141,7 +144,7 @@ def verdict_of(safe: bool | None, *, homeless: bool) -> tuple[str, str, str, str
 
 def _header(page: Page) -> str:
     kind, sign, word, words = verdict_of(page.safe, homeless=page.homeless)
-    wrong = [(s, f.message) for s in page.subjects for f in s.verdict.findings]
+    wrong = [(s, told(f.message, page.units)) for s in page.subjects for f in s.verdict.findings]
     wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
     several = len(page.subjects) > 1
     listed = "".join(f"<li>{f'<b>{esc(s.name)}</b>: ' if several else ''}{esc(text)}</li>" for s, text in wrong)
@@ -162,43 +165,50 @@ def _vehicles(page: Page) -> str:
         found = [verdict_of(s.verdict.safe, homeless=s.homeless) for s in page.subjects]
         words = [f"{sign} {word.lower()}" for _, sign, word, _ in found]
         return f"<section>{tables.vehicles_table(page, words)}</section>"
-    return (
-        f'<section class="cards" aria-label="Key figures">{"".join(map(_card, page.subjects, range(10**6)))}</section>'
-    )
+    cards = "".join(_card(s, i, page.units) for i, s in enumerate(page.subjects))
+    return f'<section class="cards" aria-label="Key figures">{cards}</section>'
 
 
-def _card(subject: Subject, index: int) -> str:
+def _card(subject: Subject, index: int, units: Units) -> str:
     verdict, limits, c = subject.verdict, subject.vehicle.limits, subject.certificate
     kind, sign, word, _ = verdict_of(verdict.safe, homeless=subject.homeless)
     low, near = verdict.lowest, verdict.nearest
-    figures = [("path", num(verdict.length_m, 0, "m"), _bound_words(subject))]
+    figures = [("path", num(verdict.length_m, 0, units.path), _bound_words(subject, units))]
     if low is not None:
         figures.append(
-            ("lowest above ground", least(low.min_agl_m, 1, "m"),
-             f"min AGL {num(limits.min_agl_m, 0, 'm')}; on the leg to item {low.seq}, {place(*low.min_agl_at)}")
+            ("lowest above ground", least(low.min_agl_m, 1, units.height),
+             f"min AGL {stated(limits.min_agl_m, units.height)}; on the leg to item {low.seq}, "
+             f"{place(*low.min_agl_at)}")
         )  # fmt: skip
     figures.append(
-        ("nearest zone", least(near.zone_clearance_m, 1, "m"),
-         f"{esc(near.nearest_zone)}; clearance {num(limits.horizontal_clearance_m, 0, 'm')}")
+        ("nearest zone", least(near.zone_clearance_m, 1, units.distance),
+         f"{esc(near.nearest_zone)}; clearance {stated(limits.horizontal_clearance_m, units.distance)}")
         if near is not None else ("nearest zone", "none", "no zone at the path's height")
     )  # fmt: skip
     limit = f"limit {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90 else "no limit"
     figures.append(("steepest", num(verdict.max_climb_deg, 1, "°"), limit))
-    energy = subject.vehicle.energy
+    battery = subject.vehicle.energy
+    used = energy(verdict.energy_j, 0, battery.battery_v)
     figures.append(
         ("battery", num(verdict.battery_used_percent, 1, "%"),
-         f"{num(verdict.energy_j / 1000, 0, 'kJ')} of {num((energy.battery_j or 0) / 1000, 0, 'kJ')}; "
-         f"{num(100 * energy.reserve, 0, '%')} must be left")
+         f"{used}, of {energy(battery.battery_j, 0, battery.battery_v)}; "
+         f"{num(100 * battery.reserve, 0, '%')} must be left")
         if verdict.battery_used_percent is not None
-        else ("energy", num(verdict.energy_j / 1000, 0, "kJ"), "battery capacity not given")
+        else ("energy", used, "battery capacity not given")
     )  # fmt: skip
     since = "after take-off" if subject.motion is None else "after the fleet's start"
     if subject.motion is None and subject.depart_s > 0.0:
-        since = f"after the start, {num(subject.depart_s, 0, 's')} of it on the ground"
+        since = f"after the start, {duration(subject.depart_s)} of it on the ground"
     items = len(verdict.mission.wire_items())
-    figures.append(("arrives", minutes(subject.arrive_s), f"{since}; {items} mission items"))
+    figures.append(
+        (
+            "arrives",
+            duration(subject.arrive_s, 1 if subject.motion is not None else 0),
+            f"{since}; {items} mission items",
+        )
+    )
     if c is not None and c.objective == "energy":
-        figures.insert(1, ("path energy", num(c.cost / 1000, 1, "kJ"), _gap_words(c.bound, c.gap_percent, 1e-3, "kJ")))
+        figures.insert(1, ("path energy", energy(c.cost, 1), _gap_words(c.bound, c.gap_percent, KILOJOULE)))
     cells = "".join(f"<div><dt>{name}</dt><dd>{value}<small>{more}</small></dd></div>" for name, value, more in figures)
     return (
         f'<article class="card t{index % COLOURS}"><h2><i class="swatch t{index % COLOURS}"></i>{esc(subject.name)}'
@@ -206,17 +216,17 @@ def _card(subject: Subject, index: int) -> str:
     )
 
 
-def _bound_words(subject: Subject) -> str:
+def _bound_words(subject: Subject, units: Units) -> str:
     c = subject.certificate
     if c is None or c.objective != "length":
-        return f"{num(subject.verdict.time_s, 0, 's')} in the air"
-    return _gap_words(c.bound, c.gap_percent, 1.0, "m")
+        return f"{duration(subject.verdict.time_s)} in the air"
+    return _gap_words(c.bound, c.gap_percent, units.path)
 
 
-def _gap_words(bound: float | None, gap_percent: float | None, share: float, unit: str) -> str:
+def _gap_words(bound: float | None, gap_percent: float | None, unit: Unit) -> str:
     if bound is None:
         return "no bound: this planner proves none"
-    return f"no path is below {least(bound * share, 0, unit)}; gap {num(gap_percent, 2, '%')}"
+    return f"no path is below {least(bound, 0, unit)}; gap {num(gap_percent, 2, '%')}"
 
 
 def _scene(page: Page, relief: Relief) -> str:
@@ -230,7 +240,8 @@ def _scene(page: Page, relief: Relief) -> str:
         '<label class="stretch" hidden>heights × <input type="range" min="1" max="8" step="0.5"> '
         "<output></output></label>"
         f'<p class="note">Drag to turn, two fingers or the right button to move. The ground is drawn every '
-        f"{num(relief.cell_m, 0 if relief.cell_m >= 10 else 1, 'm')}: do not read clearances off this view.</p>"
+        f"{num(relief.cell_m, 0 if relief.cell_m >= 10 else 1, page.units.distance)}: do not read clearances off this "
+        "view.</p>"
         "</section>"
     )
 
@@ -242,11 +253,11 @@ def _profiles(page: Page, lines: Sequence[Line | None], found: Sequence[list[Pas
             parts.append(f'<p class="note">{esc(subject.name)}: there is no line over known ground to draw.</p>')
             continue
         shown = " open" if i < OPEN_VEHICLES else ""
-        unit, name = unit_of(line)
+        unit = page.units.along(line.length_m)
         parts.append(
-            f"<details{shown}><summary>{esc(subject.name)}: {num(line.length_m / unit, 2, name)} along the track"
-            f"</summary>{tools(f'profile-{i}')}{profile_html(subject, line, found[i], i, page.world)}"
-            f"{profile_legend(subject, line, found[i])}</details>"
+            f"<details{shown}><summary>{esc(subject.name)}: {num(line.length_m, 2, unit)} along the track"
+            f"</summary>{tools(f'profile-{i}')}{profile_html(subject, line, found[i], i, page.world, page.units)}"
+            f"{profile_legend(subject, line, found[i], page.units)}</details>"
         )
     parts.append("</section>")
     return parts
@@ -257,10 +268,10 @@ def _details(page: Page, lines: Sequence[Line | None], found: Sequence[list[Pass
     for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
         shown = " open" if len(page.subjects) == 1 else ""
         parts.append(f"<details{shown}><summary>{esc(subject.name)}: limits, zones and legs</summary>")
-        parts.append(tables.limits_table(subject, line))
+        parts.append(tables.limits_table(subject, line, page.units))
         if line is not None:
             parts.append(tables.zones_table(page, subject, line, found[i]))
-        parts.append(tables.legs_table(subject) + "</details>")
+        parts.append(tables.legs_table(subject, page.units) + "</details>")
     parts.append("</section>")
     return parts
 
@@ -273,6 +284,7 @@ def _end(page: Page) -> str:
     )
     unjudged = [(s.name, what) for s in page.subjects for what in s.verdict.not_judged]
     missing = "".join(f"<li><b>{esc(who)}</b>: {esc(what)}</li>" for who, what in unjudged)
+    inputs = tables.inputs_table(page.inputs, page.facts, page.units)
     return (
         f'<section id="sent"><h2>Upload</h2>{tables.upload_table(page)}</section>'
         '<section id="notes"><h2>Notes, and what was not judged</h2>'
@@ -280,7 +292,7 @@ def _end(page: Page) -> str:
         + (f"<h3>Notes</h3><ul>{listed}</ul>" if listed else "")
         + "<p>Wind, emergency landing sites and moving obstacles are not in the model. The terrain model has errors of "
         "its own.</p></section>"
-        f'<section id="inputs"><h2>What went in</h2>{tables.inputs_table(page.inputs, page.facts)}</section>'
+        f'<section id="inputs"><h2>What went in</h2>{inputs}</section>'
         f"<footer>gcsplan {esc(__version__)}; numbers of room and clearance are rounded down</footer>"
     )
 
@@ -316,4 +328,5 @@ def _line_data(index: int, subject: Subject, line: Line) -> dict[str, object]:
         ],
         "ends": np.flatnonzero(line.end).tolist(),
         "battery": subject.vehicle.energy.battery_j and round(subject.vehicle.energy.battery_j / 1000.0, 1),
+        "volts": subject.vehicle.energy.battery_v,
     }  # fmt: skip

@@ -9,20 +9,22 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.report.chart import Axes, chart_html
 from gcsplan.report.marks import Mark
-from gcsplan.report.markup import least, num, place
+from gcsplan.report.markup import least, num, place, stated
 from gcsplan.report.plan_view import COLOURS, zone_heights
 from gcsplan.report.samples import Line, Passage, level_amsl
 from gcsplan.report.subject import Subject
+from gcsplan.units import Units, told
 from gcsplan.world.world import World
 
 TALL = 0.38
 
 
-def profile_html(subject: Subject, line: Line, found: list[Passage], index: int, world: World) -> str:
+def profile_html(
+    subject: Subject, line: Line, found: list[Passage], index: int, world: World, units: Units
+) -> str:  # fmt: skip
     """The chart of one vehicle; ``found`` are the zones that its line passes over, under or through."""
-    unit, _ = unit_of(line)
-    run = line.run_m / unit
-    axes = _axes(subject, line, found)
+    run = line.run_m
+    axes = _axes(line, found, units)
     limits = subject.vehicle.limits
     floor = np.where(np.isfinite(line.floor_m), line.floor_m, np.nan)
     bottom = np.full(len(run), -np.inf)
@@ -37,7 +39,7 @@ def profile_html(subject: Subject, line: Line, found: list[Passage], index: int,
         part = slice(p.first, p.last + 1)
         low = level_amsl(p.zone.floor, line.ground_m[part], -math.inf)
         high = level_amsl(p.zone.ceiling, line.ground_m[part], math.inf)
-        title = f"no-fly zone {p.zone.name}: {zone_heights(p.zone)}"
+        title = f"no-fly zone {p.zone.name}: {zone_heights(p.zone, units)}"
         shapes.append(axes.area(_wide(run[part], axes), low, high, "zone", title))
     if not np.array_equal(line.top_m, line.ground_m, equal_nan=True):
         shapes.append(axes.area(run, line.ground_m, line.top_m, "obstacles", "trees and buildings, as stated"))
@@ -45,15 +47,15 @@ def profile_html(subject: Subject, line: Line, found: list[Passage], index: int,
     shapes.append(axes.line(run, line.amsl_m, "casing"))
     shapes.append(axes.line(run, line.amsl_m, f"track t{index % COLOURS}"))
     words = (
-        f"Altitude profile of {subject.name}: {num(line.length_m / 1000, 2, 'km')} along the track, ground from "
-        f"{num(_least(line.ground_m), 0, 'm')} to {num(_most(line.ground_m), 0, 'm AMSL')}, path up to "
-        f"{num(float(line.amsl_m.max()), 0, 'm AMSL')}, min AGL {num(limits.min_agl_m, 0, 'm')}"
+        f"Altitude profile of {subject.name}: {num(line.length_m, 2, units.far)} along the track, ground from "
+        f"{num(_least(line.ground_m), 0, units.height)} to {num(_most(line.ground_m), 0, units.amsl)}, path up to "
+        f"{num(float(line.amsl_m.max()), 0, units.amsl)}, min AGL {stated(limits.min_agl_m, units.height)}"
     )
-    marks = _marks(subject, line, found, axes, index) + _broken(subject, line, axes, world)
+    marks = _marks(subject, line, found, axes, index, units) + _broken(subject, line, axes, world, units)
     return chart_html(f"profile-{index}", axes, shapes, marks, words, TALL)
 
 
-def profile_legend(subject: Subject, line: Line, found: list[Passage]) -> str:
+def profile_legend(subject: Subject, line: Line, found: list[Passage], units: Units) -> str:
     """The legend of a profile's colours."""
     limits = subject.vehicle.limits
     trees = not np.array_equal(line.top_m, line.ground_m, equal_nan=True)
@@ -61,19 +63,15 @@ def profile_legend(subject: Subject, line: Line, found: list[Passage]) -> str:
     return (
         '<ul class="legend"><li><i class="swatch ground"></i>ground</li>'
         + ('<li><i class="swatch obstacles"></i>trees and buildings</li>' if trees else "")
-        + f'<li><i class="swatch below"></i>too low: min AGL {num(limits.min_agl_m, 0, "m")}, clearance and errors</li>'
+        + '<li><i class="swatch below"></i>too low: min AGL '
+        + f"{stated(limits.min_agl_m, units.height)}, clearance and errors</li>"
         + ('<li><i class="swatch above"></i>too high for the limits</li>' if top else "")
         + ('<li><i class="swatch zone"></i>no-fly zone on the way</li>' if found else "")
         + "</ul>"
     )
 
 
-def unit_of(line: Line) -> tuple[float, str]:
-    """The unit of distance along a line: its metres and its name."""
-    return (1000.0, "km") if line.length_m > 2000.0 else (1.0, "m")
-
-
-def _axes(subject: Subject, line: Line, found: list[Passage]) -> Axes:
+def _axes(line: Line, found: list[Passage], units: Units) -> Axes:
     low, high = _least(line.ground_m, line.amsl_m), _most(line.amsl_m, line.ground_m)
     for p in found:  # include a level near the path, but not one far above, which would flatten everything else
         ground = line.ground_m[p.first : p.last + 1]
@@ -86,9 +84,14 @@ def _axes(subject: Subject, line: Line, found: list[Passage]) -> Axes:
     if len(top) and float(top.max()) < high + 0.6 * (high - low):
         high = max(high, float(top.max()))
     room = max(0.06 * (high - low), 1e-3 * max(line.length_m, 10.0))
-    unit, name = unit_of(line)
-    long = max(line.length_m / unit, 1e-3)
-    return Axes(-0.012 * long, 1.012 * long, low - room, high + 1.6 * room, f"along the track, {name}", "m AMSL")
+    return along_axes(line, low - room, high + 1.6 * room, units)
+
+
+def along_axes(line: Line, low_m: float, high_m: float, units: Units) -> Axes:
+    """Altitudes over the way along a line."""
+    long_m = max(line.length_m, 1e-3)
+    unit = units.along(line.length_m)
+    return Axes(-0.012 * long_m, 1.012 * long_m, low_m, high_m, "along the track", "", unit, units.amsl)
 
 
 def _least(*arrays: Floats | float) -> float:
@@ -108,35 +111,37 @@ def _wide(run: Floats, axes: Axes) -> Floats:
     return run if short <= 0 else run + short * (np.linspace(-0.5, 0.5, len(run)) if len(run) > 1 else 0.0)
 
 
-def _marks(subject: Subject, line: Line, found: list[Passage], axes: Axes, index: int) -> list[Mark]:
-    legs, colour, (unit, _) = subject.verdict.legs, f"t{index % COLOURS}", unit_of(line)
+def _marks(
+    subject: Subject, line: Line, found: list[Passage], axes: Axes, index: int, units: Units
+) -> list[Mark]:  # fmt: skip
+    legs, colour, height = subject.verdict.legs, f"t{index % COLOURS}", units.height
     marks = []
     for leg, at in zip(legs, np.flatnonzero(line.end), strict=True):
         if leg.kind != "cruise" or leg.column:
             continue
-        tip = f"item {leg.seq}: {num(leg.end[2], 1, 'm AMSL')}, {least(leg.agl_end_m, 1, 'm')} above ground"
-        marks.append(axes.mark(line.run_m[at] / unit, line.amsl_m[at], f"wp {colour}", str(leg.seq), tip, 4))
+        tip = f"item {leg.seq}: {num(leg.end[2], 1, units.amsl)}, {least(leg.agl_end_m, 1, height)} above ground"
+        marks.append(axes.mark(line.run_m[at], line.amsl_m[at], f"wp {colour}", str(leg.seq), tip, 4))
     for p in found:
         middle = (p.first + p.last) // 2
         ground = np.nan_to_num(line.ground_m[middle], nan=axes.y0)
         low = max(level_amsl(p.zone.floor, line.ground_m[middle : middle + 1], axes.y0)[0], ground)
         high = level_amsl(p.zone.ceiling, line.ground_m[middle : middle + 1], axes.y1)[0]
         y = min(max(0.5 * (max(low, axes.y0) + min(high, axes.y1)), axes.y0), axes.y1)
-        tip = f"no-fly zone {p.zone.name}: {zone_heights(p.zone)}; {passed(p)}"
-        marks.append(axes.mark(line.run_m[middle] / unit, float(y), "name", p.zone.name, tip, 3))
+        tip = f"no-fly zone {p.zone.name}: {zone_heights(p.zone, units)}; {passed(p, units)}"
+        marks.append(axes.mark(line.run_m[middle], float(y), "name", p.zone.name, tip, 3))
     lowest = subject.verdict.lowest
     if lowest is not None:
         mine = np.flatnonzero(line.leg == legs.index(lowest))
         agl = line.amsl_m[mine] - line.top_m[mine]
         if np.isfinite(agl).any():
             tightest = mine[int(np.nanargmin(agl))]
-            words = f"{least(lowest.min_agl_m, 1, 'm')} AGL"
+            words = f"{least(lowest.min_agl_m, 1, height)} AGL"
             tip = f"lowest above ground, {words}, on the leg to item {lowest.seq}, at {place(*lowest.min_agl_at)}"
-            marks.append(axes.mark(line.run_m[tightest] / unit, line.amsl_m[tightest], "tight", words, tip, 0))
+            marks.append(axes.mark(line.run_m[tightest], line.amsl_m[tightest], "tight", words, tip, 0))
     return marks
 
 
-def _broken(subject: Subject, line: Line, axes: Axes, world: World) -> list[Mark]:
+def _broken(subject: Subject, line: Line, axes: Axes, world: World, units: Units) -> list[Mark]:
     """Marks of the findings, each at the nearest sample of its item."""
     marks, seq = [], np.array([leg.seq for leg in subject.verdict.legs])
     for f in subject.verdict.findings:
@@ -144,15 +149,15 @@ def _broken(subject: Subject, line: Line, axes: Axes, world: World) -> list[Mark
         if len(mine) and math.isfinite(f.lat_deg + f.lon_deg + f.amsl_m):
             e, n = (float(v) for v in world.frame.to_plane(f.lat_deg, f.lon_deg))
             away = np.hypot(np.hypot(line.east_m[mine] - e, line.north_m[mine] - n), line.amsl_m[mine] - f.amsl_m)
-            x = line.run_m[int(mine[int(away.argmin())])] / unit_of(line)[0]
-            marks.append(axes.mark(x, f.amsl_m, "broken", f.kind.replace("_", " "), f.message, 0))
+            x = line.run_m[int(mine[int(away.argmin())])]
+            marks.append(axes.mark(x, f.amsl_m, "broken", f.kind.replace("_", " "), told(f.message, units), 0))
     return marks
 
 
-def passed(p: Passage) -> str:
+def passed(p: Passage, units: Units) -> str:
     """How a zone is passed, in words; the numbers come from samples."""
     if p.over_m is not None and p.over_m >= 0.0:
-        return f"passed {least(p.over_m, 0, 'm')} above its ceiling"
+        return f"passed {least(p.over_m, 0, units.height)} above its ceiling"
     if p.under_m is not None and p.under_m >= 0.0:
-        return f"passed {least(p.under_m, 0, 'm')} below its floor"
+        return f"passed {least(p.under_m, 0, units.height)} below its floor"
     return "passed at its height, within its clearance or inside"

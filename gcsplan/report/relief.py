@@ -14,6 +14,7 @@ from PIL import Image
 
 from gcsplan.arrays import Floats
 from gcsplan.report.samples import Line
+from gcsplan.units import METRE, Unit
 from gcsplan.world.surface import Surface
 from gcsplan.world.world import World
 from gcsplan.world.zones import Zone
@@ -116,14 +117,14 @@ class Relief:
     grid: dict[str, object]
 
 
-def relief_of(world: World, extent: Extent) -> Relief:
-    """Sample, shade and contour the ground under ``extent``."""
+def relief_of(world: World, extent: Extent, unit: Unit = METRE) -> Relief:
+    """Sample, shade and contour the ground under ``extent``; contours are at round numbers of ``unit``."""
     east, north = extent.grid()
     ground = world.airspace.surface.ground_at(*np.meshgrid(east, north))
     known = ~np.isnan(ground)
     low, high = (float(ground[known].min()), float(ground[known].max())) if known.any() else (math.nan, math.nan)
     coarse = slice(None, None, CONTOUR_EVERY)
-    contours, interval = _contours(ground[coarse, coarse], east[coarse], north[coarse], extent, low, high)
+    contours, interval = _contours(ground[coarse, coarse], east[coarse], north[coarse], extent, (low, high), unit)
     return Relief(
         extent, low, high, _picture(ground, east, north, low, high), contours, interval,
         float(east[GRID_EVERY] - east[0]), bool(known.all()),
@@ -162,12 +163,13 @@ def shaded(ground: Floats, east_m: Floats, north_m: Floats, low: float, high: fl
 
 
 def _contours(
-    ground: Floats, east_m: Floats, north_m: Floats, extent: Extent, low: float, high: float
+    ground: Floats, east_m: Floats, north_m: Floats, extent: Extent, heights_m: tuple[float, float], unit: Unit
 ) -> tuple[str, float]:
     """Contours as one SVG path, and their interval; an empty path on flat ground."""
+    low, high = heights_m
     if not high - low > 0.5:
         return "", 0.0
-    interval = nice_step((high - low) / 12.0)
+    interval = unit.size * nice_step(unit.of(high - low) / 12.0)
     made = contourpy.contour_generator(east_m, north_m, np.ma.masked_invalid(ground), name="serial")
     levels = np.arange(math.ceil(low / interval), math.floor(high / interval) + 1) * interval
     parts: list[str] = []

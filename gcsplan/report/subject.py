@@ -11,6 +11,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Separation
+from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
@@ -64,7 +65,10 @@ class Subject:
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown."""
+    """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown.
+
+    ``units`` are those of all numbers on the page; notes are in metres, as they say what to write into a file.
+    """
 
     title: str
     world: World
@@ -74,6 +78,7 @@ class Page:
     notes: tuple[str, ...] = ()
     separation: Separation | None = None
     order: tuple[str, ...] = ()
+    units: Units = METRIC
 
     @property
     def homeless(self) -> bool:
@@ -108,6 +113,7 @@ def page_of_check(
     inputs: Mapping[str, object],
     notes: Sequence[str] = (),
     homes: Sequence[WayHome | None] = (),
+    units: Units = METRIC,
 ) -> Page:
     """The page of checked files; subjects are named by file if one vehicle has several files.
 
@@ -123,4 +129,4 @@ def page_of_check(
         for i, c in enumerate(checked)
     )  # fmt: skip
     facts = tuple((f"file of {s.name}", str(c.file)) for s, c in zip(subjects, checked, strict=True))
-    return Page(title, world, subjects, dict(inputs), facts, tuple(dict.fromkeys(notes)))
+    return Page(title, world, subjects, dict(inputs), facts, tuple(dict.fromkeys(notes)), units=units)

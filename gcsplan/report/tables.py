@@ -9,11 +9,12 @@ import numpy as np
 
 from gcsplan.check.verdict import LegFigures, by_item
 from gcsplan.mavlink.mission.autopilots import profile_of
-from gcsplan.report.markup import THIN, esc, least, minutes, num, place, table
+from gcsplan.report.markup import THIN, at_least, energy, esc, least, num, place, stated, table
 from gcsplan.report.plan_view import zone_heights
 from gcsplan.report.profile_view import passed
 from gcsplan.report.samples import Line, Passage
 from gcsplan.report.subject import Page, Subject
+from gcsplan.units import KILOJOULE, Unit, Units, duration
 
 CLOSE = 0.02
 """Part of a limit's value: if less than this is left, the limit is called close."""
@@ -21,19 +22,19 @@ CLOSE = 0.02
 
 def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
     """The key figures, a row for each vehicle."""
-    rows, marks = [], []
+    units, rows, marks = page.units, [], []
     for s, word in zip(page.subjects, verdicts, strict=True):
         verdict, low, near = s.verdict, s.verdict.lowest, s.verdict.nearest
         bound = s.certificate.gap_percent if s.certificate is not None else None
         home = {True: "safe", False: "no safe return", None: "not judged"}[s.home.safe] if s.home is not None else "–"
         rows.append(
             (
-                esc(s.name), word, num(verdict.length_m, 0, "m"), num(bound, 2, "%"),
-                least(low.min_agl_m if low else None, 1, "m"),
-                f"{least(near.zone_clearance_m, 1, 'm')} {esc(near.nearest_zone)}" if near else "–",
-                num(verdict.max_climb_deg, 1, "°"), num(verdict.energy_j / 1000.0, 0, "kJ"),
+                esc(s.name), word, num(verdict.length_m, 0, units.path), num(bound, 2, "%"),
+                least(low.min_agl_m if low else None, 1, units.height),
+                f"{least(near.zone_clearance_m, 1, units.distance)} {esc(near.nearest_zone)}" if near else "–",
+                num(verdict.max_climb_deg, 1, "°"), energy(verdict.energy_j, 0, s.vehicle.energy.battery_v),
                 num(verdict.battery_used_percent, 1, "%"),
-                minutes(s.arrive_s), home,
+                duration(s.arrive_s, 1 if s.motion is not None else 0), home,
             )
         )  # fmt: skip
         marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None or s.homeless else "")
@@ -42,7 +43,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
     return table("Key figures", head, rows, marks=marks)
 
 
-def legs_table(subject: Subject) -> str:
+def legs_table(subject: Subject, units: Units) -> str:
     """Each item in the order flown: its end, heights, climb angle, nearest zone, energy and time."""
     bad = {f.seq for f in subject.verdict.findings}
     battery = subject.vehicle.energy.battery_j
@@ -52,14 +53,15 @@ def legs_table(subject: Subject) -> str:
         used += item.energy_j * item.times
         flown += item.stretches
         name = f"{item.seq} {item.kind}" + (f" ×{THIN}{item.times}" if item.times > 1 else "")
-        near = f"{least(item.zone_clearance_m, 0, 'm')} {esc(item.nearest_zone)}" if item.nearest_zone else "–"
+        near = f"{least(item.zone_clearance_m, 0, units.distance)} {esc(item.nearest_zone)}" if item.nearest_zone else "–"
         rows.append(
             (
-                esc(name), num(item.length_m, 0, "m"), num(item.end[2], 1, "m"), least(item.agl_end_m, 1, "m"),
-                "column" if item.column else least(item.min_agl_m, 1, "m"),
-                num(item.max_agl_m, 1, "m"), num(item.climb_deg, 1, "°"), near, num(item.energy_j / 1000.0, 1, "kJ"),
-                num(100.0 * used / battery, 1, "%") if battery else "–", num(item.time_s, 0, "s"),
-                minutes(clock[flown - 1]),
+                esc(name), num(item.length_m, 0, units.leg), num(item.end[2], 1, units.height),
+                least(item.agl_end_m, 1, units.height),
+                "column" if item.column else least(item.min_agl_m, 1, units.height),
+                num(item.max_agl_m, 1, units.height), num(item.climb_deg, 1, "°"), near, energy(item.energy_j, 1),
+                num(100.0 * used / battery, 1, "%") if battery else "–", duration(item.time_s),
+                duration(clock[flown - 1]),
             )
         )  # fmt: skip
         marks.append("bad" if item.seq in bad else "")
@@ -68,60 +70,66 @@ def legs_table(subject: Subject) -> str:
     return table(f"Legs of {esc(subject.name)}, in the order flown", head, rows, marks=marks)
 
 
-def limits_table(subject: Subject, line: Line | None) -> str:
+def limits_table(subject: Subject, line: Line | None, units: Units) -> str:
     """Every limit with its errors, the value that was reached, and what is left."""
     rows, marks = [], []
-    for name, needed, reached, left, unit, where, share in _limits(subject, line):
+    for name, needed, reached, left, unit, where, share in _limits(subject, line, units):
         broken = left is not None and left < -1e-6
         close = left is not None and not broken and share is not None and left <= share
         word = "broken" if broken else "close" if close else "kept" if left is not None else "–"
-        rows.append((name, needed, reached, least(left, {"m": 2, "": 0}.get(unit, 1), unit), word, where))
+        rows.append((name, needed, reached, least(left, _decimals(unit), unit), word, where))
         marks.append("bad" if broken else "close" if close else "")
     head = ("limit|", "asked", "reached", "left", "|", "where|")
     return table(f"Limits of {esc(subject.name)}, and how near each came to binding", head, rows, marks=marks)
 
 
-Row = tuple[str, str, str, float | None, str, str, float | None]
+def _decimals(unit: str | Unit) -> int:
+    """Decimals of what is left of a limit: metres to a centimetre, angles and percent to a tenth, items whole."""
+    return 2 if isinstance(unit, Unit) else 1 if unit else 0
+
+
+Row = tuple[str, str, str, float | None, str | Unit, str, float | None]
 """Limit, required value, value reached, what is left, its unit, place, and what is left at most to be called close."""
 
 
-def _limits(subject: Subject, line: Line | None) -> list[Row]:
+def _limits(subject: Subject, line: Line | None, units: Units) -> list[Row]:
     verdict, limits = subject.verdict, subject.vehicle.limits
     error, track = limits.altitude_error_m, limits.track_error_m
     flown = [leg for leg in verdict.legs if not leg.column]
+    height, distance = units.height, units.distance
     rows: list[Row] = []
     low = verdict.lowest
     if low is not None:
         needed_m = limits.min_agl_m + error
-        words = f"{num(limits.min_agl_m, 1)} + {num(error, 1)} error"
+        words = f"{stated(limits.min_agl_m, height)} + {stated(error, height)} error"
         at = f"item {low.seq}, {place(*low.min_agl_at)}"
-        rows.append(("lowest above ground and what stands on it", words, least(low.min_agl_m, 2, "m"),
-                     low.min_agl_m - needed_m, "m", at, CLOSE * needed_m))  # fmt: skip
+        rows.append(("lowest above ground and what stands on it", words, least(low.min_agl_m, 2, height),
+                     low.min_agl_m - needed_m, height, at, CLOSE * needed_m))  # fmt: skip
     highs = [leg for leg in verdict.legs if not math.isnan(leg.max_agl_m)]
     if limits.max_agl_m is not None and highs:
         top = max(highs, key=lambda leg: leg.max_agl_m)
-        rows.append(("highest above ground", f"{num(limits.max_agl_m, 1)} − {num(error, 1)} error",
-                     num(top.max_agl_m, 2, "m"), limits.max_agl_m - error - top.max_agl_m, "m", f"item {top.seq}",
+        rows.append(("highest above ground", f"{stated(limits.max_agl_m, height)} − {stated(error, height)} error",
+                     num(top.max_agl_m, 2, height), limits.max_agl_m - error - top.max_agl_m, height, f"item {top.seq}",
                      CLOSE * limits.max_agl_m))  # fmt: skip
     if limits.max_amsl_m is not None and verdict.legs:
         peak = max(verdict.legs, key=lambda leg: max(leg.start[2], leg.end[2]))
         z = max(peak.start[2], peak.end[2])
-        rows.append(("highest above sea level", f"{num(limits.max_amsl_m, 1)} − {num(error, 1)} error",
-                     num(z, 2, "m"), limits.max_amsl_m - error - z, "m", f"item {peak.seq}", 1.0))  # fmt: skip
+        rows.append(("highest above sea level", f"{stated(limits.max_amsl_m, height)} − {stated(error, height)} error",
+                     num(z, 2, height), limits.max_amsl_m - error - z, height, f"item {peak.seq}", 1.0))  # fmt: skip
     near = verdict.nearest
     if near is not None:
         needed_m = limits.horizontal_clearance_m + track
         rows.append(("horizontal distance from zones at the path's height",
-                     f"{num(limits.horizontal_clearance_m, 1)} + {num(track, 1)} error",
-                     least(near.zone_clearance_m, 2, "m"), near.zone_clearance_m - needed_m, "m",
+                     f"{stated(limits.horizontal_clearance_m, distance)} + {stated(track, distance)} error",
+                     least(near.zone_clearance_m, 2, distance), near.zone_clearance_m - needed_m, distance,
                      f"item {near.seq}, {esc(near.nearest_zone)}", max(CLOSE * needed_m, 1.0)))  # fmt: skip
     if line is not None:
-        rows += _height_left(subject, line)
+        rows += _height_left(subject, line, units)
     rows += _steepness(flown, limits.max_climb_deg, limits.max_descent_deg)
-    energy = subject.vehicle.energy
-    if energy.battery_j and verdict.battery_used_percent is not None:
-        may = 100.0 * (1.0 - energy.reserve)
-        rows.append(("battery", f"{num(may, 1)} ({num(100 * energy.reserve, 0)} kept)",
+    battery = subject.vehicle.energy
+    if battery.battery_j and verdict.battery_used_percent is not None:
+        may = 100.0 * (1.0 - battery.reserve)
+        rows.append(("battery", f"{num(may, 1)} ({num(100 * battery.reserve, 0)} kept)",
                      num(verdict.battery_used_percent, 1, "%"), may - verdict.battery_used_percent, "%", "whole flight",
                      5.0))  # fmt: skip
     items, most = len(verdict.mission.wire_items()), profile_of(verdict.mission.autopilot).max_items
@@ -132,7 +140,7 @@ def _limits(subject: Subject, line: Line | None) -> list[Row]:
     return rows
 
 
-def _height_left(subject: Subject, line: Line) -> list[Row]:
+def _height_left(subject: Subject, line: Line, units: Units) -> list[Row]:
     """The least height above all that terrain requires: min AGL, clearance and errors together, at the samples."""
     legs = subject.verdict.legs
     free = np.array([leg.column for leg in legs])[line.leg]
@@ -141,11 +149,12 @@ def _height_left(subject: Subject, line: Line) -> list[Row]:
     if not math.isfinite(room[at]):
         return []
     words = "the judgement is exact; this is drawn from samples, on the safe side, to some centimetres"
-    needed = f'<abbr title="{words}">{least(float(line.floor_m[at]), 1, "m AMSL")}</abbr>'
+    needed = f'<abbr title="{words}">{at_least(float(line.floor_m[at]), 1, units.amsl)}</abbr>'
     left = float(room[at])
-    return [("terrain with clearance and all errors, tightest sample", needed, num(float(line.amsl_m[at]), 1, "m AMSL"),
-             max(left, 0.0) if left > -0.5 and subject.verdict.safe is not False else left, "m",
-             f"item {legs[line.leg[at]].seq}, {num(line.run_m[at] / 1000, 2, 'km')} along", 1.0)]  # fmt: skip
+    return [("terrain with clearance and all errors, tightest sample", needed,
+             num(float(line.amsl_m[at]), 1, units.amsl),
+             max(left, 0.0) if left > -0.5 and subject.verdict.safe is not False else left, units.height,
+             f"item {legs[line.leg[at]].seq}, {num(line.run_m[at], 2, units.far)} along", 1.0)]  # fmt: skip
 
 
 def _steepness(flown: Sequence[LegFigures], climb_deg: float, descent_deg: float) -> list[Row]:
@@ -168,10 +177,12 @@ def zones_table(page: Page, subject: Subject, line: Line, found: Sequence[Passag
         return ""
     rows = []
     for p in found:
-        km = f"{num(line.run_m[p.first] / 1000, 2)} – {num(line.run_m[p.last] / 1000, 2, 'km')}"
-        rows.append((esc(p.zone.name), esc(zone_heights(p.zone)), km, passed(p)))
-    reach = subject.vehicle.limits.horizontal_clearance_m + subject.vehicle.limits.track_error_m
-    caption = f"Zones that {esc(subject.name)} passes within {num(reach, 0, 'm')} of their outline (heights at samples)"
+        far = page.units.far
+        ends = f"{num(far.of(line.run_m[p.first]), 2)} – {num(line.run_m[p.last], 2, far)}"
+        rows.append((esc(p.zone.name), esc(zone_heights(p.zone, page.units)), ends, passed(p, page.units)))
+    limits = subject.vehicle.limits
+    reach = stated(limits.horizontal_clearance_m + limits.track_error_m, page.units.distance)
+    caption = f"Zones that {esc(subject.name)} passes within {reach} of their outline (heights at samples)"
     return table(caption, ("zone|", "reaches|", "along the track", "how|"), rows)
 
 
@@ -182,11 +193,11 @@ def certificate_table(page: Page) -> str:
         c = s.certificate
         if c is None:
             continue
-        unit, share = ("m", 1.0) if c.unit == "m" else ("kJ", 1e-3)
+        unit = page.units.path if c.unit == "m" else KILOJOULE
         rows.append(
             (
-                esc(s.name), esc(c.objective), num(c.cost * share, 1, unit),
-                least(c.bound * share, 1, unit) if c.bound is not None else "none: this planner proves nothing",
+                esc(s.name), esc(c.objective), num(c.cost, 1, unit),
+                least(c.bound, 1, unit) if c.bound is not None else "none: this planner proves nothing",
                 num(c.gap_percent, 3, "%"), esc(c.stopped_by),
             )
         )  # fmt: skip
@@ -226,7 +237,7 @@ def _warnings(upload: Mapping[str, object]) -> Sequence[object]:
     return found if isinstance(found, list | tuple) else ()
 
 
-def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]]) -> str:
+def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]], units: Units) -> str:
     """The inputs: terrain model, its datum and resolution, hashes; and what was requested."""
     names = {
         "dem_sha256": "terrain model, SHA-256", "vertical_datum": "vertical datum", "resolution_m": "resolution",
@@ -240,7 +251,7 @@ def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]])
         if key == "bare_dem":
             words = "bare: trees, masts and wires are not in it" if value else "obstacle heights were given"
         elif key == "resolution_m" and isinstance(value, int | float):
-            words = num(float(value), 0 if value >= 10 else 3, "m")
+            words = num(float(value), 0 if value >= 10 else 3, units.distance)
         elif key.endswith("sha256"):
             words = f"<code>{words}</code>"
         rows.append((esc(names.get(key, key.replace("_", " "))), words))

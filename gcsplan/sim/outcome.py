@@ -14,6 +14,7 @@ from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.trace import Judged, Meeting, Trace, examine, meetings
+from gcsplan.units import METRIC, Told, Units, duration
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
@@ -64,7 +65,7 @@ class Breach:
 
     def describe(self, of_runs: int) -> str:
         """Return one line; ``of_runs``: the number of all runs."""
-        return self.message if of_runs == 1 else f"{self.message} (in {self.runs} of {of_runs} runs)"
+        return self.message if of_runs == 1 else Told("{} (in {} of {} runs)", self.message, self.runs, of_runs)
 
     def as_dict(self) -> dict[str, Any]:
         """Return a dict for JSON."""
@@ -185,9 +186,9 @@ class Rehearsal:
             "notes": list(self.notes),
         }  # fmt: skip
 
-    def rows(self) -> list[dict[str, str]]:
-        """Return a table row for each vehicle."""
-        return [_row(v, self.runs) for v in self.vehicles]
+    def rows(self, units: Units = METRIC) -> list[dict[str, str]]:
+        """Return a table row for each vehicle; times in the fleet's order have tenths."""
+        return [_row(v, self.runs, units, 1 if len(self.vehicles) > 1 else 0) for v in self.vehicles]
 
 
 def percentile_95(values: Sequence[float]) -> float | None:
@@ -195,21 +196,21 @@ def percentile_95(values: Sequence[float]) -> float | None:
     return sorted(values)[math.ceil(0.95 * len(values)) - 1] if values else None
 
 
-def _row(v: Performance, runs: int) -> dict[str, str]:
-    def seconds(value: float | None) -> str:
-        if value is None:
-            return "–"
-        return f"{value:.1f}" if math.isfinite(value) else "never"
+def _row(v: Performance, runs: int, units: Units = METRIC, decimals: int = 0) -> dict[str, str]:
+    def clock(value: float | None) -> str:
+        return duration(value, decimals) if value is None or math.isfinite(value) else "never"
 
-    row = {"vehicle": v.name, "leaves, s": seconds(v.depart_s), "planned, s": seconds(v.planned_s)}
+    row = {"vehicle": v.name, "leaves": clock(v.depart_s), "planned": clock(v.planned_s)}
     arrived = _median(v.arrive_s)
-    row["arrives, s"] = seconds(math.inf if arrived is None or math.isnan(arrived) else arrived)
+    row["arrives"] = clock(math.inf if arrived is None or math.isnan(arrived) else arrived)
     error = _median(v.errors_s)
     row["error, s"] = "–" if error is None else f"{error:+.2f}" if math.isfinite(error) else "never"
     if runs > 1:
         row["95 % within, s"] = "–" if v.p95_s is None else f"{v.p95_s:.2f}"
-    row["down, s"] = seconds(_median(v.end_s))
-    row["lowest AGL, m"] = "–" if math.isnan(v.min_agl_m) else f"{floored(v.min_agl_m, 1):.1f}"
+    row["down"] = clock(_median(v.end_s))
+    height = units.height
+    lowest = floored(height.of(v.min_agl_m), height.decimals(1))
+    row[f"lowest AGL, {height.symbol}"] = "–" if math.isnan(v.min_agl_m) else f"{lowest:.{height.decimals(1)}f}"
     row["battery, %"] = "–" if v.battery_used_percent is None else f"{v.battery_used_percent:.0f}"
     return row
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.verdict import Finding
-from gcsplan.figures import floored
+from gcsplan.units import Quantity, Seconds, Told, measured
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.world import World
@@ -146,11 +146,12 @@ def _finding(v: Violation, trace: Trace, sample: int, world: World) -> Finding:
     lat, lon = _degrees(world, np.array([v.east_m, v.north_m]))
     name = world.airspace.zones[v.zone].name if v.zone >= 0 else ""
     what = WORDS.get(v.kind, v.kind) + (f" “{name}” or its clearance" if name else "")
-    by = f" by {v.by:.2f} {v.unit}" if v.kind != "coverage" else ""
-    message = (
-        f"{trace.name} {what}{by} at {float(trace.times_s[sample]):.1f} s, item {int(trace.seq[sample])} "
-        f"({lat:.6f}, {lon:.6f}, {v.amsl_m:.1f} m AMSL)"
-    )
+    by = Told(" by {}", measured(v.by, v.kind, v.unit)) if v.kind != "coverage" else ""
+    message = Told(
+        "{} {}{} at {}, item {} ({:.6f}, {:.6f}, {})",
+        trace.name, what, by, Seconds(float(trace.times_s[sample]), 1), int(trace.seq[sample]), lat, lon,
+        Quantity(v.amsl_m, "amsl", 1),
+    )  # fmt: skip
     return Finding(int(trace.seq[sample]), v.kind, message, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name)
 
 
@@ -173,13 +174,15 @@ class Meeting:
     time_s: float
     kind: str = "air"
 
-    def describe(self, needed_m: float) -> str:
+    def describe(self, needed_m: float) -> Told:
         """Return one sentence; ``needed_m`` is the required separation."""
         a, b = self.names
-        near = f"{floored(self.distance_m, 1):.1f} m, needed are {needed_m:g} m, at {self.time_s:.1f} s"
-        if self.kind == "air":
-            return f"{a} and {b} came as near as {near}"
-        return f"{a} landed beside {b}, which stood there: {near}"
+        how = "{} and {} came as near as" if self.kind == "air" else "{} landed beside {}, which stood there:"
+        return Told(
+            how + " {}, needed are {}, at {}",
+            a, b, Quantity(self.distance_m, "distance", 1, "down"), Quantity(needed_m, "distance", None),
+            Seconds(self.time_s, 1),
+        )  # fmt: skip
 
 
 def meetings(

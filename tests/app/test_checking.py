@@ -17,6 +17,7 @@ from gcsplan.mission_file.from_options import WorldOptions
 from gcsplan.vehicle import Autopilot
 from tests.support import corpus
 from tests.support.corpus import Case
+from tests.support.shown import seconds
 
 
 @pytest.fixture(scope="module")
@@ -233,7 +234,7 @@ def test_a_spline_is_one_row_however_many_chords_it_has(run: Any, folder: Path, 
     row = next(row for row in rows if int(row[0]) == spline)
     assert float(row[2]) == pytest.approx(sum(leg["length_m"] for leg in chords), abs=0.51)
     assert float(row[5]) == pytest.approx(min(leg["min_agl_m"] for leg in chords), abs=0.11)
-    assert float(row[-1]) == pytest.approx(sum(leg["time_s"] for leg in chords), abs=0.51)
+    assert seconds(row[-1]) == pytest.approx(sum(leg["time_s"] for leg in chords), abs=0.51)
 
 
 def test_findings_stand_before_the_table(run: Any, folder: Path, world: list[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,9 +14,11 @@ from PIL import Image
 
 from gcsplan.check.rtl.way_home import way_home
 from gcsplan.report.page import render_page
+from gcsplan.units import AVIATION, IMPERIAL, METRIC, Units
 from tests.report.test_page import HOSTILE, fleet_page, small_page
 from tests.support import browser as chromium
 from tests.support.browser import Browser
+from tests.support.shown import same, taken_apart
 
 PROGRAM = chromium.find()
 pytestmark = [
@@ -34,16 +37,19 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield made
 
 
-@pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written(folder: Path, units: Units) -> Path:
     """A fleet of two with a way home: every kind of figure is in it."""
     told = fleet_page()
     first = told.subjects[0]
     home = way_home(first.verdict, first.vehicle, told.world, rtl_rel_home_m=20.0)
-    file = tmp_path_factory.mktemp("report") / "report.html"
-    text = render_page(replace(told, title=HOSTILE, subjects=(replace(first, home=home), *told.subjects[1:])))
-    file.write_text(text, encoding="utf-8")
-    return file
+    page = replace(told, title=HOSTILE, subjects=(replace(first, home=home), *told.subjects[1:]), units=units)
+    (folder / "report.html").write_text(render_page(page), encoding="utf-8")
+    return folder / "report.html"
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(tmp_path_factory.mktemp("report"), METRIC)
 
 
 def pixels(page: Browser) -> np.ndarray[tuple[int, int, int], np.dtype[np.int16]]:
@@ -126,6 +132,34 @@ def test_pointing_tells_numbers_with_their_units_in_every_figure(page: Browser, 
     page.point(left, top)
     assert "above ground" in tip(page)
     assert page.complaints() == []
+
+
+def told_by(page: Browser, report: Path) -> dict[str, str]:
+    """What the pointer tells in the middle of each figure."""
+    page.visit(report)
+    found = {}
+    for name in ("#map", "#profile-0 .plot", "#home-0 .plot", "#distance .plot", "#separation .plot"):
+        left, top, wide, tall = show(page, name)
+        page.point(left + 0.5 * wide, top + (0.05 if name == "#map" else 0.5) * tall)
+        found[name] = tip(page)
+    assert page.complaints() == []
+    return found
+
+
+@pytest.mark.parametrize("units", [IMPERIAL, AVIATION], ids=["imperial", "aviation"])
+def test_the_pointer_tells_the_same_numbers_in_every_system(
+    page: Browser, report: Path, units: Units, tmp_path: Path
+) -> None:
+    metric, others = told_by(page, report), told_by(page, written(tmp_path, units))
+    for name, words in metric.items():
+        (text, wanted), (other, found) = taken_apart(words), taken_apart(others[name])
+        assert other == text, name
+        assert wanted, name
+        same(found, wanted)
+    for name in ("#distance .plot", "#separation .plot"):
+        assert re.search(r"time\s+0:\d\d:\d\d\.\d\s", metric[name])
+    assert re.search(r"since take-off\s+0:\d\d:\d\d\s", metric["#profile-0 .plot"])
+    assert re.search(r"kJ · [\d.\u202f]+ Wh", metric["#profile-0 .plot"].replace("\u202fWh", " Wh"))
 
 
 def test_the_map_and_a_profile_can_be_enlarged_and_shown_whole_again(page: Browser, report: Path) -> None:

@@ -37,6 +37,7 @@ from gcsplan.report.relief import UNKNOWN, extent_of, relief_of
 from gcsplan.report.samples import distance_m, line_of, passages
 from gcsplan.report.scene_data import triangles, zone_meshes
 from gcsplan.report.subject import Page, Subject
+from gcsplan.units import METRE, duration
 from gcsplan.vehicle import Energy, Vehicle
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
@@ -352,8 +353,8 @@ def test_numbers_have_no_negative_zero_and_a_dash_where_there_is_none() -> None:
     assert [markup.num(x, 1) for x in (None, math.nan, math.inf)] == ["–"] * 3
     assert markup.num(1234567.0) == "1\u202f234\u202f567"
     assert markup.least(65.2499999999, 2) == "65.25"
-    assert markup.minutes(3725.2) == "1\u202fh 2\u202fmin 05\u202fs"
-    assert markup.minutes(59.4) == "59\u202fs"
+    assert duration(3725.2) == "1:02:05"
+    assert duration(59.44, 1) == "0:00:59.4"
 
 
 @settings(max_examples=draws(60))
@@ -502,7 +503,7 @@ def test_flat_ground_has_no_contours_and_still_a_picture() -> None:
 
 
 def test_a_curve_is_broken_where_nothing_is_known() -> None:
-    axes = Axes(0.0, 10.0, 0.0, 10.0, "x, m", "y, m")
+    axes = Axes(0.0, 10.0, 0.0, 10.0, "x", "y", METRE, METRE)
     path = axes.line([0, 1, 2, 3, 4], [0, 5, math.nan, 5, 0], "track")
     assert path == '<path class="track" d="M0 10000L1000 5000M3000 5000L4000 10000"/>'
     assert axes.area([0, 10], [-math.inf, -math.inf], [5, 5], "below").count("L") == 3

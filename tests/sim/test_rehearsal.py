@@ -227,7 +227,7 @@ def test_a_wind_that_is_too_strong_leaves_a_vehicle_that_never_arrives() -> None
     assert math.isinf(result.vehicles[0].errors_s[0])
     document = json.loads(json.dumps(result.as_dict(), allow_nan=False))
     assert document["vehicles"][0]["arrive_s"] is None
-    assert result.rows()[0]["arrives, s"] == "never"
+    assert result.rows()[0]["arrives"] == "never"
 
 
 def test_the_document_has_its_keys_and_a_row_for_each_vehicle() -> None:

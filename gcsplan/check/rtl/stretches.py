@@ -13,7 +13,7 @@ from gcsplan.check.rtl.sweep import Target
 from gcsplan.check.rtl.trace import MissionTrace
 from gcsplan.check.rtl.verdict import UnsafeStretch
 from gcsplan.check.stretch import Place
-from gcsplan.figures import raised
+from gcsplan.units import Quantity, Told
 
 ROUND_M = 0.1
 LOOKED_AT = 500
@@ -114,16 +114,19 @@ def _why(obstacles: Obstacles, row: int, name: str, grade: int, obstacle: Place 
     if what == GROUND:
         if math.isinf(top):
             return "the ground on the way home is unknown to the terrain model"
-        place = "" if obstacle is None else f" at {obstacle[0]:.6f}, {obstacle[1]:.6f} ({obstacle[2]:.0f} m AMSL)"
-        if grade == CLEAR:
-            return f"the return meets ground{place} and would clear it at {raised(top, 0):.0f} m AMSL"
-        return (
-            f"the return comes nearer than min_agl_m to ground{place} and would keep it at {raised(top, 0):.0f} m AMSL"
+        place: str = ""
+        if obstacle is not None:
+            place = Told(" at {:.6f}, {:.6f} ({})", *obstacle[:2], Quantity(obstacle[2], "amsl", 0))
+        meets = (
+            "meets ground{} and would clear"
+            if grade == CLEAR
+            else "comes nearer than min_agl_m to ground{} and would keep"
         )
-    height = ""
+        return Told(f"the return {meets} it at {{}}", place, Quantity(top, "amsl", 0, "up"))
+    height: str = ""
     if math.isinf(top):
-        height = " (no top)" if math.isinf(bottom) else f" (from {bottom:.0f} m AMSL up)"
-    return f"the return meets no-fly zone “{name}”{height} or its clearance"
+        height = " (no top)" if math.isinf(bottom) else Told(" (from {} up)", Quantity(bottom, "amsl", 0))
+    return Told("the return meets no-fly zone “{}”{} or its clearance", name, height)
 
 
 def _without_doubles(found: list[UnsafeStretch]) -> tuple[UnsafeStretch, ...]:

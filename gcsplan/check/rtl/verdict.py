@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from gcsplan.check.battery import BatteryHome
-from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, PATH, STILL_NO_RETURN, reach, together_m
+from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, PATH, STILL_NO_RETURN, together_m
 from gcsplan.check.stretch import Place
-from gcsplan.figures import counted, floored, raised
+from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting, settings
+from gcsplan.units import Quantity, Reach, Symbol, Told, joined
 from gcsplan.vehicle import Autopilot
 
 
@@ -55,16 +56,17 @@ class UnsafeStretch:
         return f"item {self.from_seq}" if self.from_seq == self.to_seq else f"items {self.from_seq} to {self.to_seq}"
 
     @property
-    def place_and_why(self) -> str:
+    def place_and_why(self) -> Told:
         """``km 1.49 to 3.45 (items 4 to 9): the return meets …``."""
-        until = f" to {self.to_m / 1e3:.2f}" if self.to_m - self.from_m >= 5.0 else ""
-        return f"km {self.from_m / 1e3:.2f}{until} ({self.items}): {self.why}"
+        ends = [self.from_m, *([self.to_m] if self.to_m - self.from_m >= 5.0 else [])]
+        numbers = joined(" to ", [Told("{}", Quantity(at_m, "far", 2, bare=True)) for at_m in ends])
+        return Told("{} {} ({}): {}", Symbol("far"), numbers, self.items, self.why)
 
-    def describe(self) -> str:
+    def describe(self) -> Told:
         """Where, why, and which altitude would help."""
         if self.lowest_rel_home_m is None:
-            return f"{self.place_and_why}; no return altitude is safe from there"
-        return f"{self.place_and_why}; safe from there at {raised(self.lowest_rel_home_m, 1):g} m above home"
+            return Told("{}; no return altitude is safe from there", self.place_and_why)
+        return Told("{}; safe from there at {} above home", self.place_and_why, _at_least(self.lowest_rel_home_m))
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,9 +167,9 @@ class WayHome:
         return together_m([*((s.from_m, s.to_m) for s in self.unsafe), *short])
 
     @property
-    def headline(self) -> str:
+    def headline(self) -> Told:
         """Both truths in one line: ``path safe; no safe return from 9.5 km of it``."""
-        return f"{PATH[self.path_safe]}; {self._return()}"
+        return Told("{}; {}", PATH[self.path_safe], self._return())
 
     def _return(self) -> str:
         if self.safe is True:
@@ -179,8 +181,10 @@ class WayHome:
             seq = self.unsafe[0].from_seq if self.unsafe else 0 if self.battery is None else self.battery.no_return_seq
             return f"no safe return from a point of it, at item {seq}"
         short_m = together_m(short)
-        battery = "" if not short else " (battery)" if not self.unsafe else f" (battery: from {reach(short_m)})"
-        return f"no safe return from {reach(self.no_return_m)} of it{battery}"
+        battery: str = ""
+        if short:
+            battery = Told(" (battery: from {})", Reach(short_m)) if self.unsafe else " (battery)"
+        return Told("no safe return from {} of it{}", Reach(self.no_return_m), battery)
 
     @property
     def advice(self) -> str:
@@ -189,16 +193,17 @@ class WayHome:
             return ""
         with_points = f", with {counted(len(self.rally), 'rally point')} on board (--rally)" if self.rally else ""
         left = self.set_leaves_m or 0.0
-        then = "safe return from all of it"
+        then: str = "safe return from all of it"
+        but = ""
         if left:
-            then = f"no safe return from {reach(left)} of it{'' if self.rally or self.left else ' (battery)'}"
+            then = Told("no safe return from {} of it{}", Reach(left), "" if self.rally or self.left else " (battery)")
         elif self.lowest_legal_rel_home_m is not None and self.set_rel_home_m >= self.lowest_legal_rel_home_m:
-            then += ", within all limits"
+            but += ", within all limits"
         if self.rally and self.battery is not None:
-            then += ", the battery not counted"
+            but += ", the battery not counted"
         if self.not_judged:
-            then += ", as far as it was judged"
-        return f"set {setting(self.autopilot, self.set_rel_home_m)}{with_points}: then {then}"
+            but += ", as far as it was judged"
+        return Told("set {}{}: then {}{}", setting(self.autopilot, self.set_rel_home_m), with_points, then, but)
 
     def as_dict(self, *, profile: bool = False) -> dict[str, Any]:
         """Plain values for ``summary.json``; the profile on request."""
@@ -233,14 +238,15 @@ class WayHome:
     def rows(self) -> list[tuple[str, str]]:
         """(label, words) for a table of two columns, below the headline."""
         source = "the autopilot's default" if self.assumed else "as given"
-        out = [("judged at", f"{self.rtl_rel_home_m:g} m above home, {source}")]
+        judged_at = Told("{} above home, {}", Quantity(self.rtl_rel_home_m, "height", None), source)
+        out: list[tuple[str, str]] = [("judged at", judged_at)]
         if self.advice:
             out.append(("on the vehicle", self.advice))
-        out += [(NO_RETURN, f"from {s.describe()}") for s in self.unsafe]
+        out += [(NO_RETURN, Told("from {}", s.describe())) for s in self.unsafe]
         if self.irregular:
             first, length = self.irregular[0], together_m((s.from_m, s.to_m) for s in self.irregular)
-            words = f"from {reach(length)} the return hits nothing but breaks a limit; first from {first.describe()}"
-            out.append(("outside a limit", words))
+            words = "from {} the return hits nothing but breaks a limit; first from {}"
+            out.append(("outside a limit", Told(words, Reach(length), first.describe())))
         if self.not_judged and not self.unsafe and self.lowest_rel_home_m is None:
             return out + self._battery() + [(NOT_JUDGED, words) for words in self.not_judged]
         out += [
@@ -251,12 +257,14 @@ class WayHome:
         out += [
             (
                 f"rally point {number}",
-                f"{r.lat_deg:.7f}, {r.lon_deg:.7f}, {r.rel_home_m:.0f} m above home: {r.why}; nearest for "
-                f"{reach(r.serves_m)}",
+                Told(
+                    "{:.7f}, {:.7f}, {} above home: {}; nearest for {}",
+                    r.lat_deg, r.lon_deg, Quantity(r.rel_home_m, "height", 0, "up"), r.why, Reach(r.serves_m),
+                ),
             )
             for number, r in enumerate(self.rally, start=1)
-        ]
-        out += [(STILL_NO_RETURN, f"from {s.place_and_why}") for s in self.left]
+        ]  # fmt: skip
+        out += [(STILL_NO_RETURN, Told("from {}", s.place_and_why)) for s in self.left]
         out += [(NOT_JUDGED, words) for words in self.not_judged]
         return out
 
@@ -272,5 +280,12 @@ class WayHome:
 def _altitudes(lowest: float | None, highest: float | None) -> str:
     if lowest is None:
         return "no single return altitude is, from all of the path"
-    upper = " or more" if highest is None else f" to {floored(highest, 1):g} m"
-    return f"from all of the path at {raised(lowest, 1):g} m{upper} above home"
+    upper: str = " or more"
+    if highest is not None:
+        upper = Told(" to {}", Quantity(highest, "height", 1, "down", trimmed=True))
+    return Told("from all of the path at {}{} above home", _at_least(lowest), upper)
+
+
+def _at_least(rel_home_m: float) -> Quantity:
+    """A return altitude that must at least be set."""
+    return Quantity(rel_home_m, "height", 1, "up", trimmed=True)

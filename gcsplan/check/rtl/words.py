@@ -1,4 +1,4 @@
-"""Words that the way home is told in: lengths and labels."""
+"""Words that the way home is told in, and lengths of overlapping parts."""
 
 from __future__ import annotations
 
@@ -7,11 +7,6 @@ from collections.abc import Iterable
 PATH = {True: "path safe", False: "path UNSAFE", None: "path not judged in full"}
 NO_RETURN, STILL_NO_RETURN, NOT_JUDGED = "no safe return", "still no safe return", "not judged"
 """Labels of `rows` that may come several times."""
-
-
-def reach(metres: float) -> str:
-    """A length along the path: ``9.5 km``, ``340 m``."""
-    return f"{metres / 1e3:.1f} km" if metres >= 999.5 else f"{metres:.0f} m"
 
 
 def together_m(parts: Iterable[tuple[float, float]]) -> float:

@@ -6,8 +6,13 @@ window.addEventListener('afterprint', () => document.documentElement.classList.r
 
 const GAP = '\u202f', THIN = '\u202f';
 
+// The units of the page: by kind (path, leg, far, distance, height, amsl, speed, climb_rate) the symbol, the size in SI,
+// and the decimals more than in SI. All data are in SI; a unit of this table converts them where they are worded.
+const units = data.units;
+
 function num(value, decimals, unit) {
   if (value === null || value === undefined || !isFinite(value)) return '–';
+  if (Array.isArray(unit)) return num(value / unit[1], Math.max(0, decimals + unit[2]), unit[0]);
   let text = value.toFixed(decimals);
   if (Number(text) === 0) text = text.replace('-', '');
   text = text.replace(/\B(?=(\d{3})+(?!\d))/g, (m, g, at) => (text.indexOf('.') >= 0 && at > text.indexOf('.') ? '' : THIN));
@@ -15,11 +20,26 @@ function num(value, decimals, unit) {
 }
 
 // Room is rounded down, as everywhere on the page.
-const least = (v, d, unit) => num(v === null ? null : Math.floor(v * 10 ** d + 1e-3) / 10 ** d, d, unit);
+function least(v, d, unit) {
+  if (Array.isArray(unit) && v !== null) return least(v / unit[1], Math.max(0, d + unit[2]), unit[0]);
+  return num(v === null ? null : Math.floor(v * 10 ** d + 1e-3) / 10 ** d, d, unit);
+}
 
-function minutes(s) {
-  const whole = Math.round(s);
-  return whole < 60 ? num(whole, 0, 's') : `${Math.floor(whole / 60)}${GAP}min ${String(whole % 60).padStart(2, '0')}${GAP}s`;
+// h:mm:ss, with decimals of a second if asked.
+function duration(s, decimals = 0) {
+  if (s === null || s === undefined || !isFinite(s)) return '–';
+  const parts = Math.round(Math.abs(s) * 10 ** decimals), whole = Math.floor(parts / 10 ** decimals);
+  const two = (v) => String(v).padStart(2, '0');
+  const text = `${Math.floor(whole / 3600)}:${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}`;
+  const rest = decimals ? `.${String(parts % 10 ** decimals).padStart(decimals, '0')}` : '';
+  return (s < 0 && parts ? '-' : '') + text + rest;
+}
+
+// An energy, given in kJ: with Wh, and mAh where the battery's voltage is known.
+function energy(kj, decimals, volts) {
+  const parts = [num(kj, decimals, 'kJ'), num(kj / 3.6, decimals, 'Wh')];
+  if (volts) parts.push(num(kj / 0.0036 / volts, 0, 'mAh'));
+  return parts.join(' · ');
 }
 
 // -- the ground -------------------------------------------------------------------------------------------------------
@@ -52,7 +72,7 @@ function placeWords(e, n) {
 
 function groundWords(e, n) {
   const z = ground.at(e, n);
-  return isNaN(z) ? 'ground unknown' : `ground about ${num(z, 0, 'm AMSL')}`;
+  return isNaN(z) ? 'ground unknown' : `ground about ${num(z, 0, units.amsl)}`;
 }
 
 // Everything that is known of one sample of one line, a row each.
@@ -60,15 +80,15 @@ function sampleRows(k, i) {
   const line = data.lines[k], leg = line.legs[line.leg[i]], top = line.o ? line.o[i] : line.g[i];
   const rows = [
     [line.name, `to item ${leg.seq}, ${leg.kind}`],
-    ['along the track', line.s[line.s.length - 1] > 2000 ? num(line.s[i] / 1000, 2, 'km') : num(line.s[i], 1, 'm')],
-    ['path', num(line.z[i], 1, 'm AMSL')],
-    ['above ' + (line.o ? 'trees' : 'ground'), least(top === null ? null : line.z[i] - top, 1, 'm')],
-    ['ground', num(line.g[i], 1, 'm AMSL')],
+    ['along the track', line.s[line.s.length - 1] > 2000 ? num(line.s[i], 2, units.far) : num(line.s[i], 1, units.distance)],
+    ['path', num(line.z[i], 1, units.amsl)],
+    ['above ' + (line.o ? 'trees' : 'ground'), least(top === null ? null : line.z[i] - top, 1, units.height)],
+    ['ground', num(line.g[i], 1, units.amsl)],
   ];
-  if (!leg.column && line.f[i] !== null) rows.push(['lowest allowed', num(line.f[i], 1, 'm AMSL')]);
-  if (line.c[i] !== null) rows.push(['highest allowed', num(line.c[i], 1, 'm AMSL')]);
-  rows.push(['climb', num(leg.climb, 1, '°')], ['since take-off', minutes(line.t[i])]);
-  rows.push(['energy used', num(line.j[i], 0, 'kJ') + (line.battery ? `, ${num((100 * line.j[i]) / line.battery, 1, '%')}` : '')]);
+  if (!leg.column && line.f[i] !== null) rows.push(['lowest allowed', num(line.f[i], 1, units.amsl)]);
+  if (line.c[i] !== null) rows.push(['highest allowed', num(line.c[i], 1, units.amsl)]);
+  rows.push(['climb', num(leg.climb, 1, '°')], ['since take-off', duration(line.t[i])]);
+  rows.push(['energy used', energy(line.j[i], 0, line.volts) + (line.battery ? ` · ${num((100 * line.j[i]) / line.battery, 1, '%')}` : '')]);
   rows.push(['at', placeWords(line.e[i], line.n[i])]);
   return rows;
 }

@@ -17,9 +17,10 @@ function startMap() {
   const made = makeView(figure, {
     tools: document.querySelector('.tools[data-for="map"]'), most: 60,
     changed: (view) => {
-      const step = niceStep((width * view.w) / 8);
-      scale.style.width = `${(100 * step) / (width * view.w)}%`;
-      scale.firstChild.textContent = step >= 1000 ? num(step / 1000, 0, 'km') : num(step, step >= 1 ? 0 : 2, 'm');
+      const about = (width * view.w) / 8, unit = about > 0.5 * units.far[1] ? units.far : units.distance;
+      const step = niceStep(about / unit[1]);
+      scale.style.width = `${(100 * step * unit[1]) / (width * view.w)}%`;
+      scale.firstChild.textContent = num(step, step >= 1 ? 0 : 2, unit[0]);
     },
     point: (event, [x, y]) => {
       const e = ground.west + x * width, n = ground.north - y * height;
@@ -42,6 +43,9 @@ function niceStep(least) {
   return [1, 2, 5, 10].map((m) => m * power).find((s) => s >= least * (1 - 1e-9));
 }
 
+const timeStep = (least) => [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600].find((s) => s >= least) ||
+  3600 * Math.ceil(least / 3600);
+
 const MOST_ROWS = 12;
 
 function startChart(figure) {
@@ -49,17 +53,18 @@ function startChart(figure) {
   const y0 = +figure.dataset.y0, y1 = +figure.dataset.y1;
   const xticks = figure.querySelector('.xticks'), grids = figure.querySelector('.grids'), cursor = figure.querySelector('.cursor');
   const name = figure.id, k = name.startsWith('profile-') ? lineOf(+name.slice(8)) : -1, own = data.charts[name];
-  const xs = k >= 0 ? data.lines[k].s.map((s) => s / (figure.dataset.unit === 'km' ? 1000 : 1)) : own.x;
+  const xs = k >= 0 ? data.lines[k].s : own.x, size = +figure.dataset.size || 0; // of the unit of x; 0 for a time
 
   function retick(view) {
     const from = x0 + view.x * (x1 - x0), span = view.w * (x1 - x0);
-    const step = niceStep(span / Math.max(3, Math.min(9, plot.clientWidth / 90)));
-    const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    const wanted = span / Math.max(3, Math.min(9, plot.clientWidth / 90));
+    const inUnit = size ? niceStep(wanted / size) : 0, step = size ? size * inUnit : timeStep(wanted);
+    const decimals = size ? Math.max(0, -Math.floor(Math.log10(inUnit) + 1e-9)) : step < 1 ? 1 : 0;
     for (const old of grids.querySelectorAll('path:not(.y)')) old.remove();
     xticks.textContent = '';
     for (let i = Math.ceil(from / step - 1e-9); i * step <= from + span * (1 + 1e-9); i++) {
       const label = document.createElement('span'), line = document.createElementNS('http://www.w3.org/2000/svg', 'path');
-      label.textContent = num(i * step, decimals);
+      label.textContent = size ? num(i * inUnit, decimals) : duration(i * step, decimals);
       label.style.left = `${(100 * (i * step - from)) / span}%`;
       xticks.append(label);
       line.setAttribute('class', 'grid');
@@ -86,10 +91,11 @@ function startChart(figure) {
       }
       nowhere();
       mark(i);
-      const rows = [[own.xname || 'time', num(own.x[i], own.xdecimals || 1, own.xunit)]];
+      const x = own.xunit === 'time' ? duration(own.x[i], 1) : num(own.x[i], own.xdecimals, units[own.xunit]);
+      const rows = [[own.xname || 'time', x]];
       const known = own.series.filter((s) => s.y[i] !== null), y = y1 - v * (y1 - y0);
       if (known.length > MOST_ROWS) known.sort((a, b) => Math.abs(a.y[i] - y) - Math.abs(b.y[i] - y));
-      for (const s of known.slice(0, MOST_ROWS)) rows.push([s.name, num(s.y[i], s.decimals, s.unit)]);
+      for (const s of known.slice(0, MOST_ROWS)) rows.push([s.name, num(s.y[i], s.decimals, units[s.unit])]);
       if (known.length > MOST_ROWS) rows.push(['farther from the pointer', `${known.length - MOST_ROWS} more`]);
       tip.rows(event, rows);
     },

@@ -21,12 +21,12 @@ from gcsplan.check.rtl.stretches import rel_home
 from gcsplan.check.rtl.sweep import Target, obstacles_of_returns
 from gcsplan.check.rtl.trace import trace_of
 from gcsplan.check.rtl.way_home import WayHome, refinement_of, way_home
-from gcsplan.check.rtl.words import reach
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import LAND, RTL, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission
 from gcsplan.mavlink.mission.mission import MissionItem as Item
+from gcsplan.units import Reach
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
@@ -415,7 +415,13 @@ def test_the_headline_tells_path_and_return_and_counts_overlaps_once() -> None:
 def test_words_know_one_from_many() -> None:
     assert [counted(n, "rally point") for n in (1, 2)] == ["1 rally point", "2 rally points"]
     assert [counted(n, "stretch", "stretches") for n in (1, 2)] == ["1 stretch", "2 stretches"]
-    assert [reach(m) for m in (0.4, 340.2, 999.4, 999.6, 9480.0)] == ["0 m", "340 m", "999 m", "1.0 km", "9.5 km"]
+    assert [Reach(m).text(None) for m in (0.4, 340.2, 999.4, 999.6, 9480.0)] == [
+        "0 m",
+        "340 m",
+        "999 m",
+        "1.0 km",
+        "9.5 km",
+    ]
 
 
 def test_figures_are_plain_values_and_words() -> None:
