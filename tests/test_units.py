@@ -10,6 +10,7 @@ import pickle
 import re
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -25,6 +26,7 @@ from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of, report_of
 from gcsplan.app.pipeline import plan
 from gcsplan.app.rehearsing import rehearse
+from gcsplan.app.report_page import page_of_plan
 from gcsplan.app.way_home import homes_of
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.cli import console
@@ -34,9 +36,11 @@ from gcsplan.figures import floored, raised
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.units import OTHERS
 from gcsplan.report import markup
+from gcsplan.report.page import render_page
 from gcsplan.units import AVIATION, IMPERIAL, METRIC, SYSTEMS, Quantity, Seconds, Told, Units, charge, duration, told
 from tests.support.shown import EXACT, NUMBER, number, same, seconds, taken_apart
 
+pytestmark = pytest.mark.xdist_group("units")  # its mission is planned once
 systems = pytest.mark.parametrize("units", SYSTEMS.values(), ids=SYSTEMS)
 
 MISSION: dict[str, Any] = {
@@ -152,6 +156,19 @@ def page_words(page: str) -> str:
     tips = re.findall(r'(?:title|aria-label)="([^"]*)"', page)
     words = html.unescape("\n".join([re.sub(r"<[^>]+>", "\n", page), *tips]))
     return "\n".join(line for line in words.splitlines() if line.strip())
+
+
+@systems
+def test_the_chart_of_separations_names_the_exact_least_distance(units: Units) -> None:
+    """The curve's samples may miss it by some centimetres, which feet show."""
+    page = page_of_plan(planned()[0], units=units)
+    assert page.separation is not None
+    assert page.separation.least is not None
+    nearer = replace(page.separation.least, distance_m=page.separation.least.distance_m - 0.2)
+    exact = markup.least(nearer.distance_m, 1, units.distance)
+    text = render_page(replace(page, separation=replace(page.separation, least=nearer)))
+    chart = text.partition('id="separation"')[2].partition("</figure>")[0]
+    assert re.findall(r'class="mark tight".*?<b>([^<]*)</b>', chart) == [exact]
 
 
 @pytest.mark.parametrize("units", [IMPERIAL, AVIATION], ids=["imperial", "aviation"])

@@ -11,6 +11,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.report.chart import Axes, chart_html
+from gcsplan.report.marks import Mark
 from gcsplan.report.markup import esc, least, num, stated, table, tools
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.subject import Page
@@ -153,14 +154,11 @@ def _separation_chart(
         shapes += [axes.line(times, d, "pair") for _, _, d in pairs]
         numbers += [(f"{a[1].name} – {b[1].name}", "distance", 1, d) for a, b, d in pairs]
     shapes.append(axes.line(times, nearest, "nearest"))
-    at = int(np.nanargmin(nearest))
-    a, b, _ = pairs[int(np.nanargmin(every[:, at]))]
-    label = least(float(nearest[at]), 1, unit)
-    tip = f"{a[1].name} and {b[1].name} are nearest at {duration(float(times[at]), 1)}: about {label}"
-    kind = "broken" if needed_m and nearest[at] < needed_m - 1e-6 else "tight"
-    marks = [axes.mark(float(times[at]), float(nearest[at]), kind, label, tip, 0)]
+    mark = _nearest_mark(page, axes, times, nearest)
+    marks = [] if mark is None else [mark]
     charts["separation"] = _numbers(times, numbers)
-    words = f"Distance of the nearest two vehicles over time; {tip}; asked for: {num(needed_m, 1, unit)}"
+    nearest_words = "" if mark is None else f"; {mark.tip}"
+    words = f"Distance of the nearest two vehicles over time{nearest_words}; asked for: {num(needed_m, 1, unit)}"
     key = (
         '<ul class="legend"><li><i class="stroke nearest"></i>nearest two</li>'
         + ('<li><i class="stroke pair"></i>each pair</li>' if len(pairs) <= MOST_PAIRS else "")
@@ -168,6 +166,27 @@ def _separation_chart(
         + "</ul>"
     )
     return chart_html("separation", axes, shapes, marks, words, TALL) + key
+
+
+def _nearest_mark(page: Page, axes: Axes, times: Floats, nearest: Floats) -> Mark | None:
+    """The nearest approach: the exact one, if the separation was judged, else that of the sampled moments."""
+    found = page.separation
+    if found is None:
+        at = int(np.nanargmin(nearest))
+        time_s, distance_m, who, about = float(times[at]), float(nearest[at]), "two vehicles", "about "
+    elif found.least is None:
+        return None
+    else:
+        time_s, distance_m, who, about = (
+            found.least.time_s,
+            found.least.distance_m,
+            " and ".join(found.least.vehicles),
+            "",
+        )
+    label = least(distance_m, 1, page.units.distance)
+    broken = found is not None and distance_m < found.rules.needed_m - 1e-6
+    tip = f"{who} are nearest at {duration(time_s, 1)}: {about}{label}"
+    return axes.mark(time_s, distance_m, "broken" if broken else "tight", label, tip, 0)
 
 
 def _numbers(times: Floats, series: Sequence[tuple[str, str, int, Floats]]) -> dict[str, object]:
