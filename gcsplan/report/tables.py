@@ -53,7 +53,8 @@ def legs_table(subject: Subject, units: Units) -> str:
         used += item.energy_j * item.times
         flown += item.stretches
         name = f"{item.seq} {item.kind}" + (f" ×{THIN}{item.times}" if item.times > 1 else "")
-        near = f"{least(item.zone_clearance_m, 0, units.distance)} {esc(item.nearest_zone)}" if item.nearest_zone else "–"
+        away = least(item.zone_clearance_m, 0, units.distance)
+        near = f"{away} {esc(item.nearest_zone)}" if item.nearest_zone else "–"
         rows.append(
             (
                 esc(name), num(item.length_m, 0, units.leg), num(item.end[2], 1, units.height),
