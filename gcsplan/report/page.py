@@ -37,7 +37,7 @@ OPEN_VEHICLES = 3
 """Vehicles whose profiles are open at first; the others open on a tap, and on paper. So do a fleet's tables."""
 MOST_CARDS = 6
 """Most vehicles with cards; the key figures of more are in one table."""
-SCRIPTS = ("base.js", "view.js", "charts.js", "mesh.js", "scene.js", "start.js")
+SCRIPTS = ("base.js", "labels.js", "view.js", "charts.js", "mesh.js", "scene.js", "start.js")
 
 
 def render_check(

@@ -178,18 +178,36 @@ def test_the_map_and_a_profile_can_be_enlarged_and_shown_whole_again(page: Brows
         assert page.evaluate(f"document.querySelectorAll('#{name} .mark.out').length") == 0
 
 
-def test_labels_do_not_lie_on_each_other(page: Browser, report: Path) -> None:
-    for width in (1200, 390):
-        page.visit(report, width=width)
-        boxes = page.evaluate(
-            "[...document.querySelectorAll('#map .mark:not(.mute):not(.out) b')].map((b) => { "
-            "const r = b.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom]; })"
-        )
-        assert len(boxes) >= 4
-        for i, a in enumerate(boxes):
-            for b in boxes[:i]:
-                wide, tall = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
-                assert wide <= 1 or tall <= 4, (width, a, b)
+LABELS = """
+(() => { const made = []; for (const figure of document.querySelectorAll('#map, .plot')) {
+  const frame = figure.getBoundingClientRect(), shown = [...figure.querySelectorAll('.mark:not(.out)')];
+  const box = (r) => [r.left, r.top, r.right, r.bottom];
+  made.push({
+    frame: box(frame),
+    labels: shown.filter((m) => !m.classList.contains('mute')).map((m) => box(m.querySelector('b').getBoundingClientRect())),
+    symbols: shown.flatMap((m) => { const s = getComputedStyle(m, '::before'), at = m.getBoundingClientRect();
+      const r = 0.5 * parseFloat(s.width);
+      return s.display === 'none' ? [] : [[at.left - r, at.top - r, at.left + r, at.top + r]]; }),
+  }); } return made; })()
+"""
+
+
+def test_labels_lie_on_no_label_and_on_no_symbol_on_a_desk_a_phone_and_on_paper(page: Browser, report: Path) -> None:
+    for width in (1200, 390, "paper"):
+        page.visit(report, width=1200 if width == "paper" else width)
+        if width == "paper":
+            page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+            assert abs(page.evaluate("document.body.clientWidth") - 180 / 25.4 * 96) < 1.0
+        figures = [f for f in page.evaluate(LABELS) if f["frame"][2] > f["frame"][0]]
+        assert len(figures[0]["labels"]) >= 4
+        assert len(figures) == 6
+        for figure in figures:
+            for i, a in enumerate(figure["labels"]):
+                for b in figure["labels"][:i] + figure["symbols"]:
+                    wide, tall = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+                    assert min(wide, tall) <= 0.5, (width, a, b)
+                assert a[0] >= figure["frame"][0]
+                assert a[2] <= figure["frame"][2] + 0.5
 
 
 def test_on_paper_everything_is_unfolded_light_and_the_view_in_space_is_there(page: Browser, report: Path) -> None:

@@ -6,11 +6,4 @@ for (const start of starts) {
 }
 // A tap beside every figure puts the tip away.
 document.addEventListener('pointerdown', (event) => { if (!event.target.closest('.view')) { tip.hide(); nowhere(); } });
-// What is folded is unfolded on paper.
-window.addEventListener('beforeprint', () => {
-  for (const part of document.querySelectorAll('details:not([open])')) { part.open = true; part.dataset.folded = ''; }
-});
-window.addEventListener('afterprint', () => {
-  for (const part of document.querySelectorAll('details[data-folded]')) { part.open = false; delete part.dataset.folded; }
-});
 document.documentElement.dataset.ready = 'yes';

@@ -1,49 +1,16 @@
 // A figure that can be moved and enlarged: an SVG whose viewBox moves, and marks over it that keep their size.
 function makeView(figure, options) {
   const svg = figure.querySelector('svg'), [, , W, H] = svg.getAttribute('viewBox').split(' ').map(Number);
-  const marks = [...figure.querySelectorAll('.mark')].map((el) => {
-    const words = el.title;
-    el.removeAttribute('title'); // the tip tells it, and a browser's own would cover it
-    return { el, label: el.querySelector('b'), x: +el.dataset.x, y: +el.dataset.y, rank: +el.dataset.rank, words };
-  });
+  const marks = marksOf(figure);
   for (const title of svg.querySelectorAll('title')) {
     title.parentNode.dataset.words = title.textContent;
     title.remove();
   }
-  marks.sort((a, b) => a.rank - b.rank);
   const view = { x: 0, y: 0, w: 1, h: 1 }, most = options.most || 40;
 
   function arrange() {
-    const width = figure.clientWidth, height = figure.clientHeight, taken = [];
-    for (const m of marks) {
-      const u = (m.x - view.x) / view.w, v = (m.y - view.y) / view.h, out = u < 0 || u > 1 || v < 0 || v > 1;
-      m.el.classList.toggle('out', out);
-      if (out) continue;
-      m.el.style.left = `${100 * u}%`;
-      m.el.style.top = `${100 * v}%`;
-    }
-    for (const m of marks) m.size = m.size || [m.label.offsetWidth, m.label.offsetHeight];
-    const shown = marks.filter((m) => !m.el.classList.contains('out'));
-    for (const m of shown) {
-      m.px = ((m.x - view.x) / view.w) * width;
-      m.py = ((m.y - view.y) / view.h) * height;
-      if (!m.el.classList.contains('name') && !m.el.classList.contains('tag')) taken.push([m.px - 3, m.py - 3, m.px + 3, m.py + 3]);
-    }
-    // Above its place, below, to the right, to the left: the first that is free; otherwise a label waits for more room.
-    for (const m of shown) {
-      const [w, h] = m.size, { px, py } = m, near = m.el.classList.contains('beside') || m.el.classList.contains('tag') ? 2 : 5;
-      const inside = m.el.classList.contains('name') && !m.el.classList.contains('beside');
-      const places = inside ? [0, -1.2, 1.2, -2.2, 2.2].map((k) => ['', px - 0.5 * w, py + (k - 0.5) * h, k]) : [
-        ['', px - 0.5 * w, py - h - near], ['d', px - 0.5 * w, py + near], ['l', px + near + 3, py - 0.5 * h], ['r', px - near - 3 - w, py - 0.5 * h]];
-      const found = places.find(([, x, y]) => {
-        if (x < 0 || x + w > width || y < 0 || y + h > height) return false;
-        return !taken.some((b) => x < b[2] && b[0] < x + w && y + 1 < b[3] && b[1] < y + h - 1);
-      });
-      for (const side of ['d', 'l', 'r']) m.el.classList.toggle(side, !!found && found[0] === side);
-      m.el.classList.toggle('mute', !found);
-      if (inside && found) m.label.style.marginTop = `${found[3] * h}px`;
-      if (found) taken.push([found[1] - 2, found[2], found[1] + w + 2, found[2] + h]);
-    }
+    const taken = layMarks(figure, marks, view);
+    if (options.laid) options.laid(view, taken);
   }
 
   function apply() {
@@ -99,7 +66,9 @@ function makeView(figure, options) {
       else if (what === 'home') zoom(1e-6);
     });
   }
-  new ResizeObserver(() => { for (const m of marks) m.size = null; arrange(); }).observe(figure);
+  const again = () => { for (const m of marks) m.w = 0; arrange(); };
+  new ResizeObserver(again).observe(figure);
+  for (const when of ['beforeprint', 'afterprint']) window.addEventListener(when, again); // paper is narrower
   apply();
   return { view, where, pixel: () => [view.w / figure.clientWidth, view.h / figure.clientHeight] };
 }
