@@ -42,8 +42,8 @@ def page_of_plan(
         subjects.append(
             Subject(
                 v.name, v.verdict, v.request.vehicle, certificate, tuple(dict.fromkeys(notes)),
-                fleet.motion(v.name) if fleet is not None and several else None, slot,
-                (homes or {}).get(v.name), uploads.get(v.name),
+                None if fleet is None else fleet.motion(v.name), slot,
+                (homes or {}).get(v.name), uploads.get(v.name), leaves=v.request.end == "none",
             )
         )  # fmt: skip
     return Page(

@@ -18,12 +18,13 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report import tables
-from gcsplan.report.fleet_view import fleet_html
+from gcsplan.report.fleet_view import fleet_html, motions_of
 from gcsplan.report.home_view import home_html, home_lines
 from gcsplan.report.markup import data_block, energy, esc, least, num, place, stated, tools
 from gcsplan.report.plan_view import COLOURS, map_html
 from gcsplan.report.profile_view import profile_html, profile_legend
 from gcsplan.report.relief import Relief, extent_of, relief_of
+from gcsplan.report.replay import replay_data, replay_html, replay_of
 from gcsplan.report.samples import MOST_SAMPLES, Line, Passage, line_of, passages
 from gcsplan.report.scene_data import exaggeration, zone_meshes
 from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check
@@ -37,7 +38,8 @@ OPEN_VEHICLES = 3
 """Vehicles whose profiles are open at first; the others open on a tap, and on paper. So do a fleet's tables."""
 MOST_CARDS = 6
 """Most vehicles with cards; the key figures of more are in one table."""
-SCRIPTS = ("base.js", "labels.js", "view.js", "charts.js", "mesh.js", "scene.js", "start.js")
+SCRIPTS = ("base.js", "labels.js", "view.js", "flight.js", "replay.js", "charts.js", "mesh.js", "scene.js",
+           "start.js")  # fmt: skip
 
 
 def render_check(
@@ -71,6 +73,8 @@ def render_page(page: Page) -> str:
     ]
     charts: dict[str, object] = {}
     fleet, home = fleet_html(page, charts), home_html(page, lines, charts)
+    replay = replay_of(page)
+    flown = [t.places[:, 1:3] for t in replay.tracks if t.flown] if replay is not None else []
     data = {
         "grid": relief.grid,
         "lines": [
@@ -80,13 +84,13 @@ def render_page(page: Page) -> str:
         ],
         "zones": zone_meshes(zones, surface, relief, drawn),
         "exaggeration": exaggeration(relief, drawn),
-        "charts": charts,
-        "units": page.units.as_dict(),
-    }
+        "charts": charts, "units": page.units.as_dict(), "replay": replay_data(replay, page) if replay else None,
+    }  # fmt: skip
     body = "".join(
         (
             _header(page), _vehicles(page),
-            f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief)}</section>',
+            f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief, flown)}'
+            f"{replay_html(replay, page) if replay else ''}</section>",
             _scene(page, relief),
             *_profiles(page, lines, found), home, fleet, *_details(page, lines, found), _end(page),
         )
@@ -165,11 +169,12 @@ def _vehicles(page: Page) -> str:
         found = [verdict_of(s.verdict.safe, homeless=s.homeless) for s in page.subjects]
         words = [f"{sign} {word.lower()}" for _, sign, word, _ in found]
         return f"<section>{tables.vehicles_table(page, words)}</section>"
-    cards = "".join(_card(s, i, page.units) for i, s in enumerate(page.subjects))
+    in_fleet = bool(motions_of(page))
+    cards = "".join(_card(subject, i, page.units, in_fleet=in_fleet) for i, subject in enumerate(page.subjects))
     return f'<section class="cards" aria-label="Key figures">{cards}</section>'
 
 
-def _card(subject: Subject, index: int, units: Units) -> str:
+def _card(subject: Subject, index: int, units: Units, *, in_fleet: bool) -> str:
     verdict, limits, c = subject.verdict, subject.vehicle.limits, subject.certificate
     kind, sign, word, _ = verdict_of(verdict.safe, homeless=subject.homeless)
     low, near = verdict.lowest, verdict.nearest
@@ -196,14 +201,14 @@ def _card(subject: Subject, index: int, units: Units) -> str:
         if verdict.battery_used_percent is not None
         else ("energy", used, "battery capacity not given")
     )  # fmt: skip
-    since = "after take-off" if subject.motion is None else "after the fleet's start"
-    if subject.motion is None and subject.depart_s > 0.0:
+    since = "after the fleet's start" if in_fleet else "after take-off"
+    if not in_fleet and subject.depart_s > 0.0:
         since = f"after the start, {duration(subject.depart_s)} of it on the ground"
     items = len(verdict.mission.wire_items())
     figures.append(
         (
             "arrives",
-            duration(subject.arrive_s, 1 if subject.motion is not None else 0),
+            duration(subject.arrive_s, 1 if in_fleet else 0),
             f"{since}; {items} mission items",
         )
     )

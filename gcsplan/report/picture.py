@@ -23,7 +23,7 @@ from matplotlib.patheffects import withStroke
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.report import space_picture
-from gcsplan.report.fleet_view import apart_m, flown_m, instants
+from gcsplan.report.fleet_view import apart_m, flown_m, instants, motions_of
 from gcsplan.report.relief import TINTS, shaded
 from gcsplan.report.samples import line_of
 from gcsplan.report.subject import Page
@@ -74,7 +74,7 @@ def figures(page: Page) -> dict[str, bytes]:
     space = space_picture.draw(page.title, page.world, tracks)
     if space is not None:
         drawn["report-space.png"] = space
-    if any(s.motion is not None for s in page.subjects):
+    if motions_of(page):
         drawn["report-fleet.png"] = _fleet_alone(page)
     out = {}
     with rc_context({"text.parse_math": False}):
@@ -116,7 +116,7 @@ def _profiles_alone(page: Page) -> Figure:
 
 
 def _fleet_alone(page: Page) -> Figure:
-    motions = [(k, s.motion) for k, s in enumerate(page.subjects) if s.motion is not None]
+    motions = motions_of(page)
     times = instants(motions)
     figure = _figure(11, 6.5)
     way, apart = figure.subplots(2, 1, sharex=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report.marks import Mark, marks_html
 from gcsplan.report.markup import at_least, esc, least, num, place, stated
@@ -23,8 +24,8 @@ COLOURS = 8
 """Number of the style sheet's classes t0 …; more vehicles reuse them from the first."""
 
 
-def map_html(page: Page, lines: Sequence[Line | None], relief: Relief) -> str:
-    """The map as a figure with its legend."""
+def map_html(page: Page, lines: Sequence[Line | None], relief: Relief, flown: Sequence[Floats] = ()) -> str:
+    """The map as a figure with its legend. ``flown``: (N, 2) east and north of each line flown in a rehearsal."""
     extent, zones = relief.extent, page.world.airspace.zones
     height = extent.height_m * extent.scale
     shapes = [
@@ -37,6 +38,7 @@ def map_html(page: Page, lines: Sequence[Line | None], relief: Relief) -> str:
             if line is not None
         ),
         *(_track_svg(line, i, extent) for i, line in enumerate(lines) if line is not None),
+        *(_flown_svg(line, extent) for line in flown),
         '<path class="cursor" d=""/>',
     ]
     marks = [m for zone in zones for m in _zone_mark(zone, extent, page.units)]
@@ -140,6 +142,11 @@ def _track_svg(line: Line, index: int, extent: Extent) -> str:
         f'<polyline class="casing" points="{points}"/>'
         f'<polyline class="track t{index % COLOURS}" data-line="{index}" points="{points}"/>'
     )
+
+
+def _flown_svg(line: Floats, extent: Extent) -> str:
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in extent.units(line[:, 0], line[:, 1]))
+    return f'<polyline class="flown" points="{points}"/>'
 
 
 def _track_marks(

@@ -32,9 +32,10 @@ class Certificate:
 class Subject:
     """One vehicle, or one checked file: its verdict, and other data on it.
 
-    ``slot`` is its part of the time table, None for a checked file; ``motion`` too, None if it flies alone. ``home`` is
-    the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if nothing was
-    sent.
+    ``slot`` is its part of the time table, None for a checked file, and so is ``motion``, the whole flight over time.
+    ``flown`` is what it flew in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
+    ``home`` is the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if
+    nothing was sent.
     """
 
     name: str
@@ -46,6 +47,8 @@ class Subject:
     slot: Slot | None = None
     home: WayHome | None = None
     upload: Mapping[str, object] | None = None
+    flown: TimedPath | None = None
+    leaves: bool = False
 
     @property
     def depart_s(self) -> float:

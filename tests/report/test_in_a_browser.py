@@ -184,7 +184,8 @@ LABELS = """
   const box = (r) => [r.left, r.top, r.right, r.bottom];
   made.push({
     frame: box(frame),
-    labels: shown.filter((m) => !m.classList.contains('mute')).map((m) => box(m.querySelector('b').getBoundingClientRect())),
+    labels: shown.filter((m) => !m.classList.contains('mute'))
+      .map((m) => box(m.querySelector('b').getBoundingClientRect())),
     symbols: shown.flatMap((m) => { const s = getComputedStyle(m, '::before'), at = m.getBoundingClientRect();
       const r = 0.5 * parseFloat(s.width);
       return s.display === 'none' ? [] : [[at.left - r, at.top - r, at.left + r, at.top + r]]; }),
@@ -208,6 +209,45 @@ def test_labels_lie_on_no_label_and_on_no_symbol_on_a_desk_a_phone_and_on_paper(
                     assert min(wide, tall) <= 0.5, (width, a, b)
                 assert a[0] >= figure["frame"][0]
                 assert a[2] <= figure["frame"][2] + 0.5
+
+
+def test_the_replay_moves_every_figure_by_slider_by_key_and_by_clock(page: Browser, report: Path) -> None:
+    for width in (1200, 390):
+        page.visit(report, width=width, phone=width < 500)
+        left, top, wide, tall = show(page, "#replay input")
+        assert page.evaluate("document.querySelectorAll('#map .crafts').length") == 1
+        assert page.evaluate("document.querySelector('#map .crafts').hidden")  # nothing over the starts at first
+        page.evaluate("document.querySelector('#replay details').open = true")
+        for kind in ("mousePressed", "mouseReleased"):
+            page.ask("Input.dispatchMouseEvent", type=kind, x=left + wide / 2, y=top + tall / 2, button="left",
+                     clickCount=1)  # fmt: skip
+        page.settle()
+        said = "document.querySelector('#replay output').innerText"
+        at = int(page.evaluate("document.querySelector('#replay input').value"))
+        assert 240 <= at <= 270
+        assert page.evaluate(said) == f"T+0:{at // 60:02d}:{at % 60:02d}"
+        row = page.evaluate("document.querySelector('#replay tbody tr').innerText").split("\t")
+        assert [row[0], row[1], row[2]] == ["uav1", "flies", "430\u202fm AMSL"]
+        assert row[4].endswith("uav2")
+        assert page.evaluate("document.querySelectorAll('#map .craft:not([hidden])').length") == 2
+        assert page.evaluate("document.querySelector('#profile-0 path.craft').getAttribute('d').length") > 3
+        assert page.evaluate("document.querySelector('#distance path.now').getAttribute('d').length") > 3
+        page.evaluate("document.querySelector('#replay input').focus()")
+        for key, code in (("ArrowRight", 39), (" ", 32)):
+            page.ask("Input.dispatchKeyEvent", type="keyDown", key=key, windowsVirtualKeyCode=code)
+        value = "+document.querySelector('#replay input').value"
+        page.evaluate(
+            f"new Promise((r) => {{ const look = () => ({value}) > {at + 2} ? r(1) : setTimeout(look, 50); look(); }})"
+        )
+        play = "document.querySelector('#replay [data-do=play]')"
+        assert page.evaluate(f"{play}.getAttribute('aria-label')") == "pause"
+        page.evaluate(f"{play}.click()")
+        page.evaluate("document.querySelector('#replay [data-do=closest]').click()")
+        assert page.evaluate(said) == page.evaluate("document.querySelector('#replay input').ariaValueText")
+        page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+        for what in ("#replay", "#map .crafts", "#profile-0 path.craft"):
+            assert page.evaluate(f"getComputedStyle(document.querySelector({what!r})).display") == "none"
+        assert page.complaints() == []
 
 
 def test_on_paper_everything_is_unfolded_light_and_the_view_in_space_is_there(page: Browser, report: Path) -> None:

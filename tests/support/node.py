@@ -10,6 +10,12 @@ from typing import Any
 
 PROGRAM = shutil.which("node")
 ANSWER_S = 30.0
+PAGE = """
+const window = { addEventListener() {} };
+const grid = { box: [0, 0, 1, 1], heights: '', cols: 0, rows: 0, base: 0, step: 1, lat: [], lon: [], lattice: 0 };
+const document = { getElementById: () => ({ textContent: JSON.stringify({ grid, lines: [] }) }) };
+"""
+"""What `base.js` finds of a page: no figure, no ground, no vehicle."""
 
 
 def ask(assets: tuple[str, ...], expression: str, given: object = None) -> Any:
@@ -17,7 +23,7 @@ def ask(assets: tuple[str, ...], expression: str, given: object = None) -> Any:
     assert PROGRAM is not None
     folder = resources.files("gcsplan.report").joinpath("assets")
     parts = [folder.joinpath(name).read_text(encoding="utf-8") for name in assets]
-    text = f"'use strict';\nconst given = {json.dumps(given)};\n" + "\n".join(parts)
+    text = f"'use strict';\nconst given = {json.dumps(given)};\n{PAGE}\n" + "\n".join(parts)
     text += f"\nprocess.stdout.write(JSON.stringify({expression}));\n"
     done = subprocess.run([PROGRAM, "-"], input=text, capture_output=True, text=True, timeout=ANSWER_S, check=False)
     assert done.returncode == 0, done.stderr

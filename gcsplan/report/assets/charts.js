@@ -14,8 +14,11 @@ function startMap() {
   const figure = document.getElementById('map'), scale = figure.querySelector('.scale'), cursor = figure.querySelector('.cursor');
   const width = +figure.dataset.widthM, height = +figure.dataset.heightM;
   const unit = 10000 / width;
+  let laid = null;
+  const crafts = startCrafts(figure, () => laid);
   const made = makeView(figure, {
     tools: document.querySelector('.tools[data-for="map"]'), most: 60,
+    laid: (view, taken) => { laid = { view, taken }; crafts(); },
     changed: (view) => {
       const about = (width * view.w) / 8, unit = about > 0.5 * units.far[1] ? units.far : units.distance;
       const step = niceStep(about / unit[1]);
@@ -101,6 +104,10 @@ function startChart(figure) {
     },
   });
   watchers.push((which, i) => mark(which === k && k >= 0 ? i : -1));
+  const across = (x) => (10000 * (x - x0)) / (x1 - x0);
+  if (data.replay && (k >= 0 || !own.xname)) {
+    startChartTime(plot.querySelector('svg'), k, xs.map(across), across, (z) => (10000 * (y1 - z)) / (y1 - y0));
+  }
   new ResizeObserver(() => retick(made.view)).observe(plot);
 }
 

@@ -1,4 +1,6 @@
 // The view in space: what is looked at from where, what the mouse and the fingers do, and the labels over it.
+const MOST_LABELS = 300; // more would not be read, and each takes time in every frame
+
 function startScene() {
   const figure = document.getElementById('scene');
   if (!figure) return;
@@ -140,19 +142,12 @@ function startScene() {
     if (printing) pen.drawImage(canvas, 0, 0, size[0], size[1]); // what WebGL drew does not reach the paper by itself
     pen.textAlign = 'center';
     pen.lineJoin = 'round';
-    const taken = [], text = style.getPropertyValue('--text'), halo = style.getPropertyValue('--paper');
-    const write = (words, x, y, bold, colour) => {
-      if (x < 0 || x > size[0] || y < 0 || y > size[1] + 12) return;
+    const said = [], text = style.getPropertyValue('--text'), halo = style.getPropertyValue('--paper');
+    // A label beside a symbol of radius r; all are written last, each where there is room.
+    const write = (words, c, r, bold, colour) => {
+      if (c[0] < 0 || c[0] > size[0] || c[1] < 0 || c[1] > size[1]) return;
       pen.font = `${bold ? '600 ' : ''}12px system-ui, sans-serif`;
-      const half = 0.5 * pen.measureText(words).width + 2;
-      x = Math.min(Math.max(x, half), size[0] - half);
-      if (taken.some((b) => x - half < b[1] && b[0] < x + half && y - 13 < b[3] && b[2] < y + 3)) return;
-      taken.push([x - half, x + half, y - 13, y + 3]);
-      pen.lineWidth = 3;
-      pen.strokeStyle = halo;
-      pen.strokeText(words, x, y);
-      pen.fillStyle = colour || text;
-      pen.fillText(words, x, y);
+      said.push({ x: c[0], y: c[1], r, w: pen.measureText(words).width, h: 14, words, bold: !!bold, font: pen.font, colour: colour || text });
     };
     const dot = (c, r, fill) => {
       pen.beginPath();
@@ -163,28 +158,35 @@ function startScene() {
       pen.fill();
       pen.stroke();
     };
-    for (const z of meshes.zones) { const c = project(z.top); if (c && !hidden(z.top)) write(z.name, c[0], c[1] - 4, true, style.getPropertyValue('--zone-text')); }
+    for (const z of meshes.zones) { const c = project(z.top); if (c && !hidden(z.top)) write(z.name, c, 0, true, style.getPropertyValue('--zone-text')); }
     data.lines.forEach((line, k) => {
       const colour = style.getPropertyValue(`--t${line.index % 8}`), last = line.s.length - 1;
       for (const [i, words] of [[0, 'start'], [last, 'goal']]) {
         const p = at(line.e[i], line.n[i], line.z[i]), c = project(p);
         if (!c || hidden(p)) continue;
         dot(c, 5, colour);
-        write(data.lines.length > 1 ? `${line.name} ${words}` : words, c[0], c[1] - 9, true);
+        write(data.lines.length > 1 ? `${line.name} ${words}` : words, c, 5, true);
       }
       line.legs.forEach((leg, j) => {
         const i = line.ends[j], p = at(line.e[i], line.n[i], line.z[i]), c = leg.kind === 'cruise' && project(p);
         if (!c || hidden(p)) return;
         dot(c, 3, colour);
-        write(String(leg.seq), c[0], c[1] - 7);
+        write(String(leg.seq), c, 3);
       });
     });
     for (const line of data.lines) for (const [e, n, z, words] of line.broken) {
       const p = at(e, n, z), c = project(p);
       if (!c) continue;
       dot(c, 6, style.getPropertyValue('--bad'));
-      write(words, c[0], c[1] + 18, true, style.getPropertyValue('--bad'));
+      write(words, c, 6, true, style.getPropertyValue('--bad'));
     }
+    if (replay.shown && !printing) replay.tracks.forEach((track, i) => {
+      const place = replay.places[i], c = place && project(at(place.e, place.n, place.z));
+      if (!c) return;
+      dot(c, 7, hollow(track) ? halo : style.getPropertyValue(`--t${track.k % 8}`));
+      if (hollow(track)) dot(c, 3, style.getPropertyValue(`--t${track.k % 8}`));
+      else if (replay.tracks.length > 1) write(track.name, c, 7, true);
+    });
     if (pointed) {
       const [k, i] = pointed, line = data.lines[k], c = project(at(line.e[i], line.n[i], line.z[i]));
       if (c) dot(c, 7, style.getPropertyValue('--cursor'));
@@ -203,8 +205,16 @@ function startScene() {
         pen.lineTo(o[0] + 5 * u[0] - side * 4 * u[1], o[1] + 5 * u[1] + side * 4 * u[0]);
       }
       pen.stroke();
-      write('N', o[0] + 20 * u[0], o[1] + 20 * u[1] + 4, true);
+      write('N', [o[0] + 20 * u[0], o[1] + 20 * u[1] + 8], 0, true);
     }
+    const first = said.reverse().sort((a, b) => b.bold - a.bold).slice(0, MOST_LABELS);
+    layLabels(first, ...size, []).forEach((spot, i) => {
+      if (!spot) return;
+      const { words, font, w, colour } = first[i], x = spot[0] + 0.5 * w, y = spot[1] + 11;
+      Object.assign(pen, { font, lineWidth: 3, strokeStyle: halo, fillStyle: colour });
+      pen.strokeText(words, x, y);
+      pen.fillText(words, x, y);
+    });
   }
 
   // The ground under a pixel: along the ray in small steps, then halved.
@@ -298,6 +308,7 @@ function startScene() {
   told();
   fit();
   new ResizeObserver(redraw).observe(figure);
+  movers.push(redraw);
   watchers.push((k, i) => { pointed = k < 0 ? null : [k, i]; redraw(); });
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
   for (const when of ['beforeprint', 'afterprint']) window.addEventListener(when, () => { printing = when === 'beforeprint'; draw(); });

@@ -1,6 +1,6 @@
 // Each figure on its own: what fails in one is told in the console, and the others are there all the same.
 document.documentElement.classList.add('live');
-const starts = [startMap, ...[...document.querySelectorAll('figure.chart')].map((f) => () => startChart(f)), startScene];
+const starts = [startMap, ...[...document.querySelectorAll('figure.chart')].map((f) => () => startChart(f)), startScene, startReplay];
 for (const start of starts) {
   try { start(); } catch (error) { console.error(error); }
 }
