@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcsplan.cli.ending import complain, emit, printable
-from gcsplan.cli.options import JsonOption, RequireWayHomeOption, UnitsName, UnitsOption, UnjudgedOption, WayHomeOption
+from gcsplan.cli.options import (
+    JsonOption,
+    RequireWayHomeOption,
+    UnitsName,
+    UnitsOption,
+    UnjudgedOption,
+    WayHomeOption,
+    require_html,
+)
 from gcsplan.errors import InputError, UsageError
 
 if TYPE_CHECKING:
@@ -93,8 +101,7 @@ def check(
         "--descent-rate": descent_rate, "--rtl-altitude": rtl_altitude,
     }  # fmt: skip
     given = {k: v for k, v in given.items() if v not in (None, [])}
-    if report is not None and (report.suffix.lower() not in (".html", ".htm") or not report.parent.is_dir()):
-        raise UsageError(f"--report {report}: a name that ends in .html, in a directory that is there, is wanted")
+    require_html(report)
     make = _in_mission if _is_mission(files[0]) else _with_options
     with steady(checking.split_name(file)[1] for file in files if not _is_mission(file)):
         batch = make(files, given, checking.Returns(way_home, require_way_home))

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from gcsplan.errors import UsageError
 from gcsplan.units import AVIATION, IMPERIAL, METRIC
 
 LINKS = "udpout:HOST:PORT sends, udpin:HOST:PORT listens, tcp:HOST:PORT, /dev/ttyUSB0,57600."
@@ -101,3 +102,9 @@ SimSysidOption = Annotated[
 MisbehaveOption = Annotated[
     str, typer.Option(metavar="HOW", help=f"Trouble, for example drop=0.1,corrupt=7,seed=3. Known: {MISBEHAVIOURS}.")
 ]
+
+
+def require_html(file: Path | None) -> None:
+    """Raise UsageError unless ``file``, the page that is to be written, is None or can be one."""
+    if file is not None and (file.suffix.lower() not in (".html", ".htm") or not file.parent.is_dir()):
+        raise UsageError(f"--report {file}: a name that ends in .html, in a directory that is there, is wanted")

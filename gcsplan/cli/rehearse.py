@@ -16,6 +16,7 @@ from gcsplan.cli.options import (
     UnitsOption,
     UnjudgedOption,
     WayHomeOption,
+    require_html,
 )
 from gcsplan.errors import UsageError
 from gcsplan.units import Quantity, duration, told, units_of
@@ -65,6 +66,10 @@ def rehearse(
     require_way_home: RequireWayHomeOption = False,
     units: UnitsOption = UnitsName.METRIC,
     allow_unjudged: UnjudgedOption = False,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="Also write the report, with what was flown beside what was planned."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Plan, upload to simulated vehicles, fly them all in simulated time, and judge arrivals, separation and limits.
@@ -75,14 +80,17 @@ def rehearse(
     """
     from gcsplan.app import pipeline, rehearsing
     from gcsplan.app import way_home as returns
+    from gcsplan.app.report_page import render_rehearsal
     from gcsplan.cli.console import remark, say, say_notes
     from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
+    from gcsplan.export.outdir import write_whole
     from gcsplan.sim.wind import Weather
 
     weather = Weather(wind, wind_from, gusts, noise_m)
     if airspeed is not None and not airspeed > 0.0:
         raise UsageError(f"--airspeed {airspeed:g}: a speed above 0 is wanted")
+    require_html(report)
     in_sitl = bool(sitl) or sitl_binary is not None
     if in_sitl and (not weather.calm or runs > 1 or airspeed is not None):
         raise UsageError("--wind, --gusts, --noise-m, --airspeed and --runs are the built-in simulator's, not --sitl's")
@@ -94,7 +102,7 @@ def rehearse(
     with planning_display(names, source.planner.objective) as progress:
         planned = pipeline.plan(source, planner=planner, progress=progress)
     pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
-    homes = returns.judged(planned, asked=way_home, option=require_way_home)
+    homes = returns.judged(planned, asked=way_home or report is not None, option=require_way_home)
     if in_sitl:
         with talking(names):
             result = rehearsing.rehearse_in_sitl(
@@ -104,6 +112,8 @@ def rehearse(
     else:
         result = rehearsing.rehearse(planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed)
     error = result.error(allow_unjudged=allow_unjudged)
+    if report is not None:  # also of a rehearsal that found violations: it shows where
+        write_whole(report, render_rehearsal(planned, result, homes, units_of(units)))
     if as_json:
         failure = None
         if error is not None:

@@ -23,6 +23,7 @@ from gcsplan.report.home_view import home_html, home_lines
 from gcsplan.report.markup import data_block, energy, esc, least, num, place, stated, tools
 from gcsplan.report.plan_view import COLOURS, map_html
 from gcsplan.report.profile_view import profile_html, profile_legend
+from gcsplan.report.rehearsal_view import headline, rehearsal_html
 from gcsplan.report.relief import Relief, extent_of, relief_of
 from gcsplan.report.replay import replay_data, replay_html, replay_of
 from gcsplan.report.samples import MOST_SAMPLES, Line, Passage, line_of, passages
@@ -91,7 +92,7 @@ def render_page(page: Page) -> str:
             _header(page), _vehicles(page),
             f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief, flown)}'
             f"{replay_html(replay, page) if replay else ''}</section>",
-            _scene(page, relief),
+            rehearsal_html(page), _scene(page, relief),
             *_profiles(page, lines, found), home, fleet, *_details(page, lines, found), _end(page),
         )
     )  # fmt: skip
@@ -147,7 +148,7 @@ def verdict_of(safe: bool | None, *, homeless: bool) -> tuple[str, str, str, str
 
 
 def _header(page: Page) -> str:
-    kind, sign, word, words = verdict_of(page.safe, homeless=page.homeless)
+    kind, sign, word, words = headline(page, verdict_of(page.safe, homeless=page.homeless))
     wrong = [(s, told(f.message, page.units)) for s in page.subjects for f in s.verdict.findings]
     wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
     several = len(page.subjects) > 1

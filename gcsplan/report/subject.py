@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
@@ -66,6 +66,32 @@ class Subject:
         return self.home is not None and self.home.safe is not True
 
 
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """One figure in SI, planned and flown; None if there is none, infinite: never.
+
+    ``subject``: the vehicle's number on the page, None for the fleet. Heights and distances are least values.
+    """
+
+    subject: int | None
+    vehicle: str
+    what: str
+    planned: float | None
+    flown: float | None
+    kind: Literal["time", "percent", "height", "distance"]
+
+
+@dataclass(frozen=True, slots=True)
+class Rehearsed:
+    """What a rehearsal found. ``how``: who flew, how often and in which weather, in a sentence."""
+
+    safe: bool | None
+    how: str
+    compared: tuple[Compared, ...]
+    violations: tuple[str, ...] = ()
+    not_flown: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Page:
     """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown.
@@ -82,6 +108,7 @@ class Page:
     separation: Separation | None = None
     order: tuple[str, ...] = ()
     units: Units = METRIC
+    rehearsed: Rehearsed | None = None
 
     @property
     def homeless(self) -> bool:

@@ -120,7 +120,8 @@ class Rehearsal:
     """The result of a rehearsal.
 
     ``closest``: the nearest approach of any two vehicles in any run, None if no two flew at the same time.
-    ``simulator``: ``gcsplan`` or ``sitl``. ``weather``: the simulated weather, for output.
+    ``simulator``: ``gcsplan`` or ``sitl``. ``weather``: the simulated weather, for output. ``flown``: the flown
+    paths of the first run, in the order of ``vehicles``.
     """
 
     simulator: str
@@ -135,6 +136,7 @@ class Rehearsal:
     closest: Meeting | None
     breaches: tuple[Breach, ...]
     notes: tuple[str, ...] = ()
+    flown: tuple[Trace, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def not_judged(self) -> tuple[str, ...]:
@@ -241,6 +243,7 @@ class Tally:
     closest: Meeting | None = None
     order_flown: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
+    flown: tuple[Trace, ...] = ()
     _breaches: dict[tuple[object, ...], Breach] = field(default_factory=dict)
     _seen: set[tuple[object, ...]] = field(default_factory=set)
 
@@ -252,6 +255,7 @@ class Tally:
     def add(self, traces: Sequence[Trace]) -> None:
         """Add one run; ``traces`` are in the order of the parts."""
         self.runs += 1
+        self.flown = self.flown or tuple(traces)
         self._seen = set()
         for i, (part, trace) in enumerate(zip(self.parts, traces, strict=True)):
             arrived = math.isfinite(trace.arrive_s)
@@ -330,7 +334,7 @@ class Tally:
         breaches = sorted(self._breaches.values(), key=lambda b: (-b.runs, b.kind, b.vehicles))
         return Rehearsal(
             simulator, self.runs, seed, weather, tuple(performances), self.terms, self.order_flown, self.order_kept,
-            self.separation_kept, self.closest, tuple(breaches), tuple(dict.fromkeys(self.notes)),
+            self.separation_kept, self.closest, tuple(breaches), tuple(dict.fromkeys(self.notes)), self.flown,
         )  # fmt: skip
 
 

@@ -1,0 +1,122 @@
+"""The report of a rehearsal: what was flown stands beside the plan's value, and comes from the flown tracks alone."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from gcsplan.app.model import Plan
+from gcsplan.app.pipeline import load_mission, plan
+from gcsplan.app.rehearsing import Rehearsal, rehearse
+from gcsplan.app.report_page import render_rehearsal
+from gcsplan.sim.wind import Weather
+from tests.app.test_fleet_planning import CROSS
+from tests.cli.test_fleet import ARRIVAL, LIMITS, run, write
+from tests.report.test_page import Reader
+
+__all__ = ["run"]
+
+
+@cache
+def planned(folder: Path) -> Plan:
+    file = folder / "cross.yaml"
+    file.write_text(yaml.safe_dump(CROSS | {"limits": LIMITS, "arrival": ARRIVAL}))
+    return plan(load_mission(file))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("rehearsal")
+
+
+def flown(folder: Path, **more: Any) -> Rehearsal:
+    """A rehearsal in a wind that the vehicles cannot fly against at their speed, with noise."""
+    return rehearse(planned(folder), weather=Weather(6.0, 90.0, 0.5, 0.5), airspeed_m_s=10.0, **more)
+
+
+def table(read: Reader) -> list[str]:
+    """The words of the section, from its heading to the next one."""
+    return read.text.split("Flown beside planned")[1].split("In space")[0].split()
+
+
+def test_flown_figures_come_from_the_flown_tracks_and_stand_beside_the_plans_with_their_difference(
+    folder: Path,
+) -> None:
+    made, result = planned(folder), flown(folder)
+    read = Reader(render_rehearsal(made, result))
+    words = " ".join(table(read))
+    for v, trace in zip(made.vehicles, result.flown, strict=True):
+        assert trace.name == v.name
+        assert made.fleet is not None
+        plan_s = made.fleet.slot(v.name).arrive_s
+        late_s = trace.arrive_s - plan_s
+        assert abs(late_s) > 1.0  # what was flown differs, and is shown as it is
+        late = f"{'+' if late_s > 0 else '−'}{abs(late_s):.2f} s"
+        assert f"{v.name} at its goal {plan_s:.1f} s {trace.arrive_s:.1f} s {late}" in words
+        lowest = v.verdict.lowest
+        assert lowest is not None
+        surface = made.world.airspace.surface
+        free = ~np.append(trace.column, True) & ~np.append(True, trace.column)
+        agl = (trace.points[:, 2] - surface.top_at(trace.points[:, 0], trace.points[:, 1]))[free]
+        row = words.split(f"{v.name} lowest above ground ")[1].split(" m ")
+        assert float(row[0]) == pytest.approx(lowest.min_agl_m, abs=0.1)
+        assert float(row[1]) == pytest.approx(agl.min(), abs=0.5)
+        assert float(row[1]) != float(row[0])
+    assert made.fleet is not None
+    assert made.fleet.closest is not None
+    assert result.closest is not None
+    assert "fleet least separation" in words
+
+
+def test_the_replay_holds_the_plan_and_the_flight_each_from_its_own_source(folder: Path) -> None:
+    made, result = planned(folder), flown(folder)
+    tracks = Reader(render_rehearsal(made, result)).data["replay"]["tracks"]
+    assert [(t["name"], t["flown"]) for t in tracks] == [
+        (name, flown) for name in ("west", "south") for flown in (False, True)
+    ]
+    for track in tracks:
+        places = np.frombuffer(base64.b64decode(track["places"]), "<f4").reshape(-1, 5).astype(float)
+        assert made.fleet is not None
+        own = next(t for t in result.flown if t.name == track["name"]) if track["flown"] else \
+            made.fleet.motion(track["name"])  # fmt: skip
+        drawn = np.column_stack([np.interp(own.times_s, places[:, 0], places[:, k]) for k in (1, 2, 3)])
+        assert np.linalg.norm(drawn - own.points, axis=1).max() < 0.25
+
+
+def test_the_first_of_several_runs_is_shown_and_said(folder: Path) -> None:
+    one, several = flown(folder, seed=4), flown(folder, seed=4, runs=3)
+    assert [np.array_equal(a.points, b.points) for a, b in zip(one.flown, several.flown, strict=True)] == [True, True]
+    read = Reader(render_rehearsal(planned(folder), several))
+    assert "3 runs: flown times are the medians" in read.text
+    assert "replay show the first run" in read.text
+
+
+def test_a_rehearsal_that_went_wrong_is_the_headline(folder: Path) -> None:
+    made, result = planned(folder), flown(folder)
+    terms = replace(result.terms, order=())
+    calm = replace(result, breaches=(), terms=terms)
+    assert "NOT AS PLANNED" not in Reader(render_rehearsal(made, calm)).text
+    assert result.breaches  # 10 m/s through the air against a wind of 6 m/s: late, in another order
+    read = Reader(render_rehearsal(made, result))
+    assert "NOT AS PLANNED" in read.text
+    assert "✓ SAFE" not in " ".join(read.text.split())
+    for breach in result.breaches:
+        assert breach.describe(1) in read.text
+
+
+def test_rehearse_writes_the_page_even_where_it_finds_violations(run: Any, tmp_path: Path) -> None:
+    file = write(tmp_path)
+    assert run("rehearse", file, "--report", "page.pdf")[0] == 2
+    code, _, err = run("rehearse", file, "--report", "page.html")
+    assert code == 0, err
+    assert "Flown beside planned" in (tmp_path / "page.html").read_text()
+    code, _, _ = run("rehearse", file, "--report", "windy.html", "--wind", "6", "--wind-from", "90", "--airspeed", "10")
+    assert code == 4
+    assert "NOT AS PLANNED" in (tmp_path / "windy.html").read_text()
