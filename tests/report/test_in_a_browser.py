@@ -122,12 +122,16 @@ def test_pointing_tells_numbers_with_their_units_in_every_figure(page: Browser, 
         told[name] = tip(page)
     assert "ground about" in told["#map"]
     assert "m AMSL" in told["#map"]
+    assert "nearest track" in told["#map"]
+    assert "its height above ground there" in told["#map"]
+    assert re.search(r"36\.\d{5}, -84\.\d{5}", told["#map"])
     for words in ("above ground", "lowest allowed", "energy used", "kJ", "along the track"):
         assert words in told["#profile-0 .plot"], words
     assert "return judged at" in told["#home-0 .plot"]
     assert "uav2" in told["#distance .plot"]
     assert "nearest two" in told["#separation .plot"]
-    assert told["#scene"]
+    assert "above ground" in told["#scene"]
+    assert re.search(r"36\.\d{5}, -84\.\d{5}", told["#scene"])
     left, top, _, _ = show(page, "#map .mark.wp")
     page.point(left, top)
     assert "above ground" in tip(page)

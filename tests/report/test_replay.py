@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -189,3 +190,22 @@ def test_a_place_that_is_passed_twice_is_found_by_its_time() -> None:
     for since, e in ((30.0, 300.0), (170.0, 300.0), (100.0, 1000.0)):
         found = node.ask(SCRIPTS, f"sampleAt(given, {{e: {e}, n: 0, z: 100}}, {since})", line)
         assert found == round(since)
+
+
+@in_node
+def test_the_pointer_finds_the_nearest_track_between_its_samples_too() -> None:
+    rng = np.random.default_rng(5)
+    lines = [np.cumsum(rng.normal(0.0, 300.0, (30, 2)), axis=0) for _ in range(4)]
+    lines[2][7] = lines[2][6]  # a column: two samples at one place
+    data = [{"s": [0] * 30, "e": xy[:, 0].tolist(), "n": xy[:, 1].tolist()} for xy in lines]
+    places = rng.uniform(-2000.0, 2000.0, (60, 2))
+    script = "given.places.map(([e, n]) => nearestTrack(given.lines, e, n))"
+    t = np.linspace(0.0, 1.0, 400)[:, None]
+    dense = [np.concatenate([a + t * (b - a) for a, b in pairwise(xy)]) for xy in lines]
+    for place, found in zip(places, node.ask(SCRIPTS, script, {"lines": data, "places": places.tolist()}), strict=True):
+        away = [float(np.hypot(*(xy - place).T).min()) for xy in dense]
+        assert found["away"] == pytest.approx(min(away), abs=2.0)
+        assert away[found["k"]] == pytest.approx(min(away), abs=2.0)
+        corner = lines[found["k"]][found["i"]]
+        assert np.hypot(*(corner - place)) >= found["away"] - 1e-6
+    assert node.ask(SCRIPTS, "nearestTrack([], 0, 0)") is None

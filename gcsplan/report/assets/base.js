@@ -77,19 +77,30 @@ function placeWords(e, n) {
   return isNaN(lat) ? '' : `${lat.toFixed(5)}, ${lon.toFixed(5)}`;
 }
 
-function groundWords(e, n) {
-  const z = ground.at(e, n);
-  return isNaN(z) ? 'ground unknown' : `ground about ${num(z, 0, units.amsl)}`;
+// What is known of a place that is on no track: `near` is the nearest one (see nearestTrack), or null.
+function groundRows(e, n, near) {
+  const z = ground.at(e, n), rows = [['at', placeWords(e, n) || '–'], ['ground about', isNaN(z) ? 'unknown' : num(z, 0, units.amsl)]];
+  if (near) {
+    const line = data.lines[near.k], far = near.away > 2000;
+    rows.push(['nearest track', `${line.name}, ${far ? num(near.away, 1, units.far) : num(near.away, 0, units.distance)} from here`]);
+    rows.push([`its height ${aboveRow(line, near.i)[0]} there`, aboveRow(line, near.i)[1]]);
+  }
+  return rows;
 }
+
+const aboveRow = (line, i) => {
+  const top = line.o ? line.o[i] : line.g[i];
+  return ['above ' + (line.o ? 'trees' : 'ground'), least(top === null ? null : line.z[i] - top, 1, 'm')];
+};
 
 // Everything that is known of one sample of one line, a row each.
 function sampleRows(k, i) {
-  const line = data.lines[k], leg = line.legs[line.leg[i]], top = line.o ? line.o[i] : line.g[i];
+  const line = data.lines[k], leg = line.legs[line.leg[i]];
   const rows = [
     [line.name, `to item ${leg.seq}, ${leg.kind}`],
     ['along the track', line.s[line.s.length - 1] > 2000 ? num(line.s[i], 2, units.far) : num(line.s[i], 1, units.distance)],
     ['path', num(line.z[i], 1, units.amsl)],
-    ['above ' + (line.o ? 'trees' : 'ground'), least(top === null ? null : line.z[i] - top, 1, units.height)],
+    aboveRow(line, i),
     ['ground', num(line.g[i], 1, units.amsl)],
   ];
   if (!leg.column && line.f[i] !== null) rows.push(['lowest allowed', num(line.f[i], 1, units.amsl)]);

@@ -1,15 +1,4 @@
 // The map, the profiles, and the fleet's charts: what the pointer tells there.
-function nearestSample(e, n, reach) {
-  let best = reach, found = null;
-  data.lines.forEach((line, k) => {
-    for (let i = 0; i < line.s.length; i++) {
-      const away = Math.hypot(line.e[i] - e, line.n[i] - n);
-      if (away < best) { best = away; found = [k, i]; }
-    }
-  });
-  return found;
-}
-
 function startMap() {
   const figure = document.getElementById('map'), scale = figure.querySelector('.scale'), cursor = figure.querySelector('.cursor');
   const width = +figure.dataset.widthM, height = +figure.dataset.heightM;
@@ -27,11 +16,11 @@ function startMap() {
     },
     point: (event, [x, y]) => {
       const e = ground.west + x * width, n = ground.north - y * height;
-      const found = nearestSample(e, n, 14 * made.pixel()[0] * width);
-      if (found) { pointAt(...found); tip.rows(event, sampleRows(...found)); return; }
+      const near = nearestTrack(data.lines, e, n);
+      if (near && near.away < 14 * made.pixel()[0] * width) { pointAt(near.k, near.i); tip.rows(event, sampleRows(near.k, near.i)); return; }
       nowhere();
       const zone = event.target.dataset && event.target.dataset.words;
-      tip.words(event, (zone ? zone + '\n' : '') + `${groundWords(e, n)}\n${placeWords(e, n)}`);
+      tip.rows(event, groundRows(e, n, near).concat(zone ? [['here', zone]] : []));
     },
   });
   watchers.push((k, i) => {

@@ -44,6 +44,21 @@ function clockWords(t) {
 // Every height and distance of the replay in words; room is rounded down.
 const metres = (value, datum) => (datum === 'AMSL' ? num(value, 0, 'm AMSL') : least(value, 0, 'm'));
 
+// The track nearest to a place in the plane: line `k`, its nearest sample `i`, and metres to the line itself, which lies
+// between samples where they are far apart; null if there is no line.
+function nearestTrack(lines, e, n) {
+  let found = null;
+  lines.forEach((line, k) => {
+    for (let i = 0; i + 1 < line.s.length; i++) {
+      const de = line.e[i + 1] - line.e[i], dn = line.n[i + 1] - line.n[i], square = de * de + dn * dn;
+      const f = square > 0 ? Math.min(1, Math.max(0, ((e - line.e[i]) * de + (n - line.n[i]) * dn) / square)) : 0;
+      const away = Math.hypot(line.e[i] + f * de - e, line.n[i] + f * dn - n);
+      if (!found || away < found.away) found = { k, i: f < 0.5 ? i : i + 1, away };
+    }
+  });
+  return found;
+}
+
 // The sample of a line where a vehicle is: near in space, and near in time where a line passes a place twice.
 function sampleAt(line, place, since) {
   let best = Infinity, found = 0;

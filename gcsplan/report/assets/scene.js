@@ -269,7 +269,7 @@ function startScene() {
       if (found) { pointAt(...found); tip.rows(event, sampleRows(...found)); return; }
       nowhere();
       const spot = under(x, y);
-      if (spot) tip.words(event, `${groundWords(...spot)}\n${placeWords(...spot)}`); else tip.hide();
+      if (spot) tip.rows(event, groundRows(...spot, nearestTrack(data.lines, ...spot))); else tip.hide();
     },
     leave: () => { tip.hide(); nowhere(); },
   });
