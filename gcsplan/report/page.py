@@ -18,10 +18,11 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report import tables
+from gcsplan.report.briefing import briefing_html
 from gcsplan.report.fleet_view import fleet_html, motions_of
 from gcsplan.report.home_view import home_html, home_lines
 from gcsplan.report.markup import data_block, energy, esc, least, num, place, stated, tools
-from gcsplan.report.plan_view import COLOURS, map_html
+from gcsplan.report.plan_view import COLOURS, map_html, map_marks
 from gcsplan.report.profile_view import profile_html, profile_legend
 from gcsplan.report.rehearsal_view import headline, rehearsal_html
 from gcsplan.report.relief import Relief, extent_of, relief_of
@@ -87,10 +88,11 @@ def render_page(page: Page) -> str:
         "exaggeration": exaggeration(relief, drawn),
         "charts": charts, "units": page.units.as_dict(), "replay": replay_data(replay, page) if replay else None,
     }  # fmt: skip
+    marks = map_marks(page, lines, relief)
     body = "".join(
         (
-            _header(page), _vehicles(page),
-            f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief, flown)}'
+            briefing_html(page, _verdict(page), relief, marks), _header(page), _vehicles(page),
+            f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief, marks, flown)}'
             f"{replay_html(replay, page) if replay else ''}</section>",
             rehearsal_html(page), _scene(page, relief),
             *_profiles(page, lines, found), home, fleet, *_details(page, lines, found), _end(page),
@@ -147,8 +149,12 @@ def verdict_of(safe: bool | None, *, homeless: bool) -> tuple[str, str, str, str
     return PATH_ONLY if safe is True and homeless else VERDICTS[safe]
 
 
+def _verdict(page: Page) -> tuple[str, str, str, str]:
+    return headline(page, verdict_of(page.safe, homeless=page.homeless))
+
+
 def _header(page: Page) -> str:
-    kind, sign, word, words = headline(page, verdict_of(page.safe, homeless=page.homeless))
+    kind, sign, word, words = _verdict(page)
     wrong = [(s, told(f.message, page.units)) for s in page.subjects for f in s.verdict.findings]
     wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
     several = len(page.subjects) > 1

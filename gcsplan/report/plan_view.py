@@ -24,8 +24,22 @@ COLOURS = 8
 """Number of the style sheet's classes t0 …; more vehicles reuse them from the first."""
 
 
-def map_html(page: Page, lines: Sequence[Line | None], relief: Relief, flown: Sequence[Floats] = ()) -> str:
-    """The map as a figure with its legend. ``flown``: (N, 2) east and north of each line flown in a rehearsal."""
+def map_marks(page: Page, lines: Sequence[Line | None], relief: Relief) -> list[Mark]:
+    """The marks of the map: zones' names, way points, starts and goals, tight places."""
+    marks = [m for zone in page.world.airspace.zones for m in _zone_mark(zone, relief.extent, page.units)]
+    for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
+        if line is not None:
+            marks += _track_marks(subject, line, i, relief.extent, page.world, page.units)
+    return marks
+
+
+def map_html(
+    page: Page, lines: Sequence[Line | None], relief: Relief, marks: Sequence[Mark], flown: Sequence[Floats] = ()
+) -> str:
+    """The map as a figure with its legend. ``marks``: see `map_marks`.
+
+    ``flown``: (N, 2) east and north of each line flown in a rehearsal.
+    """
     extent, zones = relief.extent, page.world.airspace.zones
     height = extent.height_m * extent.scale
     shapes = [
@@ -39,12 +53,7 @@ def map_html(page: Page, lines: Sequence[Line | None], relief: Relief, flown: Se
         ),
         *(_track_svg(line, i, extent) for i, line in enumerate(lines) if line is not None),
         *(_flown_svg(line, extent) for line in flown),
-        '<path class="cursor" d=""/>',
     ]
-    marks = [m for zone in zones for m in _zone_mark(zone, extent, page.units)]
-    for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
-        if line is not None:
-            marks += _track_marks(subject, line, i, extent, page.world, page.units)
     words = f"{len(page.subjects)} vehicle{'s' * (len(page.subjects) != 1)}, {len(zones)} no-fly zones"
     aspect = extent.width_m / extent.height_m
     bar, bar_words = scale_bar(extent.width_m / 8.0, page.units)
@@ -54,7 +63,7 @@ def map_html(page: Page, lines: Sequence[Line | None], relief: Relief, flown: Se
         f'data-width-m="{extent.width_m:.3f}" data-height-m="{extent.height_m:.3f}">'
         f'<svg viewBox="0 0 10000 {height:.1f}" preserveAspectRatio="none" role="img" '
         f'aria-label="Map of {esc(page.title)}: {words}; the tables below hold the same numbers">'
-        f"{''.join(shapes)}</svg>"
+        f'<g id="drawing">{"".join(shapes)}</g><path class="cursor" d=""/></svg>'
         f'<div class="marks">{marks_html(marks, extent.height_m / extent.width_m)}</div>'
         f'<div class="north" aria-hidden="true">N<br>↑</div>'
         f'<div class="scale" style="width:{100 * bar / extent.width_m:.3f}%"><b>{bar_words}</b></div></figure>'

@@ -15,9 +15,8 @@ from heapq import heapify, heappop, heappush
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.figures import raised
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.report.markup import esc, num, table
+from gcsplan.report.markup import at_least, esc, table
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.subject import Page
 from gcsplan.world.surface import Surface
@@ -182,7 +181,8 @@ def replay_html(replay: Replay, page: Page) -> str:
         *(["nearest other in the air|"] * several),
         *(["away from the plan"] * both),
     ]
-    note = f"Between stored places the replay is within {num(raised(replay.within_m, 1), 1, 'm')} of the time table"
+    within = at_least(replay.within_m, 1, page.units.distance)
+    note = f"Between stored places the replay is within {within} of the time table"
     if both:
         note += " and of what was flown. Planned vehicles are rings, flown ones dots; the dashed line is what was flown"
     exact = " Least separations are exact under “The fleet in time”." if several else ""

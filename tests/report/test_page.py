@@ -242,7 +242,7 @@ def test_what_could_not_be_judged_is_neither_safe_nor_unsafe() -> None:
     arcs = replace(page.subjects[0].verdict, not_judged=("the arcs <b> of 80 m",))
     read = Reader(render_page(replace(page, subjects=(replace(page.subjects[0], verdict=arcs),))))
     assert "NOT JUDGED" in read.text
-    assert read.text.count("the arcs <b> of 80 m") == 2
+    assert read.text.count("the arcs <b> of 80 m") == 3  # on the briefing, at the top and in the notes
     assert "Every metre was checked" not in read.text
 
 

@@ -90,7 +90,7 @@ function groundRows(e, n, near) {
 
 const aboveRow = (line, i) => {
   const top = line.o ? line.o[i] : line.g[i];
-  return ['above ' + (line.o ? 'trees' : 'ground'), least(top === null ? null : line.z[i] - top, 1, 'm')];
+  return ['above ' + (line.o ? 'trees' : 'ground'), least(top === null ? null : line.z[i] - top, 1, units.height)];
 };
 
 // Everything that is known of one sample of one line, a row each.

@@ -37,12 +37,11 @@ function nearestOther(tracks, places, i) {
 
 // A time of the time table: T+h:mm:ss.
 function clockWords(t) {
-  const s = Math.floor(Math.max(0, t) + 1e-6), two = (v) => String(v).padStart(2, '0');
-  return `T+${Math.floor(s / 3600)}:${two(Math.floor(s / 60) % 60)}:${two(s % 60)}`;
+  return `T+${duration(Math.floor(Math.max(0, t) + 1e-6))}`;
 }
 
 // Every height and distance of the replay in words; room is rounded down.
-const metres = (value, datum) => (datum === 'AMSL' ? num(value, 0, 'm AMSL') : least(value, 0, 'm'));
+const metres = (value, datum) => (datum === 'AMSL' ? num(value, 0, units.amsl) : least(value, 0, units.height));
 
 // The track nearest to a place in the plane: line `k`, its nearest sample `i`, and metres to the line itself, which lies
 // between samples where they are far apart; null if there is no line.

@@ -39,7 +39,7 @@ function startReplay() {
   }
   function offPlan(i) {
     const own = replay.tracks[i], p = own.flown ? replay.tracks.findIndex((t) => !t.flown && t.k === own.k) : -1;
-    return p < 0 || !replay.places[p] || !replay.places[i] ? '' : num(apart(replay.places[p], replay.places[i]), 1, 'm');
+    return p < 0 || !replay.places[p] || !replay.places[i] ? '' : num(apart(replay.places[p], replay.places[i]), 1, units.distance);
   }
   function tick(now) {
     if (last === null) return;

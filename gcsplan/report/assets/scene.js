@@ -85,6 +85,7 @@ function startScene() {
 
   function draw() {
     asked = false;
+    if (!figure.clientWidth) return;
     const ratio = Math.min(2, window.devicePixelRatio || 1), style = getComputedStyle(figure);
     size = [figure.clientWidth, figure.clientHeight];
     for (const c of [canvas, over]) {

@@ -1,0 +1,189 @@
+"""The briefing: one printed page with what a crew reads and signs; on the screen it is not shown.
+
+It holds nothing that the rest of the report does not hold. Names and messages are cut to a length, and lists to a
+number, so that it stays one page; what is left out is said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from gcsplan import __version__
+from gcsplan.mavlink.mission.return_altitude import setting
+from gcsplan.report.fleet_view import motions_of, separation_words
+from gcsplan.report.marks import Mark, marks_html
+from gcsplan.report.markup import energy, esc, least, num, place, plain, stated, table
+from gcsplan.report.plan_view import COLOURS
+from gcsplan.report.relief import Relief
+from gcsplan.report.subject import Page, Subject
+from gcsplan.units import Units, duration, told
+
+MOST_VEHICLES = 4
+MOST_FINDINGS, MOST_RALLY, MOST_NOTES = 3, 6, 1
+NAME, MESSAGE = 28, 105
+"""Most letters of a name in the table, and of a message."""
+MAP_MM, SMALL_MAP_MM, WIDE_MM = 56.0, 28.0, 180.0
+"""Height of the map, height where problems take the room, and greatest width."""
+KINDS = ("start", "goal", "rally", "name")
+"""The marks of the map that are on the briefing's, too."""
+NOT_IN_IT = "Wind, emergency landing sites and moving obstacles are not in the model."
+
+
+def briefing_html(page: Page, verdict: tuple[str, str, str, str], relief: Relief, marks: Sequence[Mark]) -> str:
+    """The section. ``verdict`` is the page's class, sign, word and sentence; ``marks`` are those of its map."""
+    kind, sign, word, words = verdict
+    shown = _shown(page)
+    rest = len(page.subjects) - len(shown)
+    more = f"{rest} more vehicles are not on this page: see the tables that follow." if rest else ""
+    bare = "Bare DEM: trees, masts and wires are not in it. " if page.inputs.get("bare_dem", True) else ""
+    apart = separation_words(page)
+    problems = _problems(page)
+    high_mm = SMALL_MAP_MM if problems else MAP_MM
+    return (
+        '<section class="briefing" id="briefing"><p class="brand">mission briefing</p>'
+        f'<p class="title">{esc(_short(page.title, 60))}</p>'
+        f'<p class="verdict {kind}"><b>{sign} {word}</b> {words}</p>'
+        f"{problems}{_map(page, relief, marks, high_mm)}{_vehicles(page, shown)}"
+        + "".join(f'<p class="fact">{text}</p>' for text in (more, _rally(page, shown), apart, _order(page)) if text)
+        + f'<p class="fact"><b>{bare}</b>{NOT_IN_IT} {_inputs(page)}</p>{_signatures()}</section>'
+    )
+
+
+def _shown(page: Page) -> list[tuple[int, Subject]]:
+    """The vehicles on this page: the first to arrive, where not all have room."""
+    every = list(enumerate(page.subjects))
+    first = sorted(every, key=lambda s: s[1].arrive_s)[:MOST_VEHICLES] if len(every) > MOST_VEHICLES else every
+    return sorted(first, key=lambda s: s[0])
+
+
+def _problems(page: Page) -> str:
+    """What is broken and what was not judged, the first of each."""
+    found = [f"{s.name}: {told(f.message, page.units)}" for s in page.subjects for f in s.verdict.findings]
+    found += [told(text, page.units) for text in page.rehearsed.violations] if page.rehearsed is not None else []
+    unjudged = [f"{s.name}: not judged: {what}" for s in page.subjects for what in s.verdict.not_judged]
+    out = [*found[:MOST_FINDINGS], *unjudged[:MOST_NOTES]]
+    rest = len(found) + len(unjudged) - len(out)
+    listed = "".join(f"<li>{esc(_short(text, MESSAGE))}</li>" for text in out)
+    listed += f"<li>and {rest} more, on the pages that follow</li>" if rest else ""
+    return f'<ul class="findings">{listed}</ul>' if listed else ""
+
+
+def _map(page: Page, relief: Relief, marks: Sequence[Mark], high_mm: float) -> str:
+    """The report's own map once more, small; its shapes are referred to, not repeated."""
+    extent = relief.extent
+    ratio = extent.height_m / extent.width_m
+    few = [m for m in marks if m.kind.split(" ")[0] in KINDS]
+    return (
+        f'<figure class="view map brief" id="brief" style="aspect-ratio:{1.0 / ratio:.4f};'
+        f'width:{min(WIDE_MM, high_mm / ratio):.1f}mm"><svg viewBox="0 0 10000 {extent.height_m * extent.scale:.1f}" '
+        f'preserveAspectRatio="none" role="img" aria-label="Map of {esc(page.title)}, small"><use href="#drawing"/>'
+        f'</svg><div class="marks">{marks_html(few, ratio)}</div>'
+        '<div class="north" aria-hidden="true">N<br>↑</div></figure>'
+    )
+
+
+def _vehicles(page: Page, shown: Sequence[tuple[int, Subject]]) -> str:
+    """One column for each vehicle: where, limits with what is left of them, times, way home."""
+    if not shown:
+        return ""
+    head = ["|", *(f'<i class="swatch t{i % COLOURS}"></i>{esc(_short(s.name, NAME))}|' for i, s in shown)]
+    columns = [dict(_facts(page, s, page.units)) for _, s in shown]
+    names = list(dict.fromkeys(name for column in columns for name in column))
+    rows = [(name, *(column.get(name, "–") for column in columns)) for name in names]
+    since = "T+0, the common start" if motions_of(page) else "T+0, the start" if shown[0][1].motion else "take-off"
+    return table(f"Limits, margins and times; times are h:mm:ss after {since}", head, rows)
+
+
+def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
+    verdict, limits, craft = s.verdict, s.vehicle.limits, s.vehicle
+    yield "vehicle", f"{esc(str(verdict.mission.autopilot))}, system {craft.sysid}"
+    if len(page.subjects) > 1:
+        good = "path safe" if s.homeless else "safe"
+        yield "verdict", {True: good, False: "NOT SAFE", None: "not judged"}[verdict.safe]
+    if verdict.legs:
+        for name, at in (("starts at", verdict.legs[0].start), ("ends at", verdict.legs[-1].end)):
+            yield name, f"{place(*at[:2])}<br>{num(at[2], 0, units.amsl)}"
+    items = len(verdict.mission.wire_items())
+    speed = f", {num(s.slot.speed_m_s, 1, units.speed)}" if s.slot is not None else ""
+    yield "path", f"{num(verdict.length_m, 0, units.path)}, {items} items{speed}"
+    low, near = verdict.lowest, verdict.nearest
+    lowest = least(low.min_agl_m, 1, units.height) if low is not None else "–"
+    yield "lowest above ground", f"{lowest}; at least {stated(limits.min_agl_m, units.height)}"
+    peak = max((max(leg.start[2], leg.end[2]) for leg in verdict.legs), default=math.nan)
+    most = f"; at most {stated(limits.max_amsl_m, units.height)}" if limits.max_amsl_m is not None else ""
+    yield "highest", num(peak, 0, units.amsl) + most
+    if limits.max_agl_m is not None:
+        high = max((leg.max_agl_m for leg in verdict.legs if not math.isnan(leg.max_agl_m)), default=None)
+        yield "highest above ground", f"{num(high, 1, units.height)}; at most {stated(limits.max_agl_m, units.height)}"
+    zone = (
+        f"{least(near.zone_clearance_m, 1, units.distance)}, {esc(_short(near.nearest_zone, NAME))}" if near else "none"
+    )
+    yield "nearest zone", f"{zone}; at least {stated(limits.horizontal_clearance_m, units.distance)}"
+    angle = f"; at most {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90.0 else ""
+    yield "steepest", num(verdict.max_climb_deg, 1, "°") + angle
+    across, up = stated(limits.track_error_m, units.distance), stated(limits.altitude_error_m, units.height)
+    yield "errors kept off", f"{across} across, {up} in height"
+    yield "battery", _battery(s)
+    yield "leaves", duration(s.depart_s)
+    yield "at its goal", duration(s.arrive_s)
+    if s.motion is not None:
+        end = duration(s.motion.end_s)
+        yield "on the ground", "stays in the air" if s.motion.ends_in_air else "flies on" if s.leaves else end
+    yield from _way_home(s, units)
+
+
+def _battery(s: Subject) -> str:
+    used, battery = s.verdict.battery_used_percent, s.vehicle.energy
+    if used is None:
+        return f"{energy(s.verdict.energy_j, 0, battery.battery_v)}; capacity not given"
+    return f"{num(used, 1, '%')} used; {num(100.0 * battery.reserve, 0, '%')} must be left"
+
+
+def _way_home(s: Subject, units: Units) -> Iterator[tuple[str, str]]:
+    home = s.home
+    if home is None:
+        yield "way home", "not judged"
+        return
+    yield "way home", esc(_short(told(home.headline, units), MESSAGE))
+    if home.set_rel_home_m is not None:
+        yield "to set", esc(setting(home.autopilot, home.set_rel_home_m))
+
+
+def _rally(page: Page, shown: Sequence[tuple[int, Subject]]) -> str:
+    """The proposed rally points, with their altitudes above home."""
+    several = len(page.subjects) > 1
+    every = [(s.name, r) for _, s in shown if s.home is not None for r in s.home.rally]
+    words = [
+        (f"{esc(_short(name, NAME))} " if several else "")
+        + f"{place(r.lat_deg, r.lon_deg)} at {num(r.rel_home_m, 0, page.units.height)}"
+        for name, r in every[:MOST_RALLY]
+    ]
+    rest = f"; and {len(every) - MOST_RALLY} more" if len(every) > MOST_RALLY else ""
+    return f"Rally points proposed: {'; '.join(words)}{rest}." if words else ""
+
+
+def _order(page: Page) -> str:
+    """The order of arrival, if it is of few vehicles."""
+    return f"Order: {esc(_short(', '.join(page.order), MESSAGE))}." if len(page.order) > 1 else ""
+
+
+def _inputs(page: Page) -> str:
+    dem, datum = page.inputs.get("dem_sha256"), page.inputs.get("vertical_datum")
+    words = [
+        f"terrain model {esc(str(dem)[:12])}…" if dem else "",
+        f"heights {esc(_short(str(datum), NAME))}" if datum else "",
+    ]
+    return ", ".join(["Made by gcsplan " + esc(__version__), *(w for w in words if w)]) + "."
+
+
+def _signatures() -> str:
+    """Lines to sign on; nobody's name is known here."""
+    line = "".join(f"<span>{what}</span>" for what in ("name", "date", "signature"))
+    return "".join(f'<div class="sign-here"><b>{who}</b>{line}</div>' for who in ("planned by", "flown by"))
+
+
+def _short(text: str, most: int) -> str:
+    """``text`` cut to ``most`` letters."""
+    words = plain(text)
+    return words if len(words) <= most else words[: most - 1] + "…"
