@@ -17,6 +17,7 @@ from gcsplan.app.pipeline import load_mission, plan
 from gcsplan.app.rehearsing import Rehearsal, rehearse
 from gcsplan.app.report_page import render_rehearsal
 from gcsplan.sim.wind import Weather
+from gcsplan.units import duration
 from tests.app.test_fleet_planning import CROSS
 from tests.cli.test_fleet import ARRIVAL, LIMITS, run, write
 from tests.report.test_page import Reader
@@ -59,7 +60,7 @@ def test_flown_figures_come_from_the_flown_tracks_and_stand_beside_the_plans_wit
         late_s = trace.arrive_s - plan_s
         assert abs(late_s) > 1.0  # what was flown differs, and is shown as it is
         late = f"{'+' if late_s > 0 else '−'}{abs(late_s):.2f} s"
-        assert f"{v.name} at its goal {plan_s:.1f} s {trace.arrive_s:.1f} s {late}" in words
+        assert f"{v.name} at its goal {duration(plan_s, 1)} {duration(trace.arrive_s, 1)} {late}" in words
         lowest = v.verdict.lowest
         assert lowest is not None
         surface = made.world.airspace.surface

@@ -59,7 +59,7 @@ def test_the_briefing_says_what_where_limits_margins_times_way_home_and_has_line
         "mission briefing", "Four", "uav1", "uav4", markup.place(*verdict.legs[0].start[:2]),
         markup.place(*verdict.legs[-1].end[:2]), f"{markup.least(low.min_agl_m, 1, 'm')}; at least",
         markup.num(limits.min_agl_m, 0, "m"), f"{markup.least(near.zone_clearance_m, 1, 'm')}, {near.nearest_zone}",
-        markup.num(limits.max_amsl_m, 0, "m"), "T+0:08:00", home.headline, "RTL_ALT ", "Separation", "Bare DEM",
+        markup.num(limits.max_amsl_m, 0, "m"), "0:08:00", home.headline, "RTL_ALT ", "Separation", "Bare DEM",
         "planned by", "flown by", "name", "date", "signature",
     ):  # fmt: skip
         assert " ".join(words.split()) in text, words

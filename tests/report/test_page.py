@@ -37,7 +37,7 @@ from gcsplan.report.relief import UNKNOWN, extent_of, relief_of
 from gcsplan.report.samples import distance_m, line_of, passages
 from gcsplan.report.scene_data import triangles, zone_meshes
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import METRE, duration
+from gcsplan.units import METRE, METRIC, duration
 from gcsplan.vehicle import Energy, Vehicle
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
@@ -220,7 +220,7 @@ def test_an_item_that_is_flown_in_many_chords_is_one_row_of_the_table() -> None:
         chords += [leg] if leg.column else [replace(part, min_agl_m=leg.min_agl_m + 5.0 * k) for k in (3, 0, 1, 2)]
     cut = replace(subject, verdict=replace(subject.verdict, legs=tuple(chords)))
     assert len(chords) > len(subject.verdict.legs)
-    assert tables.legs_table(cut) == tables.legs_table(subject)
+    assert tables.legs_table(cut, METRIC) == tables.legs_table(subject, METRIC)
 
 
 def test_a_broken_limit_is_told_at_the_top_and_marked_where_it_is() -> None:

@@ -8,12 +8,25 @@ import subprocess
 from importlib import resources
 from typing import Any
 
+from gcsplan.units import METRIC
+
 PROGRAM = shutil.which("node")
 ANSWER_S = 30.0
-PAGE = """
-const window = { addEventListener() {} };
-const grid = { box: [0, 0, 1, 1], heights: '', cols: 0, rows: 0, base: 0, step: 1, lat: [], lon: [], lattice: 0 };
-const document = { getElementById: () => ({ textContent: JSON.stringify({ grid, lines: [] }) }) };
+GRID = {
+    "box": [0, 0, 1, 1],
+    "heights": "",
+    "cols": 0,
+    "rows": 0,
+    "base": 0,
+    "step": 1,
+    "lat": [],
+    "lon": [],
+    "lattice": 0,
+}
+PAGE = f"""
+const window = {{ addEventListener() {{}} }};
+const found = {json.dumps(json.dumps({"grid": GRID, "lines": [], "units": METRIC.as_dict()}))};
+const document = {{ getElementById: () => ({{ textContent: found }}) }};
 """
 """What `base.js` finds of a page: no figure, no ground, no vehicle."""
 
