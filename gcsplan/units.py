@@ -8,7 +8,7 @@ h:mm:ss in every system, energies kJ beside Wh. Rounding is that of `gcsplan.fig
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Self
 
@@ -31,9 +31,9 @@ class Unit(NamedTuple):
         """The decimals of a number that is shown with ``of_si`` in SI's own unit."""
         return max(0, of_si + self.finer)
 
-    def stated(self, value: float) -> str:
+    def stated(self, value: float, rounded: Callable[[float, int], float] = round) -> str:
         """A value that was given, with the digits it has: ``60`` m, ``196.85`` ft."""
-        return f"{value:g}" if self.size == 1.0 else f"{round(self.of(value), 2):.10g}"
+        return f"{value:g}" if self.size == 1.0 else f"{rounded(self.of(value), 2):.10g}"
 
 
 METRE = Unit("m", 1.0)

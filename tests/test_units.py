@@ -317,6 +317,8 @@ def test_json_and_files_are_in_si_in_every_system(run: Any, monkeypatch: pytest.
     message = json.loads(out)["verdicts"][0]["violations"][0]["message"]
     assert re.search(r"limit 80\.00 m \(by \d+\.\d\d m\)", message)
     _, quiet, _ = run("check", "higher.yaml", "a.plan", "-q")
+    run("check", "m.yaml", "a.plan", "--report", "r.html")
+    assert "ft AMSL" in Path("r.html").read_text(encoding="utf-8")
     assert "limit 262.47 ft" in quiet  # the environment's system; an option comes before it
     assert "limit 80.00 m" in run("check", "higher.yaml", "a.plan", "-q", "--units", "metric")[1]
 

@@ -10,8 +10,9 @@ from gcsplan.app.way_home import warnings
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN
 from gcsplan.cli.console import aside, console, new_table, print_table, say
+from gcsplan.figures import raised
 from gcsplan.mavlink.mission.return_altitude import setting
-from gcsplan.units import Quantity, Reach, Units, told
+from gcsplan.units import Reach, Units, told
 
 MOST_ROWS = 8
 """Rows with one label that are printed; the report and JSON have all of them."""
@@ -32,22 +33,15 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
         best = home.set_rel_home_m
         table.add_row(
             escape(name), at, WORDS[home.safe], Reach(home.no_return_m).text(units) if home.safe is False else "–",
-            "–" if best is None else _at_least(best, units),
+            "–" if best is None else unit.stated(best, raised),
             "–" if not home.set_leaves_m else Reach(home.set_leaves_m).text(units),
             str(len(home.rally)) if home.rally else "–",
         )  # fmt: skip
     print_table(table)
     known = dict.fromkeys((h.autopilot, h.set_rel_home_m) for h in homes.values() if h.set_rel_home_m is not None)
     for autopilot, best in known:
-        say(f"{_at_least(best, units)} {unit.symbol} above home: {setting(autopilot, best)}")
+        say(f"{unit.stated(best, raised)} {unit.symbol} above home: {setting(autopilot, best)}")
     say_warnings(homes, units)
-
-
-def _at_least(rel_home_m: float, units: Units) -> str:
-    """A return altitude to set, in the units of people; the parameter's own value stands beside it."""
-    if units.height.size == 1.0:
-        return units.height.stated(rel_home_m)
-    return Quantity(rel_home_m, "height", 1, "up", trimmed=True, bare=True).text(units)
 
 
 def say_home(home: WayHome, units: Units) -> None:
