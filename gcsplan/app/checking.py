@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.app.fencing import own_fence
+from gcsplan.app.option_words import all_in_options, home_in_options, verdict_in_options
 from gcsplan.app.pipeline import world_of
 from gcsplan.app.way_home import home_of, is_required, lets_fly
 from gcsplan.check.judge import TERRAIN_ERROR_M, judge
@@ -239,11 +240,14 @@ def check_with_options(
             )
             inputs = inputs or dict(described)
             request = _request(opened, r.mission, file.stem, world)
-            checked.append(_judged(request, file, r, world, options.terrain_error_m, returns))
+            done = _judged(request, file, r, world, options.terrain_error_m, returns)
+            verdict, home = verdict_in_options(done.verdict), home_in_options(done.way_home)
+            checked.append(replace(done, verdict=verdict, way_home=home, notes=all_in_options(done.notes)))
         except InputError as error:
             unreadable.append((argument, error))
     notes = inputs.pop("notes", ())
-    return Batch("check", tuple(checked), tuple(unreadable), inputs, notes if isinstance(notes, tuple) else ())
+    said = all_in_options(notes) if isinstance(notes, tuple) else ()
+    return Batch("check", tuple(checked), tuple(unreadable), inputs, said)
 
 
 def _with_home(read: MissionFileRead, given: Home | None, argument: str) -> MissionFileRead:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -382,6 +383,22 @@ def test_the_way_home_is_judged_where_that_is_asked_for(run: Any, folder: Path, 
     assert "error" not in document
     _, out, _ = run(file, *world, "--rtl-altitude", "120", "--require-way-home", "--json")
     assert "way_home" in json.loads(out)["error"]["message"]
+
+
+def test_without_a_mission_file_the_options_are_named_and_with_one_its_keys(
+    run: Any, folder: Path, world: list[str]
+) -> None:
+    file = file_of(folder, "round")
+    _, out, err = run(file, *world, "--max-amsl", "500", "--way-home")
+    assert "write the vehicle's own as --rtl-altitude" in out + err
+    assert "above --max-amsl" in out
+    assert not re.search(r"rtl_rel_home_m|max_amsl_m|min_agl_m", out + err)
+    round_trip = corpus.cases()[0].items
+    (folder / "back.waypoints").write_text(
+        corpus.qgroundcontrol((*round_trip[:-1], replace(round_trip[-1], command=20)))
+    )
+    _, out, _ = run(folder / "back.waypoints", *world, "-q")
+    assert "the return home is not judged: its altitude is the vehicle's own (give --rtl-altitude)" in out
 
 
 def test_a_plans_own_fence_is_held_against_it(run: Any, folder: Path, world: list[str]) -> None:
