@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from gcsplan import __version__
+from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting
 from gcsplan.report.fleet_view import motions_of, separation_words
 from gcsplan.report.marks import Mark, marks_html
@@ -20,10 +21,10 @@ from gcsplan.report.subject import Page, Subject
 from gcsplan.units import Units, duration, told
 
 MOST_VEHICLES = 4
-MOST_FINDINGS, MOST_RALLY, MOST_NOTES = 3, 6, 1
+MOST_FINDINGS, MOST_RALLY, MOST_NOTES = 2, 4, 1
 NAME, MESSAGE = 28, 105
 """Most letters of a name in the table, and of a message."""
-MAP_MM, SMALL_MAP_MM, WIDE_MM = 56.0, 28.0, 180.0
+MAP_MM, SMALL_MAP_MM, WIDE_MM = 56.0, 24.0, 180.0
 """Height of the map, height where problems take the room, and greatest width."""
 KINDS = ("start", "goal", "rally", "name")
 """The marks of the map that are on the briefing's, too."""
@@ -87,7 +88,7 @@ def _vehicles(page: Page, shown: Sequence[tuple[int, Subject]]) -> str:
     """One column for each vehicle: where, limits with what is left of them, times, way home."""
     if not shown:
         return ""
-    head = ["|", *(f'<i class="swatch t{i % COLOURS}"></i>{esc(_short(s.name, NAME))}|' for i, s in shown)]
+    head = ["|", *(f'<i class="swatch t{i % COLOURS}"></i>{esc(_name(s.name))}|' for i, s in shown)]
     columns = [dict(_facts(page, s, page.units)) for _, s in shown]
     names = list(dict.fromkeys(name for column in columns for name in column))
     rows = [(name, *(column.get(name, "–") for column in columns)) for name in names]
@@ -116,9 +117,7 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     if limits.max_agl_m is not None:
         high = max((leg.max_agl_m for leg in verdict.legs if not math.isnan(leg.max_agl_m)), default=None)
         yield "highest above ground", f"{num(high, 1, units.height)}; at most {stated(limits.max_agl_m, units.height)}"
-    zone = (
-        f"{least(near.zone_clearance_m, 1, units.distance)}, {esc(_short(near.nearest_zone, NAME))}" if near else "none"
-    )
+    zone = f"{least(near.zone_clearance_m, 1, units.distance)}, {esc(_name(near.nearest_zone))}" if near else "none"
     yield "nearest zone", f"{zone}; at least {stated(limits.horizontal_clearance_m, units.distance)}"
     angle = f"; at most {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90.0 else ""
     yield "steepest", num(verdict.max_climb_deg, 1, "°") + angle
@@ -148,6 +147,8 @@ def _way_home(s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     yield "way home", esc(_short(told(home.headline, units), MESSAGE))
     if home.set_rel_home_m is not None:
         yield "to set", esc(setting(home.autopilot, home.set_rel_home_m))
+        points = f"with {counted(len(home.rally), 'rally point')} on board: " if home.rally else ""
+        yield "what that leaves", esc(_short(points + told(home.then, units), MESSAGE))
 
 
 def _rally(page: Page, shown: Sequence[tuple[int, Subject]]) -> str:
@@ -155,7 +156,7 @@ def _rally(page: Page, shown: Sequence[tuple[int, Subject]]) -> str:
     several = len(page.subjects) > 1
     every = [(s.name, r) for _, s in shown if s.home is not None for r in s.home.rally]
     words = [
-        (f"{esc(_short(name, NAME))} " if several else "")
+        (f"{esc(_name(name))} " if several else "")
         + f"{place(r.lat_deg, r.lon_deg)} at {num(r.rel_home_m, 0, page.units.height)}"
         for name, r in every[:MOST_RALLY]
     ]
@@ -181,6 +182,12 @@ def _signatures() -> str:
     """Lines to sign on; nobody's name is known here."""
     line = "".join(f"<span>{what}</span>" for what in ("name", "date", "signature"))
     return "".join(f'<div class="sign-here"><b>{who}</b>{line}</div>' for who in ("planned by", "flown by"))
+
+
+def _name(text: str) -> str:
+    """A name, cut in the middle: what tells names apart is at their ends."""
+    words = plain(text)
+    return words if len(words) <= NAME else f"{words[: NAME // 2]}…{words[1 - NAME // 2 :]}"
 
 
 def _short(text: str, most: int) -> str:

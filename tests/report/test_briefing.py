@@ -83,7 +83,9 @@ def test_what_is_broken_or_not_judged_is_on_the_page_that_is_signed() -> None:
     worst = briefing(fleet_of_four(worst=True))
     assert "more, on the pages that follow" in worst
     assert "Rally points proposed: " in worst
-    assert "and 18 more" in worst
+    assert "and 20 more" in worst
+    assert "what that leaves with 6 rally points on board: no safe return from " in worst
+    assert all(f"a vehicle with…ame, number {i}" in worst for i in (1, 2, 3, 4))
     nothing = replace(small_page().subjects[0].verdict, legs=(), not_judged=("the mission flies nowhere",))
     assert "NOT JUDGED" in briefing(replace(page, subjects=(replace(page.subjects[0], verdict=nothing),)))
 

@@ -192,6 +192,13 @@ class WayHome:
         if self.set_rel_home_m is None:
             return ""
         with_points = f", with {counted(len(self.rally), 'rally point')} on board (--rally)" if self.rally else ""
+        return Told("set {}{}: then {}", setting(self.autopilot, self.set_rel_home_m), with_points, self.then)
+
+    @property
+    def then(self) -> str:
+        """What the value to set leaves, with the rally points if there are any; empty if there is no value to name."""
+        if self.set_rel_home_m is None:
+            return ""
         left = self.set_leaves_m or 0.0
         then: str = "safe return from all of it"
         but = ""
@@ -203,7 +210,7 @@ class WayHome:
             but += ", the battery not counted"
         if self.not_judged:
             but += ", as far as it was judged"
-        return Told("set {}{}: then {}{}", setting(self.autopilot, self.set_rel_home_m), with_points, then, but)
+        return Told("{}{}", then, but)
 
     def as_dict(self, *, profile: bool = False) -> dict[str, Any]:
         """Plain values for ``summary.json``; the profile on request."""

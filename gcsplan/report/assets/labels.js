@@ -23,6 +23,7 @@ function layLabels(things, width, height, taken) {
 function reachOf(t, things) {
   let reach = t.r;
   for (const o of things) {
+    if (Math.abs(o.x - t.x) >= o.r) continue;
     const away = Math.hypot(o.x - t.x, o.y - t.y);
     if (away < o.r) reach = Math.max(reach, away + o.r);
   }
