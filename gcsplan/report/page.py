@@ -176,12 +176,12 @@ def _vehicles(page: Page) -> str:
         found = [verdict_of(s.verdict.safe, homeless=s.homeless) for s in page.subjects]
         words = [f"{sign} {word.lower()}" for _, sign, word, _ in found]
         return f"<section>{tables.vehicles_table(page, words)}</section>"
-    in_fleet = bool(motions_of(page))
-    cards = "".join(_card(subject, i, page.units, in_fleet=in_fleet) for i, subject in enumerate(page.subjects))
+    cards = "".join(_card(s, i, page) for i, s in enumerate(page.subjects))
     return f'<section class="cards" aria-label="Key figures">{cards}</section>'
 
 
-def _card(subject: Subject, index: int, units: Units, *, in_fleet: bool) -> str:
+def _card(subject: Subject, index: int, page: Page) -> str:
+    units, in_fleet = page.units, bool(motions_of(page))
     verdict, limits, c = subject.verdict, subject.vehicle.limits, subject.certificate
     kind, sign, word, _ = verdict_of(verdict.safe, homeless=subject.homeless)
     low, near = verdict.lowest, verdict.nearest
@@ -215,7 +215,7 @@ def _card(subject: Subject, index: int, units: Units, *, in_fleet: bool) -> str:
     figures.append(
         (
             "arrives",
-            duration(subject.arrive_s, 1 if in_fleet else 0),
+            duration(subject.arrive_s, page.time_decimals),
             f"{since}; {items} mission items",
         )
     )

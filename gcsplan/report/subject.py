@@ -111,6 +111,11 @@ class Page:
     rehearsed: Rehearsed | None = None
 
     @property
+    def time_decimals(self) -> int:
+        """Decimals of the arrivals: tenths in a fleet, whose order may hang on them."""
+        return 1 if sum(s.slot is not None for s in self.subjects) > 1 else 0
+
+    @property
     def homeless(self) -> bool:
         """Whether the return of any subject was judged and is not safe."""
         return any(s.homeless for s in self.subjects)

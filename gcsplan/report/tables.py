@@ -34,7 +34,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
                 f"{least(near.zone_clearance_m, 1, units.distance)} {esc(near.nearest_zone)}" if near else "–",
                 num(verdict.max_climb_deg, 1, "°"), energy(verdict.energy_j, 0, s.vehicle.energy.battery_v),
                 num(verdict.battery_used_percent, 1, "%"),
-                duration(s.arrive_s, 1 if s.motion is not None else 0), home,
+                duration(s.arrive_s, page.time_decimals), home,
             )
         )  # fmt: skip
         marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None or s.homeless else "")
