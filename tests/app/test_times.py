@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import csv
-import html
 import io
 import math
 import re
 from datetime import UTC, datetime
-from functools import cache
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -27,89 +24,15 @@ from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.mission_file import load_mission
 from gcsplan.units import duration
-from tests.support.paths import MISSIONS
+from tests.support.plans import CASES, cases, planned, text_rows
 from tests.support.shown import seconds
 
 SAME_S = 1e-6
 """Seconds by which two sums of the same times may differ."""
 
+pytestmark = pytest.mark.xdist_group("plans")  # one process plans the missions, not three
 
-def _craft(name: str, sysid: int, **more: Any) -> dict[str, Any]:
-    return {"name": name, "sysid": sysid, "autopilot": "arducopter", "speed_m_s": [3, 10]} | more
-
-
-FLAT: dict[str, Any] = {
-    "version": 1, "name": "times", "frame": {"origin": [36.6, -84.3], "amsl_m": 0}, "terrain": {"flat_m": 0},
-    "limits": {"min_agl_m": 40, "max_climb_deg": 30},
-}  # fmt: skip
-MOTION = {"climb_m_s": 2.5, "descent_m_s": 1.5, "accel_m_s2": 1.5, "leg_jerk_m_s3": 1.0, "corner_accel_m_s2": 2.5}
-VALLEY: dict[str, Any] = {
-    "version": 1, "name": "valley", "terrain": {"dem": "sample:jacksboro", "vertical_datum": "EGM96"},
-    "limits": {"min_agl_m": 60, "horizontal_clearance_m": 30, "track_error_m": 3, "altitude_error_m": 5,
-               "max_climb_deg": 15},
-}  # fmt: skip
-UP = {"start": [36.6175, -84.3892], "goal": [36.6250, -84.3800]}
-
-CASES: dict[str, Any] = {
-    "jacksboro": MISSIONS / "jacksboro.yaml",
-    "jacksboro-wing": MISSIONS / "jacksboro-wing.yaml",
-    "fleet-4": MISSIONS / "fleet-4.yaml",
-    "a hold at the gate": FLAT | {
-        "vehicles": [
-            _craft("west", 1, start={"east_m": -500, "north_m": 0}, goal={"east_m": 500, "north_m": 0}, **MOTION),
-            _craft("south", 2, start={"east_m": 0, "north_m": -500}, goal={"east_m": 0, "north_m": 500}, **MOTION,
-                   energy={"hover_w": 400}),
-        ],
-        "arrival": {"mode": "sequence", "order": ["west", "south"], "interval_s": 300, "separation_m": 30,
-                    "hold": "gate"},
-    },
-    "one that leaves later": FLAT | {
-        "vehicles": [
-            _craft("late", 1, start={"east_m": 0, "north_m": 0}, goal={"east_m": 300, "north_m": 0},
-                   via=[{"east_m": 150, "north_m": 60}], **MOTION),
-        ],
-        "arrival": {"mode": "together", "arrive_s": 400, "separation_m": 30},
-    },
-    "terrain frame and return": VALLEY | {
-        "vehicles": [_craft("over", 1, end="rtl", rtl_rel_home_m=300, max_climb_deg=60, **UP)],
-        "altitude_frame": "terrain",
-    },
-    "px4 that stays": VALLEY | {"vehicles": [_craft("px4", 1, autopilot="px4", end="loiter", **UP)]},
-    "a wing slower than it can": FLAT | {
-        "limits": {"min_agl_m": 40, "max_climb_deg": 10, "track_error_m": 10},
-        "vehicles": [
-            _craft("wing", 1, autopilot="arduplane", speed_m_s=[12, 20], turn_radius_m=100, end="land",
-                   start={"east_m": 0, "north_m": 0}, goal={"east_m": 3000, "north_m": 0},
-                   via=[{"east_m": 1500, "north_m": 800}]),
-        ],
-        "arrival": {"mode": "together", "arrive_s": 260, "separation_m": 30},
-    },
-    "a wing that returns": FLAT | {
-        "limits": {"min_agl_m": 40, "max_climb_deg": 10, "track_error_m": 10},
-        "vehicles": [
-            _craft("back", 1, autopilot="arduplane", speed_m_s=[12, 20], turn_radius_m=100, end="rtl",
-                   rtl_rel_home_m=150, start={"east_m": 0, "north_m": 0}, goal={"east_m": 3000, "north_m": 0}),
-        ],
-    },
-    "a paper's": MISSIONS / "papers" / "ib-abc-sequence.yaml",
-}  # fmt: skip
-
-SLOW = {"fleet-4", "a paper's"}
 FLOWN_QUICKLY = {"a hold at the gate", "one that leaves later", "terrain frame and return"}
-
-
-@cache
-def _planned(case: str) -> tuple[Any, Plan]:
-    asked = CASES[case]
-    source = load_mission(asked if isinstance(asked, Path) else "times.yaml", **(
-        {} if isinstance(asked, Path) else {"text": yaml.safe_dump(asked)}
-    ))  # fmt: skip
-    return source, plan(source)
-
-
-cases = pytest.mark.parametrize(
-    "case", [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in CASES]
-)
 
 
 def parts(done: Plan) -> list[tuple[VehiclePlan, Slot, TimedPath]]:
@@ -117,17 +40,9 @@ def parts(done: Plan) -> list[tuple[VehiclePlan, Slot, TimedPath]]:
     return [(v, done.fleet.slot(v.name), done.fleet.motion(v.name)) for v in done.vehicles]
 
 
-def text_rows(page: str, title: str) -> list[list[str]]:
-    """The cells of each row of the table with ``title``, as text."""
-    table = page[page.index(f"<caption>{title}") :].split("</table>")[0]
-    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", table, re.DOTALL)
-    cells = [re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", row, re.DOTALL) for row in rows]
-    return [[html.unescape(re.sub(r"<[^>]+>", "", cell)) for cell in row] for row in cells[1:]]
-
-
 @cases
 def test_the_sum_of_the_legs_is_the_arrival_and_the_motions(case: str) -> None:
-    _, done = _planned(case)
+    _, done = planned(case)
     for v, slot, motion in parts(done):
         assert motion.arrive_s == pytest.approx(slot.arrive_s, abs=SAME_S)
         climb_s = v.verdict.legs[0].time_s if slot.route.start_ground_amsl_m is None else 0.0  # not in a paper's times
@@ -145,7 +60,7 @@ def test_the_sum_of_the_legs_is_the_arrival_and_the_motions(case: str) -> None:
 
 @cases
 def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
-    _, done = _planned(case)
+    _, done = planned(case)
     files, told = outputs_of(done), {v["name"]: v for v in summary_of(done)["vehicles"]}
     rows = list(csv.DictReader(io.StringIO(files["profile.csv"])))
     page = report_of(done)
@@ -174,7 +89,7 @@ def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
 
 @cases
 def test_the_check_of_the_written_file_says_the_same_times(case: str, tmp_path: Path) -> None:
-    source, done = _planned(case)
+    source, done = planned(case)
     files = outputs_of(done)
     for v, _, _ in parts(done):
         for ending in (".waypoints", ".plan"):
@@ -191,7 +106,7 @@ def test_the_check_of_the_written_file_says_the_same_times(case: str, tmp_path: 
     "case", [pytest.param(name, marks=[] if name in FLOWN_QUICKLY else [pytest.mark.slow]) for name in CASES]
 )
 def test_a_rehearsal_compares_with_the_planned_time(case: str) -> None:
-    _, done = _planned(case)
+    _, done = planned(case)
     found = rehearse(done)
     rows = {row["vehicle"]: row for row in found.rows()}
     for performance, (v, slot, _) in zip(found.vehicles, parts(done), strict=True):
