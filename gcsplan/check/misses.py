@@ -105,7 +105,8 @@ def nearest_misses(
     met = [k for k in dict.fromkeys(report.nearest_zone.tolist()) if k >= 0]
     for k in sorted(met, key=lambda k: float(near[report.nearest_zone == k].min()))[:MOST_ZONES]:
         distance = np.where(report.nearest_zone == k, near, np.inf)
-        room, at = distance - legs.track_error_m - reach, np.zeros(len(run))
+        # The distance is a lower bound: where no violation is reported, the leg keeps its distance.
+        room, at = np.maximum(distance - legs.track_error_m - reach, 0.0), np.zeros(len(run))
         for v in report.violations:  # inside a zone the reported clearance is 0 at any depth
             if v.kind == "zone" and v.zone == k:
                 room[v.leg], distance[v.leg] = -v.by, v.value
