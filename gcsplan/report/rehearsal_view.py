@@ -57,7 +57,7 @@ def _value(c: Compared, value: float | None, units: Units) -> str:
 
 
 def _difference(c: Compared, units: Units) -> str:
-    """Flown less planned, with its sign; of least values rounded down, as they are."""
+    """Flown less planned, with its sign; of least values as they are shown, rounded down."""
     if c.planned is None or c.flown is None or not math.isfinite(c.flown - c.planned):
         return "–"
     apart = c.flown - c.planned
@@ -67,6 +67,7 @@ def _difference(c: Compared, units: Units) -> str:
         shown, text = round(apart, 1), num(abs(apart), 1, "%")
     else:
         unit: Unit = getattr(units, c.kind)
-        shown = floored(unit.of(apart), unit.decimals(1))
+        decimals = unit.decimals(1)
+        shown = round(floored(unit.of(c.flown), decimals) - floored(unit.of(c.planned), decimals), decimals)
         text = num(abs(shown) * unit.size, 1, unit)
     return ("−" if shown < 0.0 else "+") + text

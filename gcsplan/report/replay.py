@@ -28,7 +28,8 @@ FINE_M = 0.2
 MOST_LOOKED, MOST_MOMENTS = 6_000, 120_000
 """Moments of one motion, and of all together, among which the places are chosen."""
 SPEEDS = (1, 2, 5, 10, 20, 30, 60)
-FIRST_SPEED = 20
+WATCH_S = 90.0
+"""The speed at first is the lowest with which the replay is over after this time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +162,9 @@ def replay_data(replay: Replay, page: Page) -> dict[str, object]:
 def replay_html(replay: Replay, page: Page) -> str:
     """The controls and the table, hidden until the page's script runs them."""
     both, several = any(t.flown for t in replay.tracks), len(page.subjects) > 1
+    first = next((s for s in SPEEDS if replay.end_s <= s * WATCH_S), SPEEDS[-1])
     speeds = "".join(
-        f'<option value="{s}"{" selected" if s == FIRST_SPEED else ""}>{s}×</option>' for s in SPEEDS
+        f'<option value="{s}"{" selected" if s == first else ""}>{s}×</option>' for s in SPEEDS
     )  # fmt: skip
     near = '<button type="button" data-do="closest">closest approach</button>' if replay.closest_s is not None else ""
     rows = [

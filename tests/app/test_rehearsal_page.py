@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -15,7 +16,9 @@ import yaml
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import load_mission, plan
 from gcsplan.app.rehearsing import Rehearsal, rehearse
-from gcsplan.app.report_page import render_rehearsal
+from gcsplan.app.report_page import page_of_plan, render_rehearsal
+from gcsplan.report.rehearsal_view import rehearsal_html
+from gcsplan.report.subject import Compared, Rehearsed
 from gcsplan.sim.wind import Weather
 from gcsplan.units import duration
 from tests.app.test_fleet_planning import CROSS
@@ -121,3 +124,19 @@ def test_rehearse_writes_the_page_even_where_it_finds_violations(run: Any, tmp_p
     code, _, _ = run("rehearse", file, "--report", "windy.html", "--wind", "6", "--wind-from", "90", "--airspeed", "10")
     assert code == 4
     assert "NOT AS PLANNED" in (tmp_path / "windy.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("planned_m", "flown_m", "least", "words"),
+    [
+        (91.4, 91.38, True, "91.4 m 91.3 m −0.1 m"), (74.65, 74.64, True, "74.6 m 74.6 m +0.0 m"),
+        (20.0, 21.26, False, "20.0 m 21.3 m +1.3 m"), (None, 5.0, False, "– 5.0 m –"),
+        (5.0, math.inf, False, "5.0 m never –"),
+    ],
+)  # fmt: skip
+def test_a_difference_is_that_of_the_two_values_beside_it(
+    folder: Path, planned_m: float | None, flown_m: float, least: bool, words: str
+) -> None:
+    one = Compared(None, "fleet", "figure", planned_m, flown_m, "m", least)
+    text = rehearsal_html(replace(page_of_plan(planned(folder)), rehearsed=Rehearsed(True, "Flown.", (one,))))
+    assert f"fleet figure {words}" in " ".join(Reader(text).text.split())

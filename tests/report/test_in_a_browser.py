@@ -123,7 +123,7 @@ def test_pointing_tells_numbers_with_their_units_in_every_figure(page: Browser, 
     assert "ground about" in told["#map"]
     assert "m AMSL" in told["#map"]
     assert "nearest track" in told["#map"]
-    assert "its height above ground there" in told["#map"]
+    assert "its height above ground" in told["#map"]
     assert re.search(r"36\.\d{5}, -84\.\d{5}", told["#map"])
     for words in ("above ground", "lowest allowed", "energy used", "kJ", "along the track"):
         assert words in told["#profile-0 .plot"], words

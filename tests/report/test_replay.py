@@ -105,6 +105,8 @@ def test_a_checked_file_has_no_replay_and_one_vehicle_has_one() -> None:
     assert len(read.data["replay"]["tracks"]) == 1
     assert "The fleet in time" not in read.text
     box = next(a for _, a in read.elements if a.get("id") == "replay")
+    chosen = [a["value"] for t, a in read.elements if t == "option" and "selected" in a]
+    assert chosen == ["10"]  # 480 s
     assert "hidden" in box  # without a script there is nothing to move
     assert [a.get("min") for t, a in read.elements if t == "input" and a.get("type") == "range"].count("0") == 1
 

@@ -82,8 +82,9 @@ function groundRows(e, n, near) {
   const z = ground.at(e, n), rows = [['at', placeWords(e, n) || '–'], ['ground about', isNaN(z) ? 'unknown' : num(z, 0, units.amsl)]];
   if (near) {
     const line = data.lines[near.k], far = near.away > 2000;
-    rows.push(['nearest track', `${line.name}, ${far ? num(near.away, 1, units.far) : num(near.away, 0, units.distance)} from here`]);
-    rows.push([`its height ${aboveRow(line, near.i)[0]} there`, aboveRow(line, near.i)[1]]);
+    rows.push(['nearest track', line.name], ['its distance', far ? num(near.away, 1, units.far) : num(near.away, 0, units.distance)]);
+    const [above, metres] = aboveRow(line, near.i);
+    rows.push([`its height ${above}`, metres]);
   }
   return rows;
 }
