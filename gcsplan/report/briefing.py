@@ -26,6 +26,7 @@ NAME, MESSAGE = 28, 105
 """Most letters of a name in the table, and of a message."""
 MAP_MM, SMALL_MAP_MM, WIDE_MM = 56.0, 24.0, 180.0
 """Height of the map, height where problems take the room, and greatest width."""
+PX_PER_MM = 96.0 / 25.4
 KINDS = ("start", "goal", "rally", "name")
 """The marks of the map that are on the briefing's, too."""
 NOT_IN_IT = "Wind, emergency landing sites and moving obstacles are not in the model."
@@ -74,12 +75,13 @@ def _map(page: Page, relief: Relief, marks: Sequence[Mark], high_mm: float) -> s
     """The report's own map once more, small; its shapes are referred to, not repeated."""
     extent = relief.extent
     ratio = extent.height_m / extent.width_m
+    wide_mm = min(WIDE_MM, high_mm / ratio)
     few = [m for m in marks if m.kind.split(" ")[0] in KINDS]
     return (
         f'<figure class="view map brief" id="brief" style="aspect-ratio:{1.0 / ratio:.4f};'
-        f'width:{min(WIDE_MM, high_mm / ratio):.1f}mm"><svg viewBox="0 0 10000 {extent.height_m * extent.scale:.1f}" '
+        f'width:{wide_mm:.1f}mm"><svg viewBox="0 0 10000 {extent.height_m * extent.scale:.1f}" '
         f'preserveAspectRatio="none" role="img" aria-label="Map of {esc(page.title)}, small"><use href="#drawing"/>'
-        f'</svg><div class="marks">{marks_html(few, ratio)}</div>'
+        f'</svg><div class="marks">{marks_html(few, ratio, wide_mm * PX_PER_MM)}</div>'
         '<div class="north" aria-hidden="true">N<br>↑</div></figure>'
     )
 

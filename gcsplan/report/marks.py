@@ -24,9 +24,9 @@ class Mark:
     rank: int
 
 
-def marks_html(marks: Sequence[Mark], ratio: float) -> str:
+def marks_html(marks: Sequence[Mark], ratio: float, width_px: float = ASSUMED_WIDTH_PX) -> str:
     """HTML spans for ``marks``; ``ratio`` is height over width of the figure."""
-    muted = _colliding(marks, ratio)
+    muted = _colliding(marks, ratio, width_px)
     return "".join(
         f'<span class="mark {m.kind}{" mute" if i in muted else ""}" '
         f'style="left:{100 * m.x:.3f}%;top:{100 * m.y:.3f}%" '
@@ -35,7 +35,7 @@ def marks_html(marks: Sequence[Mark], ratio: float) -> str:
     )
 
 
-def _colliding(marks: Sequence[Mark], ratio: float) -> set[int]:
+def _colliding(marks: Sequence[Mark], ratio: float, width_px: float) -> set[int]:
     """Indices of the marks whose labels would overlap one of a better rank."""
     taken: list[tuple[float, float, float, float]] = []
     muted = set()
@@ -43,7 +43,7 @@ def _colliding(marks: Sequence[Mark], ratio: float) -> set[int]:
         m = marks[i]
         half = 0.5 * LETTER_PX * max(map(len, m.label.split("\n")), default=0) + 3.0
         tall = LINE_PX * (m.label.count("\n") + 1)
-        x, y = m.x * ASSUMED_WIDTH_PX, m.y * ASSUMED_WIDTH_PX * ratio
+        x, y = m.x * width_px, m.y * width_px * ratio
         box = (x - half, y - tall, x + half, y)
         if any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken):
             muted.add(i)
