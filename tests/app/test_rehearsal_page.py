@@ -127,16 +127,16 @@ def test_rehearse_writes_the_page_even_where_it_finds_violations(run: Any, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("planned_m", "flown_m", "least", "words"),
+    ("before", "flown", "kind", "words"),
     [
-        (91.4, 91.38, True, "91.4 m 91.3 m −0.1 m"), (74.65, 74.64, True, "74.6 m 74.6 m +0.0 m"),
-        (20.0, 21.26, False, "20.0 m 21.3 m +1.3 m"), (None, 5.0, False, "– 5.0 m –"),
-        (5.0, math.inf, False, "5.0 m never –"),
+        (91.4, 91.38, "height", "91.4 m 91.3 m −0.1 m"), (74.65, 74.64, "distance", "74.6 m 74.6 m +0.0 m"),
+        (20.0, 21.26, "percent", "20.0 % 21.3 % +1.3 %"), (None, 5.0, "height", "– 5.0 m –"),
+        (5.0, math.inf, "distance", "5.0 m never –"), (60.0, 58.751, "time", "0:01:00.0 0:00:58.8 −1.25 s"),
     ],
 )  # fmt: skip
 def test_a_difference_is_that_of_the_two_values_beside_it(
-    folder: Path, planned_m: float | None, flown_m: float, least: bool, words: str
+    folder: Path, before: float | None, flown: float, kind: Any, words: str
 ) -> None:
-    one = Compared(None, "fleet", "figure", planned_m, flown_m, "m", least)
+    one = Compared(None, "fleet", "figure", before, flown, kind)
     text = rehearsal_html(replace(page_of_plan(planned(folder)), rehearsed=Rehearsed(True, "Flown.", (one,))))
     assert f"fleet figure {words}" in " ".join(Reader(text).text.split())
