@@ -192,7 +192,7 @@ def replay_html(replay: Replay, page: Page) -> str:
         '<div class="replay" id="replay" role="group" aria-label="Replay" hidden>'
         '<button type="button" data-do="play" aria-label="play">▶</button>'
         '<label>time <input type="range" min="0" max="0" step="1" value="0"></label>'
-        "<output aria-live="off">T+0:00:00</output>"
+        '<output aria-live="off">T+0:00:00</output>'
         f"<label>speed <select>{speeds}</select></label>{near}"
         f"<details><summary>Every vehicle at this time</summary>{table('At the time above', head, rows)}</details>"
         f'<p class="note">{note}.{exact}</p></div>'
