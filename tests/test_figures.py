@@ -18,12 +18,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gcsplan.app import outputs, pipeline
+from gcsplan.check.misses import Miss
 from gcsplan.cli import console
 from gcsplan.cli import main as cli
 from gcsplan.export.profile import write_profile
 from gcsplan.export.summary import write_summary
-from gcsplan.figures import counted, floored, raised
-from gcsplan.report import markup
+from gcsplan.figures import counted, floored, raised, steepened
+from gcsplan.report import markup, tables
+from gcsplan.report.subject import Subject
 from gcsplan.sim.outcome import Performance, _row
 from tests.support.paths import DATA
 
@@ -61,6 +63,49 @@ def test_what_must_at_least_be_set_is_rounded_up() -> None:
     assert raised(-3.26, 1) == -3.2
     assert math.isnan(raised(math.nan, 0))
     assert raised(math.inf, 0) == math.inf
+
+
+@given(st.floats(-1e6, 1e6), st.integers(0, 3))
+@example(690.4501, 1)
+@example(4.849, 1)
+@example(59.999999999999, 1)
+@example(-4.849, 1)
+@example(-0.049, 1)
+def test_a_greatest_value_is_never_shown_better_than_it_is_nor_a_digit_worse(value: float, decimals: int) -> None:
+    digit, noise = 10.0**-decimals, 1.001e-3 * 10.0**-decimals + 1e-9 * abs(value)
+    assert value - noise <= raised(value, decimals) < value + digit
+    steep = steepened(value, decimals)
+    assert (abs(value) < 0.5 * digit and steep == 0.0) or abs(value) - noise <= abs(steep) < abs(value) + digit
+    assert steep * value >= 0.0
+    for shown, text in (
+        (raised(value, decimals), markup.greatest(value, decimals)),
+        (steep, markup.steepest(value, decimals).removesuffix("°")),
+        (steep, console.steepest(value, decimals)),
+    ):
+        plain = re.sub("[\u2009\u202f]", "", text)
+        assert float(plain) == pytest.approx(shown, abs=1e-9)
+
+
+def test_the_highest_and_the_steepest_are_the_same_everywhere_and_not_flattered() -> None:
+    plan = pipeline.plan(pipeline.load_mission(DATA / "crossing.yaml"))
+    (v,) = plan.vehicles
+    legs = tuple(leg if leg.column else replace(leg, climb_deg=4.8101, max_agl_m=690.4501) for leg in v.verdict.legs)
+    verdict = replace(v.verdict, legs=legs)
+    changed = replace(v, verdict=verdict)
+    assert console._plan_row(changed, None)["steepest, °"].split(" of ")[0] == "4.9"
+    rows = csv.DictReader(io.StringIO(write_profile(outputs.item_rows("uav1", verdict))))
+    assert "4.811" in {row["climb_deg"] for row in rows}
+    assert json.loads(write_summary(outputs.verdict_of("file", verdict)))["max_climb_deg"] == 4.811
+    subject = Subject(
+        "uav1", verdict, replace(v.request.vehicle, limits=replace(v.request.vehicle.limits, max_agl_m=700))
+    )
+    table = tables.legs_table(subject)
+    assert "4.9°" in table
+    assert "690.5\u202fm" in table
+    assert "690.46\u202fm" in tables.limits_table(subject, None)
+    miss = Miss("max_amsl", 0.0499, 690.4501, 690.5, "m", 1, 36.6, -84.3, 685.4)
+    assert miss.describe().startswith("highest altitude: 690.5 m of 690.5, 0.0 m to spare")
+    assert Miss("climb", 10.19, 4.8101, 15.0, "°", 1, 36.6, -84.3, 0.0).describe().startswith("steepest climb: 4.9 °")
 
 
 def test_a_height_that_the_nearest_number_flatters_is_the_same_everywhere() -> None:

@@ -78,6 +78,11 @@ def least(value: float | None, decimals: int = 0, unit: Unit | None = None) -> s
     return number(floored(unit.of(value), unit.decimals(decimals)), unit.decimals(decimals))
 
 
+def steepest(degrees: float | None, decimals: int = 1) -> str:
+    """A climb or descent as in `number`, but rounded away from level."""
+    return number(None if degrees is None else steepened(degrees, decimals), decimals)
+
+
 def new_table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
     """A table without rows; ``columns``: name, and whether it is right-aligned."""
     table = Table(

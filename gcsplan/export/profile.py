@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from gcsplan.export.rows import ItemRow
-from gcsplan.figures import floored
+from gcsplan.figures import floored, steepened
 
 COLUMNS: tuple[tuple[str, str, int], ...] = (
     ("lat", "lat_deg", 7),
@@ -24,7 +24,8 @@ COLUMNS: tuple[tuple[str, str, int], ...] = (
 )
 """Column, field of `ItemRow`, decimals; the columns follow vehicle, seq and command."""
 
-LEAST = ("agl_m", "min_agl_on_leg_m")
+ROUNDED = {"agl_m": floored, "min_agl_on_leg_m": floored, "climb_deg": steepened}
+"""How a field is rounded; others to the nearest."""
 
 
 def write_profile(rows: Iterable[ItemRow]) -> str:
@@ -33,13 +34,13 @@ def write_profile(rows: Iterable[ItemRow]) -> str:
     table = csv.writer(out, lineterminator="\n")
     table.writerow(["vehicle", "seq", "command", *(name for name, _, _ in COLUMNS)])
     for row in rows:
-        numbers = [_cell(getattr(row, key), decimals, least=key in LEAST) for _, key, decimals in COLUMNS]
+        numbers = [_cell(getattr(row, key), decimals, ROUNDED.get(key, round)) for _, key, decimals in COLUMNS]
         table.writerow([row.vehicle, row.seq, row.command, *numbers])
     return out.getvalue()
 
 
-def _cell(value: float | None, decimals: int, *, least: bool) -> str:
+def _cell(value: float | None, decimals: int, rounded: Callable[[float, int], float]) -> str:
     if value is None or not math.isfinite(value):
         return ""
-    text = f"{floored(value, decimals) if least else value:.{decimals}f}"
+    text = f"{rounded(value, decimals):.{decimals}f}"
     return text.lstrip("-") if float(text) == 0.0 else text

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gcsplan.figures import floored
+from gcsplan.figures import floored, raised
 
 ORDER: dict[str, tuple[str, ...]] = {
     "": ("name", "gcsplan", "planner", "objective", "seed", "inputs", "vehicles", "fleet"),
@@ -46,8 +46,8 @@ def write_summary(summary: Mapping[str, Any], *, clocks: bool = False) -> str:
     """The JSON text of ``summary``; NaN and infinity become null, numpy's numbers become plain ones.
 
     ``clocks`` keeps the clock readings. Floats are rounded by their unit; least values and lower bounds (``min_…``,
-    ``lower_bound_…``) are rounded down, so that none looks better than it is. Raises TypeError for a type that JSON
-    lacks.
+    ``lower_bound_…``) are rounded down, greatest values (``max_…``) up, so that none looks better than it is. Raises
+    TypeError for a type that JSON lacks.
     """
     return json.dumps(_plain(summary, "", clocks), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -76,4 +76,6 @@ def _rounded(value: float, key: str) -> float | None:
     decimals = next((n for suffix, n in DECIMALS if key.endswith(suffix)), OTHER_DECIMALS)
     if key.startswith(("min_", "lower_bound")):
         value = floored(value, decimals)
+    if key.startswith("max_"):
+        value = raised(value, decimals)
     return round(value, decimals) + 0.0

@@ -167,7 +167,7 @@ def _steepness(flown: Sequence[LegFigures], climb_deg: float, descent_deg: float
         if limit >= 90.0:
             continue
         angle = max(sign * steep.climb_deg, 0.0)
-        rows.append((f"steepest {name}", num(limit, 1, "°"), num(angle, 2, "°"), limit - angle, "°",
+        rows.append((f"steepest {name}", num(limit, 1, "°"), steepest(angle, 2), limit - angle, "°",
                      f"item {steep.seq}", CLOSE * limit))  # fmt: skip
     return rows
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
+from gcsplan.figures import raised
 from gcsplan.mavlink.link.numbers import finite, whole
 from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.mission.autopilots import PX4, profile_of
@@ -204,7 +205,7 @@ def _fences(values: Values, extent: _Extent) -> list[str]:
         ("GF_MAX_HOR_DIST", px4 and values.get("GF_MAX_HOR_DIST", 0) > 0, "far", extent.reach_m),
     ]
     return [
-        f"the mission goes {reach:.0f} m {way} and the fence on board ends at {values[name]:g} m ({name})"
+        f"the mission goes {raised(reach, 0):.0f} m {way} and the fence on board ends at {values[name]:g} m ({name})"
         for name, on, way, reach in limits
         if on and name in values and reach > values[name]
     ]
