@@ -27,6 +27,7 @@ from gcsplan.figures import counted, floored, raised, steepened
 from gcsplan.report import markup, tables
 from gcsplan.report.subject import Subject
 from gcsplan.sim.outcome import Performance, _row
+from gcsplan.units import METRIC
 from tests.support.paths import DATA
 
 FLEET = """
@@ -99,10 +100,10 @@ def test_the_highest_and_the_steepest_are_the_same_everywhere_and_not_flattered(
     subject = Subject(
         "uav1", verdict, replace(v.request.vehicle, limits=replace(v.request.vehicle.limits, max_agl_m=700))
     )
-    table = tables.legs_table(subject)
+    table = tables.legs_table(subject, METRIC)
     assert "4.9°" in table
     assert "690.5\u202fm" in table
-    assert "690.46\u202fm" in tables.limits_table(subject, None)
+    assert "690.46\u202fm" in tables.limits_table(subject, None, METRIC)
     miss = Miss("max_amsl", 0.0499, 690.4501, 690.5, "m", 1, 36.6, -84.3, 685.4)
     assert miss.describe().startswith("highest altitude: 690.5 m of 690.5, 0.0 m to spare")
     assert Miss("climb", 10.19, 4.8101, 15.0, "°", 1, 36.6, -84.3, 0.0).describe().startswith("steepest climb: 4.9 °")

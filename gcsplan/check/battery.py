@@ -18,6 +18,7 @@ from gcsplan.check.geodesy import flat_m
 from gcsplan.check.rtl.model import RULES
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
+from gcsplan.figures import raised
 from gcsplan.units import Quantity, Symbol, Told
 from gcsplan.vehicle import Vehicle
 
@@ -84,13 +85,13 @@ class BatteryHome:
         if self.point_of_no_return is None or self.no_return_m is None:
             return Told(
                 "enough from everywhere: flight and return use {:.0f} % at most, from {} {}; {:.0f} % may be used",
-                self.most_percent, Symbol("far"), Quantity(self.most_m, "far", 2, bare=True), usable,
+                raised(self.most_percent, 0), Symbol("far"), Quantity(self.most_m, "far", 2, bare=True), usable,
             )  # fmt: skip
         return Told(
             "point of no return at {} {} (item {}, {:.6f}, {:.6f}): from beyond it flight and return use up to {:.0f} "
             "%, and {:.0f} % may be used",
             Symbol("far"), Quantity(self.no_return_m, "far", 2, bare=True), self.no_return_seq,
-            *self.point_of_no_return[:2], self.most_percent, usable,
+            *self.point_of_no_return[:2], raised(self.most_percent, 0), usable,
         )  # fmt: skip
 
 

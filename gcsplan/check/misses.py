@@ -10,7 +10,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.stretch import Stretch
-from gcsplan.figures import floored
+from gcsplan.figures import floored, raised
 from gcsplan.units import Kind, Quantity, Rounding, Told
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Legs, Violation
@@ -51,7 +51,7 @@ class Miss:
         return Told(
             "{}{}: {} of {}, {}, item {} ({:.6f}, {:.6f}, {})",
             WORDS[self.kind], f" {self.zone}" if self.zone else "",
-            self._number(self.value, "down" if self.kind in LEAST else "near"), limit, left, self.seq,
+            self._number(self.value, "down" if self.kind in LEAST else "up"), limit, left, self.seq,
             self.lat_deg, self.lon_deg, Quantity(self.amsl_m, "amsl", 0),
         )  # fmt: skip
 
@@ -62,7 +62,8 @@ class Miss:
     def _number(self, value: float, rounding: Rounding) -> Quantity | str:
         if self.unit == "m":
             return Quantity(value, self._measured, 1, rounding)
-        return f"{floored(value, 1) if rounding == 'down' else value:.1f} {self.unit}"
+        shown = floored(value, 1) if rounding == "down" else raised(value, 1) if rounding == "up" else value
+        return f"{shown:.1f} {self.unit}"
 
 
 WORDS = {

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from gcsplan.check.verdict import by_item
 from gcsplan.cli.ending import put
-from gcsplan.figures import floored
+from gcsplan.figures import floored, steepened
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, told
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def _plan_row(
         f"nearest zone, {units.distance.symbol}": (
             f"{least(nearest.zone_clearance_m, 1, units.distance)} {escape(nearest.nearest_zone)}" if nearest else "–"
         ),
-        "steepest, °": f"{number(verdict.max_climb_deg, 1)}{climb}",
+        "steepest, °": f"{steepest(verdict.max_climb_deg)}{climb}",
         f"speed, {units.speed.symbol}": number(v.speed_m_s, 2, units.speed),
         "departs": duration(slot.depart_s if slot else 0.0, tenths) + held,
         "arrives": duration(slot.arrive_s if slot else verdict.arrive_s, tenths),
@@ -222,7 +222,7 @@ def verdict_table(
     rows = [
         (
             str(item.seq), item.kind, number(item.length_m, 0, units.leg), number(item.end[2], 1, height),
-            least(item.agl_end_m, 1, height), least(item.min_agl_m, 1, height), number(item.climb_deg, 1),
+            least(item.agl_end_m, 1, height), least(item.min_agl_m, 1, height), steepest(item.climb_deg),
             f"{least(item.zone_clearance_m, 0, near)} {escape(item.nearest_zone)}" if item.nearest_zone else "–",
             number(item.energy_j, 1, KILOJOULE), duration(item.time_s),
         )

@@ -14,7 +14,7 @@ from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting
 from gcsplan.report.fleet_view import motions_of, separation_words
 from gcsplan.report.marks import Mark, marks_html
-from gcsplan.report.markup import energy, esc, least, num, place, plain, stated, table
+from gcsplan.report.markup import energy, esc, greatest, least, num, place, plain, stated, steepest, table
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.relief import Relief
 from gcsplan.report.subject import Page, Subject
@@ -115,14 +115,15 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     yield "lowest above ground", f"{lowest}; at least {stated(limits.min_agl_m, units.height)}"
     peak = max((max(leg.start[2], leg.end[2]) for leg in verdict.legs), default=math.nan)
     most = f"; at most {stated(limits.max_amsl_m, units.height)}" if limits.max_amsl_m is not None else ""
-    yield "highest", num(peak, 0, units.amsl) + most
+    yield "highest", greatest(peak, 0, units.amsl) + most
     if limits.max_agl_m is not None:
         high = max((leg.max_agl_m for leg in verdict.legs if not math.isnan(leg.max_agl_m)), default=None)
-        yield "highest above ground", f"{num(high, 1, units.height)}; at most {stated(limits.max_agl_m, units.height)}"
+        most = stated(limits.max_agl_m, units.height)
+        yield "highest above ground", f"{greatest(high, 1, units.height)}; at most {most}"
     zone = f"{least(near.zone_clearance_m, 1, units.distance)}, {esc(_name(near.nearest_zone))}" if near else "none"
     yield "nearest zone", f"{zone}; at least {stated(limits.horizontal_clearance_m, units.distance)}"
     angle = f"; at most {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90.0 else ""
-    yield "steepest", num(verdict.max_climb_deg, 1, "°") + angle
+    yield "steepest", steepest(verdict.max_climb_deg) + angle
     across, up = stated(limits.track_error_m, units.distance), stated(limits.altitude_error_m, units.height)
     yield "errors kept off", f"{across} across, {up} in height"
     yield "battery", _battery(s)

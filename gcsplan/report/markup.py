@@ -8,7 +8,7 @@ import math
 import unicodedata
 from collections.abc import Callable, Iterable, Sequence
 
-from gcsplan.figures import floored, raised
+from gcsplan.figures import floored, raised, steepened
 from gcsplan.units import KILOJOULE, WATT_HOUR, Unit, charge
 
 THIN, UNIT_GAP = "\u202f", "\u202f"
@@ -47,6 +47,16 @@ def least(value: float | None, decimals: int = 1, unit: str | Unit = "") -> str:
 def at_least(value: float | None, decimals: int = 1, unit: str | Unit = "") -> str:
     """What must at least be set or reached, as in `num`, but rounded up."""
     return _rounded(raised, value, decimals, unit)
+
+
+def greatest(value: float | None, decimals: int = 1, unit: str | Unit = "") -> str:
+    """A greatest value as in `num`, but rounded up, after it is converted."""
+    return _rounded(raised, value, decimals, unit)
+
+
+def steepest(degrees: float | None, decimals: int = 1) -> str:
+    """A climb or descent in degrees as in `num`, but rounded away from level."""
+    return _rounded(steepened, degrees, decimals, "°")
 
 
 def _rounded(

@@ -17,11 +17,12 @@ import numpy as np
 
 from gcsplan import __version__
 from gcsplan.check.rtl.verdict import WayHome
+from gcsplan.figures import steepened
 from gcsplan.report import tables
 from gcsplan.report.briefing import briefing_html
 from gcsplan.report.fleet_view import fleet_html, motions_of
 from gcsplan.report.home_view import home_html, home_lines
-from gcsplan.report.markup import data_block, energy, esc, least, num, place, stated, tools
+from gcsplan.report.markup import data_block, energy, esc, least, num, place, stated, steepest, tools
 from gcsplan.report.plan_view import COLOURS, map_html, map_marks
 from gcsplan.report.profile_view import profile_html, profile_legend
 from gcsplan.report.rehearsal_view import headline, rehearsal_html
@@ -198,7 +199,7 @@ def _card(subject: Subject, index: int, page: Page) -> str:
         if near is not None else ("nearest zone", "none", "no zone at the path's height")
     )  # fmt: skip
     limit = f"limit {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90 else "no limit"
-    figures.append(("steepest", num(verdict.max_climb_deg, 1, "°"), limit))
+    figures.append(("steepest", steepest(verdict.max_climb_deg), limit))
     battery = subject.vehicle.energy
     used = energy(verdict.energy_j, 0, battery.battery_v)
     figures.append(
@@ -336,7 +337,8 @@ def _line_data(index: int, subject: Subject, line: Line) -> dict[str, object]:
         "f": rounded(line.floor_m), "c": rounded(line.ceiling_m), "t": rounded(line.time_s), "leg": line.leg.tolist(),
         "j": [round(float(j) / 1000.0, 1) for j in line.used_j],
         "legs": [
-            {"seq": leg.seq, "kind": leg.kind, "column": leg.column, "climb": round(leg.climb_deg, 1)} for leg in legs
+            {"seq": leg.seq, "kind": leg.kind, "column": leg.column, "climb": steepened(leg.climb_deg, 1)}
+            for leg in legs
         ],
         "ends": np.flatnonzero(line.end).tolist(),
         "battery": subject.vehicle.energy.battery_j and round(subject.vehicle.energy.battery_j / 1000.0, 1),

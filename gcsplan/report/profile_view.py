@@ -9,7 +9,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.report.chart import Axes, chart_html
 from gcsplan.report.marks import Mark
-from gcsplan.report.markup import least, num, place, stated
+from gcsplan.report.markup import greatest, least, num, place, stated
 from gcsplan.report.plan_view import COLOURS, zone_heights
 from gcsplan.report.samples import Line, Passage, level_amsl
 from gcsplan.report.subject import Subject
@@ -49,7 +49,7 @@ def profile_html(
     words = (
         f"Altitude profile of {subject.name}: {num(line.length_m, 2, units.far)} along the track, ground from "
         f"{num(_least(line.ground_m), 0, units.height)} to {num(_most(line.ground_m), 0, units.amsl)}, path up to "
-        f"{num(float(line.amsl_m.max()), 0, units.amsl)}, min AGL {stated(limits.min_agl_m, units.height)}"
+        f"{greatest(float(line.amsl_m.max()), 0, units.amsl)}, min AGL {stated(limits.min_agl_m, units.height)}"
     )
     marks = _marks(subject, line, found, axes, index, units) + _broken(subject, line, axes, world, units)
     return chart_html(f"profile-{index}", axes, shapes, marks, words, TALL)

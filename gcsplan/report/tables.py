@@ -9,7 +9,7 @@ import numpy as np
 
 from gcsplan.check.verdict import LegFigures, by_item
 from gcsplan.mavlink.mission.autopilots import profile_of
-from gcsplan.report.markup import THIN, at_least, energy, esc, least, num, place, stated, table
+from gcsplan.report.markup import THIN, at_least, energy, esc, greatest, least, num, place, stated, steepest, table
 from gcsplan.report.plan_view import zone_heights
 from gcsplan.report.profile_view import passed
 from gcsplan.report.samples import Line, Passage
@@ -32,7 +32,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
                 esc(s.name), word, num(verdict.length_m, 0, units.path), num(bound, 2, "%"),
                 least(low.min_agl_m if low else None, 1, units.height),
                 f"{least(near.zone_clearance_m, 1, units.distance)} {esc(near.nearest_zone)}" if near else "–",
-                num(verdict.max_climb_deg, 1, "°"), energy(verdict.energy_j, 0, s.vehicle.energy.battery_v),
+                steepest(verdict.max_climb_deg), energy(verdict.energy_j, 0, s.vehicle.energy.battery_v),
                 num(verdict.battery_used_percent, 1, "%"),
                 duration(s.arrive_s, page.time_decimals), home,
             )
@@ -60,7 +60,7 @@ def legs_table(subject: Subject, units: Units) -> str:
                 esc(name), num(item.length_m, 0, units.leg), num(item.end[2], 1, units.height),
                 least(item.agl_end_m, 1, units.height),
                 "column" if item.column else least(item.min_agl_m, 1, units.height),
-                num(item.max_agl_m, 1, units.height), num(item.climb_deg, 1, "°"), near, energy(item.energy_j, 1),
+                greatest(item.max_agl_m, 1, units.height), steepest(item.climb_deg), near, energy(item.energy_j, 1),
                 num(100.0 * used / battery, 1, "%") if battery else "–", duration(item.time_s),
                 duration(clock[flown - 1]),
             )
@@ -110,13 +110,14 @@ def _limits(subject: Subject, line: Line | None, units: Units) -> list[Row]:
     if limits.max_agl_m is not None and highs:
         top = max(highs, key=lambda leg: leg.max_agl_m)
         rows.append(("highest above ground", f"{stated(limits.max_agl_m, height)} − {stated(error, height)} error",
-                     num(top.max_agl_m, 2, height), limits.max_agl_m - error - top.max_agl_m, height, f"item {top.seq}",
-                     CLOSE * limits.max_agl_m))  # fmt: skip
+                     greatest(top.max_agl_m, 2, height), limits.max_agl_m - error - top.max_agl_m, height,
+                     f"item {top.seq}", CLOSE * limits.max_agl_m))  # fmt: skip
     if limits.max_amsl_m is not None and verdict.legs:
         peak = max(verdict.legs, key=lambda leg: max(leg.start[2], leg.end[2]))
         z = max(peak.start[2], peak.end[2])
         rows.append(("highest above sea level", f"{stated(limits.max_amsl_m, height)} − {stated(error, height)} error",
-                     num(z, 2, height), limits.max_amsl_m - error - z, height, f"item {peak.seq}", 1.0))  # fmt: skip
+                     greatest(z, 2, height), limits.max_amsl_m - error - z, height, f"item {peak.seq}",
+                     1.0))  # fmt: skip
     near = verdict.nearest
     if near is not None:
         needed_m = limits.horizontal_clearance_m + track

@@ -21,7 +21,7 @@ from gcsplan.check.verdict import Verdict, by_item
 from gcsplan.cli import console
 from gcsplan.cli.console import _plan_row
 from gcsplan.export.summary import write_summary
-from gcsplan.figures import floored
+from gcsplan.figures import floored, steepened
 from tests.support.plans import CASES, SLOW, cases, planned, text_rows
 from tests.support.shown import number, seconds
 
@@ -44,10 +44,11 @@ def truth(v: VehiclePlan, done: Plan) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def shown_as(text: str, value: float, decimals: int, *, least: bool = False) -> None:
-    """A number in words is the value to its last digit; least values are rounded down."""
-    wanted = floored(value, decimals) if least else round(value, decimals)
-    assert number(text) == pytest.approx(wanted, abs=0.51 * 10.0**-decimals * (not least) + 1e-9), (text, value)
+def shown_as(text: str, value: float, decimals: int, *, least: bool = False, steepest: bool = False) -> None:
+    """A number in words is the value to its last digit; least values are rounded down, the steepest up."""
+    wanted = floored(value, decimals) if least else steepened(value, decimals) if steepest else round(value, decimals)
+    off = 1e-9 if least or steepest else 0.51 * 10.0**-decimals
+    assert number(text) == pytest.approx(wanted, abs=off), (text, value)
 
 
 def test_there_are_twelve_missions() -> None:
@@ -71,7 +72,7 @@ def test_the_table_shows_it(case: str) -> None:
             clearance, name = row["nearest zone, m"].split(" ", 1)
             shown_as(clearance, true["zone_m"], 1, least=True)
             assert name == true["zone"]
-        shown_as(row["steepest, °"].split(" of ")[0], true["climb_deg"], 1)
+        shown_as(row["steepest, °"].split(" of ")[0], true["climb_deg"], 1, steepest=True)
         shown_as(row["speed, m/s"], true["speed_m_s"], 2)
 
 
@@ -122,7 +123,7 @@ def test_the_report_shows_it(case: str) -> None:
         if true["zone"] is not None:
             shown_as(quantity(cells["nearest zone"]), true["zone_m"], 1, least=True)
             assert html.unescape(notes["nearest zone"]).startswith(true["zone"])
-        shown_as(quantity(cells["steepest"]), true["climb_deg"], 1)
+        shown_as(quantity(cells["steepest"]), true["climb_deg"], 1, steepest=True)
         used = cells["energy"] if "energy" in cells else notes["battery"]
         shown_as(quantity(used.split("kJ")[0]), true["energy_j"] / 1e3, 0)
         if true["battery_percent"] is not None:
