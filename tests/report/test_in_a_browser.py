@@ -243,6 +243,7 @@ def test_the_replay_moves_every_figure_by_slider_by_key_and_by_clock(page: Brows
         page.evaluate(
             f"new Promise((r) => {{ const look = () => ({value}) > {at + 2} ? r(1) : setTimeout(look, 50); look(); }})"
         )
+        assert page.evaluate("document.querySelector('#replay details').getBoundingClientRect().right") <= width
         play = "document.querySelector('#replay [data-do=play]')"
         assert page.evaluate(f"{play}.getAttribute('aria-label')") == "pause"
         page.evaluate(f"{play}.click()")
