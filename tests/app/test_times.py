@@ -85,6 +85,13 @@ def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
         assert [row[-1] for row in table] == [duration(at) for at in ends]
         assert [seconds(row[-1]) for row in table] == pytest.approx(ends, abs=0.501)
         assert [seconds(row[-2]) for row in table] == pytest.approx([item.time_s for item in items], abs=0.501)
+        drawn = re.findall(
+            rf'"vehicle"><value>{v.name}</value>.*?"number"><value>(\d+)</value>.*?"time_s"><value>([\d.]+)<',
+            files["mission.kml"],
+        )
+        in_kml = {int(seq): float(at) for seq, at in drawn}
+        assert in_kml
+        assert {seq: at for seq, at in in_kml.items() if seq in until} == pytest.approx(until, abs=0.0501)
 
 
 @cases
