@@ -1,7 +1,7 @@
-"""The units that people read: three systems, one table of factors, and texts that can be told in each system.
+"""The units that people read: three systems, one table of factors, and texts that can be shown in each system.
 
 Inside, and in every file for machines, all is in SI. What people read is converted here and nowhere else: `Units` says
-which unit a system has for each kind of number, and a `Told` text knows the quantities that it names. Durations are
+which unit a system has for each kind of number, and a `UnitText` text knows the quantities that it names. Durations are
 h:mm:ss in every system, energies kJ beside Wh. Rounding is that of `gcsplan.figures`, after the conversion.
 """
 
@@ -209,8 +209,8 @@ class Joules:
         return f"{KILOJOULE.of(self.value):.0f} kJ ({WATT_HOUR.of(self.value):.0f} Wh)"
 
 
-class Told(str):
-    """A text that knows its quantities: as a str it is in SI, as files have it; `told` tells it in a system.
+class UnitText(str):
+    """A text that knows its quantities: as a str it is in SI, as files have it; `in_units` shows it in a system.
 
     ``template`` is one of `str.format` with a field for each of ``parts``: a quantity, another text, or anything that
     is the same in all systems.
@@ -229,24 +229,24 @@ class Told(str):
     def __getnewargs__(self) -> tuple[Any, ...]:
         return (self.template, *self.parts)
 
-    def exchanged(self, old: str, new: str) -> Told:
+    def exchanged(self, old: str, new: str) -> UnitText:
         """The text with some of its words exchanged."""
-        parts = (p.exchanged(old, new) if isinstance(p, Told) else p.replace(old, new) if isinstance(p, str) else p
+        parts = (p.exchanged(old, new) if isinstance(p, UnitText) else p.replace(old, new) if isinstance(p, str) else p
                  for p in self.parts)  # fmt: skip
-        return Told(self.template.replace(old, new), *parts)
+        return UnitText(self.template.replace(old, new), *parts)
 
 
 Part = Quantity | Symbol | Reach | Seconds | Joules
 
 
-def told(text: str, units: Units) -> str:
+def in_units(text: str, units: Units) -> str:
     """A text for people: its quantities in ``units``. A plain text is itself."""
-    return _filled(text.template, text.parts, units) if isinstance(text, Told) else text
+    return _filled(text.template, text.parts, units) if isinstance(text, UnitText) else text
 
 
-def joined(between: str, texts: Sequence[str]) -> Told:
+def joined(between: str, texts: Sequence[str]) -> UnitText:
     """Texts joined by the words ``between``, which have no braces."""
-    return Told(between.join("{}" for _ in texts), *texts)
+    return UnitText(between.join("{}" for _ in texts), *texts)
 
 
 def _filled(template: str, parts: Sequence[object], units: Units | None) -> str:
@@ -254,8 +254,8 @@ def _filled(template: str, parts: Sequence[object], units: Units | None) -> str:
     for part in parts:
         if isinstance(part, Part):
             texts.append(part.text(units))
-        elif isinstance(part, Told):
-            texts.append(str(part) if units is None else told(part, units))
+        elif isinstance(part, UnitText):
+            texts.append(str(part) if units is None else in_units(part, units))
         else:
             texts.append(part)
     return template.format(*texts)

@@ -37,7 +37,19 @@ from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.units import OTHERS
 from gcsplan.report import markup
 from gcsplan.report.page import render_page
-from gcsplan.units import AVIATION, IMPERIAL, METRIC, SYSTEMS, Quantity, Seconds, Told, Units, charge, duration, told
+from gcsplan.units import (
+    AVIATION,
+    IMPERIAL,
+    METRIC,
+    SYSTEMS,
+    Quantity,
+    Seconds,
+    Units,
+    UnitText,
+    charge,
+    duration,
+    in_units,
+)
 from tests.support.shown import EXACT, NUMBER, number, same, seconds, taken_apart
 
 pytestmark = pytest.mark.xdist_group("units")  # its mission is planned once
@@ -131,17 +143,17 @@ def test_units_by_name() -> None:
 
 
 def test_a_text_is_in_si_as_a_str_and_in_any_system_when_told() -> None:
-    inner = Told("{} at {}", Quantity(65.19, "height", 1, "down"), Seconds(1905.96, 1))
-    text = Told("{{zone}} “{}”: {}, set {}", "a {brace}", inner, Quantity(291.32, "height", 1, "up", trimmed=True))
+    inner = UnitText("{} at {}", Quantity(65.19, "height", 1, "down"), Seconds(1905.96, 1))
+    text = UnitText("{{zone}} “{}”: {}, set {}", "a {brace}", inner, Quantity(291.32, "height", 1, "up", trimmed=True))
     assert text == "{zone} “a {brace}”: 65.1 m at 1906.0 s, set 291.4 m"
-    assert told(text, METRIC) == "{zone} “a {brace}”: 65.1 m at 0:31:46.0, set 291.4 m"
-    assert told(text, AVIATION) == "{zone} “a {brace}”: 213.8 ft at 0:31:46.0, set 955.8 ft"
+    assert in_units(text, METRIC) == "{zone} “a {brace}”: 65.1 m at 0:31:46.0, set 291.4 m"
+    assert in_units(text, AVIATION) == "{zone} “a {brace}”: 213.8 ft at 0:31:46.0, set 955.8 ft"
     for twin in (copy.deepcopy(text), pickle.loads(pickle.dumps(text))):
         assert twin == text
-        assert told(twin, IMPERIAL) == told(text, IMPERIAL)
+        assert in_units(twin, IMPERIAL) == in_units(text, IMPERIAL)
     assert json.loads(json.dumps([text])) == [str(text)]
-    assert told(text.exchanged("set", "fly"), METRIC).endswith("fly 291.4 m")
-    assert told("plain", IMPERIAL) == "plain"
+    assert in_units(text.exchanged("set", "fly"), METRIC).endswith("fly 291.4 m")
+    assert in_units("plain", IMPERIAL) == "plain"
 
 
 # -- what is printed --------------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from gcsplan.mavlink.mission.commands import LOITER_TIME, LOITER_TO_ALT, LOITER_
 from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
-from gcsplan.units import METRIC, Told, Units, told
+from gcsplan.units import METRIC, Units, UnitText, in_units
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import FARTHEST_M
 from gcsplan.world.world import World
@@ -309,10 +309,10 @@ def finding_lines(c: Checked, *, allow_unjudged: bool = False, units: Units = ME
 
     A way home that is only reported is one line, ``file:item: warning: way_home: message``.
     """
-    lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(told(f.message, units))}" for f in c.verdict.findings]
+    lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(in_units(f.message, units))}" for f in c.verdict.findings]
     if not allow_unjudged:
         lines += [f"{c.file}:{_item_in(w)}: not_judged: {_without_item(w)}" for w in c.verdict.not_judged]
-    return lines + [told(line, units) for line in home_lines(c)]
+    return lines + [in_units(line, units) for line in home_lines(c)]
 
 
 def home_lines(c: Checked) -> list[str]:
@@ -325,14 +325,14 @@ def home_lines(c: Checked) -> list[str]:
     if not home.unsafe and battery is not None and battery.no_return_seq is not None:
         first = battery.no_return_seq
     if lets_fly(home, required=c.home_required):
-        return [Told("{}:{}: warning: way_home: {}", c.file, first, home.headline)]
-    advice = Told("; {}", home.advice) if home.advice else ""
-    lines: list[str] = [Told("{}:{}: way_home: {}{}", c.file, first, home.headline, advice)]
+        return [UnitText("{}:{}: warning: way_home: {}", c.file, first, home.headline)]
+    advice = UnitText("; {}", home.advice) if home.advice else ""
+    lines: list[str] = [UnitText("{}:{}: way_home: {}{}", c.file, first, home.headline, advice)]
     lines += [
-        Told("{}:{}: way_home: no safe return from {}", c.file, s.from_seq, s.describe()) for s in home.unsafe
+        UnitText("{}:{}: way_home: no safe return from {}", c.file, s.from_seq, s.describe()) for s in home.unsafe
     ]  # fmt: skip
     if battery is not None and battery.short:
-        lines.append(Told("{}:{}: way_home: {}", c.file, battery.no_return_seq or 0, battery.describe()))
+        lines.append(UnitText("{}:{}: way_home: {}", c.file, battery.no_return_seq or 0, battery.describe()))
     lines += [f"{c.file}:{_item_in(w)}: not_judged: the way home: {_without_item(w)}" for w in home.not_judged]
     return lines
 

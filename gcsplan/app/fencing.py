@@ -27,7 +27,7 @@ from gcsplan.figures import counted
 from gcsplan.mavlink.build.fence import Area, Fence, areas_of, fence_of
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
-from gcsplan.units import Quantity, Told
+from gcsplan.units import Quantity, UnitText
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.world import World
@@ -124,7 +124,7 @@ def breaches(
 def _of_fence(message: str) -> str:
     """The message on a zone, as one on an area of the fence."""
     old, new = "inside no-fly zone", "inside the fence's area"
-    return message.exchanged(old, new) if isinstance(message, Told) else message.replace(old, new)
+    return message.exchanged(old, new) if isinstance(message, UnitText) else message.replace(old, new)
 
 
 def _outside(
@@ -150,8 +150,12 @@ def _outside(
             leg = int(np.argmax(beyond_m > 0.0))
             s, short_m = flown[plane.owner[leg]], float(beyond_m[leg])
             lat, lon, amsl = s.end
-            by = Told(" (by {})", Quantity(short_m, "distance", 1)) if math.isfinite(short_m) else ", which is far away"
-            words = Told("item {} ({}): leaves the fence's area “{}”{}", s.seq, s.kind, area.name, by)
+            by = (
+                UnitText(" (by {})", Quantity(short_m, "distance", 1))
+                if math.isfinite(short_m)
+                else ", which is far away"
+            )
+            words = UnitText("item {} ({}): leaves the fence's area “{}”{}", s.seq, s.kind, area.name, by)
             by_m = short_m if math.isfinite(short_m) else math.nan
             found.append(Finding(s.seq, "fence", words, lat, lon, amsl, -by_m, 0.0, by_m, "m", area.name))
     return found

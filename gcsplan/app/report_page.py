@@ -12,6 +12,7 @@ from gcsplan.app.model import Plan
 from gcsplan.app.upload_job import JobResult
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.fleet.motion import TimedPath
+from gcsplan.report.markup import stated
 from gcsplan.report.page import render_page
 from gcsplan.report.subject import Certificate, Compared, Page, Rehearsed, Subject
 from gcsplan.sim.outcome import Rehearsal
@@ -67,7 +68,8 @@ def render_rehearsal(
     flown = {trace.name: trace for trace in result.flown}
     subjects = tuple(replace(s, flown=_motion(flown[s.name]) if s.name in flown else None) for s in page.subjects)
     violations = tuple(b.describe(result.runs) for b in result.breaches)
-    rehearsed = Rehearsed(result.safe, _how(result), tuple(_compared(plan, result)), violations, result.not_judged)
+    compared = tuple(_compared(plan, result))
+    rehearsed = Rehearsed(result.safe, _how(result, units), compared, violations, result.not_judged)
     return render_page(replace(page, subjects=subjects, rehearsed=rehearsed, notes=(*page.notes, *result.notes)))
 
 
@@ -80,11 +82,12 @@ def _motion(trace: Trace) -> TimedPath | None:
     return TimedPath(trace.name, trace.times_s[rises], trace.points[rises], arrive_s, trace.stays)
 
 
-def _how(result: Rehearsal) -> str:
+def _how(result: Rehearsal, units: Units) -> str:
     by = "gcsplan's simulated vehicles" if result.simulator == "gcsplan" else "ArduCopter SITL"
     wind, gusts, noise = (float(result.weather.get(key) or 0.0) for key in ("wind_m_s", "gusts_m_s", "noise_m"))
     calm = not (wind or gusts or noise)
-    air = "in still air" if calm else f"with {wind:g} m/s of wind, gusts of {gusts:g} m/s and {noise:g} m of noise"
+    of_wind, of_gusts, of_noise = stated(wind, units.speed), stated(gusts, units.speed), stated(noise, units.distance)
+    air = "in still air" if calm else f"with {of_wind} of wind, gusts of {of_gusts} and {of_noise} of noise"
     text = f"Flown by {by} {air}, from the missions that they stored."
     if result.runs == 1:
         return text

@@ -15,7 +15,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
 from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m
 from gcsplan.mission_file import MissionFile, VehicleRequest
-from gcsplan.units import Told
+from gcsplan.units import UnitText
 from gcsplan.world.world import World
 
 MOST_SHOWN = 5
@@ -82,7 +82,7 @@ def _lines(name: str, home: WayHome | None) -> list[str]:
     """The headline, and what to set."""
     if home is None:
         return [f"{name}: the return was not judged"]
-    return [Told("{}: {}", name, line) for line in (home.headline, home.advice) if line]
+    return [UnitText("{}: {}", name, line) for line in (home.headline, home.advice) if line]
 
 
 def against_on_board(home: WayHome, values: Mapping[str, float]) -> str | None:

@@ -19,7 +19,7 @@ from gcsplan.check.rtl.model import RULES
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.figures import raised
-from gcsplan.units import Quantity, Symbol, Told
+from gcsplan.units import Quantity, Symbol, UnitText
 from gcsplan.vehicle import Vehicle
 
 HALVINGS = 50
@@ -79,15 +79,15 @@ class BatteryHome:
             "short": [list(part) for part in self.short],
         }
 
-    def describe(self) -> Told:
+    def describe(self) -> UnitText:
         """Describe it in one line."""
         usable = 100.0 * self.usable_j / self.battery_j
         if self.point_of_no_return is None or self.no_return_m is None:
-            return Told(
+            return UnitText(
                 "enough from everywhere: flight and return use {:.0f} % at most, from {} {}; {:.0f} % may be used",
                 raised(self.most_percent, 0), Symbol("far"), Quantity(self.most_m, "far", 2, bare=True), usable,
             )  # fmt: skip
-        return Told(
+        return UnitText(
             "point of no return at {} {} (item {}, {:.6f}, {:.6f}): from beyond it flight and return use up to {:.0f} "
             "%, and {:.0f} % may be used",
             Symbol("far"), Quantity(self.no_return_m, "far", 2, bare=True), self.no_return_seq,

@@ -32,7 +32,7 @@ from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
-from gcsplan.units import Quantity, Told
+from gcsplan.units import Quantity, UnitText
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -314,7 +314,7 @@ def bare(air: Airspace) -> Airspace:
 def _low(s: Stretch, east: float, north: float, amsl: float, by: float, world: World) -> Finding:
     lat, lon = (float(x) for x in world.frame.to_degrees(east, north))
     way = "climb-out" if s.kind == "takeoff" else "glide"
-    message = Told(
+    message = UnitText(
         "item {} ({}): the {} comes too near to the ground, by {}, at {:.6f}, {:.6f}, {}",
         s.seq, s.kind, way, Quantity(by, "height", 2), lat, lon, Quantity(amsl, "amsl", 1),
     )  # fmt: skip

@@ -25,7 +25,7 @@ from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.units import Joules, Quantity, Told, measured
+from gcsplan.units import Joules, Quantity, UnitText, measured
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Violation
 from gcsplan.world.frame import EARTH_RADIUS_M, FARTHEST_M
@@ -127,7 +127,7 @@ def _is_too_far(stretch: Stretch, world: World) -> bool:
 
 def _too_far(s: Stretch) -> Finding:
     lat, lon, amsl = s.end
-    message = Told(
+    message = UnitText(
         "item {} ({}): goes to {:.6f}, {:.6f}, {}: too far from the mission's terrain to be judged",
         s.seq, s.kind, lat, lon, Quantity(amsl, "amsl", 1),
     )  # fmt: skip
@@ -226,10 +226,10 @@ def _findings(
         name = world.airspace.zones[zone].name if zone >= 0 else ""
         what = WORDS[kind] + (f" “{name}” or its clearance" if name else "")
         value, limit, over = (measured(number, kind, v.unit) for number in (v.value, v.limit, v.by))
-        numbers = Told(": {}, limit {}", value, limit) if kind not in ("coverage", "zone") else ""
-        by = Told(" (by {})", over) if kind != "coverage" else ""
+        numbers = UnitText(": {}, limit {}", value, limit) if kind not in ("coverage", "zone") else ""
+        by = UnitText(" (by {})", over) if kind != "coverage" else ""
         way = s.kind if s.jumped_from is None else f"{s.kind}, after the jump at item {s.jumped_from}"
-        message = Told(
+        message = UnitText(
             "item {} ({}): {}{}{} at {:.6f}, {:.6f}, {}",
             s.seq, way, what, numbers, by, lat, lon, Quantity(v.amsl_m, "amsl", 1),
         )  # fmt: skip
@@ -245,7 +245,7 @@ def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict
     verdict = replace(verdict, battery_used_percent=100.0 * used / energy.battery_j)
     last = verdict.legs[-1]
     if used > usable:
-        message = Told(
+        message = UnitText(
             "battery: the flight needs {} and {} may be used ({} less {:g} % reserve)",
             Joules(used), Joules(usable), Joules(energy.battery_j), 100 * energy.reserve,
         )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.stretch import Stretch
 from gcsplan.figures import floored, raised
-from gcsplan.units import Kind, Quantity, Rounding, Told
+from gcsplan.units import Kind, Quantity, Rounding, UnitText
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Legs, Violation
 from gcsplan.world.world import World
@@ -40,15 +40,15 @@ class Miss:
     amsl_m: float
     zone: str = ""
 
-    def describe(self) -> Told:
+    def describe(self) -> UnitText:
         """Describe it in one line."""
         left = (
-            Told("{} to spare", self._number(self.room, "down"))
+            UnitText("{} to spare", self._number(self.room, "down"))
             if self.room >= 0.0
-            else Told("broken by {}", self._number(-self.room, "near"))
+            else UnitText("broken by {}", self._number(-self.room, "near"))
         )
         limit = Quantity(self.limit, self._measured, None, bare=True) if self.unit == "m" else f"{self.limit:g}"
-        return Told(
+        return UnitText(
             "{}{}: {} of {}, {}, item {} ({:.6f}, {:.6f}, {})",
             WORDS[self.kind], f" {self.zone}" if self.zone else "",
             self._number(self.value, "down" if self.kind in LEAST else "up"), limit, left, self.seq,

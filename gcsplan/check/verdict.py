@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.units import Told, joined
+from gcsplan.units import UnitText, joined
 
 if TYPE_CHECKING:
     from gcsplan.fleet.arrival import Slot
@@ -219,6 +219,6 @@ class Verdict:
         """The steepest angle of all stretches except columns, up or down, degrees."""
         return max((abs(leg.climb_deg) for leg in self.legs if not leg.column and leg.horizontal_m > 0), default=0.0)
 
-    def describe(self) -> Told:
+    def describe(self) -> UnitText:
         """All findings and all that is not judged, one per line."""
         return joined("\n", [f.message for f in self.findings] + [f"not judged: {what}" for what in self.not_judged])

@@ -188,7 +188,7 @@ def _say_all(batch: Batch, units: Units) -> None:
     from gcsplan.cli.console import say, say_notes, verdict_table
     from gcsplan.cli.home_words import say_home, say_warnings
     from gcsplan.export.profile_text import profile_lines
-    from gcsplan.units import told
+    from gcsplan.units import in_units
 
     say_notes(batch.notes)
     for c in batch.checked:
@@ -196,7 +196,7 @@ def _say_all(batch: Batch, units: Units) -> None:
         name = f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})"
         verdict_table(name, c.verdict, c.way_home, units=units, energy=c.vehicle.energy)
         for miss in c.verdict.misses:
-            say(told(miss.describe(), units))
+            say(in_units(miss.describe(), units))
         for line in profile_lines(c.verdict, c.world, units):
             say(line)
         if c.way_home is not None:

@@ -15,7 +15,7 @@ from rich.table import Table
 from gcsplan.check.verdict import by_item
 from gcsplan.cli.ending import put
 from gcsplan.figures import floored, steepened
-from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, told
+from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
@@ -211,7 +211,7 @@ def verdict_table(
     title = f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe, home)}"
     if verdict.findings or verdict.not_judged:
         console.print(title)
-        console.print(told(verdict.describe(), units), style="red" if verdict.findings else "yellow", markup=False)
+        console.print(in_units(verdict.describe(), units), style="red" if verdict.findings else "yellow", markup=False)
         title = ""
     height, near = units.height, units.distance
     columns = [("item", True), ("", False), (f"leg {units.leg.symbol}", True), (f"AMSL {height.symbol}", True),

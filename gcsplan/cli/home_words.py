@@ -12,7 +12,7 @@ from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN
 from gcsplan.cli.console import aside, console, new_table, print_table, say
 from gcsplan.figures import raised
 from gcsplan.mavlink.mission.return_altitude import setting
-from gcsplan.units import Reach, Units, told
+from gcsplan.units import Reach, Units, in_units
 
 MOST_ROWS = 8
 """Rows with one label that are printed; the report and JSON have all of them."""
@@ -46,14 +46,14 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
 
 def say_home(home: WayHome, units: Units) -> None:
     """Print the rows of one way home; of many stretches the first `MOST_ROWS`."""
-    say(f"way home: {told(home.headline, units)}")
+    say(f"way home: {in_units(home.headline, units)}")
     seen: dict[str, int] = {}
     rows = home.rows()
     for label, words in rows:
         seen[label] = seen.get(label, 0) + 1
         bad = label in (NO_RETURN, STILL_NO_RETURN)
         if seen[label] <= MOST_ROWS:
-            console.print(f"  {label}: {told(words, units)}", style="red" if bad else None, markup=False)
+            console.print(f"  {label}: {in_units(words, units)}", style="red" if bad else None, markup=False)
     for label, count in seen.items():
         if count > MOST_ROWS:
             say(f"  {label}: … and {count - MOST_ROWS} more (all of them: --report, --json)")
@@ -62,4 +62,4 @@ def say_home(home: WayHome, units: Units) -> None:
 def say_warnings(homes: Mapping[str, WayHome | None], units: Units) -> None:
     """Print a headline for each vehicle without a safe return; the path's own verdict stands elsewhere."""
     for line in warnings(homes):
-        aside.print(f"warning: {told(line, units)}", style="bold yellow", markup=False)
+        aside.print(f"warning: {in_units(line, units)}", style="bold yellow", markup=False)

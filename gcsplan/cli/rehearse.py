@@ -19,7 +19,7 @@ from gcsplan.cli.options import (
     require_html,
 )
 from gcsplan.errors import UsageError
-from gcsplan.units import Quantity, duration, told, units_of
+from gcsplan.units import Quantity, duration, in_units, units_of
 
 if TYPE_CHECKING:
     from gcsplan.app.model import Plan
@@ -154,7 +154,7 @@ def _ending(result: Rehearsal, units: Units) -> list[str]:
         lines.append(least)
     if result.runs > 1 and result.p95_s is not None:
         lines.append(f"95 % of all arrivals lie within {result.p95_s:.2f} s of the plan")
-    lines += [f"violation: {told(b.describe(result.runs), units)}" for b in result.breaches]
+    lines += [f"violation: {in_units(b.describe(result.runs), units)}" for b in result.breaches]
     lines += [f"not flown: {what}" for what in result.not_judged]
     lines.append(
         {True: "flown as planned", False: "VIOLATIONS were found", None: "not everything was flown"}[result.safe]

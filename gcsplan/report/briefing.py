@@ -18,7 +18,7 @@ from gcsplan.report.markup import energy, esc, greatest, least, num, place, plai
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.relief import Relief
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import Units, duration, told
+from gcsplan.units import Units, duration, in_units
 
 MOST_VEHICLES = 4
 MOST_FINDINGS, MOST_RALLY, MOST_NOTES = 2, 4, 1
@@ -61,8 +61,8 @@ def _shown(page: Page) -> list[tuple[int, Subject]]:
 
 def _problems(page: Page) -> str:
     """What is broken and what was not judged, the first of each."""
-    found = [f"{s.name}: {told(f.message, page.units)}" for s in page.subjects for f in s.verdict.findings]
-    found += [told(text, page.units) for text in page.rehearsed.violations] if page.rehearsed is not None else []
+    found = [f"{s.name}: {in_units(f.message, page.units)}" for s in page.subjects for f in s.verdict.findings]
+    found += [in_units(text, page.units) for text in page.rehearsed.violations] if page.rehearsed is not None else []
     unjudged = [f"{s.name}: not judged: {what}" for s in page.subjects for what in s.verdict.not_judged]
     out = [*found[:MOST_FINDINGS], *unjudged[:MOST_NOTES]]
     rest = len(found) + len(unjudged) - len(out)
@@ -147,11 +147,11 @@ def _way_home(s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     if home is None:
         yield "way home", "not judged"
         return
-    yield "way home", esc(_short(told(home.headline, units), MESSAGE))
+    yield "way home", esc(_short(in_units(home.headline, units), MESSAGE))
     if home.set_rel_home_m is not None:
         yield "to set", esc(setting(home.autopilot, home.set_rel_home_m))
         points = f"with {counted(len(home.rally), 'rally point')} on board: " if home.rally else ""
-        yield "what that leaves", esc(_short(points + told(home.then, units), MESSAGE))
+        yield "what that leaves", esc(_short(points + in_units(home.then, units), MESSAGE))
 
 
 def _rally(page: Page, shown: Sequence[tuple[int, Subject]]) -> str:

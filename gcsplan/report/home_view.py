@@ -16,7 +16,7 @@ from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.profile_view import along_axes
 from gcsplan.report.samples import Line
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import Units, told
+from gcsplan.units import Units, in_units
 
 TALL = 0.3
 
@@ -41,10 +41,10 @@ def _home_line(subject: Subject, several: bool, units: Units) -> str:
     if home is None or home.safe is True:
         return ""
     who = f"{esc(subject.name)}: " if several else ""
-    cure = f": {esc(told(home.advice, units))}" if home.advice else ""
+    cure = f": {esc(in_units(home.advice, units))}" if home.advice else ""
     bad = " bad" if home.safe is False else ""
     see = 'see <a href="#home">the way home</a>'
-    return f'<p class="bare{bad}"><b>{who}{esc(told(home.headline, units))}</b>{cure}; {see}</p>'
+    return f'<p class="bare{bad}"><b>{who}{esc(in_units(home.headline, units))}</b>{cure}; {see}</p>'
 
 
 def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object]) -> str:
@@ -65,8 +65,9 @@ def _one(
         name = f"home-{index}"
         chart = tools(name) + _chart(name, subject, home, line, index, charts, units) + _legend(home)
     listed = "".join(f"<li>{esc(n)}</li>" for n in (*home.not_judged, *home.notes))
+    headline = esc(in_units(home.headline, units))
     return (
-        f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: {esc(told(home.headline, units))}</summary>"
+        f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: {headline}</summary>"
         f"{chart}{_facts(home, units)}{_stretches(subject, home, units)}{_battery(subject, home)}"
         + (f"<ul>{listed}</ul>" if listed else "")
         + "</details>"
@@ -74,7 +75,7 @@ def _one(
 
 
 def _facts(home: WayHome, units: Units) -> str:
-    rows = [(a, told(words, units)) for a, words in home.rows()]
+    rows = [(a, in_units(words, units)) for a, words in home.rows()]
     listed = [(esc(a), esc(words)) for a, words in rows if a not in (NO_RETURN, NOT_JUDGED, STILL_NO_RETURN)]
     left = "".join(f"<li>{esc(words)}</li>" for a, words in rows if a == STILL_NO_RETURN)
     title = f"No safe return even so: {counted(len(home.left), 'stretch', 'stretches')}"
@@ -102,7 +103,9 @@ def _chart(
     for s in home.unsafe:
         ends = [s.from_m, max(s.to_m, s.from_m + 0.002 * long)]
         shapes.append(
-            axes.area(ends, [-np.inf, -np.inf], [np.inf, np.inf], "nowhere", f"no safe return: {told(s.why, units)}")
+            axes.area(
+                ends, [-np.inf, -np.inf], [np.inf, np.inf], "nowhere", f"no safe return: {in_units(s.why, units)}"
+            )
         )
     shapes += [
         axes.line(x, legal, "legal"), axes.line(x, clear, "clear"),
@@ -150,7 +153,7 @@ def _stretches(subject: Subject, home: WayHome, units: Units) -> str:
             rows.append(
                 (
                     esc(s.items), kind, f"{num(units.far.of(s.from_m), 2)} – {num(s.to_m, 2, units.far)}",
-                    esc(told(s.why, units)),
+                    esc(in_units(s.why, units)),
                     place(*s.obstacle[:2]) + f", {num(s.obstacle[2], 0, units.amsl)}" if s.obstacle else "–",
                     at_least(s.lowest_rel_home_m, 1, units.height) if s.lowest_rel_home_m is not None else "none",
                 )

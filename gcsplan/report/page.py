@@ -31,7 +31,7 @@ from gcsplan.report.replay import replay_data, replay_html, replay_of
 from gcsplan.report.samples import MOST_SAMPLES, Line, Passage, line_of, passages
 from gcsplan.report.scene_data import exaggeration, zone_meshes
 from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check
-from gcsplan.units import KILOJOULE, METRIC, Unit, Units, duration, told
+from gcsplan.units import KILOJOULE, METRIC, Unit, Units, duration, in_units
 from gcsplan.world.world import World
 
 __all__ = ["render_check", "render_page"]
@@ -156,7 +156,7 @@ def _verdict(page: Page) -> tuple[str, str, str, str]:
 
 def _header(page: Page) -> str:
     kind, sign, word, words = _verdict(page)
-    wrong = [(s, told(f.message, page.units)) for s in page.subjects for f in s.verdict.findings]
+    wrong = [(s, in_units(f.message, page.units)) for s in page.subjects for f in s.verdict.findings]
     wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
     several = len(page.subjects) > 1
     listed = "".join(f"<li>{f'<b>{esc(s.name)}</b>: ' if several else ''}{esc(text)}</li>" for s, text in wrong)

@@ -14,7 +14,7 @@ from gcsplan.report.markup import at_least, esc, least, num, place, stated
 from gcsplan.report.relief import TINTS, Extent, Relief, nice_step, tints
 from gcsplan.report.samples import Line, distance_m
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import Unit, Units, duration, told
+from gcsplan.units import Unit, Units, duration, in_units
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
 
@@ -191,10 +191,8 @@ def _no_return_svg(home: WayHome | None, line: Line, extent: Extent, units: Unit
         if len(mine) > 1:
             xy = extent.units(line.east_m[mine], line.north_m[mine])
             points = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy)
-            paths.append(
-                f'<polyline class="nohome" points="{points}"><title>no safe return: {esc(told(s.why, units))}</title>'
-                "</polyline>"
-            )
+            why = esc(in_units(s.why, units))
+            paths.append(f'<polyline class="nohome" points="{points}"><title>no safe return: {why}</title></polyline>')
     return "".join(paths)
 
 
@@ -208,7 +206,7 @@ def _home_places(subject: Subject, world: World, units: Units) -> list[tuple[flo
     battery = home.battery if home is not None else None
     if battery is not None and battery.point_of_no_return is not None:
         e, n = (float(v) for v in world.frame.to_plane(*battery.point_of_no_return[:2]))
-        found.append((e, n, "broken", "no return", f"{subject.name}: {told(battery.describe(), units)}"))
+        found.append((e, n, "broken", "no return", f"{subject.name}: {in_units(battery.describe(), units)}"))
     return found
 
 
@@ -239,7 +237,7 @@ def tight_places(subject: Subject, line: Line, world: World, units: Units) -> li
                     n,
                     "broken",
                     f"item {f.seq}: {f.kind.replace('_', ' ')}",
-                    f"{subject.name}: {told(f.message, units)}",
+                    f"{subject.name}: {in_units(f.message, units)}",
                 )
             )
     return [t for t in found if math.isfinite(t[0]) and math.isfinite(t[1])]

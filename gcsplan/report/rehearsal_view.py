@@ -8,7 +8,7 @@ from gcsplan.figures import floored
 from gcsplan.report.markup import esc, least, num, table
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.subject import Compared, Page
-from gcsplan.units import Unit, Units, duration, told
+from gcsplan.units import Unit, Units, duration, in_units
 
 WORDS = {
     False: ("unsafe", "✕", "NOT AS PLANNED", "The rehearsal broke a limit, or lost what the fleet must keep."),
@@ -36,7 +36,7 @@ def rehearsal_html(page: Page) -> str:
         )
         for c in found.compared
     ]  # fmt: skip
-    listed = "".join(f"<li>{esc(told(words, page.units))}</li>" for words in (*found.violations, *found.not_flown))
+    listed = "".join(f"<li>{esc(in_units(words, page.units))}</li>" for words in (*found.violations, *found.not_flown))
     left_out = f'<ul class="findings">{listed}</ul>' if listed else ""
     head = ("vehicle|", "figure|", "planned", "flown", "difference")
     return (

@@ -14,7 +14,7 @@ from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.trace import Judged, Meeting, Trace, examine, meetings
-from gcsplan.units import METRIC, Told, Units, duration
+from gcsplan.units import METRIC, Units, UnitText, duration
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
@@ -65,7 +65,7 @@ class Breach:
 
     def describe(self, of_runs: int) -> str:
         """Return one line; ``of_runs``: the number of all runs."""
-        return self.message if of_runs == 1 else Told("{} (in {} of {} runs)", self.message, self.runs, of_runs)
+        return self.message if of_runs == 1 else UnitText("{} (in {} of {} runs)", self.message, self.runs, of_runs)
 
     def as_dict(self) -> dict[str, Any]:
         """Return a dict for JSON."""

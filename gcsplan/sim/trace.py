@@ -17,7 +17,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.verdict import Finding
-from gcsplan.units import Quantity, Seconds, Told, measured
+from gcsplan.units import Quantity, Seconds, UnitText, measured
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.world import World
@@ -146,8 +146,8 @@ def _finding(v: Violation, trace: Trace, sample: int, world: World) -> Finding:
     lat, lon = _degrees(world, np.array([v.east_m, v.north_m]))
     name = world.airspace.zones[v.zone].name if v.zone >= 0 else ""
     what = WORDS.get(v.kind, v.kind) + (f" “{name}” or its clearance" if name else "")
-    by = Told(" by {}", measured(v.by, v.kind, v.unit)) if v.kind != "coverage" else ""
-    message = Told(
+    by = UnitText(" by {}", measured(v.by, v.kind, v.unit)) if v.kind != "coverage" else ""
+    message = UnitText(
         "{} {}{} at {}, item {} ({:.6f}, {:.6f}, {})",
         trace.name, what, by, Seconds(float(trace.times_s[sample]), 1), int(trace.seq[sample]), lat, lon,
         Quantity(v.amsl_m, "amsl", 1),
@@ -174,11 +174,11 @@ class Meeting:
     time_s: float
     kind: str = "air"
 
-    def describe(self, needed_m: float) -> Told:
+    def describe(self, needed_m: float) -> UnitText:
         """Return one sentence; ``needed_m`` is the required separation."""
         a, b = self.names
         how = "{} and {} came as near as" if self.kind == "air" else "{} landed beside {}, which stood there:"
-        return Told(
+        return UnitText(
             how + " {}, needed are {}, at {}",
             a, b, Quantity(self.distance_m, "distance", 1, "down"), Quantity(needed_m, "distance", None),
             Seconds(self.time_s, 1),

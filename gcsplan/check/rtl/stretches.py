@@ -13,7 +13,7 @@ from gcsplan.check.rtl.sweep import Target
 from gcsplan.check.rtl.trace import MissionTrace
 from gcsplan.check.rtl.verdict import UnsafeStretch
 from gcsplan.check.stretch import Place
-from gcsplan.units import Quantity, Told
+from gcsplan.units import Quantity, UnitText
 
 ROUND_M = 0.1
 LOOKED_AT = 500
@@ -116,17 +116,17 @@ def _why(obstacles: Obstacles, row: int, name: str, grade: int, obstacle: Place 
             return "the ground on the way home is unknown to the terrain model"
         place: str = ""
         if obstacle is not None:
-            place = Told(" at {:.6f}, {:.6f} ({})", *obstacle[:2], Quantity(obstacle[2], "amsl", 0))
+            place = UnitText(" at {:.6f}, {:.6f} ({})", *obstacle[:2], Quantity(obstacle[2], "amsl", 0))
         meets = (
             "meets ground{} and would clear"
             if grade == CLEAR
             else "comes nearer than min_agl_m to ground{} and would keep"
         )
-        return Told(f"the return {meets} it at {{}}", place, Quantity(top, "amsl", 0, "up"))
+        return UnitText(f"the return {meets} it at {{}}", place, Quantity(top, "amsl", 0, "up"))
     height: str = ""
     if math.isinf(top):
-        height = " (no top)" if math.isinf(bottom) else Told(" (from {} up)", Quantity(bottom, "amsl", 0))
-    return Told("the return meets no-fly zone “{}”{} or its clearance", name, height)
+        height = " (no top)" if math.isinf(bottom) else UnitText(" (from {} up)", Quantity(bottom, "amsl", 0))
+    return UnitText("the return meets no-fly zone “{}”{} or its clearance", name, height)
 
 
 def _without_doubles(found: list[UnsafeStretch]) -> tuple[UnsafeStretch, ...]:

@@ -10,7 +10,7 @@ from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, PATH, STILL_NO_RETURN
 from gcsplan.check.stretch import Place
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting, settings
-from gcsplan.units import Quantity, Reach, Symbol, Told, joined
+from gcsplan.units import Quantity, Reach, Symbol, UnitText, joined
 from gcsplan.vehicle import Autopilot
 
 
@@ -56,17 +56,17 @@ class UnsafeStretch:
         return f"item {self.from_seq}" if self.from_seq == self.to_seq else f"items {self.from_seq} to {self.to_seq}"
 
     @property
-    def place_and_why(self) -> Told:
+    def place_and_why(self) -> UnitText:
         """``km 1.49 to 3.45 (items 4 to 9): the return meets …``."""
         ends = [self.from_m, *([self.to_m] if self.to_m - self.from_m >= 5.0 else [])]
-        numbers = joined(" to ", [Told("{}", Quantity(at_m, "far", 2, bare=True)) for at_m in ends])
-        return Told("{} {} ({}): {}", Symbol("far"), numbers, self.items, self.why)
+        numbers = joined(" to ", [UnitText("{}", Quantity(at_m, "far", 2, bare=True)) for at_m in ends])
+        return UnitText("{} {} ({}): {}", Symbol("far"), numbers, self.items, self.why)
 
-    def describe(self) -> Told:
+    def describe(self) -> UnitText:
         """Where, why, and which altitude would help."""
         if self.lowest_rel_home_m is None:
-            return Told("{}; no return altitude is safe from there", self.place_and_why)
-        return Told("{}; safe from there at {} above home", self.place_and_why, _at_least(self.lowest_rel_home_m))
+            return UnitText("{}; no return altitude is safe from there", self.place_and_why)
+        return UnitText("{}; safe from there at {} above home", self.place_and_why, _at_least(self.lowest_rel_home_m))
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,9 +167,9 @@ class WayHome:
         return together_m([*((s.from_m, s.to_m) for s in self.unsafe), *short])
 
     @property
-    def headline(self) -> Told:
+    def headline(self) -> UnitText:
         """Both truths in one line: ``path safe; no safe return from 9.5 km of it``."""
-        return Told("{}; {}", PATH[self.path_safe], self._return())
+        return UnitText("{}; {}", PATH[self.path_safe], self._return())
 
     def _return(self) -> str:
         if self.safe is True:
@@ -183,8 +183,8 @@ class WayHome:
         short_m = together_m(short)
         battery: str = ""
         if short:
-            battery = Told(" (battery: from {})", Reach(short_m)) if self.unsafe else " (battery)"
-        return Told("no safe return from {} of it{}", Reach(self.no_return_m), battery)
+            battery = UnitText(" (battery: from {})", Reach(short_m)) if self.unsafe else " (battery)"
+        return UnitText("no safe return from {} of it{}", Reach(self.no_return_m), battery)
 
     @property
     def advice(self) -> str:
@@ -192,7 +192,7 @@ class WayHome:
         if self.set_rel_home_m is None:
             return ""
         with_points = f", with {counted(len(self.rally), 'rally point')} on board (--rally)" if self.rally else ""
-        return Told("set {}{}: then {}", setting(self.autopilot, self.set_rel_home_m), with_points, self.then)
+        return UnitText("set {}{}: then {}", setting(self.autopilot, self.set_rel_home_m), with_points, self.then)
 
     @property
     def then(self) -> str:
@@ -203,14 +203,16 @@ class WayHome:
         then: str = "safe return from all of it"
         but = ""
         if left:
-            then = Told("no safe return from {} of it{}", Reach(left), "" if self.rally or self.left else " (battery)")
+            then = UnitText(
+                "no safe return from {} of it{}", Reach(left), "" if self.rally or self.left else " (battery)"
+            )
         elif self.lowest_legal_rel_home_m is not None and self.set_rel_home_m >= self.lowest_legal_rel_home_m:
             but += ", within all limits"
         if self.rally and self.battery is not None:
             but += ", the battery not counted"
         if self.not_judged:
             but += ", as far as it was judged"
-        return Told("{}{}", then, but)
+        return UnitText("{}{}", then, but)
 
     def as_dict(self, *, profile: bool = False) -> dict[str, Any]:
         """Plain values for ``summary.json``; the profile on request."""
@@ -245,15 +247,15 @@ class WayHome:
     def rows(self) -> list[tuple[str, str]]:
         """(label, words) for a table of two columns, below the headline."""
         source = "the autopilot's default" if self.assumed else "as given"
-        judged_at = Told("{} above home, {}", Quantity(self.rtl_rel_home_m, "height", None), source)
+        judged_at = UnitText("{} above home, {}", Quantity(self.rtl_rel_home_m, "height", None), source)
         out: list[tuple[str, str]] = [("judged at", judged_at)]
         if self.advice:
             out.append(("on the vehicle", self.advice))
-        out += [(NO_RETURN, Told("from {}", s.describe())) for s in self.unsafe]
+        out += [(NO_RETURN, UnitText("from {}", s.describe())) for s in self.unsafe]
         if self.irregular:
             first, length = self.irregular[0], together_m((s.from_m, s.to_m) for s in self.irregular)
             words = "from {} the return hits nothing but breaks a limit; first from {}"
-            out.append(("outside a limit", Told(words, Reach(length), first.describe())))
+            out.append(("outside a limit", UnitText(words, Reach(length), first.describe())))
         if self.not_judged and not self.unsafe and self.lowest_rel_home_m is None:
             return out + self._battery() + [(NOT_JUDGED, words) for words in self.not_judged]
         out += [
@@ -264,14 +266,14 @@ class WayHome:
         out += [
             (
                 f"rally point {number}",
-                Told(
+                UnitText(
                     "{:.7f}, {:.7f}, {} above home: {}; nearest for {}",
                     r.lat_deg, r.lon_deg, Quantity(r.rel_home_m, "height", 0, "up"), r.why, Reach(r.serves_m),
                 ),
             )
             for number, r in enumerate(self.rally, start=1)
         ]  # fmt: skip
-        out += [(STILL_NO_RETURN, Told("from {}", s.place_and_why)) for s in self.left]
+        out += [(STILL_NO_RETURN, UnitText("from {}", s.place_and_why)) for s in self.left]
         out += [(NOT_JUDGED, words) for words in self.not_judged]
         return out
 
@@ -289,8 +291,8 @@ def _altitudes(lowest: float | None, highest: float | None) -> str:
         return "no single return altitude is, from all of the path"
     upper: str = " or more"
     if highest is not None:
-        upper = Told(" to {}", Quantity(highest, "height", 1, "down", trimmed=True))
-    return Told("from all of the path at {}{} above home", _at_least(lowest), upper)
+        upper = UnitText(" to {}", Quantity(highest, "height", 1, "down", trimmed=True))
+    return UnitText("from all of the path at {}{} above home", _at_least(lowest), upper)
 
 
 def _at_least(rel_home_m: float) -> Quantity:
