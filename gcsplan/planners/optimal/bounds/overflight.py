@@ -116,19 +116,19 @@ class Overflight:
         """The case whose paths cost least; None if no path is better than the best. Raises Exhausted."""
         incumbent = self.incumbent
         cases = self._cases(self.outlines.walls(), frozenset())
-        for _ in range(MOST_CASES):
-            if not cases or cases[0].least >= incumbent.cost:
-                return None
+        looked = 0
+        while cases and cases[0].least < incumbent.cost:
             zone = self._too_low(cases[0])
-            if zone is None or not incumbent.budget.goes_on():
-                break
+            looked += 1
+            if zone is None or looked > MOST_CASES or not incumbent.budget.goes_on():
+                return cases[0]
             case = heapq.heappop(cases)
             around = case.shut.copy()
             around[zone] = True
             for new in (*self._cases(around, case.over), *self._cases(case.shut, case.over | {zone})):
                 new.least = max(new.least, case.least)
                 heapq.heappush(cases, new)
-        return cases[0]
+        return None
 
     def _too_low(self, case: _Case) -> int | None:
         """The zone below whose top a case's way is deepest, out of those that may be passed over or around; None if
