@@ -62,11 +62,12 @@ class UnsafeStretch:
         numbers = joined(" to ", [UnitText("{}", Quantity(at_m, "far", 2, bare=True)) for at_m in ends])
         return UnitText("{} {} ({}): {}", Symbol("far"), numbers, self.items, self.why)
 
-    def describe(self) -> UnitText:
-        """Where, why, and which altitude would help."""
+    def describe(self, good: str = "safe") -> UnitText:
+        """Where, why, and which altitude would help; ``good``: what the return is at that altitude."""
         if self.lowest_rel_home_m is None:
-            return UnitText("{}; no return altitude is safe from there", self.place_and_why)
-        return UnitText("{}; safe from there at {} above home", self.place_and_why, _at_least(self.lowest_rel_home_m))
+            return UnitText("{}; no return altitude is {} from there", self.place_and_why, good)
+        lowest = _at_least(self.lowest_rel_home_m)
+        return UnitText("{}; {} from there at {} above home", self.place_and_why, good, lowest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,8 +255,9 @@ class WayHome:
         out += [(NO_RETURN, UnitText("from {}", s.describe())) for s in self.unsafe]
         if self.irregular:
             first, length = self.irregular[0], together_m((s.from_m, s.to_m) for s in self.irregular)
-            words = "from {} the return hits nothing but breaks a limit; first from {}"
-            out.append(("outside a limit", UnitText(words, Reach(length), first.describe())))
+            where = UnitText("from {} of the path", Reach(length)) if length >= 0.5 else "from a point of the path"
+            words = "{} the return hits nothing but breaks a limit; first from {}"
+            out.append(("outside a limit", UnitText(words, where, first.describe("within all limits"))))
         if self.not_judged and not self.unsafe and self.lowest_rel_home_m is None:
             return out + self._battery() + [(NOT_JUDGED, words) for words in self.not_judged]
         out += [

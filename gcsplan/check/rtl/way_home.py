@@ -88,8 +88,9 @@ def way_home(
     most_amsl = vehicle.limits.max_amsl_m
     if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:
         most_m = most_amsl - vehicle.limits.altitude_error_m - ground
-        leaves = f"which leaves {floored(most_m, 0):.0f} m"
-        notes.append(f"a return at {raised(lowest, 1):g} m above home rises above max_amsl_m, {leaves}")
+        allowed = f"it allows {floored(most_m, 0):.0f} m above home" if most_m > 0.0 else "home is not below it"
+        need = f"the lowest that is clear from all of the path, {raised(lowest, 1):g} m above home"
+        notes.append(f"every clear return altitude rises above max_amsl_m: {need}; {allowed}")
     if refinement.stopped_early:
         notes.append("the terrain is too fine to look at all of it closely: unsafe stretches may be drawn too long")
     return WayHome(

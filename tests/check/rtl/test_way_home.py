@@ -78,7 +78,9 @@ def test_over_flat_ground_any_altitude_is_safe() -> None:
     # Min AGL 60 m and 5 m of error: from the landing column at the goal the return must be at 65 m.
     assert home.lowest_legal_rel_home_m == pytest.approx(65.0, abs=0.2)
     assert [s.from_seq for s in home.irregular] == [4]
-    assert "outside a limit: from 0 m the return hits nothing but breaks a limit; first from km 3.00" in home.describe()
+    words = "outside a limit: from a point of the path the return hits nothing but breaks a limit; first from km 3.00"
+    assert words in home.describe()
+    assert "; within all limits from there at 65" in home.describe()
     assert home.headline == "path safe; safe return from all of it"
     assert "RTL_ALT 6600 (cm)" in home.advice
     assert home.advice.endswith("then safe return from all of it, within all limits")
