@@ -31,6 +31,7 @@ from gcsplan.app.way_home import homes_of
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.cli import console
 from gcsplan.cli import main as cli
+from gcsplan.cli.home_words import say_homes
 from gcsplan.errors import UsageError
 from gcsplan.figures import floored, raised
 from gcsplan.mission_file import load_mission
@@ -354,8 +355,23 @@ def test_tables_fit_80_columns(
     monkeypatch.setattr(console.console, "width", 80)
     console.plan_table(done, homes, units)
     console.verdict_table("a.plan as a (arducopter)", done.vehicles[0].verdict, units=units)
-    lines = capfd.readouterr().out.splitlines()
+    say_homes(homes, units)
+    console.rows_table(
+        "wide", [{"vehicle": name, **{f"a wide column {i}": "0:00" for i in range(9)}} for name in homes]
+    )
+    lines = [line for line in capfd.readouterr().out.splitlines() if " above home: " not in line]  # a sentence
     assert max(map(len, lines)) <= 80, max(lines, key=len)
+
+
+def test_an_altitude_to_set_reads_as_the_judged_one_that_it_is(capfd: pytest.CaptureFixture[str]) -> None:
+    """600 m are 1968.504 ft: rounded up beside the rounded one they were two altitudes."""
+    home = next(iter(planned()[1].values()))
+    assert home is not None
+    for judged_m, words in ((600.0, ["1968.5", "1968.5"]), (599.0, ["1965.22", "1968.51"])):
+        say_homes({"a": replace(home, rtl_rel_home_m=judged_m, assumed=False, set_rel_home_m=600.0)}, AVIATION)
+        out = capfd.readouterr().out
+        assert re.findall(r"19\d\d\.\d+", out.splitlines()[-2]) == words
+        assert out.splitlines()[-1].startswith(f"{words[1]} ft above home: RTL_ALT 60000 (cm)")
 
 
 def test_rounding_after_the_conversion_differs_from_before_it() -> None:

@@ -118,15 +118,10 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     if all(row["energy, mAh"] == "–" for row in rows):  # a mission without a battery's voltage has no charges
         rows = [{name: words for name, words in row.items() if name != "energy, mAh"} for row in rows]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
-    table = new_table(title, [(name, name not in ("vehicle", "verdict")) for name in rows[0]])
-    for row in rows:
-        table.add_row(*row.values())
-    if len(rows) > 4 and _width(table) <= console.width:
-        print_table(table)
+    if len(rows) > 4:
+        rows_table(title, rows, left=("vehicle", "verdict"))
     else:
-        each = next((n for n in (4, 3, 2) if all(_width(t) <= console.width for t in _columns(title, rows, n))), 1)
-        for table in _columns(title, rows, each):
-            print_table(table)
+        _columns_table(title, rows)
     _say_fleet(plan, units)
     say_notes(plan.notes)
     say_notes_of([(v.name, n) for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)])
@@ -349,8 +344,21 @@ def remark(message: str) -> None:
 
 
 def rows_table(title: str, rows: Sequence[Mapping[str, str]], *, left: Sequence[str] = ("vehicle",)) -> None:
-    """Print rows of words by column name; columns in ``left`` are left-aligned, the others right-aligned."""
+    """Print rows of words by column name, or, where these are too wide, a column for each of ``rows``.
+
+    Columns in ``left`` are left-aligned, the others right-aligned.
+    """
     table = new_table(title, [(name, name not in left) for name in rows[0]])
     for row in rows:
         table.add_row(*row.values())
-    print_table(table)
+    if _width(table) <= console.width:
+        print_table(table)
+    else:
+        _columns_table(title, rows)
+
+
+def _columns_table(title: str, rows: Sequence[Mapping[str, str]]) -> None:
+    """Print a column for each of ``rows``, as many side by side as there is room for, up to four."""
+    each = next((n for n in (4, 3, 2) if all(_width(t) <= console.width for t in _columns(title, rows, n))), 1)
+    for table in _columns(title, rows, each):
+        print_table(table)

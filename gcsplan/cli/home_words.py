@@ -9,10 +9,10 @@ from rich.markup import escape
 from gcsplan.app.way_home import warnings
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN
-from gcsplan.cli.console import aside, console, new_table, print_table, say
+from gcsplan.cli.console import aside, console, rows_table, say
 from gcsplan.figures import raised
 from gcsplan.mavlink.mission.return_altitude import setting
-from gcsplan.units import Reach, Units, in_units
+from gcsplan.units import Reach, Unit, Units, in_units
 
 MOST_ROWS = 8
 """Rows with one label that are printed; the report and JSON have all of them."""
@@ -25,23 +25,33 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
     if not homes:
         return
     unit = units.height
-    columns = [("vehicle", False), (f"return at, {unit.symbol}", True), ("way home", False), ("unsafe from", True),
-               (f"to set, {unit.symbol}", True), ("then unsafe from", True), ("rally points", True)]  # fmt: skip
-    table = new_table("[bold]way home[/]  the autopilot's own return, from every point of the path", columns)
-    for name, home in homes.items():
-        at = unit.stated(home.rtl_rel_home_m) + (" (default)" if home.assumed else "")
-        best = home.set_rel_home_m
-        table.add_row(
-            escape(name), at, WORDS[home.safe], Reach(home.no_return_m).text(units) if home.safe is False else "–",
-            "–" if best is None else unit.stated(best, raised),
-            "–" if not home.set_leaves_m else Reach(home.set_leaves_m).text(units),
-            str(len(home.rally)) if home.rally else "–",
-        )  # fmt: skip
-    print_table(table)
-    known = dict.fromkeys((h.autopilot, h.set_rel_home_m) for h in homes.values() if h.set_rel_home_m is not None)
-    for autopilot, best in known:
-        say(f"{unit.stated(best, raised)} {unit.symbol} above home: {setting(autopilot, best)}")
+    rows = [
+        {
+            "vehicle": escape(name),
+            f"return at, {unit.symbol}": unit.stated(home.rtl_rel_home_m) + (" (default)" if home.assumed else ""),
+            "way home": WORDS[home.safe],
+            "unsafe from": Reach(home.no_return_m).text(units) if home.safe is False else "–",
+            f"to set, {unit.symbol}": _to_set(home, unit),
+            "then unsafe from": "–" if not home.set_leaves_m else Reach(home.set_leaves_m).text(units),
+            "rally points": str(len(home.rally)) if home.rally else "–",
+        }
+        for name, home in homes.items()
+    ]
+    title = "[bold]way home[/]  the autopilot's own return, from every point of the path"
+    rows_table(title, rows, left=("vehicle", "way home"))
+    known = {(h.autopilot, h.set_rel_home_m): _to_set(h, unit) for h in homes.values()}
+    for (autopilot, best_m), words in known.items():
+        if best_m is not None:
+            say(f"{words} {unit.symbol} above home: {setting(autopilot, best_m)}")
     say_warnings(homes, units)
+
+
+def _to_set(home: WayHome, unit: Unit) -> str:
+    """The altitude to set: rounded up, unless it is the judged one, which reads the same in both places."""
+    if home.set_rel_home_m is None:
+        return "–"
+    same = home.set_rel_home_m == home.rtl_rel_home_m
+    return unit.stated(home.set_rel_home_m, *([] if same else [raised]))
 
 
 def say_home(home: WayHome, units: Units) -> None:

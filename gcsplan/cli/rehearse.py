@@ -131,11 +131,13 @@ def rehearse(
 
 def _show(planned: Plan, result: Rehearsal, units: Units) -> None:
     """Print a row for each vehicle."""
+    from rich.markup import escape
+
     from gcsplan.cli.console import rows_table
 
     by = "built-in simulator" if result.simulator == "gcsplan" else "ArduCopter SITL"
     runs = f", {result.runs} runs" if result.runs > 1 else ""
-    rows_table(f"rehearsal of {planned.source.name}  {by}{runs}", result.rows(units))
+    rows_table(f"rehearsal of {escape(planned.source.name)}  {by}{runs}", result.rows(units))
 
 
 def _ending(result: Rehearsal, units: Units) -> list[str]:
