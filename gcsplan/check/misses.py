@@ -43,7 +43,7 @@ class Miss:
     def describe(self) -> UnitText:
         """Describe it in one line."""
         left = (
-            UnitText("{} to spare", self._number(self.room, "down"))
+            UnitText("{} to spare{}", self._number(self.room, "down"), " beyond the track error" if self.zone else "")
             if self.room >= 0.0
             else UnitText("broken by {}", self._number(-self.room, "near"))
         )
@@ -67,10 +67,12 @@ class Miss:
 
 
 WORDS = {
-    "min_agl": "lowest above ground", "max_agl": "highest above ground", "max_amsl": "highest altitude",
-    "terrain_clearance": "lowest above ground within the clearance", "zone": "nearest to zone",
-    "climb": "steepest climb", "descent": "steepest descent",
+    "min_agl": "lowest above ground, less the errors", "max_agl": "highest above ground, with the errors",
+    "max_amsl": "highest altitude, with the errors",
+    "terrain_clearance": "lowest above ground within the clearance, less the errors",
+    "zone": "nearest to zone", "climb": "steepest climb", "descent": "steepest descent",
 }  # fmt: skip
+"""Heights are not those of the table of legs, which has the path as it is planned: the words say which way they go."""
 LEAST = ("min_agl", "terrain_clearance", "zone")
 LIFT_M = 50_000.0
 """An added altitude error, m, that breaks every limit of height on every leg; it breaks a limit by less the larger the

@@ -27,4 +27,4 @@ def test_a_zone_whose_clearance_is_kept_is_not_called_broken_for_a_bound_of_its_
     stretch: Any = SimpleNamespace(seq=3)
     (miss,) = [m for m in nearest_misses([stretch], legs, np.zeros(1, np.intp), close, craft, where) if m.zone]
     assert miss.room == 0.0
-    assert "0.0 m to spare" in miss.describe()
+    assert ": 33.0 m of 30, 0.0 m to spare beyond the track error, item 3 (" in miss.describe()
