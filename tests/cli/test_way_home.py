@@ -206,7 +206,7 @@ def test_what_was_judged_is_not_called_unchecked_and_the_vehicles_own_name_is_to
     advice = json.loads((tmp_path / "hill" / "summary.json").read_text())["vehicles"][0]["way_home"]["set"]
     value = next(a["value"] for a in advice if a["parameter"] == "RTL_ALT")
     # The simulated vehicle has the older name, so it alone stands in the note.
-    assert f"it returns at 15 m above home (RTL_ALT), as judged: set RTL_ALT {value:.0f} (cm)\n" in text
+    assert f"the return is at 15 m above home (RTL_ALT), as judged: set RTL_ALT {value:.0f} (cm)\n" in text
 
 
 def test_the_value_that_is_told_to_set_makes_the_return_safe(run: Any, tmp_path: Path) -> None:

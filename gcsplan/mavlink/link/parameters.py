@@ -171,15 +171,15 @@ def _return_altitude(values: Values, checked_m: float | None, advised_m: float |
         return [] if checked_m is None else ["the return altitude on board could not be read"]
     name, height_m = parameter.name, parameter.metres(values[parameter.name])
     if checked_m is None:
-        return [f"after a failsafe it returns at {height_m:g} m above home ({name}); that return was not checked"]
+        return [f"after a failsafe the return is at {height_m:g} m above home ({name}); that return was not checked"]
     wanted_m = checked_m if advised_m is None else advised_m
     if abs(height_m - checked_m) > _SAME_M:
         return [
-            f"it returns at {height_m:g} m above home ({name}); the return was checked at {checked_m:g} m: set "
+            f"the return is at {height_m:g} m above home ({name}), but was checked at {checked_m:g} m: set "
             f"{parameter.setting(wanted_m)}"
         ]
     if abs(height_m - wanted_m) > _SAME_M:
-        return [f"it returns at {height_m:g} m above home ({name}), as judged: set {parameter.setting(wanted_m)}"]
+        return [f"the return is at {height_m:g} m above home ({name}), as judged: set {parameter.setting(wanted_m)}"]
     return []
 
 

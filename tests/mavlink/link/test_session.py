@@ -413,8 +413,8 @@ def test_parameters_that_fit_say_nothing() -> None:
     ("values", "words"),
     [
         ({}, "no parameters could be read"),
-        ({"RTL_ALT": 1500.0}, "returns at 15 m above home (RTL_ALT); the return was checked at 60 m"),
-        ({"RTL_ALT_M": 15.0}, "returns at 15 m above home (RTL_ALT_M)"),
+        ({"RTL_ALT": 1500.0}, "return is at 15 m above home (RTL_ALT), but was checked at 60 m"),
+        ({"RTL_ALT_M": 15.0}, "return is at 15 m above home (RTL_ALT_M)"),
         (
             {"RTL_ALT": 6000.0, "FENCE_ENABLE": 1.0, "FENCE_TYPE": 1.0, "FENCE_ALT_MAX": 66.0},
             "ends at 66 m (FENCE_ALT_MAX)",
@@ -434,9 +434,9 @@ def test_parameters_that_do_not_fit_are_told_in_words(values: dict[str, float], 
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"RTL_ALT": 6000.0}, "it returns at 60 m above home (RTL_ALT), as judged: set RTL_ALT 35300 (cm)"),
-        ({"RTL_ALT_M": 60.0}, "it returns at 60 m above home (RTL_ALT_M), as judged: set RTL_ALT_M 353 (m)"),
-        ({"RTL_ALT": 1500.0}, "the return was checked at 60 m: set RTL_ALT 35300 (cm)"),
+        ({"RTL_ALT": 6000.0}, "the return is at 60 m above home (RTL_ALT), as judged: set RTL_ALT 35300 (cm)"),
+        ({"RTL_ALT_M": 60.0}, "the return is at 60 m above home (RTL_ALT_M), as judged: set RTL_ALT_M 353 (m)"),
+        ({"RTL_ALT": 1500.0}, ", but was checked at 60 m: set RTL_ALT 35300 (cm)"),
     ],
 )
 def test_a_better_return_altitude_is_told_by_the_vehicles_own_name(values: dict[str, float], words: str) -> None:
