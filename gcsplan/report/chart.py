@@ -73,9 +73,11 @@ def chart_html(name: str, axes: Axes, shapes: Sequence[str], marks: Sequence[Mar
     grid = "".join(
         f'<path class="grid" d="M{u:.0f} 0V10000"/>' for u in axes.xy(xs, np.full(len(xs), axes.y0))[:, 0]
     ) + "".join(f'<path class="grid y" d="M0 {v:.0f}H10000"/>' for v in axes.xy(np.full(len(ys), axes.x0), ys)[:, 1])
+    parts = [100.0 * (x - axes.x0) / (axes.x1 - axes.x0) for x in xs]
+    ends = [' class="last"' if part > 95.0 else "" for part in parts]
     across = "".join(
-        f'<span style="left:{100 * (x - axes.x0) / (axes.x1 - axes.x0):.3f}%">{word}</span>'
-        for x, word in zip(xs, across_words, strict=True)
+        f'<span{end} style="left:{part:.3f}%">{word}</span>'
+        for end, part, word in zip(ends, parts, across_words, strict=True)
     )
     up = "".join(
         f'<span style="top:{100 * (axes.y1 - y) / (axes.y1 - axes.y0):.3f}%">{word}</span>'

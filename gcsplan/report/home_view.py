@@ -11,7 +11,7 @@ from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, STILL_NO_RETURN
 from gcsplan.figures import counted
 from gcsplan.report.chart import chart_html
-from gcsplan.report.markup import at_least, energy, esc, num, place, stated, table, tools
+from gcsplan.report.markup import at_least, between, energy, esc, num, place, stated, table, tools
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.profile_view import along_axes
 from gcsplan.report.samples import Line
@@ -152,7 +152,7 @@ def _stretches(subject: Subject, home: WayHome, units: Units) -> str:
         for s in stretches:
             rows.append(
                 (
-                    esc(s.items), kind, f"{num(units.far.of(s.from_m), 2)} – {num(s.to_m, 2, units.far)}",
+                    esc(s.items), kind, between(s.from_m, s.to_m, units.far),
                     esc(in_units(s.why, units)),
                     place(*s.obstacle[:2]) + f", {num(s.obstacle[2], 0, units.amsl)}" if s.obstacle else "–",
                     at_least(s.lowest_rel_home_m, 1, units.height) if s.lowest_rel_home_m is not None else "none",

@@ -74,6 +74,12 @@ def stated(value: float, unit: Unit) -> str:
     return f"{unit.stated(value)}{UNIT_GAP}{unit.symbol}"
 
 
+def between(from_m: float, to_m: float, unit: Unit) -> str:
+    """A part of a track, ``3.00 – 4.85 km``; where both ends read the same, that place alone."""
+    first, last = num(unit.of(from_m), 2), num(unit.of(to_m), 2)
+    return num(to_m, 2, unit) if first == last else f"{first} – {num(to_m, 2, unit)}"
+
+
 def energy(joules: float | None, decimals: int = 0, volts: float | None = None) -> str:
     """An energy in kJ and Wh, and in mAh where the battery's voltage is known."""
     units = (KILOJOULE, WATT_HOUR, *([charge(volts)] if volts else []))

@@ -267,8 +267,9 @@ def _profiles(page: Page, lines: Sequence[Line | None], found: Sequence[list[Pas
             continue
         shown = " open" if i < OPEN_VEHICLES else ""
         unit = page.units.along(line.length_m)
+        length = num(line.length_m, 2 if unit is page.units.far else 0, unit)
         parts.append(
-            f"<details{shown}><summary>{esc(subject.name)}: {num(line.length_m, 2, unit)} along the track"
+            f"<details{shown}><summary>{esc(subject.name)}: {length} along the track"
             f"</summary>{tools(f'profile-{i}')}{profile_html(subject, line, found[i], i, page.world, page.units)}"
             f"{profile_legend(subject, line, found[i], page.units)}</details>"
         )

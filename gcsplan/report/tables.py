@@ -9,7 +9,20 @@ import numpy as np
 
 from gcsplan.check.verdict import LegFigures, by_item
 from gcsplan.mavlink.mission.autopilots import profile_of
-from gcsplan.report.markup import THIN, at_least, energy, esc, greatest, least, num, place, stated, steepest, table
+from gcsplan.report.markup import (
+    THIN,
+    at_least,
+    between,
+    energy,
+    esc,
+    greatest,
+    least,
+    num,
+    place,
+    stated,
+    steepest,
+    table,
+)
 from gcsplan.report.plan_view import zone_heights
 from gcsplan.report.profile_view import passed
 from gcsplan.report.samples import Line, Passage
@@ -179,8 +192,7 @@ def zones_table(page: Page, subject: Subject, line: Line, found: Sequence[Passag
         return ""
     rows = []
     for p in found:
-        far = page.units.far
-        ends = f"{num(far.of(line.run_m[p.first]), 2)} – {num(line.run_m[p.last], 2, far)}"
+        ends = between(float(line.run_m[p.first]), float(line.run_m[p.last]), page.units.far)
         rows.append((esc(p.zone.name), esc(zone_heights(p.zone, page.units)), ends, passed(p, page.units)))
     limits = subject.vehicle.limits
     reach = stated(limits.horizontal_clearance_m + limits.track_error_m, page.units.distance)

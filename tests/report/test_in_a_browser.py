@@ -14,8 +14,9 @@ from PIL import Image
 
 from gcsplan.check.rtl.way_home import way_home
 from gcsplan.report.page import render_page
+from gcsplan.report.subject import Subject
 from gcsplan.units import AVIATION, IMPERIAL, METRIC, Units
-from tests.report.test_page import HOSTILE, fleet_page, small_page
+from tests.report.test_page import HOSTILE, fleet_page, small_page, verdict_over
 from tests.support import browser as chromium
 from tests.support.browser import Browser
 from tests.support.shown import same, taken_apart
@@ -285,6 +286,18 @@ def test_a_tap_tells_numbers_and_the_page_can_still_be_scrolled_by_a_finger(page
     for name in ("#map", "#scene", "#profile-0 .plot"):
         assert page.evaluate(f"getComputedStyle(document.querySelector({name!r})).touchAction") == "pan-y"
     assert page.complaints() == []
+
+
+def test_no_label_of_an_axis_makes_a_phones_page_wider_than_the_phone(page: Browser, tmp_path: Path) -> None:
+    made = small_page()
+    craft = made.subjects[0].vehicle
+    short = Subject("uav1", verdict_over(made.world, [[0.0, 0, 430], [1814, 0, 430]], craft), craft)
+    text = render_page(replace(made, subjects=(short,), units=AVIATION))  # its last label, 6 000 ft, is at the very end
+    (tmp_path / "report.html").write_text(text, encoding="utf-8")
+    page.visit(tmp_path / "report.html", width=390, height=800, phone=True)
+    last = page.evaluate("document.querySelector('#profile-0 .xticks span:last-child').textContent")
+    assert re.sub(r"\s", "", last) == "6000"
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
 
 
 def test_without_scripts_the_map_the_profile_and_every_number_are_there(page: Browser, tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ from gcsplan.report.relief import UNKNOWN, extent_of, relief_of
 from gcsplan.report.samples import distance_m, line_of, passages
 from gcsplan.report.scene_data import triangles, zone_meshes
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import METRE, METRIC, duration
+from gcsplan.units import AVIATION, METRE, METRIC, duration
 from gcsplan.vehicle import Energy, Vehicle
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
@@ -607,3 +607,16 @@ def test_the_map_has_the_reports_colours_low_ground_is_no_lake() -> None:
     pixels = np.asarray(Image.open(io.BytesIO(drawn)).convert("RGB"), np.int16)
     red, green, blue = np.moveaxis(pixels, -1, 0)
     assert float(np.mean((blue > green + 20) & (blue > red + 20))) < 0.001
+
+
+def test_a_short_track_has_whole_feet_and_a_place_is_not_a_range() -> None:
+    """A track of 1814 m was "5 951.97 ft along the track", and a landing column lay at "0.98 – 0.98 NM"."""
+    made = small_page()
+    craft = made.subjects[0].vehicle
+    short = Subject("uav1", verdict_over(made.world, [[0.0, 0, 430], [1814, 0, 430]], craft), craft)
+    for units, length in ((AVIATION, "5\u202f951\u202fft"), (METRIC, "1\u202f814\u202fm")):
+        text = render_page(replace(made, subjects=(short,), units=units))
+        assert f"<summary>uav1: {length} along the track" in text
+        assert (units is AVIATION) == ('<span class="last" style="left:99.625%">6\u202f000</span>' in text)
+    assert markup.between(1814.0, 1814.3, AVIATION.far) == "0.98\u202fNM"
+    assert markup.between(1814.0, 2814.0, METRIC.far) == "1.81 – 2.81\u202fkm"

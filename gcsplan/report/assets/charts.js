@@ -58,6 +58,7 @@ function startChart(figure) {
       const label = document.createElement('span'), line = document.createElementNS('http://www.w3.org/2000/svg', 'path');
       label.textContent = size ? num(i * inUnit, decimals) : duration(i * step, decimals);
       label.style.left = `${(100 * (i * step - from)) / span}%`;
+      label.classList.toggle('last', i * step > from + 0.95 * span);
       xticks.append(label);
       line.setAttribute('class', 'grid');
       line.setAttribute('d', `M${(10000 * (i * step - x0)) / (x1 - x0)} 0V10000`);
