@@ -363,6 +363,19 @@ def test_tables_fit_80_columns(
     assert max(map(len, lines)) <= 80, max(lines, key=len)
 
 
+@systems
+def test_the_table_of_items_gives_up_the_length_before_it_breaks(
+    monkeypatch: pytest.MonkeyPatch, units: Units, capfd: pytest.CaptureFixture[str]
+) -> None:
+    verdict = planned()[0].vehicles[0].verdict
+    legs = tuple(replace(leg, nearest_zone=leg.nearest_zone and "raptor cliffs over it") for leg in verdict.legs)
+    monkeypatch.setattr(console.console, "width", 80)
+    console.verdict_table("a.plan", replace(verdict, legs=legs), units=units)
+    lines = capfd.readouterr().out.splitlines()[1:-1]
+    assert "raptor cliffs over it" in "".join(lines)
+    assert max(map(len, lines)) <= 80, max(lines, key=len)
+
+
 def test_an_altitude_to_set_reads_as_the_judged_one_that_it_is(capfd: pytest.CaptureFixture[str]) -> None:
     """600 m are 1968.504 ft: rounded up beside the rounded one they were two altitudes."""
     home = next(iter(planned()[1].values()))

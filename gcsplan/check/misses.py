@@ -42,18 +42,21 @@ class Miss:
 
     def describe(self) -> UnitText:
         """Describe it in one line."""
+        beyond, with_error = (" beyond the track error", " with the track error") if self.zone else ("", "")
         left = (
-            UnitText("{} to spare{}", self._number(self.room, "down"), " beyond the track error" if self.zone else "")
+            UnitText("{} to spare{}", self._number(self.room, "down"), beyond)
             if self.room >= 0.0
-            else UnitText("broken by {}", self._number(-self.room, "near"))
+            else UnitText("broken by {}{}", self._number(-self.room, "up"), with_error)
         )
         limit = Quantity(self.limit, self._measured, None, bare=True) if self.unit == "m" else f"{self.limit:g}"
-        return UnitText(
-            "{}{}: {} of {}, {}, item {} ({:.6f}, {:.6f}, {})",
-            WORDS[self.kind], f" {self.zone}" if self.zone else "",
-            self._number(self.value, "down" if self.kind in LEAST else "up"), limit, left, self.seq,
-            self.lat_deg, self.lon_deg, Quantity(self.amsl_m, "amsl", 0),
+        found = UnitText(
+            "{}{}: {} of {}", WORDS[self.kind], f" {self.zone}" if self.zone else "",
+            self._number(self.value, "down" if self.kind in LEAST else "up"), limit,
         )  # fmt: skip
+        if self.zone and self.value < 0.0:
+            found = UnitText("inside zone {}: {} from its edge", self.zone, self._number(-self.value, "up"))
+        at = Quantity(self.amsl_m, "amsl", 0)
+        return UnitText("{}, {}, item {} ({:.6f}, {:.6f}, {})", found, left, self.seq, self.lat_deg, self.lon_deg, at)
 
     @property
     def _measured(self) -> Kind:

@@ -223,10 +223,11 @@ def verdict_table(
         )
         for item in items
     ]  # fmt: skip
-    for shown in (10, 9, 8):  # on a narrow terminal leave out time and energy; the limits matter more
-        table = new_table(title, columns[:shown])
+    for hidden in ((), (9,), (8, 9), (2, 8, 9)):  # too narrow: without time, energy, length; the limits matter more
+        shown = [i for i in range(len(columns)) if i not in hidden]
+        table = new_table(title, [columns[i] for i in shown])
         for item, row in zip(items, rows, strict=True):
-            table.add_row(*row[:shown], style="red" if item.seq in bad else None)
+            table.add_row(*(row[i] for i in shown), style="red" if item.seq in bad else None)
         if _width(table) <= console.width:
             break
     print_table(table)
