@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, get_args
 import gcsplan
 from gcsplan import errors
 from gcsplan.cli import ending
-from gcsplan.mission_file import load, schema, units, vehicles
+from gcsplan.mission_file import load, point_keys, schema, units, vehicles
 from gcsplan.planners import registry
 
 TOP = Path(__file__).resolve().parents[1]
@@ -38,9 +38,9 @@ ELSEWHERE: Mapping[str, float] = {
 
 @cache
 def _said() -> dict[tuple[str, str], str]:
-    """Class and key to the line below the key, in the module of the keys."""
+    """Class and key to the line below the key, in the modules of the keys."""
     found = {}
-    for kind in ast.parse(inspect.getsource(schema)).body:
+    for kind in [*ast.parse(inspect.getsource(schema)).body, *ast.parse(inspect.getsource(point_keys)).body]:
         if isinstance(kind, ast.ClassDef):
             for field, text in zip(kind.body, kind.body[1:], strict=False):
                 if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
@@ -56,11 +56,11 @@ def sections() -> list[tuple[str, type[schema.Keys]]]:
         found.append((place, kind))
         for key, field in kind.model_fields.items():
             for inner in _sections_in(field.annotation):
-                if key in kind.__annotations__ and inner not in (schema.LocalPoint, *(k for _, k in found)):
+                if key in kind.__annotations__ and inner not in (*schema.POINT_FORMS.values(), *(k for _, k in found)):
                     walk(inner, f"{place}.{key}".lstrip(".") + ("[]" if _is_list(field.annotation) else ""))
 
     walk(schema.MissionKeys, "")
-    return [*found, ("{east_m, north_m}", schema.LocalPoint)]
+    return [*found, *schema.POINT_FORMS.items()]
 
 
 def _sections_in(annotation: Any) -> Iterator[type[schema.Keys]]:
@@ -113,7 +113,7 @@ def _value(key: str, told: Mapping[str, Any], named: Mapping[str, Any]) -> str:
     """What may stand there: from the JSON schema of a key."""
     if "$ref" in told:
         name = told["$ref"].rsplit("/", 1)[-1]
-        return "{east_m, north_m}" if name == "LocalPoint" else "section"
+        return next((form for form, kind in schema.POINT_FORMS.items() if kind.__name__ == name), "section")
     choices = told.get("anyOf") or told.get("oneOf")
     if choices:
         words = [_value(key, c, named) for c in choices if c.get("type") != "null"]

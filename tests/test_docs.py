@@ -75,7 +75,9 @@ def test_units_and_defaults_are_those_of_the_code(made: ModuleType) -> None:
     assert by_key["`altitude_frame`"] == ["`relative`, `amsl`, `terrain`", "`relative`"]
     assert by_key["`sysid`"] == ["whole number, 1 to 255", "**wanted**"]
     assert by_key["`leg_jerk_m_s3`"][0].startswith("m/s³")
-    assert by_key["`via`"][0] == "list of [lat, lon] or [lat, lon, agl_m] or {east_m, north_m}"
+    assert by_key["`via`"][0] == (
+        "list of [lat, lon] or [lat, lon, agl_m] or text or {east_m, north_m} or {lat, lon, agl_m} or {at, agl_m}"
+    )
 
 
 def test_the_command_line_s_reference_names_every_command_and_option(made: ModuleType) -> None:

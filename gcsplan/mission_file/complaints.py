@@ -9,8 +9,12 @@ from typing import Any, TypeVar, get_args
 from pydantic import ValidationError
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.schema import FORMS, Keys, LocalPoint, nearest, shown
+from gcsplan.mission_file.keys import Keys
+from gcsplan.mission_file.places import EXAMPLES
+from gcsplan.mission_file.point_keys import POINT_FORMS
+from gcsplan.mission_file.schema import FORMS, nearest, shown
 from gcsplan.mission_file.units import nearest_key
+from gcsplan.mission_file.yaml_slips import missing_space
 
 Section = TypeVar("Section", bound=Keys)
 
@@ -23,7 +27,9 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Pro
     """
     if not isinstance(value, dict):
         keys = ", ".join(list(kind.model_fields)[:6])
-        problems.append(Problem(where, f"must be a mapping of keys ({keys}, …), given {shown(value)}"))
+        tight = missing_space(value) if isinstance(value, str) else ""
+        hint = f"; {tight}" if tight else ""
+        problems.append(Problem(where, f"must be a mapping of keys ({keys}, …), given {shown(value)}{hint}"))
         return None
     try:
         return kind.model_validate(value)
@@ -95,7 +101,8 @@ def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
             given = context.get("actual_length", given)
             return Problem(path, f"must have {bound} values{_form_of(loc)}, given {given}")
         case "list_type" if _form_of(loc):
-            return Problem(path, f"must be [lat, lon], or {{east_m, north_m}} in a mission with a frame, given {given}")
+            words = f"must be [lat, lon], {{lat, lon}}, or text such as {EXAMPLES[0]}"
+            return Problem(path, f"{words}, or {{east_m, north_m}} in a mission with a frame, given {given}")
         case "list_type":
             return Problem(path, f"must be a list, given {given}")
         case "model_type" | "dict_type" | "model_attributes_type":
@@ -110,8 +117,8 @@ def _form_of(loc: tuple[int | str, ...]) -> str:
 def _model_at(kind: type[Keys], loc: Iterable[int | str]) -> type[Keys]:
     """The section that holds the key at ``loc``, whose names are the known ones."""
     for part in loc:
-        if part == "{east_m, north_m}":
-            kind = LocalPoint
+        if part in POINT_FORMS:
+            kind = POINT_FORMS[part]
         elif isinstance(part, str) and part in kind.model_fields:
             kind = _sections_in(kind.model_fields[part].annotation) or kind
     return kind
@@ -120,4 +127,5 @@ def _model_at(kind: type[Keys], loc: Iterable[int | str]) -> type[Keys]:
 def _sections_in(annotation: Any) -> type[Keys] | None:
     if isinstance(annotation, type) and issubclass(annotation, Keys):
         return annotation
-    return next((s for a in get_args(annotation) if (s := _sections_in(a)) is not None and s is not LocalPoint), None)
+    places = POINT_FORMS.values()
+    return next((s for a in get_args(annotation) if (s := _sections_in(a)) is not None and s not in places), None)

@@ -11,6 +11,7 @@ from typing import Any
 from gcsplan.errors import InputError
 from gcsplan.mission_file.schema import shown
 from gcsplan.mission_file.strict_yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, read_yaml
+from gcsplan.mission_file.yaml_slips import missing_space
 
 UNNAMED = Path("mission.yaml")
 """Path of a mission that has no file; files that the mission names are then found from the current folder."""
@@ -38,7 +39,9 @@ def read_content(
             f"load_mission takes a path, the text of a mission file, or a mapping, given {type(source).__name__}"
         )
     if not isinstance(raw, dict):
-        raise InputError(f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}", where=where)
+        tight = missing_space(raw) if isinstance(raw, str) else ""
+        words = f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}"
+        raise InputError(f"{words}; {tight}" if tight else words, where=where)
     return file, where, raw
 
 

@@ -50,6 +50,7 @@ from gcsplan.mission_file.world import (
     make_place,
     make_spec,
     make_zones,
+    place_notes,
 )  # fmt: skip
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
 from gcsplan.world.frame import FARTHEST_M, Frame
@@ -132,6 +133,8 @@ class _Reading:
         way_home: ReturnRule = self._choice("way_home", get_args(ReturnRule), "reported")
         frame_keys = self._section(FrameKeys, "frame")
         terrain_keys = self._section(TerrainKeys, "terrain")
+        if frame_keys is not None:
+            self.notes += place_notes(frame_keys.origin, f"{self.where}frame.origin")
         planner = self._planner()
         terminals = self._vehicles(terrain_keys, altitude_frame)
         names = check_unique(self._list("vehicles"), f"{self.where}vehicles", problems)
@@ -265,9 +268,13 @@ class _Reading:
             if altitude_frame == "terrain" and keys.turn_radius_m > 0.0:
                 words = "a fixed wing's turns are planned above home or sea level: use altitude_frame: relative or amsl"
                 self.problems.append(Problem(f"{at}.turn_radius_m", words))
-            start = make_place(keys.start, f"{at}.start", self.problems, local=self.local)
-            goal = make_place(keys.goal, f"{at}.goal", self.problems, local=self.local)
-            via = [make_place(p, f"{at}.via[{j}]", self.problems, local=self.local) for j, p in enumerate(keys.via)]
+            start = make_place(keys.start, f"{at}.start", self.problems, self.notes, local=self.local)
+            goal = make_place(keys.goal, f"{at}.goal", self.problems, self.notes, local=self.local)
+            via = [
+                make_place(p, f"{at}.via[{j}]", self.problems, self.notes, local=self.local)
+                for j, p in enumerate(keys.via)
+            ]
+            self.notes += _one_speed(one, keys)
             terminals.append(Terminals(keys, vehicle, start, goal, tuple(via)))
         return terminals
 
@@ -326,3 +333,11 @@ class _Reading:
         except InputError as why:
             self.problems += why.problems
             return None
+
+
+def _one_speed(given: Mapping[str, Any], keys: VehicleKeys) -> list[str]:
+    """A note if one number stands for the slowest and the fastest speed."""
+    if isinstance(given.get("speed_m_s"), list | None):
+        return []
+    slow, fast = keys.speed_m_s
+    return [f"{keys.name}: speed_m_s is one number, read as [{slow:g}, {fast:g}]: always this speed"]

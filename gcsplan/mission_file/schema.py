@@ -9,21 +9,20 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Discriminator,
     Field,
     Tag,
-    model_validator,
 )
 
+from gcsplan.mission_file.keys import FAR_M, Keys, Length, Metres
+from gcsplan.mission_file.point_keys import POINT_FORMS, LatLon, Point, ViaPoint
+
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
-_FAR = 1e6
 
 LEAST = 1e-3
 """Smallest speed, acceleration, or battery capacity in J: a division by less has no useful bound."""
@@ -38,9 +37,7 @@ def _no_trifle(value: float) -> float:
     return value
 
 
-Metres = Annotated[float, Field(ge=-_FAR, le=_FAR)]
-Length = Annotated[float, Field(ge=0.0, le=_FAR)]
-Positive = Annotated[float, Field(gt=0.0, le=_FAR)]
+Positive = Annotated[float, Field(gt=0.0, le=FAR_M)]
 Angle = Annotated[float, Field(gt=0.0, le=90.0)]
 Speed = Annotated[float, Field(gt=0.0, le=300.0), AfterValidator(_no_trifle)]
 Accel = Annotated[float, Field(gt=0.0, le=100.0), AfterValidator(_no_trifle)]
@@ -50,47 +47,25 @@ Encoding = Literal["box", "sections", "polar", "bspline", "offsets"]
 SwarmCost = Literal["krill", "ssgwo", "msfoa", "abo", "ib-abc"]
 
 
-class Keys(BaseModel):
-    """A section of the file. The string below a key is its description in the reference (docs/_build_reference.py)."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
-
-    @property
-    def given(self) -> dict[str, Any]:
-        """The keys that are in the file, with their values."""
-        return {k: getattr(self, k) for k in self.model_fields_set}
+def _count(value: Any) -> str:
+    return "several" if isinstance(value, list) else "one"
 
 
-class LocalPoint(Keys):
-    """A point of a local frame, on the ground unless it has ``up_m`` or ``agl_m``."""
-
-    east_m: Metres
-    """East of the frame's origin."""
-    north_m: Metres
-    """North of the frame's origin."""
-    up_m: Metres | None = None
-    """Height above the frame's zero."""
-    agl_m: Length | None = None
-    """Height above ground."""
-
-    @model_validator(mode="after")
-    def _one_height(self) -> LocalPoint:
-        if self.up_m is not None and self.agl_m is not None:
-            raise ValueError("give up_m or agl_m, not both")
-        return self
+def _same(speed_m_s: float) -> list[float]:
+    return [speed_m_s, speed_m_s]
 
 
-def _form(value: Any) -> str:
-    return "{east_m, north_m}" if isinstance(value, dict | LocalPoint) else "[lat, lon]"
-
-
-_Local = Annotated[LocalPoint, Tag("{east_m, north_m}")]
 Pair = Annotated[list[Metres], Field(min_length=2, max_length=2)]
-LatLon = Annotated[list[float], Field(min_length=2, max_length=2)]
-LatLonAgl = Annotated[list[float], Field(min_length=2, max_length=3)]
-Point = Annotated[Annotated[LatLon, Tag("[lat, lon]")] | _Local, Discriminator(_form)]
-ViaPoint = Annotated[Annotated[LatLonAgl, Tag("[lat, lon]")] | _Local, Discriminator(_form)]
-FORMS = ("[lat, lon]", "{east_m, north_m}", "one", "several")
+if TYPE_CHECKING:  # one speed becomes two
+    SpeedRange = list[float]
+else:
+    SpeedRange = Annotated[
+        Annotated[Speed, AfterValidator(_same), Tag("one")]
+        | Annotated[list[Speed], Field(min_length=2, max_length=2), Tag("several")],
+        Discriminator(_count),
+    ]
+FORMS = ("[lat, lon]", "text", *POINT_FORMS, "one", "several")
+"""The tags of unions, which are no part of a key's place."""
 
 
 class FrameKeys(Keys):
@@ -109,12 +84,8 @@ class PeakKeys(Keys):
     """East and north of its top, metres."""
     height_m: Metres
     """Height of its top above the flat ground."""
-    decay_m: Annotated[list[Annotated[float, Field(ge=1e-3, le=_FAR)]], Field(min_length=2, max_length=2)]
+    decay_m: Annotated[list[Annotated[float, Field(ge=1e-3, le=FAR_M)]], Field(min_length=2, max_length=2)]
     """East and north distance from the top at which the height has fallen to 37 % (1/e)."""
-
-
-def _count(value: Any) -> str:
-    return "several" if isinstance(value, list) else "one"
 
 
 class TerrainKeys(Keys):
@@ -235,8 +206,8 @@ class VehicleKeys(LimitKeys):
     """Height above home of the autopilot's own return; needed with `end: rtl`."""
     takeoff_heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | None = None
     """Launch heading of a fixed wing; if absent, the planner chooses one."""
-    speed_m_s: Annotated[list[Speed], Field(min_length=2, max_length=2)] = [3.0, 15.0]
-    """Slowest and fastest cruise speed."""
+    speed_m_s: SpeedRange = [3.0, 15.0]
+    """Slowest and fastest cruise speed; one number is both."""
     lean_angle_deg: Annotated[float, Field(ge=10.0, le=80.0)] | None = None
     """ArduCopter's largest lean (`ATC_ANGLE_MAX`): 3° for each m/s of cruise; if absent 30, so 10 m/s at most."""
     climb_m_s: Speed = 2.5
@@ -297,7 +268,7 @@ class ArrivalKeys(Keys):
 
 def _plain_values(parameters: dict[str, Any]) -> dict[str, Any]:
     for key, value in parameters.items():
-        if not isinstance(value, int | float | str) or not (isinstance(value, str) or abs(value) <= _FAR):
+        if not isinstance(value, int | float | str) or not (isinstance(value, str) or abs(value) <= FAR_M):
             raise ValueError(f"{key[:80]} must be a plain number or word, given {shown(value)}")
     return parameters
 

@@ -13,6 +13,8 @@ from typing import Any
 import yaml
 
 from gcsplan.errors import InputError
+from gcsplan.mission_file.places import EXAMPLES
+from gcsplan.mission_file.yaml_slips import cure, missing_space
 
 MAX_BYTES = 5_000_000
 MAX_DEPTH = 40
@@ -61,10 +63,32 @@ def read_yaml(text: str, *, where: str) -> Any:
         if context and why.context_mark is not None and mark is not why.context_mark:
             context += f" (begun in line {why.context_mark.line + 1})"
         problem = " ".join(x for x in (context, why.problem) if x)
-        hint = "; indent with spaces, not tabs" if mark is not None and "\t" in _line(text, mark.line) else ""
+        begun = None if why.context_mark is None else why.context_mark.line
+        hint = "" if mark is None else cure(text, mark.line, begun)
         raise InputError(f"this is not YAML: {problem}{hint}", where=_place(where, mark)) from None
     except (yaml.YAMLError, UnicodeError) as why:
         raise InputError(f"this is not YAML: {str(why).splitlines()[0][:200]}", where=where) from None
+
+
+def line_of(text: str, path: str) -> int | None:
+    """The line, from 1, of ``vehicles[0].start`` in a document that `read_yaml` has read.
+
+    That of the nearest section around it if the key is not there; None if not even its first key is.
+    """
+    node = yaml.compose(text, Loader=_Loader)
+    line = None
+    for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
+        if isinstance(node, yaml.MappingNode) and key:
+            inner = next(((k, v) for k, v in node.value if isinstance(k, yaml.ScalarNode) and k.value == key), None)
+            if inner is None:
+                return line
+            line, node = inner[0].start_mark.line + 1, inner[1]
+        elif isinstance(node, yaml.SequenceNode) and index and int(index) < len(node.value):
+            node = node.value[int(index)]
+            line = node.start_mark.line + 1
+        else:
+            return line
+    return line
 
 
 def _measure(text: str, where: str) -> None:
@@ -118,8 +142,10 @@ def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
     for key_node, value_node in node.value:
         key = _scalar(key_node, where) if isinstance(key_node, yaml.ScalarNode) else None
         if not isinstance(key, str):
+            number = isinstance(key, int | float) and not isinstance(key, bool)
+            hint = f"; a place within braces has brackets: `[{EXAMPLES[0]}]`" if number else ""
             raise InputError(
-                f"a key must be a word, given {_shown(key_node)}", where=_place(where, key_node.start_mark)
+                f"a key must be a word, given {_shown(key_node)}{hint}", where=_place(where, key_node.start_mark)
             )
         if key == "<<" and key_node.tag == _PLAIN:
             for part in value_node.value if isinstance(value_node, yaml.SequenceNode) else [value_node]:
@@ -130,6 +156,9 @@ def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
             continue
         if key in found:
             raise InputError(f"the key `{key}` stands twice; keep one", where=_place(where, key_node.start_mark))
+        tight = missing_space(key) if value_node.tag == _PLAIN and not value_node.value else ""
+        if tight:  # `{sysid:1}` is a mapping with the key `sysid:1`
+            raise InputError(tight, where=_place(where, key_node.start_mark))
         found[key] = _value(value_node, where)
     return merged | found
 
@@ -163,11 +192,6 @@ def _require_tag(node: yaml.Node, kind: str, where: str) -> None:
 
 def _place(where: str, mark: Any) -> str:
     return where if mark is None else f"{where}: line {mark.line + 1}, column {mark.column + 1}"
-
-
-def _line(text: str, number: int) -> str:
-    lines = text.splitlines()
-    return lines[number] if number < len(lines) else ""
 
 
 def _shown(node: yaml.Node) -> str:

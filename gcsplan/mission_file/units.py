@@ -15,7 +15,8 @@ from functools import cache
 from typing import Any, NamedTuple, TypeGuard, get_args
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.schema import MOST_VOLTS, Keys, MissionKeys, shown
+from gcsplan.mission_file.keys import Keys
+from gcsplan.mission_file.schema import MOST_VOLTS, MissionKeys, shown
 from gcsplan.units import FOOT, KM_PER_HOUR, KNOT, MILLIAMPERE_HOUR, MINUTE, NAUTICAL_MILE, WATT_HOUR, Unit
 
 UNITS = {

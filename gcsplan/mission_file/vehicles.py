@@ -233,8 +233,7 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
             return
     wanted = [("takeoff_agl_m", keys.takeoff_agl_m), ("approach_agl_m", keys.approach_agl_m)]
     for i, point in enumerate(keys.via):
-        agl_m = (point[2] if len(point) > 2 else None) if isinstance(point, list) else point.agl_m
-        wanted.append((f"via[{i}]", agl_m))
+        wanted.append((f"via[{i}]", point.agl_m))
     for key, agl_m in wanted:
         if agl_m is None:
             continue

@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.schema import FrameKeys, LocalPoint, TerrainKeys, ZoneKeys
+from gcsplan.mission_file.places import Degrees
+from gcsplan.mission_file.point_keys import LocalPoint
+from gcsplan.mission_file.schema import FrameKeys, TerrainKeys, ZoneKeys
 from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, check_degrees, circle, polygon
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
@@ -56,17 +58,25 @@ class Place:
         return float(lat), float(lon)
 
 
-def make_place(point: list[float] | LocalPoint, where: str, problems: list[Problem], *, local: bool) -> Place | None:
+def make_place(
+    point: Degrees | LocalPoint, where: str, problems: list[Problem], notes: list[str], *, local: bool
+) -> Place | None:
     """A point of the file; None, and ``problems``, if it cannot be a place."""
     if isinstance(point, LocalPoint):
         if not local:
             problems.append(Problem(where, "local metres need `frame: {origin: [lat, lon], amsl_m: …}` in the mission"))
             return None
         return Place(where, None, (point.east_m, point.north_m), point.up_m, point.agl_m)
-    degrees = (point[0], point[1])
+    degrees = (point.lat_deg, point.lon_deg)
     if not check_degrees(degrees, where, problems):
         return None
-    return Place(where, degrees, agl_m=point[2] if len(point) > 2 else None)
+    notes += place_notes(point, where)
+    return Place(where, degrees, agl_m=point.agl_m)
+
+
+def place_notes(point: Degrees, where: str) -> list[str]:
+    """What a user has to know about how a place was read; ``where`` is its key behind the name of the file."""
+    return [f"{where.split(': ', 1)[-1]}: {point.note}"] if point.note else []
 
 
 def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
@@ -106,7 +116,7 @@ def make_frame(places: Sequence[Place], keys: FrameKeys | None, problems: list[P
     """The mission's plane; None, and ``problems``, if the points are too far apart for one plane."""
     try:
         if keys is not None:
-            frame = Frame(keys.origin[0], keys.origin[1], keys.amsl_m)
+            frame = Frame(keys.origin.lat_deg, keys.origin.lon_deg, keys.amsl_m)
         else:
             points = np.array([p.degrees for p in places if p.degrees is not None])
             frame = Frame(*centre_of(points[:, 0], points[:, 1]))
@@ -171,7 +181,7 @@ def make_zones(
     before = len(problems)
     points = [keys.center] if keys.center is not None else keys.polygon or []
     at = [f"{where}.center"] if keys.center is not None else [f"{where}.polygon[{i}]" for i in range(len(points))]
-    places = [make_place(p, a, problems, local=local) for p, a in zip(points, at, strict=True)]
+    places = [make_place(p, a, problems, notes, local=local) for p, a in zip(points, at, strict=True)]
     if len(problems) == before and len({isinstance(p, LocalPoint) for p in points}) > 1:
         problems.append(Problem(f"{where}.polygon", "give all corners in degrees, or all in local metres"))
     if keys.radius_m is None and keys.center is not None:

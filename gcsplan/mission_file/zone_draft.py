@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.errors import Problem
+from gcsplan.mission_file.places import range_fault
 from gcsplan.world.degree_shapes import (
     LARGEST_RADIUS_M,
     counter_clockwise,
@@ -143,18 +144,10 @@ def polygon(
 
 def check_degrees(point: tuple[float, float], where: str, problems: list[Problem]) -> bool:
     """Whether (latitude, longitude) can be a place; if not, a problem is added, with a guess at swapped numbers."""
-    lat, lon = point
-    if abs(lat) <= 90.0 and abs(lon) <= 180.0:
-        return True
-    if abs(lat) > 90.0 and abs(lon) <= 90.0 and abs(lat) <= 180.0:
-        problems.append(
-            Problem(where, f"latitude and longitude look swapped: {lat:g} is no latitude, wanted [lat, lon]")
-        )
-    elif abs(lat) > 90.0:
-        problems.append(Problem(where, f"latitude must be within ±90°, given {lat:g}"))
-    else:
-        problems.append(Problem(where, f"longitude must be within ±180°, given {lon:g}"))
-    return False
+    fault = range_fault(*point)
+    if fault:
+        problems.append(Problem(where, fault))
+    return not fault
 
 
 def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[ZoneDraft, Zone]], list[ZoneDraft]]:

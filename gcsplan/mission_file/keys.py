@@ -1,0 +1,24 @@
+"""The base of every section of a mission file, and the kinds of number that sections share."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+FAR_M = 1e6
+"""Largest number of metres that a key takes, so that slips are found."""
+
+Metres = Annotated[float, Field(ge=-FAR_M, le=FAR_M)]
+Length = Annotated[float, Field(ge=0.0, le=FAR_M)]
+
+
+class Keys(BaseModel):
+    """A section of the file. The string below a key is its description in the reference (docs/_build_reference.py)."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The keys that are in the file, with their values."""
+        return {k: getattr(self, k) for k in self.model_fields_set}

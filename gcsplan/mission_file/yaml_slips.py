@@ -1,0 +1,73 @@
+"""The cure for a slip of the pen in YAML: what the line looks like, and what it should be."""
+
+from __future__ import annotations
+
+import re
+
+MOST_SHOWN = 60
+"""Characters of a line that a cure repeats."""
+
+_TIGHT = re.compile(r"(\s*(?:-\s+)?)([A-Za-z_]\w*):(?![\s/])(.+)")
+_TIGHT_DASH = re.compile(r"(\s*)-([A-Za-z_]\w*:(?:\s.*)?)")
+_COLON_IN_VALUE = re.compile(r"\s*(?:-\s+)?([A-Za-z_]\w*):\s+([^\"'\[{|>#&*!].*:(?:\s.*)?)")
+_QUOTED = re.compile(r"""\s*(?:-\s+)?([A-Za-z_]\w*):\s+(["'])(.*)""")
+_RESERVED = re.compile(r"\s*(?:-\s+)?([A-Za-z_]\w*):\s+([@`%].*)")
+
+
+def cure(text: str, line: int, begun: int | None) -> str:
+    """``; line N: …`` for the line of a YAML error (from 0), or an empty text if its shape is not known.
+
+    ``begun`` is the line where the parser began what it could not finish: a value without a space after its colon is
+    noticed one line later only.
+    """
+    lines = text.splitlines()
+    before = next((k for k in range(min(line, len(lines)) - 1, -1, -1) if lines[k].strip()), None)
+    for number in dict.fromkeys(k for k in (line, begun, before) if k is not None):
+        if number < len(lines):
+            found = _of_line(lines[number], own=number == line)
+            if found:
+                return f"; line {number + 1}: {found}"
+    return ""
+
+
+def missing_space(text: str) -> str:
+    """The cure for text such as ``sysid:1`` where a key and its value are wanted, or an empty text."""
+    match = _TIGHT.fullmatch(text)
+    return f"a space is missing after the colon: `{match[2]}: {_short(match[3].strip())}`" if match else ""
+
+
+def _of_line(line: str, *, own: bool) -> str:
+    """What is wrong with a line; ``own`` if the parser stopped in it."""
+    if "\t" in line[: len(line) - len(line.lstrip())]:
+        return "indent with spaces, not tabs"
+    if "\u00a0" in line:
+        return "a no-break space is no space in YAML; type the space anew"
+    if own and (match := _COLON_IN_VALUE.fullmatch(line)):
+        return f"a colon within a text needs quotes: `{match[1]}: {_in_quotes(match[2])}`"
+    if own and (match := _QUOTED.fullmatch(line)) and (inner := _inner_quotes(match[2], match[3])):
+        return f"a text that has quotes in it is written without quotes around it: `{match[1]}: {_short(inner)}`"
+    if own and (match := _RESERVED.fullmatch(line)):
+        return f"a text that begins with {match[2][0]} needs quotes: `{match[1]}: {_in_quotes(match[2])}`"
+    if match := _TIGHT_DASH.fullmatch(line):
+        return f"a space is missing after the dash: `- {_short(match[2])}`"
+    return missing_space(line)
+
+
+def _inner_quotes(mark: str, rest: str) -> str:
+    """The text between the outer quotes, if the quote mark stands within it, too, and it may do without them."""
+    whole = rest.rstrip()
+    inner = whole[:-1] if whole.endswith(mark) else whole
+    plain = inner and inner[0] not in "\"'[]{}&*!|>%@`#-?:, " and ": " not in inner and " #" not in inner
+    return inner if mark in inner and plain and "\\" not in inner else ""
+
+
+def _in_quotes(text: str) -> str:
+    """A text in the quotes that it does not have itself."""
+    value = text.strip()
+    if '"' in value or "\\" in value:
+        return "'" + _short(value.replace("'", "''")) + "'"
+    return f'"{_short(value)}"'
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= MOST_SHOWN else text[:MOST_SHOWN] + "…"
