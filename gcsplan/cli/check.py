@@ -22,6 +22,7 @@ from gcsplan.errors import InputError, UsageError
 if TYPE_CHECKING:
     from gcsplan.app.checking import Batch, Checked, Returns
     from gcsplan.mission_file.from_options import WorldOptions
+    from gcsplan.mission_file.places import Degrees
     from gcsplan.units import Units
 
 Number = float | None
@@ -58,7 +59,10 @@ def check(
         str | None, typer.Option(metavar="NAME", help="arducopter, arduplane or px4, where the file does not say.")
     ] = None,
     home: Annotated[
-        str | None, typer.Option(metavar="LAT,LON", help="Where the vehicle arms, instead of the file's home.")
+        str | None,
+        typer.Option(
+            metavar="LAT,LON", help="Where the vehicle arms, instead of the file's home; or as text in UTM, MGRS, …"
+        ),
     ] = None,
     speed: Annotated[Number, typer.Option(metavar="M_S", help="Cruise speed, where the file sets none.")] = None,
     climb_rate: Annotated[Number, typer.Option(metavar="M_S", help="Fastest climb [default: 2.5]")] = None,
@@ -163,25 +167,25 @@ def _options(given: dict[str, object]) -> WorldOptions:
     if isinstance(speed := given.get("--speed"), float):
         vehicle["speed_m_s"] = [min(speed, 3.0), speed]
     zones, rtl = given.get("--zones"), given.get("--rtl-altitude")
+    home = _home(str(given["--home"])) if "--home" in given else None
     return WorldOptions(
         terrain=under("dem", "vertical_datum", "geoid_grid", "crs", "obstacle_height_m"),
         zones=tuple(str(z) for z in zones) if isinstance(zones, list) else (),
         limits={k: float(str(v)) for k, v in under(*limits).items()},
         vehicle=vehicle,
-        home=_place(str(given["--home"])) if "--home" in given else None,
+        home=None if home is None else (home.lat_deg, home.lon_deg),
         rtl_rel_home_m=rtl if isinstance(rtl, float) else None,
+        notes=() if home is None or not home.note else (f"--home: {home.note}",),
     )
 
 
-def _place(text: str) -> tuple[float, float]:
-    parts = text.replace(" ", "").split(",")
+def _home(text: str) -> Degrees:
+    from gcsplan.mission_file.places import read_place
+
     try:
-        lat, lon = (float(p) for p in parts)
-    except ValueError:
-        lat = lon = 999.0
-    if not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
-        raise UsageError(f"--home {text}: LAT,LON in degrees is wanted, for example 36.6,-84.38")
-    return lat, lon
+        return read_place(text)
+    except ValueError as why:
+        raise UsageError(f"--home {text[:100]}: LAT,LON in degrees is wanted, for example 36.6,-84.38: {why}") from None
 
 
 def _say_all(batch: Batch, units: Units) -> None:

@@ -19,8 +19,11 @@ UNNAMED = Path("mission.yaml")
 
 def read_content(
     source: str | os.PathLike[str] | Mapping[str, Any] | None, text: str | None
-) -> tuple[Path, str, dict[str, Any]]:
-    """The file, its name in messages, and the mapping of keys. Raises InputError, TypeError as `load_mission`."""
+) -> tuple[Path, str, dict[str, Any], str | None]:
+    """The file, its name in messages, the mapping of keys, and its text if it has one.
+
+    Raises InputError and TypeError as `load_mission`.
+    """
     if isinstance(source, str) and ("\n" in source or "\r" in source):
         if text is not None:
             raise TypeError("load_mission takes one text: the first argument is the file's path where text= is given")
@@ -31,7 +34,8 @@ def read_content(
         file, where, raw = UNNAMED, "mission", _Plain().of(source, "mission", 0)
     elif isinstance(source, str | os.PathLike):
         file, where = Path(source), str(source)
-        raw = read_yaml(_text(file, where) if text is None else text, where=where)
+        text = _text(file, where) if text is None else text
+        raw = read_yaml(text, where=where)
     elif source is None and text is not None:
         file, where, raw = UNNAMED, "mission", read_yaml(text, where="mission")
     else:
@@ -42,7 +46,7 @@ def read_content(
         tight = missing_space(raw) if isinstance(raw, str) else ""
         words = f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}"
         raise InputError(f"{words}; {tight}" if tight else words, where=where)
-    return file, where, raw
+    return file, where, raw, text
 
 
 def _text(file: Path, where: str) -> str:

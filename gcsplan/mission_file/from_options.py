@@ -45,7 +45,7 @@ OPTIONS = {
 class WorldOptions:
     """The values of the options, by the mission file's names. Paths are as written; None means not given.
 
-    ``home`` (latitude, longitude) is the home of every file.
+    ``home`` (latitude, longitude) is the home of every file, and ``notes`` say how options were read.
     """
 
     terrain: Mapping[str, object] = field(default_factory=dict)
@@ -55,6 +55,7 @@ class WorldOptions:
     home: tuple[float, float] | None = None
     rtl_rel_home_m: float | None = None
     terrain_error_m: float = TERRAIN_ERROR_M
+    notes: tuple[str, ...] = ()
 
 
 class OpenWorld:
@@ -63,7 +64,7 @@ class OpenWorld:
     def __init__(self, options: WorldOptions) -> None:
         problems: list[Problem] = []
         self.options = options
-        self.notes: list[str] = []
+        self.notes: list[str] = [*options.notes]
         self._drafts = _drafts(options.zones, problems, self.notes)
         self._terrain: Terrain | None = None
         keys = read_section(TerrainKeys, dict(options.terrain), "", problems)

@@ -40,6 +40,7 @@ from gcsplan.mission_file.schema import (
     nearest,
     shown,
 )  # fmt: skip
+from gcsplan.mission_file.strict_yaml import lines_of
 from gcsplan.mission_file.terminals import Terminals
 from gcsplan.mission_file.units import in_own_units
 from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle, within_lean
@@ -94,10 +95,10 @@ def load_mission(
         >>> [request.vehicle.name for request in mission.vehicles]
         ['uav1']
     """
-    file, where, raw = read_content(source, text)
+    file, where, raw, written = read_content(source, text)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         raise InputError(f"this gcsplan reads version 1, given {shown(raw['version'])}", where=f"{where}: version")
-    return _Reading(file, where, raw, planner_names, around).mission()
+    return _Reading(file, where, raw, written, planner_names, around).mission()
 
 
 class _Reading:
@@ -108,10 +109,11 @@ class _Reading:
         file: Path,
         where: str,
         raw: dict[str, Any],
+        text: str | None,
         planner_names: Collection[str] | None,
         around: Sequence[tuple[float, float]],
     ) -> None:
-        self.file, self.given, self.planner_names, self.around = file, raw, planner_names, around
+        self.file, self.given, self.text, self.planner_names, self.around = file, raw, text, planner_names, around
         self.where = f"{where}: "
         self.units = in_own_units(raw, self.where)
         self.raw = self.units.raw
@@ -162,7 +164,7 @@ class _Reading:
             site = Site(terrain, frame, box, placed, terminals, set(places), self.local)
             ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
-            raise InputError.of([self.units.as_written(p) for p in problems])
+            raise InputError.of(self._with_lines([self.units.as_written(p) for p in problems]))
         info = ground.surface.info
         notes = info.get("notes", ())
         self.notes += [str(n) for n in notes] if isinstance(notes, tuple) else []
@@ -177,7 +179,17 @@ class _Reading:
         return replace(source, wider=partial(site.wider, source), reaching=self._reaching)
 
     def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
-        return _Reading(self.file, self.where.removesuffix(": "), self.given, self.planner_names, places).mission()
+        where = self.where.removesuffix(": ")
+        return _Reading(self.file, where, self.given, self.text, self.planner_names, places).mission()
+
+    def _with_lines(self, problems: list[Problem]) -> list[Problem]:
+        """The problems with their lines, if the mission was a text; those of other files stay as they are."""
+        if self.text is None:
+            return problems
+        own = [p.where.removeprefix(self.where) if p.where.startswith(self.where) else "" for p in problems]
+        lines = lines_of(self.text, own)
+        return [p if n is None else Problem(p.where, f"{p.message} (line {n})")
+                for p, n in zip(problems, lines, strict=True)]  # fmt: skip
 
     # -- the plain keys ------------------------------------------------------------------------------------------
 

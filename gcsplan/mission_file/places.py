@@ -50,6 +50,7 @@ _ANGLE = re.compile(
     )?""",
     re.VERBOSE,
 )
+_FLOAT = re.compile(rf"[-+]?{_NUMBER}(?:E[-+]?\d{{1,3}})?")
 _BEFORE = re.compile(r"([NSEW])\s*([^NSEW]+?)\s*[,;/]?\s*([NSEW])\s*([^NSEW]+)")
 _AFTER = re.compile(r"([^NSEW]+?)\s*([NSEW])\s*[,;/]?\s*([^NSEW]+?)\s*([NSEW])")
 _ONE_BEFORE, _ONE_AFTER = re.compile(r"([NSEW])\s*([^NSEW]+)"), re.compile(r"([^NSEW]+?)\s*([NSEW])")
@@ -147,6 +148,9 @@ def _abbreviated(plain: str) -> str:
 
 def _read_degrees(plain: str) -> tuple[float, float]:
     """Latitude and longitude in degrees, not yet checked for their range."""
+    parts = plain.split(",")
+    if len(parts) == 2 and all(_FLOAT.fullmatch(part.strip()) for part in parts):  # also 1e-05, as programs print it
+        return float(parts[0]), float(parts[1])
     text = _abbreviated(plain)
     other = re.search(r"[^-+0-9NSEW°'\":.,;/ ]+", text)
     if other:

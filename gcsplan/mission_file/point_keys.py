@@ -86,7 +86,7 @@ class DegreePoint(Keys):
             return value
         own: dict[str, Any] = {}
         for key, one in value.items():
-            name: str = ALIASES.get(str(key), key)
+            name = ALIASES[key] if key in ALIASES else key  # noqa: SIM401 (mypy)
             if name in own:
                 raise ValueError(f"{name} stands twice, as {key} too; keep one")
             own[name] = one

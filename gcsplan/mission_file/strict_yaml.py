@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from typing import Any
 
 import yaml
@@ -70,12 +71,16 @@ def read_yaml(text: str, *, where: str) -> Any:
         raise InputError(f"this is not YAML: {str(why).splitlines()[0][:200]}", where=where) from None
 
 
-def line_of(text: str, path: str) -> int | None:
-    """The line, from 1, of ``vehicles[0].start`` in a document that `read_yaml` has read.
+def lines_of(text: str, paths: Iterable[str]) -> list[int | None]:
+    """The line, from 1, of each key such as ``vehicles[0].start`` in a document that `read_yaml` has read.
 
     That of the nearest section around it if the key is not there; None if not even its first key is.
     """
-    node = yaml.compose(text, Loader=_Loader)
+    root = yaml.compose(text, Loader=_Loader)
+    return [_line_of(root, path) for path in paths]
+
+
+def _line_of(node: yaml.Node | None, path: str) -> int | None:
     line = None
     for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
         if isinstance(node, yaml.MappingNode) and key:

@@ -55,9 +55,10 @@ def _of_line(line: str, *, own: bool) -> str:
 
 def _inner_quotes(mark: str, rest: str) -> str:
     """The text between the outer quotes, if the quote mark stands within it, too, and it may do without them."""
-    whole = rest.rstrip()
-    inner = whole[:-1] if whole.endswith(mark) else whole
-    plain = inner and inner[0] not in "\"'[]{}&*!|>%@`#-?:, " and ": " not in inner and " #" not in inner
+    inner, last = rest.rstrip()[:-1], rest.rstrip()[-1:]
+    plain = (
+        last == mark and inner and inner[0] not in "\"'[]{}&*!|>%@`#-?:, " and ": " not in inner and " #" not in inner
+    )
     return inner if mark in inner and plain and "\\" not in inner else ""
 
 
