@@ -173,6 +173,9 @@ def _read_degrees(plain: str) -> tuple[float, float]:
         angle, one, other_angle, two = after.groups()
     degrees = {letter: _angle(part, letter).deg for letter, part in ((one, angle), (two, other_angle))}
     lat, lon = (one, two) if one in LAT_LETTERS else (two, one)
+    for name, letter, most in (("latitude", lat, 90), ("longitude", lon, 180)):
+        if abs(degrees[letter]) > most:  # the letters say which is which, so nothing is swapped
+            raise grids.Refused(f"a {name} is at most {most}°, given {abs(degrees[letter]):.10g}° {letter}")
     return degrees[lat], degrees[lon]
 
 

@@ -115,9 +115,14 @@ def _form(value: Any) -> str:
         return "text"
     if not isinstance(value, dict):
         return "[lat, lon]"
-    if "at" in value:
-        return "{at, agl_m}"
     return "{lat, lon}" if any(key in value for key in (*ALIASES, *ALIASES.values())) else "{east_m, north_m}"
+
+
+def _via_form(value: Any) -> str:
+    if isinstance(value, dict) and "at" in value:
+        return "{at, agl_m}"
+    form = _form(value)
+    return "{lat, lon, agl_m}" if form == "{lat, lon}" else form
 
 
 def _all_text(values: list[Any]) -> bool:
@@ -151,12 +156,12 @@ else:
         Tag("text"),
     ]  # fmt: skip
     _Named = Annotated[DegreePoint, AfterValidator(_of_keys), Tag("{lat, lon}")]
-    _ViaNamed = Annotated[ViaDegreePoint, AfterValidator(_of_keys), Tag("{lat, lon}")]
+    _ViaNamed = Annotated[ViaDegreePoint, AfterValidator(_of_keys), Tag("{lat, lon, agl_m}")]
     _At = Annotated[TextPoint, AfterValidator(_of_keys), Tag("{at, agl_m}")]
     LatLon = Annotated[_List | _Text | _Named, Discriminator(_form)]
     # The first section of a union tells the other units of its keys, so LocalPoint with its heights is the first.
     Point = Annotated[_List | _Text | _Local | _Named, Discriminator(_form)]
-    ViaPoint = Annotated[_ListAgl | _Text | _Local | _ViaNamed | _At, Discriminator(_form)]
+    ViaPoint = Annotated[_ListAgl | _Text | _Local | _ViaNamed | _At, Discriminator(_via_form)]
 POINT_FORMS: dict[str, type[Keys]] = {
     "{east_m, north_m}": LocalPoint, "{lat, lon}": DegreePoint, "{lat, lon, agl_m}": ViaDegreePoint,
     "{at, agl_m}": TextPoint,
