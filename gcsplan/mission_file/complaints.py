@@ -99,7 +99,9 @@ def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
             least, most = context.get("min_length"), context.get("max_length")
             bound = f"at least {least}" if least is not None else f"at most {most}"
             given = context.get("actual_length", given)
-            return Problem(path, f"must have {bound} values{_form_of(loc)}, given {given}")
+            whole = _form_of(loc) and given == 4 and all(type(v) is int for v in error["input"])
+            hint = f"; decimals begin with a point: [{EXAMPLES[0]}]" if whole else ""
+            return Problem(path, f"must have {bound} values{_form_of(loc)}, given {given}{hint}")
         case "list_type" if _form_of(loc):
             words = f"must be [lat, lon], {{lat, lon}}, or text such as {EXAMPLES[0]}"
             return Problem(path, f"{words}, or {{east_m, north_m}} in a mission with a frame, given {given}")

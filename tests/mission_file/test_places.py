@@ -14,8 +14,10 @@ import yaml
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from gcsplan.cli.check import _options
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file import schema
+from gcsplan.mission_file.from_options import OpenWorld
 from gcsplan.mission_file.load import load_mission
 from gcsplan.mission_file.places import EXAMPLES, MAX_CHARS, read_place
 from gcsplan.mission_file.request import MissionFile
@@ -327,6 +329,7 @@ def test_a_coarse_square_and_a_hemisphere_are_told() -> None:
     [
         ({"start": "147.2, 36.6"}, "start", "read as degrees: latitude and longitude look swapped"),
         ({"start": 47.4}, "start", "must be [lat, lon], {lat, lon}, or text such as 47.39708, 8.34403"),
+        ({"start": [47, 39708, 8, 34403]}, "start", "decimals begin with a point"),
         ({"start": [170629, 30038]}, "start", "degrees with colons need quotes"),
         ({"start": {"lat": 47.4}}, "start.lon", "is missing"),
         ({"start": {"lat": 47.4, "latitude": 47.4, "lon": 8.3}}, "start", "lat stands twice"),
@@ -388,3 +391,23 @@ def test_the_json_schema_takes_every_form() -> None:
     assert forms[1]["examples"] == list(EXAMPLES)
     assert {"lat", "latitude", "lon", "longitude", "lng"} <= told["$defs"]["DegreePoint"]["properties"].keys()
     assert [form["type"] for form in told["properties"]["speed_m_s"]["oneOf"]] == ["number", "array"]
+
+
+def test_a_vehicle_without_a_space_after_its_colon_is_told() -> None:
+    whole = mission() | {"vehicles": ["name:uav1"]}
+    (found,) = problems(whole)
+    assert found.where == "mission: vehicles[0]"
+    assert "a space is missing after the colon: `name: uav1`" in found.message
+    assert "`version: 1`" in problems("version:1\n")[0].message
+
+
+def test_the_home_of_check_is_a_place_in_any_form() -> None:
+    plain = _options({"--home": "36.6,-84.38"})
+    assert plain.home == (36.6, -84.38)
+    assert plain.notes == ()
+    assert _options({"--home": "36.6 N, 84.38 W"}) == plain
+    coarse = _options({"--home": "32TMT 7312 4932", "--dem": "sample:jacksboro", "--min-agl": 60})
+    assert apart_m(coarse.home, GRID) < 10.0
+    assert any(note.startswith("--home: ") and "square of 10 m" in note for note in OpenWorld(coarse).notes)
+    with pytest.raises(InputError, match=r"--home 136.6, 84.38: .*look swapped"):
+        _options({"--home": "136.6, 84.38"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 import yaml
@@ -11,7 +12,8 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file import strict_yaml
-from gcsplan.mission_file.strict_yaml import read_yaml
+from gcsplan.mission_file.strict_yaml import lines_of, read_yaml
+from gcsplan.mission_file.yaml_slips import cure
 from tests.support.effort import draws
 
 
@@ -91,3 +93,51 @@ def test_any_text_is_read_or_refused(text: str) -> None:
     except InputError:
         return
     assert value is None or isinstance(value, dict | list | str | int | float)
+
+
+SLIPS = [
+    ("a: 1\nname: uav: north\n", "line 2: a colon within a text needs quotes", 'a: 1\nname: "uav: north"\n'),
+    ("- name: a, b: c\n", "line 1: a colon within", '- name: "a, b: c"\n'),
+    ("version:1\nname: x\n", "line 1: a space is missing after the colon", "version: 1\nname: x\n"),
+    ("v:\n  - name: a\n    sysid:1\n    b: 2\n", "line 3: a space is missing after the colon",
+     "v:\n  - name: a\n    sysid: 1\n    b: 2\n"),
+    ("a: 1\nlink:udp\n", "line 2: a space is missing after the colon", "a: 1\nlink: udp\n"),
+    ("v: {name:uav1, sysid: 1}\n", "a space is missing after the colon", "v: {name: uav1, sysid: 1}\n"),
+    ("v:\n  -name: a\n    sysid: 1\n", "line 2: a space is missing after the dash", "v:\n  - name: a\n    sysid: 1\n"),
+    ("v:\n\ta: 1\n", "line 2: indent with spaces, not tabs", None),
+    ("v:\n  a: 1\n\tb: 2\n", "line 3: indent with spaces, not tabs", None),
+    ("a:\u00a01\nb: 2\n", "line 1: a no-break space", None),
+    ("v: {center: 47.39708, 8.34403, radius_m: 4}\n", "a place within braces has brackets", None),
+    ("at: \"47°23'49.5\"N 8°20'38.5\"E\"\n", "written without quotes", "at: 47°23'49.5\"N 8°20'38.5\"E\n"),
+    ("name: 'it's here'\n", "written without quotes", "name: it's here\n"),
+    ("name: @home\n", "begins with @ needs quotes", 'name: "@home"\n'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "words", "cured"), SLIPS)
+def test_a_slip_of_the_pen_is_told_with_its_cure(text: str, words: str, cured: str | None) -> None:
+    said = refusal(text)
+    assert words in said
+    if cured is not None:
+        (shown,) = re.findall(r"`(.+)`", said)
+        assert shown in cured
+        read_yaml(cured, where="m.yaml")
+
+
+@pytest.mark.parametrize("text", ['a: "x" y\n', "a: [1, 2\nb: 3\n", "a: 1\n b: 2\n", 'a: "b\nc: 1\n'])
+def test_no_cure_is_guessed(text: str) -> None:
+    assert "`" not in refusal(text)
+
+
+@settings(max_examples=draws(300))
+@given(
+    st.text(st.sampled_from("ab:{}[],&*|>'\"#%@`-?\n\t 1.\u00a0°"), max_size=60), st.integers(0, 9), st.integers(0, 9)
+)
+def test_a_cure_is_one_line_for_any_text(text: str, line: int, begun: int) -> None:
+    assert "\n" not in cure(text, line, begun)
+
+
+def test_a_key_has_the_line_that_it_stands_in() -> None:
+    text = "a: 1\n# words\nb:\n  - c: {d: 2}\n    e: x\n  - f\n"
+    paths = ["a", "b", "b[0]", "b[0].c", "b[0].c.d", "b[0].e", "b[1]", "b[0].missing", "b[7]", "z", "", "a.b"]
+    assert lines_of(text, paths) == [1, 3, 4, 4, 4, 5, 6, 4, 3, None, None, 1]
