@@ -76,7 +76,8 @@ def test_units_and_defaults_are_those_of_the_code(made: ModuleType) -> None:
     assert by_key["`sysid`"] == ["whole number, 1 to 255", "**wanted**"]
     assert by_key["`leg_jerk_m_s3`"][0].startswith("m/s³")
     assert by_key["`via`"][0] == (
-        "list of [lat, lon] or [lat, lon, agl_m] or text or {east_m, north_m} or {lat, lon, agl_m} or {at, agl_m}"
+        "list of [lat, lon] or [lat, lon, agl_m] or text or [text, text] or {east_m, north_m} or {lat, lon, agl_m} "
+        "or {at, agl_m}"
     )
 
 

@@ -66,6 +66,14 @@ def _named_places(schema: dict[str, Any]) -> None:
     ]
 
 
+_ONE_OR_TWO_TEXTS = WithJsonSchema(
+    {
+        "anyOf": [
+            {"type": "string", "maxLength": MAX_CHARS, "examples": list(EXAMPLES)},
+            {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2},
+        ]
+    }
+)
 _NUMBER_OR_TEXT = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})
 
 
@@ -151,10 +159,7 @@ else:
     _Local = Annotated[LocalPoint, Tag("{east_m, north_m}")]
     _List = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_of_list), Tag("[lat, lon]")]
     _ListAgl = Annotated[list[float], Field(min_length=2, max_length=3), AfterValidator(_of_list), Tag("[lat, lon]")]
-    _Text = Annotated[
-        str, Field(max_length=MAX_CHARS, examples=list(EXAMPLES)), BeforeValidator(_joined), AfterValidator(read_place),
-        Tag("text"),
-    ]  # fmt: skip
+    _Text = Annotated[str, BeforeValidator(_joined), AfterValidator(read_place), _ONE_OR_TWO_TEXTS, Tag("text")]
     _Named = Annotated[DegreePoint, AfterValidator(_of_keys), Tag("{lat, lon}")]
     _ViaNamed = Annotated[ViaDegreePoint, AfterValidator(_of_keys), Tag("{lat, lon, agl_m}")]
     _At = Annotated[TextPoint, AfterValidator(_of_keys), Tag("{at, agl_m}")]

@@ -386,9 +386,9 @@ def test_the_json_schema_takes_every_form() -> None:
     told = schema.VehicleKeys.model_json_schema()
     forms = told["properties"]["start"]["oneOf"]
     assert [form.get("type", form.get("$ref")) for form in forms] == [
-        "array", "string", "#/$defs/LocalPoint", "#/$defs/DegreePoint"
+        "array", None, "#/$defs/LocalPoint", "#/$defs/DegreePoint"
     ]  # fmt: skip
-    assert forms[1]["examples"] == list(EXAMPLES)
+    assert forms[1]["anyOf"][0]["examples"] == list(EXAMPLES)
     assert {"lat", "latitude", "lon", "longitude", "lng"} <= told["$defs"]["DegreePoint"]["properties"].keys()
     assert [form["type"] for form in told["properties"]["speed_m_s"]["oneOf"]] == ["number", "array"]
 
@@ -411,3 +411,17 @@ def test_the_home_of_check_is_a_place_in_any_form() -> None:
     assert any(note.startswith("--home: ") and "square of 10 m" in note for note in OpenWorld(coarse).notes)
     with pytest.raises(InputError, match=r"--home 136.6, 84.38: .*look swapped"):
         _options({"--home": "136.6, 84.38"})
+
+
+def test_the_examples_of_the_reference_are_read() -> None:
+    """Each form in the table of docs/reference/mission-file.md, near the same place."""
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "mission-file.md").read_text(encoding="utf-8")
+    rows = [
+        line for line in page.split("## Places")[1].split("## Other units")[0].splitlines() if line.startswith("| ")
+    ]
+    examples = [example for row in rows[2:] for example in re.findall(r"`([^`]+)`", row)]
+    examples = [example for example in examples if re.search(r"\d", example)]
+    assert len(examples) >= 14
+    for example in examples:
+        at = load(mission(start=yaml.safe_load(example) if example[0] in "[{" else example)).vehicles[0].start_deg
+        assert apart_m(at, (47.39708, 8.34403)) < 25_000.0
