@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
+from functools import cache
 from typing import Annotated, NoReturn
 
 import typer
@@ -50,6 +52,12 @@ def root(
         raise typer.Exit
 
 
+@cache
+def _commands() -> Callable[..., object]:
+    """The commands with their options, made once: the app itself would make them again for every call."""
+    return typer.main.get_command(app)
+
+
 def main() -> NoReturn:
     """Run a command and exit with its code; an error prints one message without traceback (``--debug`` shows it)."""
     debug = "--debug" in sys.argv
@@ -60,7 +68,7 @@ def main() -> NoReturn:
     try:
         end_in_good_order()
         # With standalone_mode=False click returns the code of typer.Exit instead of exiting.
-        code = app(args=arguments, prog_name="gcsplan", standalone_mode=False)
+        code = _commands()(args=arguments, prog_name="gcsplan", standalone_mode=False)
         if code == Interrupted.exit_code:  # typer's code for Ctrl-C
             raise KeyboardInterrupt
         put("")

@@ -161,10 +161,10 @@ def _map(ax: Axes, page: Page, extent: tuple[float, float, float, float]) -> Non
     west, south, east, north = extent
     columns = PIXELS
     lines = max(2, round(PIXELS * (north - south) / (east - west)))
-    e, n = np.meshgrid(np.linspace(west, east, columns), np.linspace(north, south, lines))
-    ground = page.world.airspace.surface.ground_at(e, n)
+    e, n = np.linspace(west, east, columns), np.linspace(north, south, lines)
+    ground = page.world.airspace.surface.ground_at(e, n[:, None])
     low, high = (float(np.nanmin(ground)), float(np.nanmax(ground))) if not np.isnan(ground).all() else (0.0, 0.0)
-    picture = shaded(ground, e[0], n[:, 0], low, high)
+    picture = shaded(ground, e, n, low, high)
     ax.imshow(np.rint(picture).astype(np.uint8), extent=(west, east, south, north))
     tints = LinearSegmentedColormap.from_list("ground", [(at, (r / 255, g / 255, b / 255)) for at, (r, g, b) in TINTS])
     heights = ScalarMappable(Normalize(low, max(high, low + 1.0)), tints)

@@ -120,7 +120,7 @@ class Relief:
 def relief_of(world: World, extent: Extent, unit: Unit = METRE) -> Relief:
     """Sample, shade and contour the ground under ``extent``; contours are at round numbers of ``unit``."""
     east, north = extent.grid()
-    ground = world.airspace.surface.ground_at(*np.meshgrid(east, north))
+    ground = world.airspace.surface.ground_at(east, north[:, None])
     known = ~np.isnan(ground)
     low, high = (float(ground[known].min()), float(ground[known].max())) if known.any() else (math.nan, math.nan)
     coarse = slice(None, None, CONTOUR_EVERY)

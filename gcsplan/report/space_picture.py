@@ -31,17 +31,15 @@ def draw(title: str, world: World, tracks: Sequence[tuple[str, str, Line]]) -> F
     longer = max(extent.width_m, extent.height_m)
     east = np.linspace(extent.west_m, extent.east_m, max(2, round(NODES * extent.width_m / longer)))
     north = np.linspace(extent.north_m, extent.south_m, max(2, round(NODES * extent.height_m / longer)))
-    e, n = np.meshgrid(east, north)
-    ground = world.airspace.surface.ground_at(e, n)
+    ground = world.airspace.surface.ground_at(east, north[:, None])
     figure = Figure(figsize=(11, 6.5), layout="constrained")
     FigureCanvasAgg(figure)
     ax = figure.add_subplot(projection="3d", computed_zorder=False)
     assert isinstance(ax, Axes3D)
     colours = shaded(ground, east, north, relief.low_m, relief.high_m)[:-1, :-1] / 255.0
     km = 1000.0
-    ax.plot_surface(
-        e / km, n / km, ground, facecolors=colours, rstride=1, cstride=1, shade=False, lw=0, antialiased=False, zorder=1
-    )
+    look = {"facecolors": colours, "shade": False, "lw": 0, "antialiased": False, "zorder": 1}
+    ax.plot_surface(*np.meshgrid(east / km, north / km), ground, rstride=1, cstride=1, **look)
     top = max([relief.high_m, *(float(line.amsl_m.max()) for line in lines)])
     for mesh in zone_meshes(world.airspace.zones, world.airspace.surface, relief, lines):
         at = np.array(mesh["at"]).reshape(-1, 3)

@@ -36,7 +36,7 @@ def canopy_on(ground: Window, canopy: Window, *, unknown_m: float = np.nan) -> F
         j, i = np.arange(first, first + n), np.arange(fine_cols)
         corner_col = (np.arange(fine_cols + 1) / parts) - 0.5
         corner_row = (np.arange(first, first + n + 1) / parts) - 0.5
-        at = to_ground(*np.meshgrid(corner_col, corner_row))
+        at = to_ground(corner_col, corner_row[:, None])
         _raise_cells(cells, at, heights[np.ix_(j // parts, i // parts)])
     _outside(cells, ground, canopy, unknown_m)
     nodes = np.zeros((rows, cols))
@@ -68,7 +68,7 @@ def _outside(cells: Floats, ground: Window, canopy: Window, unknown_m: float) ->
     step = max(1, _CHUNK_CELLS // cols)
     for first in range(0, rows - 1, step):
         n = min(step, rows - 1 - first)
-        at = to_canopy(*np.meshgrid(np.arange(cols, dtype=float), np.arange(first, first + n + 1, dtype=float)))
+        at = to_canopy(np.arange(cols), np.arange(first, first + n + 1)[:, None])
         limit = np.asarray(canopy.heights_m.shape[::-1]) - 0.5
         inside = np.asarray(((at >= -0.5) & (at <= limit)).all(axis=-1))
         whole = inside[:-1, :-1] & inside[:-1, 1:] & inside[1:, :-1] & inside[1:, 1:]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.polynomial.polynomial import polyvander2d
 from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Floats
@@ -14,6 +15,7 @@ Sides = tuple[bool, bool, bool, bool]
 NO_SIDES: Sides = (False, False, False, False)
 DEGREE = 6
 TERMS = tuple((i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i))
+_IN_U, _IN_V = np.array(TERMS).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +42,8 @@ class GridMap:
         t = np.cos(np.pi * (np.arange(17) + 0.5) / 17)
         e, n = (a.ravel() for a in np.meshgrid(centre[0] + scale_m * t, centre[1] + scale_m * t))
         col, row = exact(e, n)
-        basis = _basis((e - centre[0]) / scale_m, (n - centre[1]) / scale_m)
+        square = polyvander2d((e - centre[0]) / scale_m, (n - centre[1]) / scale_m, (DEGREE, DEGREE))
+        basis = square.reshape(len(e), DEGREE + 1, DEGREE + 1)[:, _IN_U, _IN_V]
         coefficients, *_ = np.linalg.lstsq(basis, np.stack([col, row], axis=-1), rcond=None)
         fitted = cls(np.ascontiguousarray(coefficients), centre, scale_m, 0.0)
         # Bound the residual on a lattice that shares no point with the fit's nodes, and double it.
@@ -60,11 +63,25 @@ class GridMap:
         return cls(coefficients, (west_m, north_m), 1.0, 0.0)
 
     def __call__(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
-        """(..., 2) col, row of points in the plane; not finite for points that are infinitely far away."""
+        """(..., 2) col, row of points in the plane; not finite for points that are infinitely far away.
+
+        The shapes are broadcast: the points of a lattice cost least as a row of eastings and a column of northings.
+        """
         u = (np.asarray(east_m, float) - self.centre[0]) / self.scale_m
         v = (np.asarray(north_m, float) - self.centre[1]) / self.scale_m
+        v = v.reshape((1,) * (u.ndim - v.ndim) + v.shape)  # of_u has axes before those of v
+        square = np.zeros((DEGREE + 1, 2, DEGREE + 1))
+        square[_IN_U, :, _IN_V] = self.coefficients
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(_basis(u, v) @ self.coefficients)
+            powers = np.ones((DEGREE + 1, v.size))
+            for power in range(DEGREE):
+                np.multiply(powers[power], v.ravel(), out=powers[power + 1])
+            # The coefficient of each power of u at each v.
+            of_u = (square.reshape(-1, DEGREE + 1) @ powers).reshape(DEGREE + 1, 2, *v.shape)
+            value = of_u[DEGREE]
+            for power in reversed(range(DEGREE)):
+                value = value * u + of_u[power]
+        return np.stack([value[0], value[1]], axis=-1)
 
     def jacobian(self, east_m: float, north_m: float) -> Floats:
         """(2, 2) d(col, row) / d(east_m, north_m) at a point."""
@@ -88,17 +105,6 @@ class GridMap:
             if not np.abs(off).max(initial=0.0) > 1e-9:  # a nanometre
                 break
         return np.asarray(plane)
-
-
-def _basis(u: Floats, v: Floats) -> Floats:
-    pu, pv = [np.ones_like(u)], [np.ones_like(v)]
-    for _ in range(DEGREE):
-        pu.append(pu[-1] * u)
-        pv.append(pv[-1] * v)
-    terms = np.empty((*np.broadcast_shapes(np.shape(u), np.shape(v)), len(TERMS)))
-    for k, (i, j) in enumerate(TERMS):
-        np.multiply(pu[i], pv[j], out=terms[..., k])
-    return terms
 
 
 @dataclass(frozen=True, eq=False)

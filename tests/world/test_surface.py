@@ -184,6 +184,16 @@ def test_shapes_of_the_answers_are_those_of_the_points() -> None:
     assert surface.top_at([], []).shape == (0,)
 
 
+def test_a_lattice_is_a_row_of_eastings_and_a_column_of_northings() -> None:
+    frame = Frame(47.0, 11.0)
+    grid = GridMap.fit(Exact(frame, 4326, 1 / 1200), (-5000.0, -5000.0, 5000.0, 5000.0))
+    east, north = np.linspace(-4000.0, 4000.0, 7), np.linspace(-3000.0, 3000.0, 5)
+    whole = grid(*np.meshgrid(east, north))
+    assert grid(east, north[:, None]).shape == whole.shape
+    assert grid(east, north[:, None]) == pytest.approx(whole, abs=1e-9)
+    assert grid(east, north[0]) == pytest.approx(whole[0], abs=1e-9)
+
+
 def test_what_is_no_surface_is_refused_and_what_is_one_cannot_be_changed() -> None:
     good = np.zeros((3, 3))
     for bad in (np.zeros((1, 3)), np.zeros((3, 1)), np.zeros(9)):
