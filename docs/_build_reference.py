@@ -295,19 +295,24 @@ def messages() -> tuple[Message, ...]:
         seen: set[ast.AST] = set()
         for scope in scopes:
             nodes = list(ast.walk(scope))
+            calls = [node for node in nodes if isinstance(node, ast.Call) and node not in seen]
+            seen.update(calls)
+            calls = [node for node in calls if _called(node) in _RAISED]
+            if not calls:
+                continue
             named = {ast.unparse(node.targets[0]): node.value for node in nodes if isinstance(node, ast.Assign)}
-            for node in nodes:
-                if not isinstance(node, ast.Call) or node in seen:
-                    continue
-                seen.add(node)
-                raised = ast.unparse(node.func).split(".")[-1]
-                if raised not in _RAISED:
-                    continue
+            for node in calls:
+                raised = _called(node)
                 given = node.args[1:2] if raised == "Problem" else node.args[:1]
                 text = _text(given[0], named) if given else ""
                 if len(re.sub(r"‹.*?›|\W", "", text)) > 3:
                     found.append(Message(module, raised, text, node))
     return tuple(found)
+
+
+def _called(node: ast.Call) -> str:
+    """The last word of what is called: ``InputError`` in ``errors.InputError(…)``."""
+    return getattr(node.func, "attr", getattr(node.func, "id", ""))
 
 
 def _text(node: ast.expr, named: Mapping[str, ast.expr], depth: int = 0) -> str:

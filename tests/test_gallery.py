@@ -14,7 +14,7 @@ from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.mavlink.mission.compare import compare, faults
 from tests.support.paths import MISSIONS
 
-SLOW = {"fleet-100", "fleet-4", "jacksboro-high"}
+SLOW = {"fleet-100", "fleet-4", "jacksboro-high", "jacksboro-wing"}
 
 
 @pytest.mark.parametrize(

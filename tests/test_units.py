@@ -184,6 +184,7 @@ def test_the_chart_of_separations_names_the_exact_least_distance(units: Units) -
     assert re.findall(r'class="mark tight".*?<b>([^<]*)</b>', chart) == [exact]
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("units", [IMPERIAL, AVIATION], ids=["imperial", "aviation"])
 def test_every_number_of_the_report_is_the_same_in_every_system(units: Units) -> None:
     done, homes = planned()
@@ -309,6 +310,7 @@ def checked(out: str) -> tuple[list[str], list[tuple[float, float]]]:
     return lines, found
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("units", [IMPERIAL, AVIATION], ids=["imperial", "aviation"])
 @pytest.mark.parametrize("mission", ["m.yaml", "higher.yaml"], ids=["kept", "broken"])
 def test_check_says_the_same_in_every_system(run: Any, units: Units, mission: str) -> None:

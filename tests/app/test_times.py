@@ -40,6 +40,7 @@ def parts(done: Plan) -> list[tuple[VehiclePlan, Slot, TimedPath]]:
     return [(v, done.fleet.slot(v.name), done.fleet.motion(v.name)) for v in done.vehicles]
 
 
+@pytest.mark.first_quick
 @cases
 def test_the_sum_of_the_legs_is_the_arrival_and_the_motions(case: str) -> None:
     _, done = planned(case)

@@ -48,6 +48,8 @@ from tests.support.effort import draws
 from tests.support.paths import MISSIONS
 from tests.support.worlds import vehicle, world
 
+pytestmark = pytest.mark.xdist_group("wings")  # one process plans the missions, not three
+
 HOME_DEG, GROUND_M, RADIUS_M, SPEED_M_S = (36.6, -84.3), 300.0, 100.0, 20.0
 FLAT = world(GROUND_M)
 

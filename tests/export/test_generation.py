@@ -159,6 +159,7 @@ def heed_signals() -> None:
         signal.signal(number, signal.SIG_DFL)
 
 
+@pytest.mark.first_quick
 @posix
 @pytest.mark.parametrize(("number", "code"), [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", 130)])
 def test_a_signal_ends_a_command_with_a_message_and_its_code(tmp_path: Path, number: str, code: int) -> None:
@@ -400,6 +401,7 @@ for action in (
 """
 
 
+@pytest.mark.first_quick
 @as_root
 @pytest.mark.parametrize("mode", [0o755, 0o700, 0o1777])
 @pytest.mark.parametrize("state", ["whole", "caught", "half"])

@@ -86,6 +86,7 @@ def has_all(points: Floats, pinned: Bools, before: Floats, pinned_before: Bools)
     return np.array_equal(points[pinned], before[pinned_before])
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("objective", ["length", "energy"])
 @pytest.mark.parametrize("seed", range(6))
 def test_polished_paths_are_legal_no_dearer_and_keep_their_stops(seed: int, objective: Objective) -> None:

@@ -58,6 +58,7 @@ def test_every_scenario_has_its_file() -> None:
     assert {f.stem for f in FILES} == NAMES
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("name", "lengths"),
     [

@@ -49,6 +49,7 @@ CASES: dict[str, Problem] = {
 }
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("name", CASES)
 def test_the_gap_closes_in_tenths_of_a_second(name: str) -> None:
     found = plan(CASES[name])
