@@ -9,10 +9,10 @@ from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
 from gcsplan.app.wings import plan_wing
 from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.build.multirotor import acceptance_radius_m
 from gcsplan.mavlink.build.order import MARGINS, Margins, Order
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Progress
-from gcsplan.vehicle import Autopilot
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 
@@ -57,8 +57,7 @@ def plan_vehicle(
         failed = verdict
         if not any(f.seq > mission.first_seq for f in verdict.findings if f.kind != "battery"):
             break  # larger margins cannot cure a battery or a take-off column
-        all_along = source.altitude_frame == "terrain" or vehicle.autopilot is Autopilot.ARDUPLANE
-        margins = _larger(margins, verdict, all_along=all_along)
+        margins = _larger(margins, verdict, acceptance_radius_m(vehicle))
     assert failed is not None
     raise unsafe(failed, vehicle)
 
@@ -108,14 +107,14 @@ def widest(brief: Brief, plans: Sequence[VehiclePlan]) -> Brief:
     return max([brief, *(v.brief for v in plans if v.brief is not None)], key=lambda b: b.source.level)
 
 
-def _larger(margins: Margins, verdict: Verdict, *, all_along: bool) -> Margins:
-    """Margins for the next attempt.
+def _larger(margins: Margins, verdict: Verdict, corner_m: float) -> Margins:
+    """Margins for the next attempt: three times as large, and the altitude's by at least what was lacking.
 
-    ``all_along``: the shortage occurs on many legs, not at one hilltop. That is so for terrain-frame legs over sloping
-    ground, and for ArduPlane, which makes changes of height below GLIDE_SLOPE_MIN at once.
+    ``corner_m``: metres before a way point at which the vehicle may turn. It cuts the corner by less, up and down, too.
+    So less is lacking above a zone, of which a finding tells only how far inside it is.
     """
     heights = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
-    low_m = max((f.by for f in verdict.findings if f.kind in heights), default=0.0) if all_along else 0.0
-    return Margins(
-        3.0 * margins.altitude_m + 1.05 * low_m, 3.0 * margins.track_m, 3.0 * margins.bow_m, 3.0 * margins.slope
-    )
+    lacking = [f.by for f in verdict.findings if f.kind in heights]
+    lacking += [min(f.by, corner_m) for f in verdict.findings if f.kind == "zone"]
+    more_m = max(2.0 * margins.altitude_m, 1.05 * max(lacking, default=0.0))
+    return Margins(margins.altitude_m + more_m, 3.0 * margins.track_m, 3.0 * margins.bow_m, 3.0 * margins.slope)

@@ -49,6 +49,36 @@ def test_the_example_of_the_contract_plans_as_printed() -> None:
     assert summary["fleet"]["closest"]["vehicles"] == ["uav1", "uav2"]
 
 
+OVER_A_ZONE: dict[str, Any] = {
+    "version": 1, "name": "over", "frame": {"origin": [36.6, -84.3], "amsl_m": 0}, "terrain": {"flat_m": 0},
+    "no_fly": [{"name": "Z", "center": [36.6, -84.29], "radius_m": 150, "ceiling_amsl_m": 80}],
+    "vehicles": [
+        {"name": "a", "sysid": 1, "start": [36.6, -84.3], "goal": [36.6, -84.28], "speed_m_s": [3, 10],
+         "climb_m_s": 2.5, "descent_m_s": 1.5, "accel_m_s2": 1.5, "corner_accel_m_s2": 2.5, "leg_jerk_m_s3": 1.0},
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("autopilot", ["arducopter", "px4", "arduplane"])
+@pytest.mark.parametrize("track_error_m", [0, 3])
+def test_corners_are_cut_above_what_the_path_passes_over_though_no_error_is_allowed(
+    autopilot: str, track_error_m: float
+) -> None:
+    errors = {"track_error_m": track_error_m, "altitude_error_m": 0, "horizontal_clearance_m": 0}
+    craft = OVER_A_ZONE["vehicles"][0] | {"autopilot": autopilot}
+    asked = OVER_A_ZONE | {"limits": {"min_agl_m": 40, "max_climb_deg": 30} | errors, "vehicles": [craft]}
+    (v,) = plan(load_mission(DATA / "over.yaml", text=yaml.safe_dump(asked))).vehicles
+    assert v.verdict.safe is True
+    assert 80.0 < v.solution.path.points[:, 2].max() < 84.0  # over it, and no higher than cut corners need
+    assert v.gap_percent is not None
+    assert v.gap_percent < 0.5
+
+
+def test_corners_are_cut_above_hills_though_no_error_is_allowed() -> None:
+    (v,) = planned(limits={"track_error_m": 0, "altitude_error_m": 0}).vehicles
+    assert v.verdict.safe is True
+
+
 @pytest.mark.parametrize("autopilot", list(Autopilot))
 def test_every_autopilot_gets_a_safe_mission_whose_files_read_back_the_same(autopilot: Autopilot) -> None:
     done = planned({"autopilot": str(autopilot)})

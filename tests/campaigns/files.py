@@ -28,8 +28,6 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import typer
-
 from gcsplan.cli import main as cli
 from tests.campaigns.disk import workshop
 from tests.campaigns.hostile import KINDS, write_clean
@@ -91,7 +89,6 @@ def work(seed: int) -> None:
     os.dup2(said.fileno(), 1)
     os.dup2(said.fileno(), 2)  # libraries write there without Python
     write_clean()
-    cli.app = typer.main.get_command(cli.app)  # type: ignore[assignment]  # made once: making it takes longer than a check
     while True:
         print(json.dumps(["begins", seed]), file=say, flush=True)
         kind, code, found = attack(seed)
