@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
 from gcsplan.app.wings import plan_wing
-from gcsplan.check.verdict import Verdict
+from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.multirotor import acceptance_radius_m
-from gcsplan.mavlink.build.order import MARGINS, Margins, Order
+from gcsplan.mavlink.build.order import MARGINS, Order
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Progress
 from gcsplan.world.limits import Limits
@@ -44,8 +45,15 @@ def plan_vehicle(
         return plan_wing(brief, request, limited, world, merged, progress)
     margins, failed = MARGINS, None
     for _ in range(ATTEMPTS):
-        problem, notes = make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, merged)
-        solution = run_planner(brief.run, problem, vehicle, world)
+        try:
+            problem, notes = make_problem(
+                source, limited, world, brief.objective, brief.seed, margins, progress, merged
+            )
+            solution = run_planner(brief.run, problem, vehicle, world)
+        except NoMission:
+            if failed is None:
+                raise
+            break  # there is no path with margins this large: report what the last mission broke
         over = looked_over(brief, solution)
         for spaced in (True, False):  # first without way points nearer than the acceptance radii, where that is legal
             order = Order(request.end, source.altitude_frame, spaced=spaced)
@@ -55,9 +63,10 @@ def plan_vehicle(
                     request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order, over
                 )
         failed = verdict
-        if not any(f.seq > mission.first_seq for f in verdict.findings if f.kind != "battery"):
-            break  # larger margins cannot cure a battery or a take-off column
-        margins = _larger(margins, verdict, acceptance_radius_m(vehicle))
+        findings = on_path(mission, verdict)
+        if not findings:
+            break  # larger margins cannot cure a battery, a take-off column or a return
+        margins = larger(margins, findings, acceptance_radius_m(vehicle))
     assert failed is not None
     raise unsafe(failed, vehicle)
 
@@ -105,16 +114,3 @@ def rebuilt(
 def widest(brief: Brief, plans: Sequence[VehiclePlan]) -> Brief:
     """The brief with the most terrain, of ``brief`` and those that the vehicles were planned under."""
     return max([brief, *(v.brief for v in plans if v.brief is not None)], key=lambda b: b.source.level)
-
-
-def _larger(margins: Margins, verdict: Verdict, corner_m: float) -> Margins:
-    """Margins for the next attempt: three times as large, and the altitude's by at least what was lacking.
-
-    ``corner_m``: metres before a way point at which the vehicle may turn. It cuts the corner by less, up and down, too.
-    So less is lacking above a zone, of which a finding tells only how far inside it is.
-    """
-    heights = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
-    lacking = [f.by for f in verdict.findings if f.kind in heights]
-    lacking += [min(f.by, corner_m) for f in verdict.findings if f.kind == "zone"]
-    more_m = max(2.0 * margins.altitude_m, 1.05 * max(lacking, default=0.0))
-    return Margins(margins.altitude_m + more_m, 3.0 * margins.track_m, 3.0 * margins.bow_m, 3.0 * margins.slope)

@@ -14,6 +14,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import build_mission, corner_m
 from gcsplan.mavlink.build.order import LONGEST_LEG_M, MARGINS, Margins, Order
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
@@ -95,6 +96,13 @@ def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
     words = "\n".join(f"  {f.message}" for f in verdict.findings[:8])
     if all(f.kind == "battery" for f in verdict.findings):
         return NoMission(f"{vehicle.name}: {verdict.findings[0].message}", reason="battery")
+    items, first = verdict.mission.items, verdict.mission.first_seq
+    returns = {i + first for i, item in enumerate(items) if item.command == cmd.RTL}
+    if any(f.seq in returns for f in verdict.findings):
+        words += (
+            "\n  an rtl leads straight home at the return altitude: end: land and end: loiter end the mission at the "
+            "goal, and rtl_rel_home_m is the altitude"
+        )
     return NoMission(
         f"{vehicle.name}: a path was found, but the mission as {vehicle.autopilot} flies it breaks limits:\n{words}",
         reason="infeasible",

@@ -15,17 +15,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
 from gcsplan.app.wing_ends import FlightEnd, circle_m, goals, starts
 from gcsplan.arrays import Floats
 from gcsplan.check.arcs import UNFITTING
 from gcsplan.check.circles import circle_growth
-from gcsplan.check.verdict import Verdict
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
-from gcsplan.mavlink.build.order import MARGINS, Margins, Order, Wing
-from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.build.order import MARGINS, Order, Wing
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.world.path import Path
@@ -78,9 +77,10 @@ def plan_wing(
         if not plan.verdict.findings:
             return replace(plan, notes=(*notes, *plan.notes))
         failed = plan
-        if not _mendable(plan):
-            break
-        margins = _larger(margins, plan.verdict)
+        findings = on_path(plan.mission, plan.verdict)
+        if not findings:
+            break  # larger margins cannot cure a battery or the ends
+        margins = larger(margins, findings)
     assert failed is not None
     raise unsafe(failed.verdict, vehicle)
 
@@ -115,27 +115,6 @@ def _pairs(problem: Problem, limited: VehicleRequest, sharp: Floats) -> Iterator
     for start in starts(problem, limited, sharp):
         for goal in goals(problem, limited, sharp):
             yield start, goal
-
-
-def _mendable(plan: VehiclePlan) -> bool:
-    """Whether larger margins may help; they do not where only the ends or the battery break a limit."""
-    items, first = plan.mission.items, plan.mission.first_seq
-    mended = {i + first for i, item in enumerate(items) if item.command in (cmd.WAYPOINT, cmd.LOITER_UNLIM)}
-    return any(f.seq in mended for f in plan.verdict.findings if f.kind != "battery")
-
-
-def _larger(margins: Margins, verdict: Verdict) -> Margins:
-    """Margins for the next attempt, by the shortages of the last one: heights and distances are treated separately."""
-    heights = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
-    low_m = max((f.by for f in verdict.findings if f.kind in heights), default=0.0)
-    near_m = max((f.by for f in verdict.findings if f.kind == "zone"), default=0.0)
-    steep = max((f.by / f.limit for f in verdict.findings if f.kind in ("climb", "descent")), default=0.0)
-    return Margins(
-        margins.altitude_m + 0.02 + 1.05 * low_m,
-        margins.track_m + 0.03 + 1.05 * near_m,
-        3.0 * margins.bow_m,
-        margins.slope + (0.001 + 1.5 * steep if steep else 0.0),
-    )
 
 
 def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
