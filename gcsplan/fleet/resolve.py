@@ -178,8 +178,10 @@ def _refuse_goals(plan: Schedule, crews: Sequence[Crew], rules: Rules, hold: Hol
 
 def _other_cure(plan: Schedule, ends: Set[str]) -> str:
     if plan.mode == "together":
-        return ", or let them arrive in sequence"
-    return ", or let the first fly on (end: rtl)" if ends == {"loiter"} else ", or say when a pad is cleared"
+        return ", or let them arrive in sequence (arrival: {mode: sequence})"
+    if ends == {"loiter"}:
+        return ", or let the first fly on (end: rtl)"
+    return ", or say how long a landed vehicle stands on its pad (arrival: {pad_clear_s: …})"
 
 
 def _asked(rules: Rules) -> str:
