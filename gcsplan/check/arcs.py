@@ -5,7 +5,8 @@ What is assumed of ArduPlane (commands_logic.cpp, `verify_nav_wp`; AP_L1_Control
 - A way point counts as reached at its own acceptance radius (param2), else at `turn_distance`: the smaller of
   WP_RADIUS and the L1 distance, times turn/90°. There the turn begins, on an arc of ``turn_radius_m``.
 - If that is not the tangent length of the corner, the arc moves along the leg before it by the difference, and the leg
-  after it moves to the side by the difference times the turn's sine: both legs are widened by that.
+  after it moves to the side by the difference times the turn's sine: both legs are widened by that, the leg after it
+  until the aircraft is back on it (`SETTLES_S`).
 - The aircraft leaves the arc in calm air too (`tracking`): the excess over ``track_error_m`` widens both legs as well.
 - Altitude changes evenly along what is flown, from the middle of one arc to the middle of the next. ArduPlane instead
   computes it along the straight line between way points, and aims at the altitude of the way point once a turn begins:
@@ -53,8 +54,9 @@ ABOUT = math.radians(170.0)
 MOST_BANK_DEG = 45.0
 """Default of ArduPlane's ROLL_LIMIT_DEG."""
 
-SETTLES_S = 15.0
-"""Seconds on a straight leg until the L1 controller is back on it (NAVL1_PERIOD 17, NAVL1_DAMPING 0.75)."""
+SETTLES_S, REMAINS = 15.0, 0.03
+"""An aircraft that is some metres off a straight leg is back on it, but for this part, after this many seconds
+(NAVL1_PERIOD 17) and as many metres as it was off: the L1 law simulated, with NAVL1_DAMPING from 0.6 to 1."""
 
 L1_PERIODS_S = (1.0, 60.0)
 """ArduPlane's range for NAVL1_PERIOD, s; it also bounds the simulation of a turn in `tracking`."""
@@ -209,9 +211,9 @@ class _Run:
             )
             # Left sharp, so that the rest can be judged.
             found[k], found[k + 1] = _Corner(off_m=a.off_m), _Corner(off_m=b.off_m)
-        settles_s = SETTLES_S * self.tuning.l1_slower
-        for k, s in enumerate(self.run[:-1]):  # on a leg too short to settle, the offset remains at the next turn
-            if self.long_m[k] - found[k].tangent - found[k + 1].tangent < settles_s * s.speed_m_s:
+        for k in range(len(self.run) - 1):  # on a leg too short to settle, the offset remains at the next turn
+            straight_m = self.long_m[k] - found[k].tangent - found[k + 1].tangent
+            if straight_m < self._settles_m(k, found[k].off_m):
                 found[k + 1] = replace(found[k + 1], off_m=found[k + 1].off_m + found[k].off_m)
         return found
 
@@ -233,10 +235,18 @@ class _Run:
         least, most = (self.tuning.plane_turns_m(s.speed_m_s, turn, growth) for growth in (1.0, thin))
         return least, most
 
-    def _widen_m(self, k: int) -> float:
-        """How much a leg is widened, m: for a late or early turn before it, and for a circle from which it starts."""
-        c = self.corners[k]
-        return c.off_m + (self.behind_m if k == 0 else 0.0)
+    def _widen_m(self, k: int, *, settled: bool = False) -> float:
+        """How much a leg is widened, m: until it has ``settled`` for a late or early turn before it, and for a circle
+        from which it starts."""
+        return self.corners[k].off_m * (REMAINS if settled else 1.0) + (self.behind_m if k == 0 else 0.0)
+
+    def _settled_m(self, k: int) -> float:
+        """After how many metres of its straight part the aircraft is back on leg ``k``; 0 if it never leaves it."""
+        off_m = self.corners[k].off_m
+        return self._settles_m(k, off_m) if off_m > 0.0 else 0.0
+
+    def _settles_m(self, k: int, off_m: float) -> float:
+        return SETTLES_S * self.tuning.l1_slower * self.run[k].speed_m_s + off_m
 
     def _track(self, k: int) -> list[tuple[Floats, float, float]]:
         """Leg ``k`` as flown: (east and north, metres flown, how far the piece up to there may lie elsewhere)."""
@@ -250,7 +260,10 @@ class _Run:
         off = a.off_m + sag
         track = [(p, self.half_m[k] * (n - i) / max(n, 1), off) for i, p in reversed(list(enumerate(behind)))]
         done = float(self.half_m[k]) + max(float(self.straight_m[k]), 0.0)
-        track.append((reaches, done, self._widen_m(k)))
+        settled_m = self._settled_m(k)
+        if settled_m < self.straight_m[k]:
+            track.append((leaves + settled_m * along, float(self.half_m[k]) + settled_m, self._widen_m(k)))
+        track.append((reaches, done, self._widen_m(k, settled=settled_m < self.straight_m[k])))
         ahead, sag = self._half_arc(reaches, heading, b.turn)
         n = len(ahead) - 1
         off = b.off_m + sag + (self.behind_m if k == 0 else 0.0)
@@ -346,9 +359,14 @@ class _Run:
                     )  # fmt: skip
         if self.straight_m[k] > SAME_M:
             along = np.array([math.cos(self.heading[k]), math.sin(self.heading[k])])
-            start = self._place(self.points[k, :2] + a.tangent * along, leaves)
-            end = self._place(self.points[k + 1, :2] - b.tangent * along, reaches)
-            yield replace(s, start=start, end=end, reach_m=s.reach_m + self._widen_m(k), hold_s=0.0)
+            settled_m = min(self._settled_m(k), float(self.straight_m[k]))
+            cuts = a.tangent + np.array([0.0, settled_m, float(self.straight_m[k])])
+            for i, (p, q) in enumerate(pairwise(cuts.tolist())):
+                if q - p > SAME_M:
+                    start, end = (self._place(self.points[k, :2] + m * along, z0 + slope * m) for m in (p, q))
+                    yield replace(
+                        s, start=start, end=end, reach_m=s.reach_m + self._widen_m(k, settled=i == 1), hold_s=0.0
+                    )
 
 
 def _chord(radius: float, heading: float, turn: float) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -20,13 +21,13 @@ from gcsplan.app.outputs import outputs_of
 from gcsplan.app.pipeline import plan
 from gcsplan.app.wing_ends import starts
 from gcsplan.arrays import Floats
-from gcsplan.check.arcs import SAG_M, bend
+from gcsplan.check.arcs import REMAINS, SAG_M, SETTLES_S, bend
 from gcsplan.check.climb_out import above_slant, flared, slant_shortage
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tracking import l1_off_m, tracking_m
-from gcsplan.check.tuning import Tuning
+from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.timing import Course
@@ -248,10 +249,36 @@ def test_a_zone_at_the_corner_is_passed_inside_and_one_inside_the_corner_is_hit(
 
 
 def test_a_turn_that_begins_early_or_late_widens_its_arc_and_the_leg_behind_it() -> None:
-    beside = (1500.0 - 30.0, 900.0)  # 30 m inside of the leg behind the corner
+    beside = (1500.0 - 30.0, 300.0)  # 30 m inside of the leg behind the corner
     assert judged_with_disc(*beside, 14.0).safe is True
     assert judged_with_disc(*beside, 14.0, [60.0, 1.0]).safe is False  # 40 m late
     assert judged_with_disc(*beside, 14.0, [140.0, 1.0]).safe is False  # 40 m early
+    later = (beside[0], 900.0)  # there it is back on the leg
+    assert judged_with_disc(*later, 13.0, [60.0, 1.0]).safe is True
+    assert judged_with_disc(*later, 15.0, [60.0, 1.0]).safe is False
+
+
+@pytest.mark.parametrize("off_m", [2.0, 10.0, 40.0, 100.0])
+@pytest.mark.parametrize("damping", [0.6, 0.75, 1.0])
+def test_an_aircraft_beside_its_leg_settles_as_soon_and_as_near_as_is_judged(off_m: float, damping: float) -> None:
+    for speed, period in ((12.0, 17.0), (20.0, 25.0), (30.0, 5.0)):
+        tuning = replace(DEFAULTS, l1_period_s=period, l1_damping=damping)
+        settled = SETTLES_S * tuning.l1_slower * speed + off_m
+        later = [abs(y) for x, y in back_on_a_leg(off_m, speed, period, damping) if x >= settled]
+        assert max(later) <= REMAINS * off_m
+
+
+def back_on_a_leg(off_m: float, speed: float, period: float, damping: float) -> list[tuple[float, float]]:
+    """Metres along a leg and beside it, ten times a second, from ``off_m`` beside it (AP_L1_Control.cpp)."""
+    x, y, heading, bank, seen = 0.0, off_m, 0.0, 0.0, []
+    for _ in range(700):
+        to_leg = math.asin(min(max(-y / (damping * period * speed / math.pi), -math.sqrt(0.5)), math.sqrt(0.5)))
+        push = 4.0 * math.pi * damping * speed / period * math.sin(to_leg - heading)
+        bank += (min(max(math.atan(push / 9.80665), -math.pi / 4), math.pi / 4) - bank) * 0.1 / 0.5
+        heading += 9.80665 * math.tan(bank) / speed * 0.1
+        x, y = x + 0.1 * speed * math.cos(heading), y + 0.1 * speed * math.sin(heading)
+        seen.append((x, y))
+    return seen
 
 
 def test_without_an_acceptance_radius_the_default_is_taken_and_said() -> None:
@@ -669,6 +696,14 @@ def test_a_landing_glides_from_the_approach_and_a_wanted_heading_is_kept(landing
     assert 4.0 < -legs[-1].climb_deg <= 8.0
     out = landing.world.frame.to_plane(*legs[0].end[:2]) - landing.world.frame.to_plane(*legs[0].start[:2])
     assert math.degrees(math.atan2(out[0], out[1])) == pytest.approx(60.0, abs=0.1)
+
+
+@pytest.mark.slow
+def test_the_example_can_land_where_the_ground_beside_the_pad_is_higher() -> None:
+    text = (MISSIONS / "jacksboro-wing.yaml").read_text().replace("way_home: required", "way_home: reported")
+    (v,) = plan(load_mission(MISSIONS / "m.yaml", text=re.sub(r"\bend: \w+", "end: land", text))).vehicles
+    assert v.verdict.safe is True
+    assert v.mission.items[-1].command == cmd.LAND
 
 
 def test_it_flies_at_one_speed_from_the_ground_to_the_goal_and_arrives_flying(landing: Plan) -> None:
