@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,9 @@ FEW_CELLS, CELLS_IN_BYTE = 5_000_000, 100
 
 ALIGNED_CELLS = 1e-3
 """Tiles whose nodes are off a common grid by more than this part of a cell are refused."""
+
+WIDEST_COLUMNS = 10
+"""Columns of tiles may differ by a ratio of numbers up to this."""
 
 _SPARE_CELLS = 3
 
@@ -59,15 +63,24 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """A tile with its first node in the common grid."""
+    """A tile with its first node in the common grid; each of its columns is ``step`` common ones wide."""
 
     raster: Raster
     col: int
     row: int
+    step: int = 1
+
+    @property
+    def cols(self) -> int:
+        """Columns of the common grid from its first node to its last."""
+        return (self.raster.cols - 1) * self.step + 1
 
     def overlap(self, col: int, row: int, cols: int, rows: int) -> tuple[int, int, int, int] | None:
-        """Column, row, columns, rows shared with a window of the common grid; None if they do not overlap."""
-        c0, c1 = max(col, self.col), min(col + cols, self.col + self.raster.cols)
+        """Column, row, columns, rows shared with a window of the common grid; None if they do not overlap.
+
+        A tile with wider columns is taken one of them farther to each side: nodes between two of them need both.
+        """
+        c0, c1 = max(col - self.step + 1, self.col), min(col + cols + self.step - 1, self.col + self.cols)
         r0, r1 = max(row, self.row), min(row + rows, self.row + self.raster.rows)
         return (c0, r0, c1 - c0, r1 - r0) if c0 < c1 and r0 < r1 else None
 
@@ -88,7 +101,11 @@ class _Layout:
 
 
 class Mosaic:
-    """Tiles with one coordinate system, one resolution and one grid. Raises InputError if they differ."""
+    """Tiles with one coordinate system and one grid. Raises InputError if they differ.
+
+    Columns of tiles may differ in width by a simple ratio, as published models widen them towards the poles: then the
+    common grid is the finest that holds the nodes of all, and nodes between two of a tile are linear between them.
+    """
 
     def __init__(self, rasters: Sequence[Raster], *, where: str) -> None:
         self.rasters = tuple(rasters)
@@ -104,7 +121,8 @@ class Mosaic:
                     where=where,
                 )
             span = max(first.cols, first.rows, other.cols, other.rows)
-            if max(abs(other.dx / first.dx - 1.0), abs(other.dy / first.dy - 1.0)) * span > ALIGNED_CELLS:
+            off = abs(other.dx / first.dx / _ratio(other, first) - 1.0)
+            if max(off, abs(other.dy / first.dy - 1.0)) * span > ALIGNED_CELLS:
                 raise InputError(
                     f"the tiles must share one resolution: {first.name} has cells of {first.dx:g} × {first.dy:g}, "
                     f"{other.name} of {other.dx:g} × {other.dy:g}; bring them together with gdalwarp -tr",
@@ -127,7 +145,8 @@ class Mosaic:
         layout = self._layout(lon_deg)
         col, row = layout.grid_of(self._near(np.asarray(x), lon_deg), np.asarray(y))
         return any(
-            p.col - 0.5 <= col <= p.col + p.raster.cols - 0.5 and p.row - 0.5 <= row <= p.row + p.raster.rows - 0.5
+            p.col - 0.5 * p.step <= col <= p.col + p.cols - 1 + 0.5 * p.step
+            and p.row - 0.5 <= row <= p.row + p.raster.rows - 0.5
             for p in layout.tiles
         )
 
@@ -167,7 +186,7 @@ class Mosaic:
 
         wide = (box[0] - spare_m, box[1] - spare_m, box[2] + spare_m, box[3] + spare_m)
         col, row = exact(*_lattice(wide))
-        first_col, last_col = min(p.col for p in tiles), max(p.col + p.raster.cols for p in tiles)
+        first_col, last_col = min(p.col for p in tiles), max(p.col + p.cols for p in tiles)
         first_row, last_row = min(p.row for p in tiles), max(p.row + p.raster.rows for p in tiles)
         c0, c1 = max(math.floor(col.min()) - _SPARE_CELLS, first_col), math.ceil(col.max()) + _SPARE_CELLS + 1
         r0, r1 = max(math.floor(row.min()) - _SPARE_CELLS, first_row), math.ceil(row.max()) + _SPARE_CELLS + 1
@@ -223,7 +242,7 @@ class Mosaic:
         """West, south, east, north of all tiles in the plane, as far as the plane reaches; ``box`` is the mission's."""
         there, _ = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
         layout = self._layout(float(frame.to_degrees(0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))[1]))
-        cols = [c for p in layout.tiles for c in (p.col, p.col + p.raster.cols - 1)]
+        cols = [c for p in layout.tiles for c in (p.col, p.col + p.cols - 1)]
         rows = [r for p in layout.tiles for r in (p.row, p.row + p.raster.rows - 1)]
         x = layout.x0 + layout.dx * np.linspace(min(cols), max(cols), 33)
         y = layout.y0 - layout.dy * np.linspace(min(rows), max(rows), 33)
@@ -243,23 +262,26 @@ class Mosaic:
         first = self.rasters[0]
         x0 = first.west + 0.5 * first.dx + self._turn(first, lon_deg)
         y0 = first.north - 0.5 * first.dy
+        ratios = [_ratio(raster, first) for raster in self.rasters]
+        parts = math.lcm(*(ratio.denominator for ratio in ratios))
+        dx = first.dx / parts
         tiles = []
-        for raster in self.rasters:
+        for raster, ratio in zip(self.rasters, ratios, strict=True):
             nearest = self._turn(raster, lon_deg)
             # A tile wider than half the globe may meet the mission on both of its sides.
             wide = self.crs.geographic and raster.cols * raster.dx > 180.0
             for turn in (nearest, nearest - 360.0, nearest + 360.0) if wide else (nearest,):
-                col = (raster.west + 0.5 * raster.dx + turn - x0) / first.dx
+                col = (raster.west + 0.5 * raster.dx + turn - x0) / dx
                 row = (y0 - (raster.north - 0.5 * raster.dy)) / first.dy
                 if max(abs(col - round(col)), abs(row - round(row))) <= ALIGNED_CELLS:
-                    tiles.append(_Placed(raster, round(col), round(row)))
+                    tiles.append(_Placed(raster, round(col), round(row), round(ratio * parts)))
                 elif turn == nearest:
                     raise InputError(
                         f"the tiles must lie on one grid: {raster.name} is off that of {first.name} by "
                         f"{col - round(col):.3f} columns and {row - round(row):.3f} rows; gdalwarp them together",
                         where=self.where,
                     )
-        return _Layout(x0, y0, first.dx, first.dy, tuple(tiles))
+        return _Layout(x0, y0, dx, first.dy, tuple(tiles))
 
 
 def _datum(raster: Raster) -> str:
@@ -285,25 +307,81 @@ def _union(a: Box, b: Box) -> Box:
     return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
 
 
+def _ratio(raster: Raster, first: Raster) -> Fraction:
+    """The width of a raster's columns in columns of the first one, as a ratio of small numbers; 1 if it is none."""
+    ratio = Fraction(raster.dx / first.dx).limit_denominator(WIDEST_COLUMNS)
+    return ratio if 0 < ratio <= WIDEST_COLUMNS else Fraction(1)
+
+
 def _read(
     parts: list[tuple[_Placed, tuple[int, int, int, int]]], c0: int, r0: int, cols: int, rows: int
 ) -> tuple[Floats, list[str]]:
     heights = np.full((rows, cols), np.nan)
-    differing, worst = 0, 0.0
+    differing = _Differing()
+    wide = [(tile, shared) for tile, shared in parts if tile.step > 1]
     for tile, (col, row, width, height) in parts:
-        for first, new in tile.raster.read(col - tile.col, row - tile.row, width, height):
-            top = row - r0 + first
-            into = heights[top : top + len(new), col - c0 : col - c0 + width]
-            off = np.abs(into - new)
-            both = off > 0.0
-            if both.any():
-                differing += int(np.count_nonzero(both))
-                worst = max(worst, float(off[both].max()))
-            np.fmax(into, new, out=into)
+        if tile.step == 1:
+            for first, new in tile.raster.read(col - tile.col, row - tile.row, width, height):
+                top = row - r0 + first
+                differing.put(heights[top : top + len(new), col - c0 : col - c0 + width], new)
+    # Tiles whose columns are the same nodes: between neighbours there is no gap.
+    for step, phase in sorted({(tile.step, tile.col % tile.step) for tile, _ in wide}):
+        some = [(tile, shared) for tile, shared in wide if (tile.step, tile.col % tile.step) == (step, phase)]
+        _put_wide(heights, some, c0, r0, phase, differing)
     notes = []
-    if differing:
-        notes.append(f"tiles differ where they overlap ({differing} nodes, {worst:g} m at most); the higher one counts")
+    if differing.nodes:
+        notes.append(
+            f"tiles differ where they overlap ({differing.nodes} nodes, {differing.worst_m:g} m at most); the higher "
+            "one counts"
+        )
     unknown = int(np.count_nonzero(np.isnan(heights)))
     if unknown:
         notes.append(f"{unknown} of {heights.size} DEM nodes around the mission are unknown (void or no tile)")
     return heights, notes
+
+
+@dataclass
+class _Differing:
+    """Puts heights into others and counts where both are known and differ."""
+
+    nodes: int = 0
+    worst_m: float = 0.0
+
+    def put(self, into: Floats, new: Floats) -> None:
+        """Keep the higher one of two known heights, or the known one."""
+        off = np.abs(into - new)
+        both = off > 0.0
+        if both.any():
+            self.nodes += int(np.count_nonzero(both))
+            self.worst_m = max(self.worst_m, float(off[both].max()))
+        np.fmax(into, new, out=into)
+
+
+def _put_wide(
+    heights: Floats,
+    parts: Sequence[tuple[_Placed, tuple[int, int, int, int]]],
+    c0: int,
+    r0: int,
+    phase: int,
+    differing: _Differing,
+) -> None:
+    """Put tiles whose columns are wider than the common ones into ``heights``, linear between their own nodes."""
+    cols = heights.shape[1]
+    step = parts[0][0].step
+    first, last = (c0 - phase) // step, -((phase - c0 - cols + 1) // step)  # own columns around the window
+    top, bottom = min(s[1] for _, s in parts) - r0, max(s[1] + s[3] for _, s in parts) - r0
+    own = np.full((bottom - top, last - first + 1), np.nan)
+    for tile, (col, row, width, height) in parts:
+        own_first = -((tile.col - col) // step)  # the tile's own first column in the window
+        count = (col + width - 1 - tile.col) // step - own_first + 1
+        at = (tile.col - phase) // step + own_first - first
+        if count < 1:
+            continue
+        for line, new in tile.raster.read(own_first, row - tile.row, count, height):
+            above = row - r0 - top + line
+            differing.put(own[above : above + len(new), at : at + count], new)
+    common = np.arange(c0, c0 + cols) - phase - first * step
+    k, part = common // step, (common % step) / step
+    on = part == 0.0  # a node of its own needs no neighbour
+    between = np.where(on, own[:, k], (1.0 - part) * own[:, k] + part * own[:, np.minimum(k + 1, last - first)])
+    differing.put(heights[top:bottom], between)

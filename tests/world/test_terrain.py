@@ -214,6 +214,42 @@ def test_a_gap_between_tiles_is_unknown(tmp_path: Path) -> None:
     assert any("unknown" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize(("upper", "lower"), [(0.003, 0.002), (0.002, 0.003), (0.005, 0.003), (0.004, 0.002)])
+def test_tiles_whose_columns_differ_by_a_simple_ratio_are_one_ground(
+    tmp_path: Path, upper: float, lower: float
+) -> None:
+    """As published models widen their columns towards the poles: each side is bilinear in its own grid."""
+    heights, files, first = {}, [], -84.596  # of the first nodes of all
+    for name, dx, north in (("upper", upper, 36.6), ("lower", lower, 36.5)):
+        heights[name] = hills(round(0.2 / dx), 50)
+        cols = heights[name].shape[1]
+        for part, columns in (("west", slice(0, cols // 2)), ("east", slice(cols // 2, cols))):
+            west = first + columns.start * dx - 0.5 * dx
+            transform = from_origin(west, north, dx, 0.002)
+            files.append(tif(tmp_path / f"{name}-{part}.tif", heights[name][:, columns], transform))
+    box = (-7000.0, -9000.0, 7000.0, 9000.0)
+    surface = load(files, box=box)
+    e, n = inside(box)
+    degrees = FRAME.to_degrees(e, n)
+    lat, lon = degrees[:, 0], degrees[:, 1]
+    ground = surface.ground_at(e, n)
+    for name, dx, north in (("upper", upper, 36.6), ("lower", lower, 36.5)):
+        row, col = (north - 0.001 - lat) / 0.002, (lon - first) / dx
+        within = (row > 0.0) & (row < 49.0)
+        assert within.sum() > 300
+        expected = by_hand(heights[name], col[within], row[within])
+        assert ground[within] == pytest.approx(expected, abs=0.02)
+    seam = ground[(lat < 36.501) & (lat > 36.499)]  # between the last row of one and the first of the other
+    assert len(seam) > 5
+    assert np.isfinite(seam).all()
+
+
+@pytest.mark.parametrize("dx", [0.002 * 1.37, 0.002 * 11, 0.002 / 12])
+def test_columns_of_no_simple_ratio_are_refused(tmp_path: Path, dx: float) -> None:
+    odd = tif(tmp_path / "b.tif", hills(100, 100), from_origin(-84.6, 36.6, dx, 0.002))
+    assert "one resolution" in str(refusal([degrees_tif(tmp_path / "a.tif"), odd]))
+
+
 def test_where_tiles_differ_the_higher_one_counts_and_is_told(tmp_path: Path) -> None:
     heights = hills(100, 100)
     raised = heights.copy()
