@@ -130,7 +130,14 @@ def _value(key: str, told: Mapping[str, Any], named: Mapping[str, Any]) -> str:
             unit, _, bounds = inner.partition(", ")
             return f"[{unit}, {unit}]" + (f", each {bounds}" if bounds else "")
         return f"list of {inner}" + ("s" if inner == "section" else "")
-    kind = {"number": "number", "integer": "whole number", "string": "text", "object": "mapping"}[told["type"]]
+    names = {
+        "number": "number",
+        "integer": "whole number",
+        "string": "text",
+        "object": "mapping",
+        "boolean": "`true`, `false`",
+    }
+    kind = names[told["type"]]
     unit = units.UNITS.get(units.unit_end(key), "")
     return ", ".join(word for word in (unit or kind, _bounds(told)) if word)
 

@@ -22,6 +22,7 @@ pytestmark = pytest.mark.xdist_group("house")  # one process reads the modules, 
 
 # The packages from the bottom up. Each may import what stands in its set, and itself; a module in none is a mistake.
 WORLD = {"arrays", "errors", "figures", "native", "units", "world"}
+TERRAIN = WORLD | {"dem"}
 VEHICLE = WORLD | {"vehicle"}
 MISSION = VEHICLE | {"mavlink.mission"}
 MAVLINK = {"mavlink.mission", "mavlink.build", "mavlink.files", "mavlink.protocol", "mavlink.link"}
@@ -36,6 +37,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "native": set(),
     "units": {"errors", "figures"},
     "world": {"arrays", "errors", "figures", "native", "units"},
+    "dem": WORLD,
     "vehicle": WORLD,
     "logs": {"arrays", "errors", "figures"},
     "optimisers": {"arrays", "errors"},
@@ -53,15 +55,15 @@ MAY_IMPORT: dict[str, set[str]] = {
     "export": ABOVE,
     "report": ABOVE | {"export"},
     "sim": VEHICLE | MAVLINK | {"check"},
-    "mission_file": OUTWARD,
+    "mission_file": OUTWARD | TERRAIN,
     "app": OUTWARD | {"mission_file"},
     "bench": APP,
-    "cli": APP | {"bench", "logs"},
+    "cli": APP | {"bench", "dem", "logs"},
     "__main__": {"cli"},
 }
 
 PROJECTION = {"world/frame.py", "world/datum.py", "world/grids.py", "world/terrain.py"}
-SOCKETS = {"mavlink/link/link.py", "mavlink/link/transport.py", "sim/server.py", "sim/sockets.py"}
+SOCKETS = {"dem/download.py", "mavlink/link/link.py", "mavlink/link/transport.py", "sim/server.py", "sim/sockets.py"}
 NETWORK = {"socket", "socketserver", "select", "selectors", "asyncio", "ssl", "http", "urllib", "serial"}
 DEGREES = ("lat_deg", "lon_deg", "lat_e7", "lon_e7")
 MOST_LINES = 400  # of a module
@@ -226,6 +228,18 @@ def test_optimisers_are_numpy_alone() -> None:
 def test_sockets_are_opened_by_the_link_and_the_simulated_vehicles_server_alone() -> None:
     users = {name_of(p) for p in MODULES if NETWORK & {m.split(".")[0] for m in imports_of(p)}}
     assert users <= SOCKETS
+
+
+def test_terrain_is_fetched_by_its_own_command_alone() -> None:
+    network = {"gcsplan.dem.download", "gcsplan.dem.fetch"}
+    users = {name_of(p) for p in MODULES if own_imports(p) & network}
+    assert users == {"dem/fetch.py", "cli/dem.py"}
+    outside = [
+        n
+        for n in ast.parse((ROOT / "cli/dem.py").read_text(encoding="utf-8")).body
+        if isinstance(n, ast.Import | ast.ImportFrom)
+    ]
+    assert not {own(name) for name in imported(outside, ("gcsplan", "cli"))} & network, "other commands import it too"
 
 
 def test_no_module_has_grown_into_two() -> None:

@@ -16,6 +16,7 @@ from gcsplan.check.verdict import by_item
 from gcsplan.cli.ending import put
 from gcsplan.figures import floored, steepened
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
+from gcsplan.world.model_words import what_is_not_in
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
@@ -128,8 +129,8 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     if plan.fleet is not None:
         notes = [(slot.name, note) for slot in plan.fleet.slots for note in slot.notes]
         say_notes_of([(name, note.removeprefix(f"{name} ")) for name, note in notes])
-    if plan.source.inputs.get("bare_dem"):
-        console.print("[yellow]bare DEM: trees, masts and wires are not in it[/]")
+    if words := what_is_not_in(plan.source.inputs):
+        console.print(words, style="yellow", markup=False)
 
 
 def _say_fleet(plan: Plan, units: Units) -> None:

@@ -12,6 +12,7 @@ import typer
 
 from gcsplan.cli import check, energy, fly, links, plan, rehearse
 from gcsplan.cli.bench import bench_app
+from gcsplan.cli.dem import dem_app
 from gcsplan.cli.ending import Interrupted, end_in_good_order, explained, fail, interrupted, put, speak_plainly
 from gcsplan.cli.memory import settle_memory
 from gcsplan.errors import GcsplanError, InputError
@@ -26,6 +27,7 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 2 bad input, 3 no mission, 4 violation, 5 refused, 6 unknown or dead link, "
     "7 read-back differs, 70 a bug of ours, 129, 130, 143 interrupted (SIGHUP, Ctrl-C, SIGTERM).",
 )
+app.add_typer(dem_app, name="dem")
 app.add_typer(bench_app, name="bench")
 app.command(short_help="Plan a mission file; upload and verify on request.")(plan.plan)
 app.command(short_help="Plan, fly it all in a simulator, judge.")(rehearse.rehearse)

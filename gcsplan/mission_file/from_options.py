@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
 from gcsplan.mission_file.complaints import read_section
@@ -23,7 +24,7 @@ from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
-from gcsplan.world.terrain import Terrain, open_terrain
+from gcsplan.world.terrain import OpenTerrain
 from gcsplan.world.world import World
 from gcsplan.world.zones import Zone
 
@@ -66,12 +67,12 @@ class OpenWorld:
         self.options = options
         self.notes: list[str] = [*options.notes]
         self._drafts = _drafts(options.zones, problems, self.notes)
-        self._terrain: Terrain | None = None
+        self._terrain: OpenTerrain | None = None
         keys = read_section(TerrainKeys, dict(options.terrain), "", problems)
         if keys is not None:
             self._obstacle_m = keys.obstacle_height_m
             try:
-                self._terrain = open_terrain(make_spec(keys, Path()), where="--dem")
+                self._terrain = open_dem(make_spec(keys, Path()), where="--dem")
             except InputError as why:
                 problems += why.problems
         self._limits = read_section(LimitKeys, dict(options.limits), "", problems) or LimitKeys()
@@ -125,7 +126,7 @@ class OpenWorld:
         ]
         box = self._box(in_plane, reach_m)
         scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
-        surface = self._terrain.load(frame, box)
+        surface = self._terrain.around(frame, box).load(frame, box)
         zones: list[Zone] = []
         for draft, zone in placed:
             own: list[Problem] = []

@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
+from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
 from gcsplan.mission_file.complaints import read_section, unknown_keys
@@ -55,7 +56,7 @@ from gcsplan.mission_file.world import (
 )  # fmt: skip
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
 from gcsplan.world.frame import FARTHEST_M, Frame
-from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
+from gcsplan.world.terrain import OpenTerrain, Terrain, TerrainSpec
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
 
@@ -161,8 +162,10 @@ class _Reading:
             others = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in self.around if terrain.covers(*p))]
             others = [p for p in others if math.hypot(*p) <= FARTHEST_M]
             box = make_box([*(p.in_plane(frame) for p in places), *others], [z for _, z in placed], local=self.local)
-            site = Site(terrain, frame, box, placed, terminals, set(places), self.local)
-            ground = site.load(problems)
+            here = self._around(terrain, frame, box)
+            if here is not None:
+                site = Site(here, frame, box, placed, terminals, set(places), self.local)
+                ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
             raise InputError.of(self._with_lines([self.units.as_written(p) for p in problems]))
         info = ground.surface.info
@@ -188,7 +191,7 @@ class _Reading:
             return problems
         own = [p.where.removeprefix(self.where) if p.where.startswith(self.where) else "" for p in problems]
         lines = lines_of(self.text, own)
-        return [p if n is None else Problem(p.where, f"{p.message} (line {n})")
+        return [p if n is None else replace(p, message=f"{p.message} (line {n})")
                 for p, n in zip(problems, lines, strict=True)]  # fmt: skip
 
     # -- the plain keys ------------------------------------------------------------------------------------------
@@ -333,7 +336,7 @@ class _Reading:
         if left_out:
             self.notes.append(f"left out: {counted(left_out, 'zone')} of files, too far away to matter")
 
-    def _open(self, spec: TerrainSpec) -> Terrain | None:
+    def _open(self, spec: TerrainSpec) -> OpenTerrain | None:
         where = f"{self.where}terrain"
         if spec.peaks and not self.local:
             self.problems.append(
@@ -341,7 +344,14 @@ class _Reading:
             )
             return None
         try:
-            return open_terrain(spec, where=where)
+            return open_dem(spec, where=where)
+        except InputError as why:
+            self.problems += why.problems
+            return None
+
+    def _around(self, terrain: OpenTerrain, frame: Frame, box: tuple[float, float, float, float]) -> Terrain | None:
+        try:
+            return terrain.around(frame, box)
         except InputError as why:
             self.problems += why.problems
             return None

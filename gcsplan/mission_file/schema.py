@@ -99,7 +99,7 @@ class TerrainKeys(Keys):
         ]
         | None
     ) = None
-    """A raster (.tif, .hgt, .asc), relative to this file, a list of tiles, or `sample:jacksboro`."""
+    """A raster (.tif, .hgt, .asc) or a list of tiles, `sample:jacksboro`, or a source: `copernicus-glo30`, `srtm`."""
     vertical_datum: Text | None = None
     """The zero of heights: `EGM96`, `NAVD88`, `WGS84` (ellipsoidal), …; required if the raster does not state it."""
     geoid_grid: Text | None = None
@@ -118,6 +118,8 @@ class TerrainKeys(Keys):
     """A raster of heights above ground; together with `obstacle_height_m` the higher one counts."""
     canopy_nodata_m: Annotated[float, Field(ge=0.0, le=250.0)] | None = None
     """Height of canopy cells without data; if absent, the ground there is unknown."""
+    sea: bool = False
+    """With a source of `dem fetch`: tiles that it does not publish are sea at 0 m, even if GLO-90 shows land there."""
 
 
 class LimitKeys(Keys):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, NamedTuple, TypeGuard, get_args
 
@@ -73,7 +73,7 @@ class Converted:
         for place, (written, words) in self.given.items():
             rest = problem.where.removeprefix(place)
             if rest != problem.where and rest[:1] in ("", "[", "."):
-                return Problem(written + rest, f"{problem.message} ({words})")
+                return replace(problem, where=written + rest, message=f"{problem.message} ({words})")
         return problem
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gcsplan.dem.terrain import source_or_path
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.places import Degrees
 from gcsplan.mission_file.point_keys import LocalPoint
@@ -18,7 +19,7 @@ from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.peaks import Peak
 from gcsplan.world.surface import Surface
-from gcsplan.world.terrain import Terrain, TerrainSpec
+from gcsplan.world.terrain import OpenTerrain, TerrainSpec
 from gcsplan.world.zones import Circle, Level, Zone
 
 Box = tuple[float, float, float, float]
@@ -83,7 +84,7 @@ def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
     """The terrain in the form of `gcsplan.world.terrain`; paths are relative to the mission file's folder."""
     dem = () if keys.dem is None else (keys.dem,) if isinstance(keys.dem, str) else tuple(keys.dem)
     return TerrainSpec(
-        dem=tuple(d if d.startswith("sample:") else str(folder / d) for d in dem),
+        dem=tuple(d if d.startswith("sample:") else source_or_path(d, folder) for d in dem),
         vertical_datum=keys.vertical_datum,
         geoid_grid=None if keys.geoid_grid is None else str(folder / keys.geoid_grid),
         crs=keys.crs,
@@ -93,10 +94,11 @@ def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
         obstacle_height_m=keys.obstacle_height_m,
         canopy=None if keys.canopy is None else str(folder / keys.canopy),
         canopy_nodata_m=keys.canopy_nodata_m,
+        sea=keys.sea,
     )
 
 
-def covered(places: Sequence[Place], terrain: Terrain, problems: list[Problem]) -> list[Place]:
+def covered(places: Sequence[Place], terrain: OpenTerrain, problems: list[Problem]) -> list[Place]:
     """The places that the DEM covers; the others go to ``problems``, with a guess at swapped numbers."""
     good = []
     for place in places:

@@ -19,6 +19,7 @@ from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.relief import Relief
 from gcsplan.report.subject import Page, Subject
 from gcsplan.units import Units, duration, in_units
+from gcsplan.world.model_words import what_is_not_in
 
 MOST_VEHICLES = 4
 MOST_FINDINGS, MOST_RALLY, MOST_NOTES = 2, 4, 1
@@ -38,7 +39,8 @@ def briefing_html(page: Page, verdict: tuple[str, str, str, str], relief: Relief
     shown = _shown(page)
     rest = len(page.subjects) - len(shown)
     more = f"{rest} more vehicles are not on this page: see the tables that follow." if rest else ""
-    bare = "Bare DEM: trees, masts and wires are not in it. " if page.inputs.get("bare_dem", True) else ""
+    words = what_is_not_in(page.inputs)
+    bare = f"{esc(words[0].upper() + words[1:])}. " if words else ""
     apart = separation_words(page)
     problems = _problems(page)
     high_mm = SMALL_MAP_MM if problems else MAP_MM

@@ -32,11 +32,11 @@ from gcsplan.report.samples import MOST_SAMPLES, Line, Passage, line_of, passage
 from gcsplan.report.scene_data import exaggeration, zone_meshes
 from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check
 from gcsplan.units import KILOJOULE, METRIC, Unit, Units, duration, in_units
+from gcsplan.world.model_words import what_is_not_in
 from gcsplan.world.world import World
 
 __all__ = ["render_check", "render_page"]
 
-BARE_DEM = "bare DEM: trees, masts and wires are not in it"
 OPEN_VEHICLES = 3
 """Vehicles whose profiles are open at first; the others open on a tap, and on paper. So do a fleet's tables."""
 MOST_CARDS = 6
@@ -160,7 +160,8 @@ def _header(page: Page) -> str:
     wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
     several = len(page.subjects) > 1
     listed = "".join(f"<li>{f'<b>{esc(s.name)}</b>: ' if several else ''}{esc(text)}</li>" for s, text in wrong)
-    bare = f'<p class="bare"><b>{BARE_DEM}</b></p>' if page.inputs.get("bare_dem", True) else ""
+    words = what_is_not_in(page.inputs)
+    bare = f'<p class="bare"><b>{esc(words)}</b></p>' if words else ""
     return (
         f'<header><p class="brand">gcsplan mission report</p><h1>{esc(page.title)}</h1>'
         f'<div class="verdict {kind}"><span class="sign" aria-hidden="true">{sign}</span>'

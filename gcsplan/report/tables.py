@@ -28,6 +28,7 @@ from gcsplan.report.profile_view import passed
 from gcsplan.report.samples import Line, Passage
 from gcsplan.report.subject import Page, Subject
 from gcsplan.units import KILOJOULE, Unit, Units, duration
+from gcsplan.world.model_words import what_is_not_in
 
 CLOSE = 0.02
 """Part of a limit's value: if less than this is left, the limit is called close."""
@@ -256,14 +257,15 @@ def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]],
     names = {
         "dem_sha256": "terrain model, SHA-256", "vertical_datum": "vertical datum", "resolution_m": "resolution",
         "bare_dem": "terrain model", "zones_sha256": "zones, SHA-256",
+        "dem_source": "terrain from", "dem_tiles": "tiles", "sea_tiles": "tiles taken as sea, 0 m",
     }  # fmt: skip
     rows = []
     for key, value in inputs.items():
-        if value is None:
+        if value is None or key == "dem_kind":  # which stands in the words of bare_dem
             continue
         words = esc(value)
         if key == "bare_dem":
-            words = "bare: trees, masts and wires are not in it" if value else "obstacle heights were given"
+            words = esc(what_is_not_in(inputs).replace(" DEM: ", ": ", 1) or "obstacle heights were given")
         elif key == "resolution_m" and isinstance(value, int | float):
             words = num(float(value), 0 if value >= 10 else 3, units.distance)
         elif key.endswith("sha256"):

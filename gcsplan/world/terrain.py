@@ -43,7 +43,8 @@ class TerrainSpec:
     Either ``dem`` (paths of tiles, or ``sample:jacksboro`` alone), or ``flat_m`` with ``peaks`` on it (metres of a
     local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` state what the rasters do not.
     ``obstacle_height_m`` stands everywhere; ``canopy`` is a raster of heights above ground, whose nodata cells are
-    unknown unless ``canopy_nodata_m`` sets their height; if both are set the higher one counts.
+    unknown unless ``canopy_nodata_m`` sets their height; if both are set the higher one counts. ``sea``: where a
+    published source has no tile there is sea.
     """
 
     dem: tuple[str, ...] = ()
@@ -56,13 +57,21 @@ class TerrainSpec:
     obstacle_height_m: float = 0.0
     canopy: str | None = None
     canopy_nodata_m: float | None = None
+    sea: bool = False
 
 
-class Terrain(Protocol):
-    """A terrain whose headers have been read and accepted."""
+class OpenTerrain(Protocol):
+    """A terrain that has been found and accepted, as far as that is possible before a mission's area is known."""
 
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
         """True if a place lies on the terrain (which may still be void there)."""
+
+    def around(self, frame: Frame, box: Box) -> Terrain:
+        """The terrain that a mission in ``box`` (west, south, east, north, plane metres) uses. Raises InputError."""
+
+
+class Terrain(OpenTerrain, Protocol):
+    """A terrain whose headers have been read and accepted."""
 
     @property
     def is_flat(self) -> bool:
@@ -96,38 +105,39 @@ def open_terrain(spec: TerrainSpec, *, where: str) -> Terrain:
     """Open and check every file of ``spec`` without reading heights. Raises InputError."""
     if bool(spec.dem) == (spec.flat_m is not None or bool(spec.peaks)):
         raise InputError("give either `dem` or `flat_m` and `peaks`", where=where)
-    return _RasterTerrain(spec, where) if spec.dem else _LocalTerrain(spec, where)
+    if not spec.dem:
+        return _LocalTerrain(spec, where)
+    return terrain_of(_rasters(spec, place(where, "dem")), spec, where=where)
 
 
-def _at(where: str, key: str) -> str:
+def terrain_of(rasters: Sequence[Raster], spec: TerrainSpec, *, where: str) -> Terrain:
+    """Terrain of tiles that are open; ``spec`` says the rest. Raises InputError."""
+    return _RasterTerrain(rasters, spec, where)
+
+
+def place(where: str, key: str) -> str:
     """The place of a key in messages; ``where`` is a place in a mission file, or a command-line option (no keys)."""
     return where if where.startswith("-") else f"{where}.{key}" if where else key
 
 
 class _RasterTerrain:
-    def __init__(self, spec: TerrainSpec, where: str) -> None:
+    def __init__(self, rasters: Sequence[Raster], spec: TerrainSpec, where: str) -> None:
         self._spec = spec
         self._where = where
-        dem = _at(where, "dem")
-        if SAMPLE in spec.dem:
-            if len(spec.dem) > 1 or spec.crs or spec.height_unit:
-                raise InputError(f"{SAMPLE} stands alone: no other tile, no crs, no height_unit", where=dem)
-            rasters = [sample_jacksboro()]
-        elif any(d.startswith("sample:") for d in spec.dem):
-            raise InputError(f"the only sample is {SAMPLE}, given {spec.dem[0]}", where=dem)
-        else:
-            rasters = [_open(path, spec, dem, i, len(spec.dem)) for i, path in enumerate(spec.dem)]
-        self._mosaic = Mosaic(rasters, where=dem)
-        self._datum = vertical_datum(spec.vertical_datum, rasters[0].vertical, where=_at(where, "vertical_datum"))
+        self._mosaic = Mosaic(rasters, where=place(where, "dem"))
+        self._datum = vertical_datum(spec.vertical_datum, rasters[0].vertical, where=place(where, "vertical_datum"))
         self._geoid = _geoid(spec, self._datum, where)
         self._canopy: Mosaic | None = None
         if spec.canopy is not None:
             # The canopy's heights are above ground: its vertical datum, if it names one, means nothing.
-            raster = open_raster(Path(spec.canopy), where=_at(where, "canopy"))
-            self._canopy = Mosaic([raster], where=_at(where, "canopy"))
+            raster = open_raster(Path(spec.canopy), where=place(where, "canopy"))
+            self._canopy = Mosaic([raster], where=place(where, "canopy"))
 
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
         return self._mosaic.covers(lat_deg, lon_deg)
+
+    def around(self, frame: Frame, box: Box) -> Terrain:
+        return self
 
     @property
     def is_flat(self) -> bool:
@@ -147,7 +157,7 @@ class _RasterTerrain:
         if np.isnan(ground).all():
             raise InputError(
                 "the DEM holds nothing but voids around the mission; give one with data here",
-                where=_at(self._where, "dem"),
+                where=place(self._where, "dem"),
             )
         notes = [n for r in rasters for n in r.notes] + list(window.notes)
         datum = self._datum.name
@@ -194,13 +204,16 @@ class _LocalTerrain:
         self._spec = spec
         for key in ("geoid_grid", "crs", "height_unit", "canopy", "canopy_nodata_m"):
             if getattr(spec, key) is not None:
-                raise InputError(f"{key} belongs to a `dem`, not to flat ground and peaks", where=_at(where, key))
-        self._datum = vertical_datum(spec.vertical_datum or "AMSL", None, where=_at(where, "vertical_datum"))
+                raise InputError(f"{key} belongs to a `dem`, not to flat ground and peaks", where=place(where, key))
+        self._datum = vertical_datum(spec.vertical_datum or "AMSL", None, where=place(where, "vertical_datum"))
         if self._datum.ellipsoidal:
-            raise InputError("flat ground and peaks are above mean sea level", where=_at(where, "vertical_datum"))
+            raise InputError("flat ground and peaks are above mean sea level", where=place(where, "vertical_datum"))
 
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
         return True
+
+    def around(self, frame: Frame, box: Box) -> Terrain:
+        return self
 
     @property
     def is_flat(self) -> bool:
@@ -235,13 +248,23 @@ class _LocalTerrain:
         return Surface(heights, top, grid, info, goes_on)
 
 
+def _rasters(spec: TerrainSpec, where: str) -> list[Raster]:
+    if SAMPLE in spec.dem:
+        if len(spec.dem) > 1 or spec.crs or spec.height_unit:
+            raise InputError(f"{SAMPLE} stands alone: no other tile, no crs, no height_unit", where=where)
+        return [sample_jacksboro()]
+    if any(d.startswith("sample:") for d in spec.dem):
+        raise InputError(f"the only sample is {SAMPLE}, given {spec.dem[0]}", where=where)
+    return [_open(path, spec, where, i, len(spec.dem)) for i, path in enumerate(spec.dem)]
+
+
 def _open(path: str, spec: TerrainSpec, where: str, index: int, count: int) -> Raster:
     at = f"{where}[{index}]" if count > 1 else where
     return open_raster(Path(path), where=at, crs=spec.crs, height_unit=spec.height_unit)
 
 
 def _geoid(spec: TerrainSpec, datum: VerticalDatum, where: str) -> GeoidGrid | None:
-    at = _at(where, "geoid_grid")
+    at = place(where, "geoid_grid")
     if datum.ellipsoidal:
         if spec.geoid_grid is None:
             raise InputError(

@@ -31,7 +31,7 @@ from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import Order
 from gcsplan.report import fleet_view, markup, tables
 from gcsplan.report.chart import Axes, ticks
-from gcsplan.report.page import BARE_DEM, render_check, render_page
+from gcsplan.report.page import render_check, render_page
 from gcsplan.report.picture import draw, figures
 from gcsplan.report.relief import UNKNOWN, extent_of, relief_of
 from gcsplan.report.samples import distance_m, line_of, passages
@@ -39,6 +39,7 @@ from gcsplan.report.scene_data import triangles, zone_meshes
 from gcsplan.report.subject import Page, Subject
 from gcsplan.units import AVIATION, METRE, METRIC, duration
 from gcsplan.vehicle import Energy, Vehicle
+from gcsplan.world.model_words import BARE_DEM, SURFACE_DEM
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
@@ -259,6 +260,13 @@ def test_obstacle_heights_silence_the_bare_dem_line_and_nothing_else_does() -> N
     assert BARE_DEM in render_page(page)
     assert BARE_DEM in render_page(replace(page, inputs={}))
     assert BARE_DEM not in render_page(replace(page, inputs={"bare_dem": False}))
+
+
+def test_a_surface_model_is_not_called_bare() -> None:
+    shown = render_page(replace(small_page(), inputs={"bare_dem": False, "dem_kind": "surface"}))
+    assert SURFACE_DEM in shown
+    assert BARE_DEM not in shown
+    assert "obstacle heights were given" not in shown
 
 
 def test_unknown_ground_is_left_out_of_the_heights_and_told() -> None:

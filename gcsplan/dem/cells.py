@@ -1,0 +1,83 @@
+"""Tiles of one degree, named by their south-west corner as in N36W085, and those that a box of the plane needs."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from gcsplan.errors import InputError
+from gcsplan.world.frame import Frame
+from gcsplan.world.terrain import RASTER_SPARE_M, Box
+
+SPARE_M = RASTER_SPARE_M + 200.0
+"""Around a box, m: what is read around it, and three cells of the coarsest source."""
+
+MOST_CELLS = 100
+"""Most tiles that one mission or one command may need: a mission is much smaller, and so many take gigabytes."""
+
+_NAME = re.compile(r"([NS])(\d{2})([EW])(\d{3})")
+
+
+class Cell(NamedTuple):
+    """A tile of one degree by its south-west corner, whole degrees."""
+
+    lat_deg: int
+    lon_deg: int
+
+    @property
+    def north_south(self) -> str:
+        """Such as ``N36``."""
+        return f"{'S' if self.lat_deg < 0 else 'N'}{abs(self.lat_deg):02d}"
+
+    @property
+    def east_west(self) -> str:
+        """Such as ``W085``."""
+        return f"{'W' if self.lon_deg < 0 else 'E'}{abs(self.lon_deg):03d}"
+
+    @property
+    def name(self) -> str:
+        """Such as ``N36W085``."""
+        return self.north_south + self.east_west
+
+
+def cell_of(name: str) -> Cell | None:
+    """The tile of a name such as ``N36W085``; None if there is none of that name."""
+    match = _NAME.fullmatch(name)
+    if match is None:
+        return None
+    lat = int(match[2]) * (-1 if match[1] == "S" else 1)
+    lon = int(match[4]) * (-1 if match[3] == "W" else 1)
+    cell = Cell(lat, lon)
+    return cell if -90 <= lat < 90 and -180 <= lon < 180 and cell.name == name else None
+
+
+def names_of(cells: Iterable[Cell]) -> str:
+    """The names, with commas."""
+    return ",".join(cell.name for cell in cells)
+
+
+def cells_in(frame: Frame, box: Box, *, where: str) -> tuple[Cell, ...]:
+    """The tiles that terrain for ``box`` (west, south, east, north, plane metres) is read from, north-west first.
+
+    Raises InputError if they are more than `MOST_CELLS`.
+    """
+    f = np.linspace(0.0, 1.0, 65)
+    west, south, east, north = box[0] - SPARE_M, box[1] - SPARE_M, box[2] + SPARE_M, box[3] + SPARE_M
+    e, n = np.meshgrid(west + f * (east - west), south + f * (north - south))
+    degrees = np.asarray(frame.to_degrees(e, n), float)
+    lat, lon = degrees[..., 0], degrees[..., 1]
+    middle = float(frame.to_degrees(0.5 * (west + east), 0.5 * (south + north))[1])
+    lon = middle + (lon - middle + 180.0) % 360.0 - 180.0  # the antimeridian is no edge
+    lats = range(max(-90, math.floor(np.min(lat))), min(89, math.floor(np.max(lat))) + 1)
+    lons = range(math.floor(lon.min()), math.floor(lon.max()) + 1)
+    if len(lats) * len(lons) > MOST_CELLS:
+        raise InputError(
+            f"this area needs {len(lats) * len(lons)} tiles of one degree, more than {MOST_CELLS}; choose a smaller "
+            "one",
+            where=where,
+        )
+    return tuple(Cell(a, (o + 180) % 360 - 180) for a in reversed(lats) for o in lons)

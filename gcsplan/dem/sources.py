@@ -1,0 +1,128 @@
+"""The table of published terrain: where each source lies, what its heights mean, and how its tiles are named.
+
+Addresses, names and spacings are those of the publishers' own descriptions (docs/how-to/terrain.md names them). A
+source belongs here only if its datum and its kind of model are stated by its publisher for every tile.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from gcsplan.dem.cells import Cell
+
+Kind = Literal["surface", "bare"]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One source.
+
+    ``kind``: a surface model holds trees and buildings, a bare one only the earth. ``address`` is that of the public
+    bucket, and ``bucket`` its name, the folder that a mirror has for it. ``object_of`` names the object of a tile,
+    ``listing`` the one that lists all tiles; each match of ``listed`` in it is a tile (groups: N36, W085), and a list
+    is whole if it holds ``least_tiles`` and ends with ``last``. ``columns_of`` counts a tile's columns for 3,600 rows.
+    """
+
+    name: str
+    title: str
+    kind: Kind
+    vertical_datum: str
+    bucket: str
+    address: str
+    listing: str
+    listed: re.Pattern[str]
+    last: str
+    least_tiles: int
+    object_of: Callable[[Cell], str]
+    columns_of: Callable[[Cell], int]
+    shares_edges: bool
+    most_tile_bytes: int
+    licence: str
+
+    def tiles_in(self, text: str) -> frozenset[str] | None:
+        """The names of the tiles in a list; None if it is not the whole list."""
+        names = frozenset(north_south + east_west for north_south, east_west in self.listed.findall(text))
+        return names if len(names) >= self.least_tiles and text.rstrip().endswith(self.last) else None
+
+
+def _copernicus(arc_seconds: int) -> Callable[[Cell], str]:
+    def object_of(cell: Cell) -> str:
+        name = f"Copernicus_DSM_COG_{arc_seconds}_{cell.north_south}_00_{cell.east_west}_00_DEM"
+        return f"{name}/{name}.tif"
+
+    return object_of
+
+
+def _copernicus_columns(cell: Cell) -> int:
+    """Columns widen in steps towards the poles; a tile counts by its side that is nearer to the equator."""
+    nearer = cell.lat_deg if cell.lat_deg >= 0 else -cell.lat_deg - 1
+    steps = ((50, 3600), (60, 2400), (70, 1800), (80, 1200), (85, 720))
+    return next((columns for below, columns in steps if nearer < below), 360)
+
+
+GLO30 = Source(
+    name="copernicus-glo30",
+    title="Copernicus DEM GLO-30",
+    kind="surface",
+    vertical_datum="EGM2008",
+    bucket="copernicus-dem-30m",
+    address="https://copernicus-dem-30m.s3.amazonaws.com",
+    listing="tileList.txt",
+    listed=re.compile(r"^Copernicus_DSM_COG_10_([NS]\d{2})_00_([EW]\d{3})_00_DEM\s*$", re.MULTILINE),
+    last="_DEM",
+    least_tiles=20_000,
+    object_of=_copernicus(10),
+    columns_of=_copernicus_columns,
+    shares_edges=False,
+    most_tile_bytes=128 * 2**20,
+    licence="© DLR e.V. 2010-2014 and © Airbus Defence and Space GmbH 2014-2018, provided under COPERNICUS by the "
+    "European Union and ESA",
+)
+
+GLO90 = Source(
+    name="copernicus-glo90",
+    title="Copernicus DEM GLO-90",
+    kind="surface",
+    vertical_datum="EGM2008",
+    bucket="copernicus-dem-90m",
+    address="https://copernicus-dem-90m.s3.amazonaws.com",
+    listing="tileList.txt",
+    listed=re.compile(r"^Copernicus_DSM_COG_30_([NS]\d{2})_00_([EW]\d{3})_00_DEM\s*$", re.MULTILINE),
+    last="_DEM",
+    least_tiles=20_000,
+    object_of=_copernicus(30),
+    columns_of=_copernicus_columns,
+    shares_edges=False,
+    most_tile_bytes=128 * 2**20,
+    licence=GLO30.licence,
+)
+"""It holds every tile of land, so its list tells the sea from tiles that another source merely lacks."""
+
+SRTM = Source(
+    name="srtm",
+    title="SRTM GL1 (NASA SRTMGL1 v3)",
+    kind="surface",
+    vertical_datum="EGM96",
+    bucket="raster",
+    address="https://opentopography.s3.sdsc.edu/raster",
+    listing="SRTM_GL1/SRTM_GL1_srtm.vrt",
+    listed=re.compile(r"SRTM_GL1_srtm/(?:[A-Za-z0-9_]+/)*([NS]\d{2})([EW]\d{3})\.tif"),
+    last="</VRTDataset>",
+    least_tiles=14_000,
+    object_of=lambda cell: f"SRTM_GL1/SRTM_GL1_srtm/{cell.name}.tif",
+    columns_of=lambda _: 3600,
+    shares_edges=True,
+    most_tile_bytes=128 * 2**20,
+    licence="NASA JPL, distributed by OpenTopography (doi.org/10.5069/G9445JDF)",
+)
+
+SOURCES: dict[str, Source] = {source.name: source for source in (GLO30, SRTM)}
+"""The sources that a mission may name."""
+
+WITNESS = GLO90
+"""The fuller source, whose list must agree before a missing tile counts as sea."""
+
+MOST_LIST_BYTES = 64 * 2**20

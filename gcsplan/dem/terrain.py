@@ -1,0 +1,167 @@
+"""Opens the terrain that a mission states: files, flat ground, or a published source by its name.
+
+A source's tiles come from the cache alone, and a mission uses those that its first window needs: the same ones
+whatever else the cache holds, so that a plan does not change when another mission's tiles are fetched.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from gcsplan.arrays import Floats
+from gcsplan.dem.cache import Cache, Record
+from gcsplan.dem.cells import Cell, cells_in, names_of
+from gcsplan.dem.sources import SOURCES, Source
+from gcsplan.errors import InputError
+from gcsplan.world.datum import VerticalDatum, take_apart
+from gcsplan.world.frame import Frame
+from gcsplan.world.geoid import GeoidGrid
+from gcsplan.world.raster import Raster, open_raster, sha256_of
+from gcsplan.world.surface import Surface
+from gcsplan.world.terrain import Box, OpenTerrain, Terrain, TerrainSpec, open_terrain, place, terrain_of
+
+ROWS = 3600
+"""Rows of a tile of sea if no tile beside it says another number."""
+
+
+def open_dem(spec: TerrainSpec, *, where: str) -> OpenTerrain:
+    """Open what ``spec`` names; a published source is one name of `SOURCES`. Raises InputError."""
+    named = [name for name in spec.dem if name in SOURCES]
+    if not named:
+        if spec.sea:
+            raise InputError(
+                f"sea counts with a published source, which lists its tiles: dem: {' or '.join(SOURCES)}",
+                where=place(where, "sea"),
+            )
+        return open_terrain(spec, where=where)
+    if len(spec.dem) > 1:
+        raise InputError(f"{named[0]} stands alone: no other tile beside it", where=place(where, "dem"))
+    for key in ("crs", "height_unit"):
+        if getattr(spec, key) is not None:
+            raise InputError(f"{named[0]} states it itself; remove the key", where=place(where, key))
+    return _SourceTerrain(SOURCES[named[0]], spec, where)
+
+
+class _SourceTerrain:
+    """A source, all over the globe; which tiles are needed is known with a mission's area."""
+
+    def __init__(self, source: Source, spec: TerrainSpec, where: str) -> None:
+        self._source, self._spec, self._where = source, spec, where
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        return True
+
+    def around(self, frame: Frame, box: Box) -> Terrain:
+        at = place(self._where, "dem")
+        cache = Cache(self._source)
+        records = cache.need(cells_in(frame, box, where=at), where=at)
+        sea = [c for c, r in records.items() if r.state == "sea" or (r.state == "absent" and self._spec.sea)]
+        absent = [c for c, r in records.items() if r.state == "absent" and c not in sea]
+        tiles = {c: _tile(cache, c, r, at) for c, r in records.items() if r.state == "tile"}
+        if not tiles and not sea:
+            raise InputError(f"{_not_published(self._source, absent)}; give another DEM", where=at)
+        sample = next(iter(tiles.values()), None)
+        found = [tiles[c] if c in tiles else _sea(self._source, c, sample) for c in records if c in tiles or c in sea]
+        terrain = terrain_of(found, replace(self._spec, dem=(self._source.name,)), where=self._where)
+        return _Told(terrain, *_told(self._source, records, sea, absent))
+
+
+class _Told:
+    """A terrain whose surfaces say which source they are from."""
+
+    def __init__(self, terrain: Terrain, info: dict[str, object], notes: tuple[str, ...]) -> None:
+        self._terrain, self._info, self._notes = terrain, info, notes
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        return self._terrain.covers(lat_deg, lon_deg)
+
+    def around(self, frame: Frame, box: Box) -> Terrain:
+        return self
+
+    @property
+    def is_flat(self) -> bool:
+        return False
+
+    @property
+    def geoid(self) -> GeoidGrid | None:
+        return self._terrain.geoid
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        return self._terrain.extent(frame, box)
+
+    def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
+        surface = self._terrain.load(frame, box, most_cells=most_cells)
+        notes = surface.info["notes"]
+        assert isinstance(notes, tuple)
+        return replace(surface, info=surface.info | self._info | {"notes": (*notes, *self._notes)})
+
+
+def _told(
+    source: Source, records: Mapping[Cell, Record], sea: list[Cell], absent: list[Cell]
+) -> tuple[dict[str, object], tuple[str, ...]]:
+    """What reports say of the terrain, and notes."""
+    info: dict[str, object] = {
+        "bare_dem": source.kind == "bare",
+        "dem_source": source.name,
+        "dem_kind": source.kind,
+        "dem_tiles": names_of(records),
+        "source": source.title,
+    }
+    notes = []
+    if sea:
+        info["sea_tiles"] = names_of(sea)
+        said = [c for c in sea if records[c].state == "absent"]
+        listed = [c for c in sea if c not in said]
+        if listed:
+            notes.append(f"sea, 0 m: {names_of(listed)}, which neither {source.name} nor GLO-90 has a tile of")
+        if said:
+            notes.append(f"sea, 0 m, because the mission says so: {names_of(said)}; GLO-90 shows land there")
+    if absent:
+        notes.append(_not_published(source, absent))
+    return info, tuple(notes)
+
+
+def _not_published(source: Source, cells: list[Cell]) -> str:
+    return (
+        f"{source.name} does not publish {names_of(cells)}, and GLO-90 shows land there: the ground is unknown and "
+        "cannot be flown over"
+    )
+
+
+def _tile(cache: Cache, cell: Cell, record: Record, where: str) -> Raster:
+    """A cached tile with its source's datum, if it is still what its record says."""
+    path = cache.tile_path(cell)
+    if sha256_of(path) != record.sha256:
+        raise InputError.of([cache.missing((cell,), where, "damaged, unlike its checksum")])
+    raster = open_raster(path, where=where)
+    return replace(raster, vertical=VerticalDatum(cache.source.vertical_datum), sha256=lambda: record.sha256)
+
+
+def _sea(source: Source, cell: Cell, sample: Raster | None) -> Raster:
+    """A tile at 0 m on the grid that the source's tiles have, ``sample`` being one of them."""
+    rows = ROWS if sample is None else round(1.0 / sample.dy)
+    cols = round(rows * source.columns_of(cell) / ROWS)
+    dx, dy = 1.0 / cols, 1.0 / rows
+    more = 1 if source.shares_edges else 0
+
+    def read(col: int, row: int, width: int, height: int) -> Iterator[tuple[int, Floats]]:
+        yield 0, np.zeros((height, width))
+
+    return Raster(
+        f"sea {cell.name}", take_apart("EPSG:4326", where=source.name), cell.lon_deg - 0.5 * dx,
+        cell.lat_deg + 1.0 + 0.5 * dy, dx, dy, cols + more, rows + more, VerticalDatum(source.vertical_datum), read,
+        (rows + more) * (cols + more), lambda: hashlib.sha256(f"sea {cell.name}".encode()).hexdigest(),
+    )  # fmt: skip
+
+
+def source_or_path(name: str, folder: Path) -> str:
+    """The name of a source, or the path of a file in ``folder``; a file that has a source's name is that file."""
+    path = folder / name
+    if name in SOURCES:
+        return str(path.absolute()) if path.exists() else name
+    return str(path)
