@@ -178,7 +178,13 @@ class Fetch:
         names = _tiles_in(source, file) if _age_days(file) < LIST_DAYS else None
         if names is None:
             part = self._part(file)
-            download(url, part, most_bytes=MOST_LIST_BYTES, patience=self._patience, report=self._report(file.name))
+            download(
+                url,
+                part,
+                most_bytes=MOST_LIST_BYTES,
+                patience=self._patience,
+                report=self._report(f"list of {source.name}"),
+            )
             names = _tiles_in(source, part)
             if names is None:
                 _drop(part)

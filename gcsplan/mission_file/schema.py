@@ -99,7 +99,7 @@ class TerrainKeys(Keys):
         ]
         | None
     ) = None
-    """A raster (.tif, .hgt, .asc) or a list of tiles, `sample:jacksboro`, or a source: `copernicus-glo30`, `srtm`."""
+    """A raster (.tif, .hgt, .hgt.zip, .asc), a list of tiles, `sample:jacksboro`, `copernicus-glo30` or `srtm`."""
     vertical_datum: Text | None = None
     """The zero of heights: `EGM96`, `NAVD88`, `WGS84` (ellipsoidal), …; required if the raster does not state it."""
     geoid_grid: Text | None = None

@@ -83,7 +83,7 @@ class Raster:
 
 
 def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: str | None = None) -> Raster:
-    """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt, ESRI .asc).
+    """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt or .hgt.zip, ESRI .asc).
 
     ``crs`` overrides the file's; ``height_unit`` states the unit if the file does not. Raises InputError for anything
     that is not a readable, georeferenced, north-up raster of real numbers.
@@ -189,13 +189,21 @@ def _driver(path: Path, other: str) -> str:
         return "GTiff"
     if other:
         return other
-    return "SRTMHGT" if path.suffix.lower() == ".hgt" else "AAIGrid"
+    return "SRTMHGT" if _is_hgt(path) else "AAIGrid"
+
+
+def _is_hgt(path: Path) -> bool:
+    """Whether a name is that of an SRTM tile, zipped or not: GDAL then reads the one tile of that name inside."""
+    return path.name.lower().endswith((".hgt", ".hgt.zip"))
 
 
 def _unreadable(path: Path, why: Exception) -> str:
     hint = ""
-    if path.suffix.lower() == ".hgt":
-        hint = "; an .hgt tile is named after its south-west corner (N36W085.hgt) and holds 1201 or 3601 posts a side"
+    if _is_hgt(path):
+        hint = (
+            "; an .hgt tile is named after its south-west corner (N36W085.hgt, or N36W085.hgt.zip with that inside) "
+            "and holds 1201 or 3601 posts a side"
+        )
     elif path.suffix.lower() == ".zip":
         hint = "; unpack it first"
     cause = why.__cause__ or why  # rasterio says "see previous exception"

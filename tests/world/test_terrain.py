@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import warnings
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -202,6 +203,39 @@ def test_srtm_posts_lie_on_whole_degrees_and_neighbouring_tiles_join(tmp_path: P
     assert surface.info["notes"] == ()
     hashes = [hashlib.sha256(t.read_bytes()).hexdigest() for t in tiles]
     assert surface.info["dem_sha256"] == hashlib.sha256("\n".join(hashes).encode()).hexdigest()
+
+
+def test_a_zipped_hgt_as_mavproxy_keeps_it_is_the_same_ground(tmp_path: Path) -> None:
+    posts = hills(1201, 1201)
+    posts[7, 9] = -32768
+    plain = hgt(tmp_path / "N36W085.hgt", posts)
+    (tmp_path / "zipped").mkdir()
+    zipped = tmp_path / "zipped" / "N36W085.hgt.zip"
+    with zipfile.ZipFile(zipped, "w", zipfile.ZIP_DEFLATED) as file:
+        file.write(plain, "N36W085.hgt")
+    assert np.array_equal(load(plain).ground_m, load(zipped).ground_m, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "inside", "data"),
+    [
+        ("N36W085.hgt.zip", "N36W086.hgt", bytes(2 * 1201 * 1201)),
+        ("N36W085.hgt.zip", "N36W085.hgt", bytes(5000)),
+        ("N36W085.hgt.zip", "N36W085.hgt", None),
+        ("tile.hgt.zip", "tile.hgt", bytes(2 * 1201 * 1201)),
+    ],
+    ids=["another tile", "short", "no zip", "no corner"],
+)
+def test_a_zipped_hgt_that_is_none_is_refused_with_what_it_must_be(
+    tmp_path: Path, name: str, inside: str, data: bytes | None
+) -> None:
+    path = tmp_path / name
+    if data is None:
+        path.write_bytes(b"PK\3\4" + bytes(100))
+    else:
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+            file.writestr(inside, data)
+    assert "N36W085.hgt.zip with that inside" in str(refusal(path))
 
 
 def test_a_gap_between_tiles_is_unknown(tmp_path: Path) -> None:
