@@ -2,7 +2,7 @@
 
     from gcsplan import load_mission, plan, rehearse, upload, write
 
-    planned = plan(load_mission("missions/jacksboro.yaml"))
+    planned = plan(load_mission("sample:jacksboro"))
     for vehicle in planned.vehicles:
         print(vehicle.name, vehicle.verdict.length_m, vehicle.verdict.safe)
     write(planned, "jacksboro", report=True)

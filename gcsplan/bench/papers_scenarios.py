@@ -17,18 +17,14 @@ import numpy as np
 from gcsplan.bench.papers_printed import PRINTED, Least
 from gcsplan.errors import InputError, unknown_name
 from gcsplan.mavlink.build.order import Margins
-from gcsplan.mission_file import MissionFile
+from gcsplan.mission_file import MissionFile, samples
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.swarm.planner import Settings
 from gcsplan.world.world import World
 
-FOLDERS = (
-    Path("missions", "papers"),
-    Path(__file__).parents[2] / "missions" / "papers",
-    Path(__file__).parents[1] / "missions" / "papers",
-)
-"""Folders in which the mission files are searched: here, beside the sources, within the package."""
+FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in samples.FOLDERS))
+"""Folders in which the mission files are searched: here, then those of the samples."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -126,7 +126,9 @@ def check(
 
 
 def _is_mission(argument: str) -> bool:
-    return Path(argument).suffix.lower() in (".yaml", ".yml")
+    from gcsplan.mission_file.samples import is_sample
+
+    return Path(argument).suffix.lower() in (".yaml", ".yml") or is_sample(argument)
 
 
 def _in_mission(files: list[str], given: dict[str, object], returns: Returns) -> Batch:

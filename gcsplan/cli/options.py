@@ -37,7 +37,7 @@ UnitsOption = Annotated[
         "JSON and notes stay in SI.",
     ),
 ]
-MissionArgument = Annotated[Path, typer.Argument(metavar="MISSION.yaml", help="The mission file.")]
+MissionArgument = Annotated[Path, typer.Argument(metavar="MISSION.yaml", help="The mission file, or sample:NAME.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
 UnjudgedOption = Annotated[
     bool, typer.Option("--allow-unjudged", help="Accept a mission of which something could not be judged.")

@@ -109,10 +109,11 @@ def plan(
     from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.export.outdir import add_output, settle_outputs
+    from gcsplan.mission_file.samples import file_of
     from gcsplan.units import units_of
 
     system = units_of(units)
-    directory = Path(mission.stem) if out is None else out
+    directory = Path(file_of(mission).stem) if out is None else out
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     each = _require_options(planner, objective, png, directory)
     if settle_outputs(directory):

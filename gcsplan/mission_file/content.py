@@ -1,4 +1,4 @@
-"""The source of a mission: a file, its text, or a mapping made by a script; all become the same mapping."""
+"""The source of a mission: a file, a sample, its text, or a mapping made by a script; all become the same mapping."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
+from gcsplan.mission_file import samples
 from gcsplan.mission_file.schema import shown
 from gcsplan.mission_file.strict_yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, read_yaml
 from gcsplan.mission_file.yaml_slips import missing_space
@@ -34,7 +35,9 @@ def read_content(
         file, where, raw = UNNAMED, "mission", _Plain().of(source, "mission", 0)
     elif isinstance(source, str | os.PathLike):
         file, where = Path(source), str(source)
-        text = _text(file, where) if text is None else text
+        if text is None:
+            file = samples.file_of(source)
+            text = _text(file, where)
         raw = read_yaml(text, where=where)
     elif source is None and text is not None:
         file, where, raw = UNNAMED, "mission", read_yaml(text, where="mission")
@@ -63,7 +66,7 @@ def _text(file: Path, where: str) -> str:
     except UnicodeDecodeError as why:
         raise InputError(f"the file must be UTF-8 text, byte {why.start} is not", where=where) from None
     except FileNotFoundError:
-        raise InputError("there is no such file", where=where) from None
+        raise InputError(f"there is no such file{samples.hint(file)}", where=where) from None
     except (OSError, ValueError) as why:
         raise InputError(f"the file cannot be read: {why}", where=where) from None
 

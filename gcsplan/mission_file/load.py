@@ -73,8 +73,9 @@ def load_mission(
 ) -> MissionFile:
     """Read and judge a mission; nothing is planned yet.
 
-    ``source`` is one of: the path of a mission file (a ``str`` without a line break, or a path object); the YAML text
-    of one (a ``str`` with a line break); a mapping of the same keys, which may contain lists, tuples and numpy numbers.
+    ``source`` is one of: the path of a mission file (a ``str`` without a line break, or a path object), or
+    ``sample:NAME`` for one that comes with gcsplan (``sample:jacksboro``); the YAML text of one (a ``str`` with a line
+    break); a mapping of the same keys, which may contain lists, tuples and numpy numbers.
     With ``text``, that is the content, and ``source`` is the path that it would have (or None). Files that a mission
     names are found relative to its own path, or else to the current folder.
 

@@ -3,40 +3,20 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
-from gcsplan.cli import main as cli
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
 from tests.app.test_fleet_planning import CROSS
-from tests.support.impatient import be_impatient
 
 LIMITS = CROSS["limits"] | {"track_error_m": 3, "altitude_error_m": 3}
 ARRIVAL = {"mode": "sequence", "order": ["west", "south"], "interval_s": 20, "separation_m": 30}
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
-    """Call ``gcsplan ARGUMENTS`` in an empty directory; gives (exit code, standard output, standard error)."""
-    monkeypatch.chdir(tmp_path)
-    be_impatient(monkeypatch)
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        out, err = capfd.readouterr()
-        assert isinstance(ended.value.code, int)
-        return ended.value.code, out, err
-
-    return call
 
 
 def write(tmp_path: Path, arrival: dict[str, Any] = ARRIVAL, **more: Any) -> Path:

@@ -12,35 +12,15 @@ from typing import Any
 import pytest
 
 import gcsplan
-from gcsplan.cli import main as cli
 from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
-from tests.support.impatient import be_impatient
 from tests.support.paths import DATA
 
 CROSSING = DATA / "crossing.yaml"
 OUTPUTS = {"uav1.waypoints", "uav1.plan", "mission.kml", "mission.geojson", "profile.csv", "summary.json"}
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
-    """Call ``gcsplan ARGUMENTS`` in an empty directory; gives (exit code, standard output, standard error)."""
-    monkeypatch.chdir(tmp_path)
-    be_impatient(monkeypatch)
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        out, err = capfd.readouterr()
-        code = ended.value.code
-        assert isinstance(code, int)
-        return code, out, err
-
-    return call
 
 
 def changed(tmp_path: Path, old: str, new: str) -> Path:
