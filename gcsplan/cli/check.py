@@ -45,7 +45,10 @@ def check(
     crs: Annotated[str | None, typer.Option(metavar="EPSG:N", help="Of a DEM that does not say.")] = None,
     obstacle_height: Annotated[Number, typer.Option(metavar="M", help="Of trees and houses, everywhere.")] = None,
     zones: Annotated[
-        list[str] | None, typer.Option(metavar="FILE", help="No-fly zones, .geojson or .kml; may be repeated.")
+        list[str] | None,
+        typer.Option(
+            metavar="FILE", help="A file of no-fly zones (.geojson, .kml, .kmz, .gpkg, .csv, …); may be repeated."
+        ),
     ] = None,
     min_agl: Annotated[Number, typer.Option(metavar="M", help="Lowest height above ground.")] = None,
     max_agl: Annotated[Number, typer.Option(metavar="M", help="Highest height above ground.")] = None,

@@ -144,18 +144,24 @@ class LimitKeys(Keys):
 
 
 class ZoneKeys(Keys):
-    """One entry of ``no_fly:``: a circle, a polygon or a file."""
+    """One entry of ``no_fly:``: a circle, a polygon, a line or a file."""
 
     name: Text | None = None
     """Name of the zone in messages and reports."""
     center: Point | None = None
     """Centre of a circle; needs `radius_m`."""
     radius_m: float | None = None
-    """Radius of a circle, at most 100 000."""
+    """Radius of a circle, at most 100 000; with `file` that of its points that have none of their own."""
     polygon: list[Point] | None = None
     """Corners of a polygon, in order; it is closed automatically."""
+    line: list[Point] | None = None
+    """Points of a line, such as a power line; needs `buffer_m`."""
+    buffer_m: float | None = None
+    """Half the width of a corridor around a line, at most 20 000; with `file` that of its lines that have none."""
     file: Text | None = None
-    """A .geojson or .kml file of zones; the other keys are then in that file."""
+    """A file of zones: .geojson, .kml, .kmz, .gpkg, .shp, .fgb, .zip or .csv; names and heights stand in it."""
+    layer: Text | None = None
+    """With `file`: the only layer of a .gpkg to be read; if absent, every one."""
     floor_agl_m: Metres | None = None
     """Floor of the zone above ground, point by point; if absent or 0, nothing passes below."""
     ceiling_agl_m: Metres | None = None

@@ -14,7 +14,16 @@ from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.places import Degrees
 from gcsplan.mission_file.point_keys import LocalPoint
 from gcsplan.mission_file.schema import FrameKeys, TerrainKeys, ZoneKeys
-from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, check_degrees, circle, polygon
+from gcsplan.mission_file.zone_attributes import SIZES
+from gcsplan.mission_file.zone_draft import (
+    Bounds,
+    ZoneDraft,
+    check_degrees,
+    check_size,
+    circle,
+    corridor,
+    polygon,
+)
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.peaks import Peak
@@ -162,40 +171,66 @@ def make_zones(
     keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[str], *, local: bool
 ) -> list[ZoneDraft]:
     """The zones of one entry of ``no_fly``: a single zone, or all zones of a file."""
-    kinds = [k for k in ("center", "polygon", "file") if getattr(keys, k) is not None]
+    kinds = [k for k in ("center", "polygon", "line", "file") if getattr(keys, k) is not None]
     if len(kinds) != 1:
         given = " and ".join(kinds) or "none"
-        problems.append(Problem(where, f"give one of center (with radius_m), polygon and file, given {given}"))
+        wanted = "give one of center (with radius_m), polygon, line (with buffer_m) and file"
+        problems.append(Problem(where, f"{wanted}, given {given}"))
         return []
     if keys.file is not None:
-        others = sorted(keys.given.keys() - {"file"})
-        problems += [Problem(f"{where}.{k}", "stands in the file itself, in a feature's properties") for k in others]
-        try:
-            found = read_zones(folder / keys.file, where=f"{where}.file")
-        except InputError as why:
-            problems += why.problems
-            return []
-        problems += found.problems
-        notes += found.notes
-        return found.zones
+        return _zones_of_file(keys, keys.file, where, folder, problems, notes)
+    return _own_zone(keys, where, fallback, problems, notes, local=local)
+
+
+def _zones_of_file(
+    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[str]
+) -> list[ZoneDraft]:
+    others = sorted(keys.given.keys() - {"file", "layer", *SIZES})
+    problems += [Problem(f"{where}.{k}", "stands in the file itself, in a feature's properties") for k in others]
+    sizes = [(getattr(keys, size), f"{where}.{size}") for size in SIZES if getattr(keys, size) is not None]
+    good = [check_size(size_m, at, problems) for size_m, at in sizes]
+    if not all(good):
+        return []
+    try:
+        found = read_zones(
+            folder / file, where=f"{where}.file", radius_m=keys.radius_m, buffer_m=keys.buffer_m, layer=keys.layer
+        )
+    except InputError as why:
+        problems += why.problems
+        return []
+    problems += found.problems
+    notes += found.notes
+    return found.zones
+
+
+def _own_zone(
+    keys: ZoneKeys, where: str, fallback: str, problems: list[Problem], notes: list[str], *, local: bool
+) -> list[ZoneDraft]:
+    """The zone whose shape stands in the mission file."""
     name = keys.name or fallback
     bounds = Bounds(keys.floor_agl_m, keys.ceiling_agl_m, keys.floor_amsl_m, keys.ceiling_amsl_m)
     before = len(problems)
-    points = [keys.center] if keys.center is not None else keys.polygon or []
-    at = [f"{where}.center"] if keys.center is not None else [f"{where}.polygon[{i}]" for i in range(len(points))]
+    kind = "center" if keys.center is not None else "polygon" if keys.polygon is not None else "line"
+    points = [keys.center] if keys.center is not None else keys.polygon or keys.line or []
+    at = [f"{where}.{kind}" if kind == "center" else f"{where}.{kind}[{i}]" for i in range(len(points))]
     places = [make_place(p, a, problems, notes, local=local) for p, a in zip(points, at, strict=True)]
     if len(problems) == before and len({isinstance(p, LocalPoint) for p in points}) > 1:
-        problems.append(Problem(f"{where}.polygon", "give all corners in degrees, or all in local metres"))
-    if keys.radius_m is None and keys.center is not None:
-        problems.append(Problem(f"{where}.radius_m", "is missing"))
-    if keys.radius_m is not None and keys.polygon is not None:
-        problems.append(Problem(f"{where}.radius_m", "belongs to a center, not to a polygon"))
+        problems.append(Problem(f"{where}.{kind}", "give all corners in degrees, or all in local metres"))
+    for size, owner in zip(SIZES, ("center", "line"), strict=True):
+        if kind == owner and getattr(keys, size) is None:
+            problems.append(Problem(f"{where}.{size}", "is missing"))
+        if kind != owner and getattr(keys, size) is not None:
+            problems.append(Problem(f"{where}.{size}", f"belongs to a {owner}, not to a {kind}"))
+    if keys.layer is not None:
+        problems.append(Problem(f"{where}.layer", "belongs to a file; leave it out"))
     if len(problems) > before:
         return []
     flat = [p.degrees or p.metres or (0.0, 0.0) for p in places if p is not None]
     in_metres = isinstance(points[0], LocalPoint) if points else local
     if keys.center is not None and keys.radius_m is not None:
         draft = circle(name, where, flat[0], keys.radius_m, bounds, problems, local=in_metres)
+    elif keys.buffer_m is not None:
+        draft = corridor(name, where, flat, keys.buffer_m, bounds, problems, local=in_metres)
     else:
         draft = polygon(name, where, flat, bounds, problems, local=in_metres)
     return [draft] if draft is not None else []

@@ -1,4 +1,4 @@
-"""What the attributes of a zone say, in every format: its name, floor, ceiling and radius.
+"""What the attributes of a zone say, in every format: its name, floor, ceiling, and its radius or buffer.
 
 There is one table of names, and case does not matter. An attribute that seems to limit a zone but is not read leaves
 the zone larger, and a remark says so; a limit that is read and not understood is a mistake.
@@ -28,6 +28,8 @@ from gcsplan.world.zones import Level
 
 NAMES = ("name", "title", "label", "designator", "identifier", "ident")
 RADIUS = "radius_m"
+BUFFER = "buffer_m"
+SIZES = (RADIUS, BUFFER)
 OWN = ("flooraglm", "flooramslm", "ceilingaglm", "ceilingamslm")
 BOUNDS = {
     "lower": "floor", "floor": "floor", "bottom": "floor", "base": "floor",
@@ -85,7 +87,7 @@ def meaning_of(key: str) -> Meaning:
     lower = key.lower()
     plain = re.sub(r"[^a-z0-9]", "", lower)
     limit, shared = _LIMIT.fullmatch(plain), bool(_SHARED.fullmatch(plain))
-    used = limit is not None or shared or lower in (*NAMES, RADIUS)
+    used = limit is not None or shared or lower in (*NAMES, *SIZES)
     return Meaning(lower, plain in OWN, limit, shared, used, bool(_SEEMS_A_LIMIT.search(lower)))
 
 
@@ -96,11 +98,13 @@ class Attribute:
     key: str
     value: Any
     where: str
+    stands_for: str = ""
+    """The name in the table for which its own name stands in this file, if that is another."""
 
     @property
     def meaning(self) -> Meaning:
         """What the table says of its name."""
-        return meaning_of(self.key)
+        return meaning_of(self.stands_for or self.key)
 
     def __str__(self) -> str:
         return f"{self.key[:40]} {repr(self.value)[:60]}"
@@ -116,6 +120,7 @@ class Said:
     remarks: tuple[Remark, ...]
     of_levels: bool
     """Whether an attribute speaks of a floor or ceiling, if only to say that there is none."""
+    buffer_m: float | None = None
 
 
 def read_attributes(given: Sequence[Attribute], name: str, problems: list[Problem]) -> Said | None:
@@ -125,20 +130,20 @@ def read_attributes(given: Sequence[Attribute], name: str, problems: list[Proble
     for a in given:
         if a.value is None or (isinstance(a.value, str) and not a.value.strip()):
             continue
-        meaning = meaning_of(a.key)
+        meaning = a.meaning
         if meaning.used:
             known.append(a)
         elif meaning.seems_a_limit or _reads_as_level(a.value):
             ignored.append(a)
     reading = _Reading(_name(known) or name, problems)
     before = len(problems)
-    radius_m = reading.radius_m([a for a in known if a.meaning.lower == RADIUS])
+    radius_m, buffer_m = (reading.size_m([a for a in known if a.meaning.lower == size]) for size in SIZES)
     bounds = reading.bounds(known)
     if ignored:
         reading.remarks.append((NOT_READ, ", ".join(str(a) for a in ignored[:6]) + (", …" if len(ignored) > 6 else "")))
     if len(problems) > before:
         return None
-    return Said(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels)
+    return Said(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels, buffer_m)
 
 
 def shown(value: Any) -> str:
@@ -185,7 +190,7 @@ class _Reading:
     of_levels: bool = False
     read_as: list[str] = field(default_factory=list)
 
-    def radius_m(self, given: Sequence[Attribute]) -> float | None:
+    def size_m(self, given: Sequence[Attribute]) -> float | None:
         found = {self._metres(a): a for a in given}
         if len(found) > 1:
             self._wrong(given[1], f"and {given[0]} contradict each other: leave one out")

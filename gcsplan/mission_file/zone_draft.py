@@ -12,9 +12,11 @@ import numpy as np
 from gcsplan.errors import Problem
 from gcsplan.mission_file.places import range_fault
 from gcsplan.world.degree_shapes import (
+    LARGEST_BUFFER_M,
     LARGEST_RADIUS_M,
     counter_clockwise,
     near_circle,
+    near_corridors,
     near_polygons,
     outline_of,
 )
@@ -22,7 +24,7 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
 MAX_VERTICES = 100_000
-"""Most vertices of one polygon."""
+"""Most vertices of one polygon or line."""
 
 Remark = tuple[str, str]
 """What a user has to know about how a zone of a file was read: a sentence for all such zones, and what this one has."""
@@ -35,8 +37,9 @@ SHOWN_ZONES = 20
 class ZoneDraft:
     """A zone before there is a plane.
 
-    ``points`` is the centre alone (with ``radius_m``) or a polygon's vertices, not closed: (latitude, longitude) in
-    degrees, or (east_m, north_m) if ``local``. ``where`` is its place in the user's file.
+    ``points`` is the centre alone (with ``radius_m``), a line (with ``buffer_m``, the half-width of its corridor), or a
+    polygon's vertices, not closed: (latitude, longitude) in degrees, or (east_m, north_m) if ``local``. ``where`` is
+    its place in the user's file.
     """
 
     name: str
@@ -47,6 +50,7 @@ class ZoneDraft:
     floor: Level | None = None
     ceiling: Level | None = None
     remarks: tuple[Remark, ...] = ()
+    buffer_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,13 +107,7 @@ def circle(
 ) -> ZoneDraft | None:  # fmt: skip
     """A cylinder; None, and new ``problems``, if it is wrong."""
     before = len(problems)
-    if not 0.0 < radius_m <= LARGEST_RADIUS_M:
-        problems.append(
-            Problem(
-                f"{where}.radius_m",
-                f"must be above 0 and at most {LARGEST_RADIUS_M:g} (a larger zone is a polygon), given {radius_m:g}",
-            )
-        )
+    check_size(radius_m, f"{where}.radius_m", problems)
     if not local:
         check_degrees(centre, f"{where}.center", problems)
     floor, ceiling = bounds.levels(where, problems)
@@ -125,13 +123,7 @@ def polygon(
     """A prism; None, and new ``problems``, if its outline is not simple or its bounds contradict each other."""
     before = len(problems)
     at = f"{where}.{key}" if key else where
-    if len(points) > MAX_VERTICES:
-        problems.append(Problem(at, f"has {len(points)} points, more than {MAX_VERTICES}; simplify it"))
-        return None
-    if not local:
-        for i, point in enumerate(points):
-            if not check_degrees(point, f"{at}[{i}]", problems):
-                break  # one swapped point means that all are swapped
+    _check_points(points, at, problems, local=local)
     floor, ceiling = bounds.levels(where, problems)
     if len(problems) > before:
         return None
@@ -140,6 +132,43 @@ def polygon(
         problems.append(Problem(at, fault))
         return None
     return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling)
+
+
+def corridor(
+    name: str, where: str, points: Sequence[tuple[float, float]], buffer_m: float, bounds: Bounds,
+    problems: list[Problem], *, local: bool = False, key: str = "line",
+) -> ZoneDraft | None:  # fmt: skip
+    """All within ``buffer_m`` of a line, as a prism; None, and new ``problems``, if it is wrong."""
+    before = len(problems)
+    at = f"{where}.{key}" if key else where
+    check_size(buffer_m, f"{where}.buffer_m", problems)
+    _check_points(points, at, problems, local=local)
+    if len(set(points)) < 2:
+        problems.append(Problem(at, f"a line needs at least 2 different points, given {len(set(points))}"))
+    floor, ceiling = bounds.levels(where, problems)
+    if len(problems) > before:
+        return None
+    line = tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
+    return ZoneDraft(name, where, line, local, None, floor, ceiling, buffer_m=buffer_m)
+
+
+def check_size(value_m: float, where: str, problems: list[Problem]) -> bool:
+    """Whether a radius, or a half-width (``where`` ends in ``buffer_m``), is sound; if not, a problem is added."""
+    is_buffer = where.endswith("buffer_m")
+    most = LARGEST_BUFFER_M if is_buffer else LARGEST_RADIUS_M
+    if 0.0 < value_m <= most:
+        return True
+    words = f"must be above 0 and at most {most:g} (a {'wider' if is_buffer else 'larger'} zone is a polygon)"
+    problems.append(Problem(where, f"{words}, given {value_m:g}"))
+    return False
+
+
+def _check_points(points: Sequence[tuple[float, float]], at: str, problems: list[Problem], *, local: bool) -> None:
+    if len(points) > MAX_VERTICES:
+        problems.append(Problem(at, f"has {len(points)} points, more than {MAX_VERTICES}; simplify it"))
+    elif not local:
+        # One swapped point means that all are swapped, so that one problem is enough.
+        all(check_degrees(point, f"{at}[{i}]", problems) for i, point in enumerate(points))
 
 
 def check_degrees(point: tuple[float, float], where: str, problems: list[Problem]) -> bool:
@@ -168,8 +197,8 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
     return placed, far
 
 
-def zone_notes(placed: Sequence[tuple[ZoneDraft, Zone]]) -> list[str]:
-    """The remarks of the zones in the plane, with one note for all zones that share a sentence."""
+def zone_notes(placed: Sequence[tuple[ZoneDraft, object]]) -> list[str]:
+    """The remarks of the zones, beside their drafts, with one note for all zones that share a sentence."""
     about: dict[str, list[str]] = {}
     for draft in {id(draft): draft for draft, _ in placed}.values():  # a polygon may be cut into several zones
         for sentence, detail in draft.remarks:
@@ -197,7 +226,9 @@ def one_line(text: str) -> str:
 def zones_sha256(drafts: Sequence[ZoneDraft]) -> str:
     """Hash of the zones' contents, independent of where and in what layout they were written."""
     plain = [
-        [d.name, d.points, d.local, d.radius_m, d.floor and str(d.floor), d.ceiling and str(d.ceiling)] for d in drafts
+        [d.name, d.points, d.local, d.radius_m, d.floor and str(d.floor), d.ceiling and str(d.ceiling)]
+        + ([d.buffer_m] if d.buffer_m is not None else [])
+        for d in drafts
     ]
     return hashlib.sha256(json.dumps(plain).encode()).hexdigest()
 
@@ -206,6 +237,8 @@ def _shapes(draft: ZoneDraft, frame: Frame) -> Sequence[Circle | Polygon]:
     if draft.radius_m is not None:
         circle = near_circle(draft.points[0], draft.radius_m, frame, local=draft.local)
         return [circle] if circle is not None else []
+    if draft.buffer_m is not None:
+        return near_corridors(draft.points, draft.buffer_m, frame, local=draft.local)
     if draft.local:
         return [counter_clockwise(np.asarray(draft.points, float))]
     return near_polygons(draft.points, frame)

@@ -1,24 +1,31 @@
 """The zones of one file from another program, in any of the formats.
 
-Polygons are prisms, Points with ``radius_m`` are cylinders. Floors and ceilings are in a feature's properties, or in a
-Placemark's ExtendedData (`zone_attributes`). A feature that cannot be understood is refused, never skipped, because a
-zone that is left out would be flown through. A hole counts as no-fly.
+Polygons are prisms, points with ``radius_m`` are cylinders, lines with ``buffer_m`` corridors; the mission may give
+both sizes for all shapes of a file that have none of their own. Floors and ceilings are in a feature's properties, or
+in a Placemark's ExtendedData (`zone_attributes`). A feature that cannot be understood is refused, never skipped,
+because a zone that is left out would be flown through. A hole counts as no-fly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import Literal
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
 from gcsplan.mission_file.zone_attributes import Said
-from gcsplan.mission_file.zone_draft import Remark, ZoneDraft, circle, polygon
+from gcsplan.mission_file.zone_draft import Remark, ZoneDraft, circle, corridor, polygon
 from gcsplan.world.zones import Level
 
 MAX_ZONES = 20_000
-RADIUS_OF_POLYGON = "the radius of a polygon is not read, so that nothing beyond its outline is kept clear"
+SIZE_OF_OTHER = "the {} of a {} is not read, so that nothing beyond its {} is kept clear"
+RADIUS_OF_POLYGON = SIZE_OF_OTHER.format("radius", "polygon", "outline")
+BUFFER_OF_POLYGON = SIZE_OF_OTHER.format("buffer", "polygon", "outline")
+
+Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +39,17 @@ class Drawn:
 NOT_DRAWN = Drawn()
 
 
+@dataclass(frozen=True, slots=True)
+class Unsized:
+    """A point or line without a size of its own; ``make`` makes it with one, and it belongs before zone ``at``."""
+
+    kind: Literal["point", "line"]
+    at: int
+    where: str
+    make: Callable[[float], ZoneDraft | None]
+    remarks: tuple[Remark, ...]
+
+
 @dataclass
 class ZoneFile:
     """The contents of one file; ``problems`` are its mistakes, each with its place."""
@@ -40,13 +58,34 @@ class ZoneFile:
     zones: list[ZoneDraft] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     holes: int = 0
+    said: list[str] = field(default_factory=list)
+    columns: tuple[str, ...] = ()
+    unsized: list[Unsized] = field(default_factory=list)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes for the user."""
-        if not self.holes:
-            return ()
-        return (f"{self.path.name}: {counted(self.holes, 'hole')} in polygons counted as no-fly",)
+        holes = [f"{counted(self.holes, 'hole')} in polygons counted as no-fly"] if self.holes else []
+        return tuple(f"{self.path.name}: {note}" for note in [*self.said, *holes])
+
+    def give_sizes(self, radius_m: float | None, buffer_m: float | None) -> None:
+        """Give the points and lines without a size of their own that of the mission; without one they are a problem."""
+        given = {"point": radius_m, "line": buffer_m}
+        for some in reversed(self.unsized):  # from the last one, so that the others' places stay
+            size_m = given[some.kind]
+            if size_m is not None and (draft := some.make(size_m)) is not None:
+                self.zones.insert(some.at, self._remarked(draft, some.remarks))
+        for kind, what, key in (("point", "a radius", "radius_m"), ("line", "a corridor's half-width", "buffer_m")):
+            lacking = [some.where for some in self.unsized if some.kind == kind and given[kind] is None]
+            if lacking:
+                others = f", and so do {len(lacking) - 1} more" if len(lacking) > 1 else ""
+                found = f"; columns found: {', '.join(self.columns)}" if self.columns else ""
+                words = (
+                    f"a {kind} needs {what} to be a zone{others}: give each a {key}, or write {key} beside `file` in "
+                    f"the mission, for all of them{found}"
+                )
+                self.problems.append(Problem(lacking[0], words))
+        self.unsized = []
 
     def add_ring(
         self, said: Said, part: str, where: str, ring: list[tuple[float, float]], key: str, drawn: Drawn = NOT_DRAWN
@@ -56,24 +95,42 @@ class ZoneFile:
         remarks = [*said.remarks, *drawn.remarks]
         if drawn.ceiling is not None:
             bounds = replace(bounds, **{f"ceiling_{drawn.ceiling.datum}_m": drawn.ceiling.value_m})
-        if said.radius_m is not None:
-            remarks.append((RADIUS_OF_POLYGON, f"{said.radius_m:g} m"))
+        for size_m, words in ((said.radius_m, RADIUS_OF_POLYGON), (said.buffer_m, BUFFER_OF_POLYGON)):
+            if size_m is not None:
+                remarks.append((words, f"{size_m:g} m"))
         self._add(polygon(part[:200], where, ring, bounds, self.problems, key=key), where, remarks)
 
-    def add_circle(
-        self, said: Said, part: str, where: str, centre: tuple[float, float], remarks: Sequence[Remark] = ()
+    def add_circle(self, said: Said, part: str, where: str, centre: Point, remarks: Sequence[Remark] = ()) -> None:
+        """Add a circle called ``part`` by its centre, (latitude, longitude); its radius may come from the mission."""
+        make = partial(circle, part[:200], where, centre, bounds=said.bounds, problems=self.problems)
+        self._add_sized("point", said.radius_m, lambda size_m: make(radius_m=size_m), where, [*said.remarks, *remarks])
+
+    def add_line(
+        self, said: Said, part: str, where: str, line: list[Point], key: str, remarks: Sequence[Remark] = ()
     ) -> None:
-        """Add a circle called ``part`` by its centre, (latitude, longitude); a missing radius is a problem."""
-        if said.radius_m is None:
-            self.problems.append(Problem(where, "a Point needs radius_m to be a zone"))
-        else:
-            draft = circle(part[:200], where, centre, said.radius_m, said.bounds, self.problems)
-            self._add(draft, where, [*said.remarks, *remarks])
+        """Add the corridor around a line, (latitude, longitude); its half-width may come from the mission."""
+        make = partial(corridor, part[:200], where, line, bounds=said.bounds, problems=self.problems, key=key)
+        self._add_sized("line", said.buffer_m, lambda size_m: make(buffer_m=size_m), where, [*said.remarks, *remarks])
+
+    def _add_sized(
+        self, kind: Literal["point", "line"], size_m: float | None, make: Callable[[float], ZoneDraft | None],
+        where: str, remarks: Sequence[Remark],
+    ) -> None:  # fmt: skip
+        if size_m is not None:
+            self._add(make(size_m), where, remarks)
+            return
+        self._require_room(where)
+        self.unsized.append(Unsized(kind, len(self.zones), where, make, tuple(remarks)))
 
     def _add(self, draft: ZoneDraft | None, where: str, remarks: Sequence[Remark]) -> None:
-        if draft is None:
-            return
-        if len(self.zones) >= MAX_ZONES:
+        if draft is not None:
+            self._require_room(where)
+            self.zones.append(self._remarked(draft, remarks))
+
+    def _require_room(self, where: str) -> None:
+        if len(self.zones) + len(self.unsized) >= MAX_ZONES:
             raise InputError(f"the file has more than {MAX_ZONES} zones", where=where)
+
+    def _remarked(self, draft: ZoneDraft, remarks: Sequence[Remark]) -> ZoneDraft:
         of_file = tuple((f"{self.path.name}: {sentence}", detail) for sentence, detail in remarks)
-        self.zones.append(replace(draft, remarks=of_file))
+        return replace(draft, remarks=of_file)

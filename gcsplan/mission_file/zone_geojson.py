@@ -1,4 +1,4 @@
-"""Zones from GeoJSON (RFC 7946): Polygons are prisms, Points with ``radius_m`` cylinders; a hole counts as no-fly."""
+"""Zones from GeoJSON (RFC 7946): Polygons, Points and lines, whose sizes are in their properties or in the mission."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_attributes import RADIUS, Attribute, Said, is_number, read_attributes, shown
+from gcsplan.mission_file.zone_attributes import SIZES, Attribute, Said, is_number, read_attributes, shown
 from gcsplan.mission_file.zone_file import Drawn, ZoneFile
 
 ALTITUDES = "the altitudes of corners are not read as limits"
@@ -67,7 +67,7 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         return
     # gcsplan's own mission.geojson contains tracks and way points beside the zones; they are skipped.
     drawn = {"track": ("LineString", "MultiLineString"), "waypoint": ("Point",)}.get(str(properties.get("kind")), ())
-    if geometry.get("type") in drawn and not any(key.lower() == RADIUS for key in properties):
+    if geometry.get("type") in drawn and not any(key.lower() in SIZES for key in properties):
         return
     said = read_attributes(_attributes(properties, geometry, where), fallback, found.problems)
     if said is None:
@@ -86,9 +86,25 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         for i, rings in enumerate(polygons):
             part = said.name if kind == "Polygon" else f"{said.name}/{i + 1}"
             _rings(found, rings, said, part, where, at if kind == "Polygon" else f"{at}[{i}]")
+    elif kind in ("LineString", "MultiLineString", "MultiPoint"):
+        parts = [coordinates] if kind == "LineString" else coordinates
+        if not isinstance(parts, list) or not parts:
+            found.problems.append(Problem(at, f"a {kind} needs a list of coordinates, given {shown(parts)}"))
+            return
+        for i, one in enumerate(parts):
+            part = said.name if kind == "LineString" else f"{said.name}/{i + 1}"
+            place = at if kind == "LineString" else f"{at}[{i}]"
+            if kind == "MultiPoint":
+                centre = _position(found, one, place)
+                if centre is not None:
+                    found.add_circle(said, part, where, centre, _unread([one]).remarks)
+            else:
+                _line(found, one, said, part, where, place)
     else:
         found.problems.append(
-            Problem(where, f"must be a Polygon, a MultiPolygon or a Point with radius_m, given {shown(kind)}")
+            Problem(
+                where, f"must be a Polygon, a Point with radius_m or a LineString with buffer_m, given {shown(kind)}"
+            )
         )
 
 
@@ -112,14 +128,29 @@ def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: s
         found.problems.append(Problem(at, f"a polygon is a list of rings, given {shown(rings)}"))
         return
     found.holes += len(rings) - 1
-    outline = []
-    for i, position in enumerate(rings[0]):
-        point = _position(found, position, f"{at}[0][{i}]")
+    outline = _positions(found, rings[0], f"{at}[0]")
+    if outline is not None:
+        found.add_ring(said, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]))
+
+
+def _line(found: ZoneFile, positions: Any, said: Said, part: str, where: str, at: str) -> None:
+    if not isinstance(positions, list):
+        found.problems.append(Problem(at, f"a line is a list of positions, given {shown(positions)}"))
+        return
+    line = _positions(found, positions, at)
+    if line is not None:
+        found.add_line(said, part, where, line, at.removeprefix(where).removeprefix("."), _unread(positions).remarks)
+
+
+def _positions(found: ZoneFile, positions: list[Any], at: str) -> list[tuple[float, float]] | None:
+    """Every position as (latitude, longitude); None, and a problem, if one is none."""
+    points = []
+    for i, position in enumerate(positions):
+        point = _position(found, position, f"{at}[{i}]")
         if point is None:
-            return
-        outline.append(point)
-    key = at.removeprefix(where).removeprefix(".")
-    found.add_ring(said, part, where, outline, key, _unread(rings[0]))
+            return None
+        points.append(point)
+    return points
 
 
 def _position(found: ZoneFile, position: Any, where: str) -> tuple[float, float] | None:

@@ -1,4 +1,4 @@
-"""Zones from KML: Placemarks with Polygons, or with Points whose ExtendedData has ``radius_m``.
+"""Zones from KML: Placemarks with Polygons, Points and LineStrings, whose sizes are in ExtendedData or in the mission.
 
 Floors and ceilings come from ExtendedData. A polygon without them that is drawn from its altitude down to the ground
 (``extrude``) has its highest altitude as the ceiling, above the ground or above sea level as altitudeMode says. Other
@@ -16,7 +16,7 @@ import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_attributes import RADIUS, Attribute, Said, as_figure, read_attributes
+from gcsplan.mission_file.zone_attributes import SIZES, Attribute, Said, as_figure, read_attributes
 from gcsplan.mission_file.zone_file import NOT_DRAWN, Drawn, ZoneFile
 from gcsplan.mission_file.zone_levels import LARGEST_M
 from gcsplan.world.zones import Level
@@ -30,7 +30,8 @@ Corner = tuple[float, float, float]
 
 READ = "the ceiling is the height to which the zone is drawn; one over the ground follows it point by point"
 NOT_READ = "the drawn altitudes are not read as limits"
-_SHAPES = ("Polygon", "Point", "LineString", "LinearRing", "Model", "Track", "MultiTrack")
+_READ_SHAPES = ("Polygon", "Point", "LineString")
+_SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
 
 
 def read_kml(path: Path, data: bytes) -> ZoneFile:
@@ -79,12 +80,15 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     said = read_attributes(given, f"{found.path.stem}[{number}]", found.problems)
     if said is None:
         return
-    shapes = [e for e in _walk(placemark, found.path, leaves=("Polygon", "Point")) if _kind(e) in _SHAPES]
-    others = [_kind(e) for e in shapes if _kind(e) not in ("Polygon", "Point")]
+    shapes = [e for e in _walk(placemark, found.path, leaves=_READ_SHAPES) if _kind(e) in _SHAPES]
+    others = [_kind(e) for e in shapes if _kind(e) not in _READ_SHAPES]
     if others or not shapes:
         kind = others[0] if others else "none"
         found.problems.append(
-            Problem(where, f"its geometry must be Polygons, or Points with radius_m in ExtendedData, given {kind}")
+            Problem(
+                where,
+                f"its geometry must be Polygons, Points with a radius_m or LineStrings with a buffer_m, given {kind}",
+            )
         )
         return
     for i, shape in enumerate(shapes):
@@ -95,6 +99,10 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
                 found.add_circle(said, part, where, points[0][:2], _unread(points).remarks)
             elif points is not None:
                 found.problems.append(Problem(where, f"a Point has one coordinate, given {len(points)}"))
+        elif _kind(shape) == "LineString":
+            points = _coordinates(found, shape, where)
+            if points is not None:
+                found.add_line(said, part, where, [p[:2] for p in points], "", _unread(points).remarks)
         else:
             _polygon(found, shape, said, part, where)
 
@@ -174,5 +182,5 @@ def _extended_data(placemark: Any, where: str) -> list[Attribute]:
             key = element.get("name", "")
             texts = [element] if _kind(element) == "SimpleData" else [e for e in element if _kind(e) == "value"]
             text = next((e.text or "" for e in texts), "").strip()
-            given.append(Attribute(key, as_figure(text) if key.lower() == RADIUS else text, f"{where}.{key[:80]}"))
+            given.append(Attribute(key, as_figure(text) if key.lower() in SIZES else text, f"{where}.{key[:80]}"))
     return given

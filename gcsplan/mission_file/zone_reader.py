@@ -1,30 +1,55 @@
-"""Zones from a file of either format, GeoJSON or KML, chosen by its name."""
+"""Zones from a file of any format, chosen by its name."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from gcsplan.errors import InputError
+from gcsplan.mission_file.zone_csv import read_csv
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_geojson import read_geojson
 from gcsplan.mission_file.zone_kml import read_kml
+from gcsplan.mission_file.zone_zip import unpack
 
 MAX_BYTES = 20_000_000
+"""Most bytes of a file, and of what is unpacked from one."""
+
+VECTOR = (".gpkg", ".shp", ".fgb", ".zip")
+KINDS = (".geojson", ".json", ".kml", ".kmz", ".csv", *VECTOR)
 
 
-def read_zones(path: Path, *, where: str) -> ZoneFile:
-    """The zones of a .geojson, .json or .kml file.
+def read_zones(
+    path: Path, *, where: str, radius_m: float | None = None, buffer_m: float | None = None, layer: str | None = None
+) -> ZoneFile:
+    """The zones of a file in any of the formats.
 
-    ``where`` is the key that the zones belong to. Mistakes in single features are collected in ``problems``; a file
-    that cannot be read at all raises InputError.
+    ``where`` is the key that the zones belong to, ``radius_m`` the radius of points and ``buffer_m`` the half-width
+    around lines that have none of their own, ``layer`` the only layer to read.
+
+    Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
-    if kind not in (".geojson", ".json", ".kml"):
-        hint = " (unpack a .kmz first: it is a zip of a .kml)" if kind == ".kmz" else ""
-        raise InputError(f"zones are read from .geojson, .json and .kml files, given {path.name}{hint}", where=where)
-    data = _bytes(path, where)
+    if kind not in KINDS:
+        known = ", ".join(KINDS[:-1])
+        raise InputError(f"zones are read from {known} and {KINDS[-1]} files, given {path.name}", where=where)
+    if layer is not None and kind not in VECTOR:
+        raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
+    found = _read(path, kind, _bytes(path, where), layer)
+    found.give_sizes(radius_m, buffer_m)
+    return found
+
+
+def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
     if kind == ".kml":
         return read_kml(path, data)
+    if kind == ".kmz":
+        return read_kml(path, unpack(path, data, [".kml"], MAX_BYTES)[".kml"])
+    if kind == ".csv":
+        return read_csv(path, data)
+    if kind in VECTOR:
+        from gcsplan.mission_file.zone_vector import read_vector  # most missions need neither it nor PROJ's database
+
+        return read_vector(path, data, layer=layer, most_bytes=MAX_BYTES)
     return read_geojson(path, data)
 
 

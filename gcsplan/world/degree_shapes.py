@@ -1,7 +1,8 @@
-"""Circles and polygons in degrees, converted to the plane and cut to the part near enough to matter.
+"""Circles, polygons and corridors in degrees, converted to the plane and cut to the part near enough to matter.
 
 The plane cannot hold points a quarter of the globe away, and it bends long edges. So zones and fences are converted
-here: polygons, whose edges are straight in degrees, are cut in degrees to the mission's neighbourhood and projected.
+here: polygons and lines, straight in degrees from point to point, are cut in degrees to the mission's neighbourhood
+and projected.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.errors import InputError
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.zones import Circle, Polygon
 
@@ -25,8 +27,17 @@ Corner = tuple[float, float]
 LARGEST_RADIUS_M = 100_000.0
 """Largest radius, m: a circle in the plane is one on the ground only where the plane's scale hardly changes over it."""
 
+LARGEST_BUFFER_M = 20_000.0
+"""Largest half-width of a corridor, m."""
+
 EDGE_BOW_M = 0.05
 """An edge is straight in degrees; it is cut until its pieces in the plane are this near to it, m."""
+
+SIMPLER_M, SIMPLER_PART = 0.5, 0.005
+"""A corridor leaves out what bends its line by less than the first, m, and this part of its half-width."""
+
+WIDER_PART, MOST_WIDENINGS = 0.005, 8
+"""A corridor is drawn wider by this part of its half-width until it holds all that it must, so many times at most."""
 
 FAR_M = 1.6 * FARTHEST_M
 """No mission goes farther than this from the frame's origin, m."""
@@ -48,12 +59,61 @@ def near_polygons(ring: Sequence[Corner], frame: Frame) -> list[Polygon]:
 
     Its edges are cut to keep `EDGE_BOW_M`.
     """
-    points = unwrapped(ring, frame.lon_deg)
-    tall = math.degrees(FAR_M / 6_350_000.0)
+    parts = _near_parts(unwrapped(ring, frame.lon_deg), frame)
+    cut = [_cut_edges(part, np.roll(part, -1, axis=0), frame) for part in parts]
+    return [counter_clockwise(frame.to_plane(points[:, 1], points[:, 0])) for points in cut]
+
+
+def near_corridors(line: Sequence[Corner], buffer_m: float, frame: Frame, *, local: bool = False) -> list[Polygon]:
+    """Polygons that together hold every point within ``buffer_m`` of the line; none if it is too far away.
+
+    ``line`` is (latitude, longitude), straight in degrees from point to point, or (east_m, north_m) if ``local``. The
+    polygons have no holes: where a line surrounds a place, its parts have polygons of their own. They reach beyond the
+    buffer by at most 5 % and 0.1 m.
+    """
+    if local:
+        parts = [np.asarray(line, float)]
+    else:
+        near = _near_parts(unwrapped(line, frame.lon_deg), frame, spare_m=buffer_m, is_line=True)
+        cut = [np.concatenate([_cut_edges(part[:-1], part[1:], frame), part[-1:]]) for part in near]
+        parts = [frame.to_plane(points[:, 1], points[:, 0]) for points in cut]
+    corridors = []
+    for points in parts:
+        scale = frame.scale_at(float(np.hypot(points[:, 0], points[:, 1]).max()) + buffer_m)
+        corridors += [counter_clockwise(ring) for ring in _rings_around(points, buffer_m * scale + EDGE_BOW_M)]
+    return corridors
+
+
+def _rings_around(points: Floats, buffer_m: float) -> list[Floats]:
+    """The outlines, not closed, of polygons without holes that hold every point within ``buffer_m`` of a line."""
+    import shapely
+
+    line = shapely.LineString(points)
+    # Corners closer to their neighbours' line than this are left out; the buffer that follows is measured from all.
+    plain = line.simplify(min(SIMPLER_M, SIMPLER_PART * buffer_m))
+    for more in range(1, MOST_WIDENINGS + 1):
+        # A polygon of chords lies inside the round outline, so it is drawn wider until no point of it is too near.
+        shape = shapely.buffer(plain, buffer_m * (1.0 + WIDER_PART * more), quad_segs=12)
+        # GEOS loses a part of some lines that are closed and cross themselves.
+        if shape.geom_type != "Polygon" or shape.interiors or not shape.contains(line):
+            break
+        if shape.exterior.distance(line) >= buffer_m:
+            return [np.asarray(shape.exterior.coords)[:-1]]
+    if len(points) > 2:
+        half = len(points) // 2
+        return _rings_around(points[: half + 1], buffer_m) + _rings_around(points[half:], buffer_m)
+    raise InputError(
+        f"no corridor of {buffer_m:g} m was found around a line of {len(points)} points; simplify the line"
+    )
+
+
+def _near_parts(points: Floats, frame: Frame, *, spare_m: float = 0.0, is_line: bool = False) -> list[Floats]:
+    """The parts of a polygon or line (N, 2) longitude, latitude within `FAR_M` and ``spare_m``, not closed."""
+    tall = math.degrees((FAR_M + spare_m) / 6_350_000.0)
     wide = min(tall / math.cos(math.radians(min(abs(frame.lat_deg) + tall, 89.0))), 80.0)
     south, north = frame.lat_deg - tall, frame.lat_deg + tall
     window = (frame.lon_deg - wide, south, frame.lon_deg + wide, north)
-    rings: list[Floats] = []
+    found: list[Floats] = []
     for turn in (0.0, -360.0, 360.0):
         turned = points + np.array([turn, 0.0])
         low, high = turned.min(axis=0), turned.max(axis=0)
@@ -63,14 +123,12 @@ def near_polygons(ring: Sequence[Corner], frame: Frame) -> list[Polygon]:
         if low[0] < window[0] or high[0] > window[2] or low[1] < south or high[1] > north:
             import shapely
 
-            cut = shapely.intersection(shapely.Polygon(turned), shapely.box(*window))
-            parts = [
-                np.asarray(p.exterior.coords)[:-1]
-                for p in getattr(cut, "geoms", [cut])
-                if p.geom_type == "Polygon" and not p.is_empty
-            ]
-        rings += [_cut_edges(part, frame) for part in parts]
-    return [counter_clockwise(frame.to_plane(ring[:, 1], ring[:, 0])) for ring in rings]
+            whole = (shapely.LineString if is_line else shapely.Polygon)(turned)
+            cut = shapely.intersection(whole, shapely.box(*window))
+            near = [p for p in getattr(cut, "geoms", [cut]) if p.geom_type == whole.geom_type and not p.is_empty]
+            parts = [np.asarray(p.coords) if is_line else np.asarray(p.exterior.coords)[:-1] for p in near]
+        found += parts
+    return found
 
 
 def counter_clockwise(vertices: Floats) -> Polygon:
@@ -105,13 +163,12 @@ def unwrapped(points: Sequence[Corner], near_lon_deg: float) -> Floats:
     return np.stack([p[:, 1] + 360.0 * np.round((lon - p[:, 1]) / 360.0), p[:, 0]], axis=-1)
 
 
-def _cut_edges(ring: Floats, frame: Frame) -> Floats:
-    """The ring (N, 2) longitude, latitude with every edge cut into equal pieces near their chords in the plane."""
-    following = np.roll(ring, -1, axis=0)
-    bow = frame.bow_m(ring[:, ::-1], following[:, ::-1])
+def _cut_edges(begins: Floats, ends: Floats, frame: Frame) -> Floats:
+    """The edges (N, 2) longitude, latitude cut into pieces near their chords in the plane, without the last end."""
+    bow = frame.bow_m(begins[:, ::-1], ends[:, ::-1])
     pieces = np.maximum(1, np.ceil(np.sqrt(bow / EDGE_BOW_M))).astype(int)
     return np.concatenate(
-        [a + (b - a) * (np.arange(n) / n)[:, None] for a, b, n in zip(ring, following, pieces, strict=True)]
+        [a + (b - a) * (np.arange(n) / n)[:, None] for a, b, n in zip(begins, ends, pieces, strict=True)]
     )
 
 

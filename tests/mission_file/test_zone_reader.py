@@ -170,7 +170,7 @@ def test_a_polygon_across_the_antimeridian_is_one_zone(tmp_path: Path, lon_deg: 
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (collection(point(-84.3, 36.6)), "features[0]: a Point needs radius_m"),
+        (collection(point(-84.3, 36.6)), "features[0]: a point needs a radius to be a zone: give each a radius_m"),
         (collection(point(-84.3, 36.6, radius_m="60")), "features[0].properties.radius_m: must be a number"),
         (collection(point(-84.3, 36.6, radius_m=True)), "must be a number"),
         (collection(point(-84.3, 36.6, radius_m=-1)), "radius_m: must be above 0"),
@@ -180,7 +180,12 @@ def test_a_polygon_across_the_antimeridian_is_one_zone(tmp_path: Path, lon_deg: 
         (collection(square(ceiling_agl_m=0)), "under ground"),
         (collection(square(floor_agl_m=-3)), "at least 0"),
         (collection(feature(None)), "no geometry"),
-        (collection(feature({"type": "LineString", "coordinates": SQUARE})), "must be a Polygon"),
+        (collection(feature({"type": "LineString", "coordinates": SQUARE})), "a line needs a corridor's half-width"),
+        (collection(feature({"type": "LineString", "coordinates": SQUARE[:1]}, buffer_m=5)), "at least 2 different"),
+        (collection(feature({"type": "LineString", "coordinates": 5}, buffer_m=5)), "a line is a list of positions"),
+        (collection(feature({"type": "LineString", "coordinates": SQUARE}, buffer_m=0)), "buffer_m: must be above 0"),
+        (collection(feature({"type": "MultiPoint", "coordinates": []}, radius_m=5)), "needs a list of coordinates"),
+        (collection(feature({"type": "Circle"})), "must be a Polygon, a Point with radius_m or a LineString"),
         (collection(feature({"type": "Polygon", "coordinates": []})), "list of rings"),
         (collection(feature({"type": "Polygon", "coordinates": [SQUARE[:2]]})), "at least 3 different points"),
         (collection(feature({"type": "Polygon", "coordinates": [[[0, 0], [1, 1], [2, 2]]]})), "in order around it"),
@@ -212,9 +217,9 @@ def test_every_mistake_of_a_file_is_told_at_once(tmp_path: Path) -> None:
     assert len(found.zones) == 1
 
 
-@pytest.mark.parametrize("name", ["zones.shp", "zones.kmz", "zones"])
+@pytest.mark.parametrize("name", ["zones.dxf", "zones.txt", "zones"])
 def test_other_formats_are_refused(tmp_path: Path, name: str) -> None:
-    assert ".geojson, .json and .kml" in messages(tmp_path, collection(square()), name)
+    assert ".geojson, .json, .kml, .kmz, .csv" in messages(tmp_path, collection(square()), name)
 
 
 def test_missing_and_oversized_files_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -279,9 +284,9 @@ def test_a_multigeometry_becomes_several_zones(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (BODY.format("<Point><coordinates>-84.3,36.6</coordinates></Point>"), "needs radius_m"),
-        (BODY.format("<name>way</name><LineString/>"), "Placemark 1 (way): its geometry must be Polygons"),
-        (BODY.format(f"<MultiGeometry><Polygon>{GOOD}</Polygon><LineString/></MultiGeometry>"), "given LineString"),
+        (BODY.format("<Point><coordinates>-84.3,36.6</coordinates></Point>"), "a point needs a radius"),
+        (BODY.format("<name>way</name><LineString/>"), "Placemark 1 (way): has no coordinates"),
+        (BODY.format(f"<MultiGeometry><Polygon>{GOOD}</Polygon><LinearRing/></MultiGeometry>"), "given LinearRing"),
         (BODY.format(""), "given none"),
         (BODY.format("<Polygon/>"), "one outerBoundaryIs"),
         (BODY.format(f"<Polygon>{RING.format('')}</Polygon>"), "no coordinates"),

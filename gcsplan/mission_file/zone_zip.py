@@ -1,0 +1,47 @@
+"""Zip archives of zone files, KMZ and zipped Shapefiles: one member is unpacked, never more than is allowed."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+
+from gcsplan.errors import InputError
+
+
+def unpack(
+    path: Path, data: bytes, kinds: Sequence[str], most_bytes: int, beside: Sequence[str] = ()
+) -> dict[str, bytes]:
+    """The one file of ``kinds`` (suffixes in lower case) in an archive, then those ``beside`` it, by their suffixes.
+
+    Raises InputError if there is none or more than one, if they have more than ``most_bytes`` together, and if the
+    archive is damaged or encrypted.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            # Programs of Apple add files ._NAME below __MACOSX, which are none of the user's.
+            names = [PurePosixPath(n) for n in archive.namelist() if not PurePosixPath(n).name.startswith("._")]
+            found = [n for n in names if n.suffix.lower() in kinds]
+            if len(found) != 1:
+                inside = ", ".join(str(n)[:60] for n in (found or names)[:6]) or "nothing"
+                words = f"the archive must hold one {' or '.join(kinds)} file, given {inside}"
+                cure = "; unpack it, and name each file in no_fly" if len(found) > 1 else ""
+                raise InputError(words + cure, where=str(path))
+            main = found[0]
+            companions = [n for n in names if n.with_suffix("") == main.with_suffix("") and n.suffix.lower() in beside]
+            unpacked: dict[str, bytes] = {}
+            for name in dict.fromkeys([main, *companions]):
+                with archive.open(str(name)) as member:
+                    unpacked[name.suffix.lower()] = member.read(most_bytes + 1)
+                # What the archive says of sizes may be a lie, so that the bytes themselves are counted.
+                if sum(len(content) for content in unpacked.values()) > most_bytes:
+                    words = f"unpacks to more than {most_bytes} bytes; simplify or split it"
+                    raise InputError(words, where=f"{path}: {name}")
+            return unpacked
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError, NotImplementedError) as why:
+        if isinstance(why, InputError):
+            raise
+        words = f"this is not a sound zip archive ({str(why)[:100]}); unpack it, and name the file in it"
+        raise InputError(words, where=str(path)) from None

@@ -1,0 +1,81 @@
+"""Corridors around lines: nothing within the buffer is outside, and little beyond it is inside."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyproj import Geod
+
+from gcsplan.world.degree_shapes import near_corridors
+from gcsplan.world.frame import Frame
+from tests.support.effort import draws
+
+FRAME = Frame(46.5, 8.0)
+GEOD = Geod(ellps="WGS84")
+
+
+@settings(max_examples=draws(400))
+@given(st.integers(2, 40), st.floats(0.1, 5000.0), st.floats(1.0, 20_000.0), st.integers(0, 10**6), st.booleans())
+def test_a_corridor_in_metres_holds_its_buffer_and_little_more(
+    corners: int, buffer_m: float, step_m: float, seed: int, closed: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.normal(0.0, step_m, (corners, 2)), axis=0)
+    if closed:
+        points = np.concatenate([points, points[:1]])
+    polygons = [shapely.Polygon(p.vertices) for p in near_corridors(points.tolist(), buffer_m, FRAME, local=True)]
+    assert all(p.is_valid and shapely.is_ccw(p.exterior) for p in polygons)
+    line = shapely.LineString(points)
+    # Places at the buffer's very edge, and at what may be kept clear at most.
+    for part, inside in ((0.999999, True), (1.06, False)):
+        turn = rng.uniform(0.0, 2.0 * math.pi, 200)
+        reach = part * buffer_m + (0.0 if inside else 0.2)
+        along = shapely.get_coordinates(line.interpolate(rng.uniform(0.0, 1.0, 200), normalized=True))
+        at = shapely.points(along + reach * np.stack([np.cos(turn), np.sin(turn)], axis=-1))
+        held = np.any([shapely.contains(p, at) for p in polygons], axis=0)
+        away = shapely.distance(line, at)
+        assert held.all() if inside else not held[away >= reach * (1.0 - 1e-9)].any()
+
+
+def test_a_corridor_in_degrees_holds_what_lies_on_the_ground_within_its_buffer() -> None:
+    line = [(46.0, 6.6), (46.9, 8.3), (46.2, 9.4)]
+    rng = np.random.default_rng(5)
+    (polygon,) = (shapely.Polygon(p.vertices) for p in near_corridors(line, 300.0, FRAME))
+    for begin, end in itertools.pairwise(line):
+        part = rng.uniform(0.0, 1.0, 2000)[:, None]
+        at = np.asarray(begin) + part * (np.asarray(end) - np.asarray(begin))  # straight in degrees
+        lon, lat, _ = GEOD.fwd(at[:, 1], at[:, 0], rng.uniform(0, 360, 2000), np.full(2000, 299.999))
+        east_north = FRAME.to_plane(lat, lon)
+        assert shapely.contains_xy(polygon, east_north[:, 0], east_north[:, 1]).all()
+    assert polygon.area < 1.05 * (GEOD.line_length(*zip(*[p[::-1] for p in line], strict=True)) * 600.0 + math.pi * 9e4)
+
+
+def test_a_line_that_surrounds_a_place_leaves_it_free() -> None:
+    turn = np.linspace(0.0, 2.0 * math.pi, 73)
+    circle = np.stack([1000.0 * np.cos(turn), 1000.0 * np.sin(turn)], axis=-1)
+    polygons = [shapely.Polygon(p.vertices) for p in near_corridors(circle.tolist(), 50.0, FRAME, local=True)]
+    assert len(polygons) == 2
+    assert not any(p.contains(shapely.Point(0.0, 0.0)) for p in polygons)
+    wanted = math.pi * (1050.0**2 - 950.0**2)
+    assert wanted < shapely.union_all(polygons).area < 1.06 * wanted
+
+
+def test_a_line_across_a_country_is_cut_to_the_mission_s_world() -> None:
+    line = [(30.0, -20.0), (46.5, 8.0), (60.0, 40.0)]
+    (polygon,) = (shapely.Polygon(p.vertices) for p in near_corridors(line, 1000.0, FRAME))
+    assert polygon.contains(shapely.Point(0.0, 0.0))
+    assert max(abs(x) for x in polygon.bounds) < 400_000.0
+    assert near_corridors([(46.5, 100.0), (46.5, 101.0)], 1000.0, FRAME) == []
+
+
+@pytest.mark.parametrize("lon_deg", [179.99, -179.99])
+def test_a_line_across_the_antimeridian_is_one_corridor(lon_deg: float) -> None:
+    (corridor,) = near_corridors([(10.0, 179.98), (10.0, -179.98)], 100.0, Frame(10.0, lon_deg))
+    area_m2 = shapely.Polygon(corridor.vertices).area
+    assert area_m2 == pytest.approx(0.04 * 109_640 * 200 + math.pi * 100**2, rel=0.02)
