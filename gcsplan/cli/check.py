@@ -10,6 +10,7 @@ import typer
 from gcsplan.cli.ending import complain, emit, printable
 from gcsplan.cli.options import (
     JsonOption,
+    ListZonesOption,
     RequireWayHomeOption,
     UnitsName,
     UnitsOption,
@@ -83,6 +84,7 @@ def check(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE.html", help="Also write the report: map, profiles, tables.")
     ] = None,
+    list_zones: ListZonesOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Check whether .waypoints or .plan files, of any origin, fly safely.
@@ -94,11 +96,20 @@ def check(
     Every leg is judged along its whole length, as the autopilot flies it: jumps, loiters, take-off, landing, speeds,
     each altitude frame. The exit code is 0 if all pass, 4 on a violation or if anything could not be judged, 2 if a
     file cannot be read. A return that is not safe is a warning, unless a safe one is required.
+
+    With --list-zones a FILE may also be a file of zones.
     """
     from gcsplan.app import checking, outputs
     from gcsplan.export.outdir import steady
     from gcsplan.units import units_of
 
+    if list_zones:
+        from gcsplan.cli.zone_list import show_zones
+
+        named = [Path(f) for f in (*files, *(zones or [])) if Path(f).suffix.lower() not in (".waypoints", ".plan")]
+        if not named:
+            raise UsageError("--list-zones: of which zones? Give a mission file (.yaml) or a file of zones, too")
+        return show_zones(named, units_of(units), as_json=as_json)
     given: dict[str, object] = {
         "--dem": dem, "--vertical-datum": vertical_datum, "--geoid-grid": geoid_grid, "--crs": crs,
         "--obstacle-height": obstacle_height, "--zones": zones, "--min-agl": min_agl, "--max-agl": max_agl,

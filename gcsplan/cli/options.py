@@ -39,6 +39,12 @@ UnitsOption = Annotated[
 ]
 MissionArgument = Annotated[Path, typer.Argument(metavar="MISSION.yaml", help="The mission file, or sample:NAME.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
+ListZonesOption = Annotated[
+    bool,
+    typer.Option(
+        "--list-zones", help="Show what was understood of each zone: shape, size, floor, ceiling. Nothing else is done."
+    ),
+]
 UnjudgedOption = Annotated[
     bool, typer.Option("--allow-unjudged", help="Accept a mission of which something could not be judged.")
 ]

@@ -16,6 +16,7 @@ from gcsplan.cli.options import (
     ArmedOption,
     AtomicOption,
     JsonOption,
+    ListZonesOption,
     MissionArgument,
     PlaceOption,
     RequireWayHomeOption,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
     from gcsplan.app.model import Plan
     from gcsplan.app.upload_job import JobResult, UploadJob, UploadOptions
+    from gcsplan.units import Units
 
 SHOWN = 15
 """Names of written files that are printed at most; a fleet has hundreds of files."""
@@ -95,6 +97,7 @@ def plan(
     ignore_position: PlaceOption = False,
     atomic: AtomicOption = False,
     timeout: TimeoutOption = 60.0,
+    list_zones: ListZonesOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a mission file, write its outputs, and upload and verify them on request.
@@ -113,6 +116,8 @@ def plan(
     from gcsplan.units import units_of
 
     system = units_of(units)
+    if list_zones:
+        return _list_zones(mission, system, upload, as_json)
     directory = Path(file_of(mission).stem) if out is None else out
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     each = _require_options(planner, objective, png, directory)
@@ -179,6 +184,14 @@ def plan(
     if as_json:
         emit(outputs.summary_of(planned, results, homes), uploads.failure(results) if targets else None)
     raise typer.Exit(uploads.exit_code(results) if targets else 0)
+
+
+def _list_zones(mission: Path, units: Units, upload: list[str] | None, as_json: bool) -> None:
+    from gcsplan.cli.zone_list import show_zones
+
+    if upload:
+        raise UsageError("--list-zones plans nothing, so that nothing can be sent; leave --upload out")
+    show_zones([mission], units, as_json=as_json)
 
 
 def _require_options(planner: str | None, objective: str | None, png: Path | None, directory: Path) -> bool:

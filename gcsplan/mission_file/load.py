@@ -103,6 +103,12 @@ def load_mission(
     return _Reading(file, where, raw, written, planner_names, around).mission()
 
 
+def read_no_fly(source: str | os.PathLike[str]) -> tuple[list[ZoneDraft], list[str]]:
+    """The zones of a mission file, and the notes on them; nothing else in it needs to be right. Raises InputError."""
+    file, where, raw, written = read_content(source, None)
+    return _Reading(file, where, raw, written, None, ()).zones_alone()
+
+
 class _Reading:
     """One pass over one file: the steps in order, and the problems found so far."""
 
@@ -181,6 +187,16 @@ class _Reading:
             notes=tuple(dict.fromkeys(self.notes)), way_home=way_home, geoid=site.terrain.geoid,
         )  # fmt: skip
         return replace(source, wider=partial(site.wider, source), reaching=self._reaching)
+
+    def zones_alone(self) -> tuple[list[ZoneDraft], list[str]]:
+        """The zones, far ones too, and the notes on them. Raises InputError."""
+        start = f"{self.where}no_fly"
+        self.problems = [p for p in self.problems if p.where.startswith(start)]
+        self.notes = []
+        drafts = self._zones()
+        if self.problems:
+            raise InputError.of(self._with_lines([self.units.as_written(p) for p in self.problems]))
+        return drafts, list(dict.fromkeys(self.notes))
 
     def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
         where = self.where.removesuffix(": ")
