@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
@@ -38,6 +39,9 @@ SIMPLER_M, SIMPLER_PART = 0.5, 0.005
 
 WIDER_PART, MOST_WIDENINGS = 0.005, 8
 """A corridor is drawn wider by this part of its half-width until it holds all that it must, so many times at most."""
+
+METRES_OF_DEGREE = 111_700.0
+"""A degree of a meridian or of the equator is shorter, m."""
 
 FAR_M = 1.6 * FARTHEST_M
 """No mission goes farther than this from the frame's origin, m."""
@@ -114,11 +118,12 @@ def _near_parts(points: Floats, frame: Frame, *, spare_m: float = 0.0, is_line: 
     south, north = frame.lat_deg - tall, frame.lat_deg + tall
     window = (frame.lon_deg - wide, south, frame.lon_deg + wide, north)
     found: list[Floats] = []
+    (west_most, south_most), (east_most, north_most) = points.min(axis=0), points.max(axis=0)
     for turn in (0.0, -360.0, 360.0):
-        turned = points + np.array([turn, 0.0])
-        low, high = turned.min(axis=0), turned.max(axis=0)
+        low, high = (west_most + turn, south_most), (east_most + turn, north_most)
         if low[0] >= window[2] or high[0] <= window[0] or low[1] >= north or high[1] <= south:
             continue
+        turned = points + np.array([turn, 0.0])
         parts: list[Floats] = [turned]
         if low[0] < window[0] or high[0] > window[2] or low[1] < south or high[1] > north:
             import shapely
@@ -164,12 +169,29 @@ def unwrapped(points: Sequence[Corner], near_lon_deg: float) -> Floats:
 
 
 def _cut_edges(begins: Floats, ends: Floats, frame: Frame) -> Floats:
-    """The edges (N, 2) longitude, latitude cut into pieces near their chords in the plane, without the last end."""
-    bow = frame.bow_m(begins[:, ::-1], ends[:, ::-1])
-    pieces = np.maximum(1, np.ceil(np.sqrt(bow / EDGE_BOW_M))).astype(int)
-    return np.concatenate(
-        [a + (b - a) * (np.arange(n) / n)[:, None] for a, b, n in zip(begins, ends, pieces, strict=True)]
-    )
+    """The edges (N, 2) longitude, latitude cut into equal pieces near their chords in the plane, without the last
+    end."""
+    long = _may_bow(begins, ends)
+    if not long.any():
+        return begins
+    pieces = np.ones(len(begins), int)
+    bow = frame.bow_m(begins[long, ::-1], ends[long, ::-1])
+    pieces[long] = np.maximum(1, np.ceil(np.sqrt(bow / EDGE_BOW_M))).astype(int)
+    edge = np.repeat(np.arange(len(begins)), pieces)
+    part = (np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[edge]
+    return np.asarray(begins[edge] + (ends - begins)[edge] * part[:, None])
+
+
+def _may_bow(start: Floats, end: Floats) -> NDArray[np.bool_]:
+    """(N,) whether edges, (N, 2) longitude, latitude, may lie farther than `EDGE_BOW_M` from their chords in the plane.
+
+    An edge of length s at latitude f bows by at most (0.18 tan f + 0.02) s²/R, a fifth of what is compared here.
+    Most outlines have many short edges, and to measure them takes longer than all else.
+    """
+    high, low = np.maximum(np.abs(start[:, 1]), np.abs(end[:, 1])), np.minimum(np.abs(start[:, 1]), np.abs(end[:, 1]))
+    lon, lat = METRES_OF_DEGREE * np.abs(end - start).T
+    squared = (lon * np.cos(np.radians(low))) ** 2 + lat**2
+    return np.asarray((np.tan(np.radians(np.minimum(high, 89.9))) + 0.1) * squared > EDGE_BOW_M * 6.3e6)
 
 
 def _why_invalid(shape: shapely.Polygon, local: bool) -> str:

@@ -1,4 +1,4 @@
-"""Corridors around lines: nothing within the buffer is outside, and little beyond it is inside."""
+"""Polygons and corridors in degrees, cut for the plane: by measured edges, and by places within a buffer."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
+from gcsplan.world import degree_shapes
 from gcsplan.world.degree_shapes import near_corridors
 from gcsplan.world.frame import Frame
 from tests.support.effort import draws
@@ -79,3 +80,18 @@ def test_a_line_across_the_antimeridian_is_one_corridor(lon_deg: float) -> None:
     (corridor,) = near_corridors([(10.0, 179.98), (10.0, -179.98)], 100.0, Frame(10.0, lon_deg))
     area_m2 = shapely.Polygon(corridor.vertices).area
     assert area_m2 == pytest.approx(0.04 * 109_640 * 200 + math.pi * 100**2, rel=0.02)
+
+
+@pytest.mark.draws
+def test_the_cuts_are_those_of_edges_that_are_all_measured() -> None:
+    rng = np.random.default_rng(3)
+    for lat in (0.0, 47.0, -64.0, 80.0):
+        frame = Frame(lat, 8.0)
+        for scale in (0.003, 0.03, 0.3):
+            ring = np.array([8.0, lat]) + rng.uniform(-2.5, 2.5, 2) + scale * rng.uniform(-1, 1, (40, 2))
+            ring[:, 1] = np.clip(ring[:, 1], -84.0, 84.0)
+            following = np.roll(ring, -1, axis=0)
+            bow = frame.bow_m(ring[:, ::-1], following[:, ::-1])
+            pieces = np.maximum(1, np.ceil(np.sqrt(bow / degree_shapes.EDGE_BOW_M))).astype(int)
+            whole = [a + (b - a) * (np.arange(n) / n)[:, None] for a, b, n in zip(ring, following, pieces, strict=True)]
+            assert np.array_equal(degree_shapes._cut_edges(ring, following, frame), np.concatenate(whole))

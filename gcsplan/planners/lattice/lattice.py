@@ -179,6 +179,12 @@ def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) ->
         t = np.clip(((centre - a) * d).sum(-1) / np.maximum((d * d).sum(-1), 1e-300), 0.0, 1.0)
         off = a + t[:, None] * d - centre
         return np.asarray(np.hypot(off[:, 0], off[:, 1]) < shape.radius_m * scale + reach_m)
+    if not len(a):
+        return np.zeros(0, bool)
+    west, south, east, north = zone.bounds
+    low, high = np.minimum(a, b).min(axis=0) - reach_m - 1.0, np.maximum(a, b).max(axis=0) + reach_m + 1.0
+    if west > high[0] or east < low[0] or south > high[1] or north < low[1]:  # as most zones of a country's file are
+        return np.zeros(len(a), bool)
     import shapely  # most missions have no polygons
 
     polygon = shapely.Polygon(shape.vertices)
