@@ -6,14 +6,15 @@ plan`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from datetime import datetime
+import math
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime, timedelta
 from os import PathLike
 from typing import Any
 
 from gcsplan.app.fleet_planning import fleet_of
 from gcsplan.app.gate import GateTime
-from gcsplan.app.model import Brief, Plan, VehiclePlan
+from gcsplan.app.model import Brief, FleetPlan, Plan, VehiclePlan
 from gcsplan.app.planning import over_one_terrain
 from gcsplan.app.refusals import plan_or_explain
 from gcsplan.check.verdict import Verdict
@@ -69,7 +70,7 @@ def plan(
         (True, 900, (2, 3))
     """
     if not isinstance(source, MissionFile):
-        source = load_mission(source)
+        source = load_mission(source, departure=gate_utc)
     settings = source.planner
     name = planner or settings.name
     entry = get_planner(name)
@@ -83,11 +84,29 @@ def plan(
     brief, vehicles = over_one_terrain(brief, _one_by_one(brief, progress), progress)
     source = brief.source
     flown, fleet = fleet_of(vehicles, brief, None if gate_utc is None else GateTime(gate_utc))
+    require_within_hours(source, flown, fleet)
     notes = list(source.notes)
     if len(flown) > 1 and source.arrival is None:
         notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
     notes += fleet.notes
     return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet)
+
+
+def require_within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: FleetPlan) -> None:
+    """Raise InputError if a flight lasts beyond the hours for which zones were left out."""
+    hours = source.hours
+    if hours is None:
+        return
+    start = fleet.start_utc or hours.start
+    last_s, name = max((fleet.slot(v.name).arrive_s + v.verdict.time_s - v.verdict.arrive_s, v.name) for v in flown)
+    # A flight without end has no hours that hold it.
+    end = start + timedelta(seconds=math.ceil(min(last_s, 1e8)))
+    if start < hours.start or end > hours.end:
+        raise InputError(
+            f"zones were left out that do not apply from {hours}, but {name} flies from {start:%Y-%m-%d %H:%M}Z to "
+            f"{end:%Y-%m-%d %H:%M}Z; write at: [from, to] with all of the flight in it",
+            where=f"{source.path}: at",
+        )
 
 
 def _one_by_one(brief: Brief, progress: Callable[[str, Progress], None] | None) -> list[VehiclePlan]:

@@ -236,14 +236,12 @@ class _Run:
         return least, most
 
     def _widen_m(self, k: int, *, settled: bool = False) -> float:
-        """How much a leg is widened, m: until it has ``settled`` for a late or early turn before it, and for a circle
-        from which it starts."""
-        return self.corners[k].off_m * (REMAINS if settled else 1.0) + (self.behind_m if k == 0 else 0.0)
+        """How much a leg is widened, m: for a turn before it until it ``settled``, and for a circle at its start."""
+        return (REMAINS if settled else 1.0) * self.corners[k].off_m + (self.behind_m if k == 0 else 0.0)
 
     def _settled_m(self, k: int) -> float:
         """After how many metres of its straight part the aircraft is back on leg ``k``; 0 if it never leaves it."""
-        off_m = self.corners[k].off_m
-        return self._settles_m(k, off_m) if off_m > 0.0 else 0.0
+        return self._settles_m(k, self.corners[k].off_m) if self.corners[k].off_m > 0.0 else 0.0
 
     def _settles_m(self, k: int, off_m: float) -> float:
         return SETTLES_S * self.tuning.l1_slower * self.run[k].speed_m_s + off_m
@@ -260,10 +258,9 @@ class _Run:
         off = a.off_m + sag
         track = [(p, self.half_m[k] * (n - i) / max(n, 1), off) for i, p in reversed(list(enumerate(behind)))]
         done = float(self.half_m[k]) + max(float(self.straight_m[k]), 0.0)
-        settled_m = self._settled_m(k)
-        if settled_m < self.straight_m[k]:
+        if settled := (settled_m := self._settled_m(k)) < self.straight_m[k]:
             track.append((leaves + settled_m * along, float(self.half_m[k]) + settled_m, self._widen_m(k)))
-        track.append((reaches, done, self._widen_m(k, settled=settled_m < self.straight_m[k])))
+        track.append((reaches, done, self._widen_m(k, settled=settled)))
         ahead, sag = self._half_arc(reaches, heading, b.turn)
         n = len(ahead) - 1
         off = b.off_m + sag + (self.behind_m if k == 0 else 0.0)

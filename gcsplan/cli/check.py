@@ -48,7 +48,8 @@ def check(
     zones: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="FILE", help="A file of no-fly zones (.geojson, .kml, .kmz, .gpkg, .csv, …); may be repeated."
+            metavar="FILE",
+            help="No-fly zones: .geojson, .kml, .kmz, .gpkg, .csv, …, or a state's; may be repeated.",
         ),
     ] = None,
     min_agl: Annotated[Number, typer.Option(metavar="M", help="Lowest height above ground.")] = None,

@@ -124,7 +124,7 @@ def plan(
     if settle_outputs(directory):
         remark(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
     try:
-        source = pipeline.load_mission(mission)
+        source = pipeline.load_mission(mission, departure=None if gate is None else gate.start)
         targets: dict[str, str] = {}
         if upload or fence or fence_infinite:  # otherwise the upload modules need not be imported
             from gcsplan.app import fencing, uploads

@@ -14,6 +14,7 @@ from pathlib import Path
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
+from gcsplan.mission_file.airspace.left_out import faults_near, unused_notes, used
 from gcsplan.mission_file.complaints import read_section
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys
@@ -117,7 +118,8 @@ class OpenWorld:
                 f"the places lie more than {FARTHEST_M / 1000:.0f} km from their middle: too far for one plane",
                 where="--dem",
             )
-        placed, far = place_zones(self._drafts, frame)
+        drafts = used(self._drafts)
+        placed, far = place_zones(drafts, frame)
         # A swapped zone would belong to the mission; as it stands it would be left out, and flown through.
         problems = [
             Problem(draft.where, f"latitude and longitude of the zone {draft.name!r} look swapped")
@@ -125,6 +127,7 @@ class OpenWorld:
             if looks_swapped(draft, frame)
         ]
         box = self._box(in_plane, reach_m)
+        problems += faults_near(placed, box)
         scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
         surface = self._terrain.around(frame, box).load(frame, box)
         zones: list[Zone] = []
@@ -140,11 +143,11 @@ class OpenWorld:
             raise InputError.of([_renamed(p) for p in problems])
         notes = surface.info.get("notes", ())
         said = [*self.notes, *(str(n) for n in (notes if isinstance(notes, tuple) else ()))]
-        said += zone_notes(placed)
+        said += [*zone_notes(placed), *unused_notes(self._drafts, frame, box)]
         if far:
             said.append(f"left out: {counted(len(far), 'zone')} of files, too far away to matter")
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}
-        inputs["zones_sha256"] = zones_sha256(self._drafts)
+        inputs["zones_sha256"] = zones_sha256(drafts)
         inputs["notes"] = tuple(dict.fromkeys(said))
         return World(frame, Airspace(surface, zones, scale=scale)), inputs
 

@@ -11,6 +11,7 @@ import os
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args
@@ -18,6 +19,9 @@ from typing import Any, get_args
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
+from gcsplan.mission_file.airspace.left_out import faults_near, unused_notes, used
+from gcsplan.mission_file.airspace.policy import OUT_OF_HOURS
+from gcsplan.mission_file.airspace.times import Hours, hours_of
 from gcsplan.mission_file.complaints import read_section, unknown_keys
 from gcsplan.mission_file.content import read_content
 from gcsplan.mission_file.ground import Ground, Site
@@ -70,6 +74,7 @@ def load_mission(
     text: str | None = None,
     planner_names: Collection[str] | None = None,
     around: Sequence[tuple[float, float]] = (),
+    departure: datetime | None = None,
 ) -> MissionFile:
     """Read and judge a mission; nothing is planned yet.
 
@@ -80,7 +85,8 @@ def load_mission(
     names are found relative to its own path, or else to the current folder.
 
     ``planner_names`` replaces the table of planners. ``around`` are places (latitude, longitude) in degrees, besides
-    the mission's own, for which terrain is loaded too if it covers them.
+    the mission's own, for which terrain is loaded too if it covers them. ``departure`` is when the mission begins, if
+    it does not say so itself (``at``).
 
     Returns a `MissionFile`: vehicles, zones and terrain in metres. Raises InputError with every problem that was found,
     each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is called
@@ -100,13 +106,13 @@ def load_mission(
     file, where, raw, written = read_content(source, text)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         raise InputError(f"this gcsplan reads version 1, given {shown(raw['version'])}", where=f"{where}: version")
-    return _Reading(file, where, raw, written, planner_names, around).mission()
+    return _Reading(file, where, raw, written, planner_names, around, departure).mission()
 
 
 def read_no_fly(source: str | os.PathLike[str]) -> tuple[list[ZoneDraft], list[str]]:
     """The zones of a mission file, and the notes on them; nothing else in it needs to be right. Raises InputError."""
     file, where, raw, written = read_content(source, None)
-    return _Reading(file, where, raw, written, None, ()).zones_alone()
+    return _Reading(file, where, raw, written, None, (), None).zones_alone()
 
 
 class _Reading:
@@ -120,7 +126,9 @@ class _Reading:
         text: str | None,
         planner_names: Collection[str] | None,
         around: Sequence[tuple[float, float]],
+        departure: datetime | None,
     ) -> None:
+        self.departure = departure
         self.file, self.given, self.text, self.planner_names, self.around = file, raw, text, planner_names, around
         self.where = f"{where}: "
         self.units = in_own_units(raw, self.where)
@@ -150,7 +158,9 @@ class _Reading:
         names = check_unique(self._list("vehicles"), f"{self.where}vehicles", problems)
         arrival_keys = self._section(ArrivalKeys, "arrival")
         arrival = make_arrival(arrival_keys, names, f"{self.where}arrival", problems)
-        drafts = self._zones()
+        hours = hours_of(self.raw.get("at"), self.departure, f"{self.where}at", self.problems)
+        published = self._zones(hours)
+        drafts = used(published)
 
         spec = None if terrain_keys is None else make_spec(terrain_keys, self.file.parent)
         terrain = None if spec is None else self._open(spec)
@@ -171,6 +181,8 @@ class _Reading:
             box = make_box([*(p.in_plane(frame) for p in places), *others], [z for _, z in placed], local=self.local)
             here = self._around(terrain, frame, box)
             if here is not None:
+                problems += faults_near(placed, box)
+                self.notes += unused_notes(published, frame, box)
                 site = Site(here, frame, box, placed, terminals, set(places), self.local)
                 ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
@@ -185,22 +197,27 @@ class _Reading:
             airspace_scale=ground.scale, vehicles=ground.vehicles, arrival=arrival, planner=planner,
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
             notes=tuple(dict.fromkeys(self.notes)), way_home=way_home, geoid=site.terrain.geoid,
+            hours=hours if any(d.unused.startswith(OUT_OF_HOURS) for d in published) else None,
         )  # fmt: skip
         return replace(source, wider=partial(site.wider, source), reaching=self._reaching)
 
     def zones_alone(self) -> tuple[list[ZoneDraft], list[str]]:
-        """The zones, far ones too, and the notes on them. Raises InputError."""
+        """The zones that are used, far ones too, and the notes on them and the others. Raises InputError."""
         start = f"{self.where}no_fly"
+        hours = hours_of(self.raw.get("at"), self.departure, f"{self.where}at", self.problems)
         self.problems = [p for p in self.problems if p.where.startswith(start)]
         self.notes = []
-        drafts = self._zones()
+        published = self._zones(hours)
         if self.problems:
             raise InputError.of(self._with_lines([self.units.as_written(p) for p in self.problems]))
-        return drafts, list(dict.fromkeys(self.notes))
+        self.notes += [f"{draft.name} is not used: {draft.unused}" for draft in published if draft.unused]
+        self.notes += [f"{fault.where}: {fault.message}" for draft in published for fault in draft.faults]
+        return used(published), list(dict.fromkeys(self.notes))
 
     def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
         where = self.where.removesuffix(": ")
-        return _Reading(self.file, where, self.given, self.text, self.planner_names, places).mission()
+        names = self.planner_names
+        return _Reading(self.file, where, self.given, self.text, names, places, self.departure).mission()
 
     def _with_lines(self, problems: list[Problem]) -> list[Problem]:
         """The problems with their lines, if the mission was a text; those of other files stay as they are."""
@@ -310,7 +327,7 @@ class _Reading:
             terminals.append(Terminals(keys, vehicle, start, goal, tuple(via)))
         return terminals
 
-    def _zones(self) -> list[ZoneDraft]:
+    def _zones(self, hours: Hours | None) -> list[ZoneDraft]:
         where = f"{self.where}no_fly"
         value = self.raw.get("no_fly")
         if value is not None and not isinstance(value, list):
@@ -328,7 +345,7 @@ class _Reading:
                     Problem(f"{at}.name", f"{keys.name[:64]!r} is the name of no_fly[{first}] already")
                 )
             drafts += make_zones(
-                keys, at, self.file.parent, f"no_fly[{i}]", self.problems, self.notes, local=self.local
+                keys, at, self.file.parent, f"no_fly[{i}]", self.problems, self.notes, local=self.local, hours=hours
             )
         # Names in zone files of other programs may repeat; reports need unique names.
         seen: Counter[str] = Counter()

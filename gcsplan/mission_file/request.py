@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.frame import Frame
 from gcsplan.world.geoid import GeoidGrid
@@ -89,7 +90,8 @@ class MissionFile:
     takes more cells, or if there is no more. ``level`` counts the widenings; the terrain of each contains that of the
     one before. ``reaching(places)`` reads the same content again, with terrain for these places (latitude, longitude)
     too. ``way_home``: whether a safe return is required, or only reported where it is judged. ``geoid`` is the grid
-    that the terrain was converted with, if it is ellipsoidal.
+    that the terrain was converted with, if it is ellipsoidal. ``hours`` are those of the flight, if a zone was left out
+    because it does not apply in them.
     """
 
     name: str
@@ -112,3 +114,4 @@ class MissionFile:
     way_home: ReturnRule = "reported"
     reaching: Callable[[Sequence[tuple[float, float]]], MissionFile] | None = None
     geoid: GeoidGrid | None = None
+    hours: Hours | None = None

@@ -159,9 +159,15 @@ class ZoneKeys(Keys):
     buffer_m: float | None = None
     """Half the width of a corridor around a line, at most 20 000; with `file` that of its lines that have none."""
     file: Text | None = None
-    """A file of zones: .geojson, .kml, .kmz, .gpkg, .shp, .fgb, .zip or .csv; names and heights stand in it."""
+    """A file of zones: .geojson, .kml, .kmz, .gpkg, .shp, .fgb, .zip, .csv, OpenAir, ED-269, ED-318 or openAIP."""
     layer: Text | None = None
     """With `file`: the only layer of a .gpkg to be read; if absent, every one."""
+    kinds: Annotated[list[Text], Field(min_length=1, max_length=100)] | None = None
+    """Of an authority's file: the kinds of zones that are no-fly; if absent, all that restrict."""
+    authorised: Annotated[list[Text], Field(max_length=1000)] = []
+    """Of an authority's file: the identifiers or names of zones that the mission is authorised to enter."""
+    flight_level_error_m: Length | None = None
+    """Of an authority's file: how far flight levels may be from heights above sea level; else they limit nothing."""
     floor_agl_m: Metres | None = None
     """Floor of the zone above ground, point by point; if absent or 0, nothing passes below."""
     ceiling_agl_m: Metres | None = None
@@ -325,6 +331,8 @@ class MissionKeys(Keys):
     """Limits of every vehicle; a vehicle may override any of them."""
     no_fly: list[ZoneKeys] = []
     """Zones that no vehicle enters."""
+    at: Text | Annotated[list[Text], Field(min_length=2, max_length=2)] | None = None
+    """When it is flown: a time, a day, or [from, to]; published zones that do not apply then are left out."""
     vehicles: Annotated[list[VehicleKeys], Field(min_length=1, max_length=255)]
     """The vehicles, with their starts and goals."""
     arrival: ArrivalKeys | None = None

@@ -11,6 +11,8 @@ import numpy as np
 
 from gcsplan.dem.terrain import source_or_path
 from gcsplan.errors import InputError, Problem
+from gcsplan.mission_file.airspace.policy import Policy
+from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.mission_file.places import Degrees
 from gcsplan.mission_file.point_keys import LocalPoint
 from gcsplan.mission_file.schema import FrameKeys, TerrainKeys, ZoneKeys
@@ -37,6 +39,9 @@ MARGIN_M, MARGIN_PART, MARGIN_MOST_M = 3000.0, 1.0, 25_000.0
 """Margin for detours: the first, m, or this part of the points' extent if larger, up to the third, m."""
 
 LOCAL_MARGIN_M, LOCAL_MARGIN_PART = 50.0, 0.5
+
+OF_FILES = {"kinds", "authorised", "flight_level_error_m"}
+"""Keys of a zone that belong to a file of an authority."""
 
 _MANY_NODES = 250_000
 
@@ -168,9 +173,10 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
 
 
 def make_zones(
-    keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[str], *, local: bool
-) -> list[ZoneDraft]:
-    """The zones of one entry of ``no_fly``: a single zone, or all zones of a file."""
+    keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[str], *, local: bool,
+    hours: Hours | None = None,
+) -> list[ZoneDraft]:  # fmt: skip
+    """The zones of one entry of ``no_fly``: a single zone, or all zones of a file, at the mission's ``hours``."""
     kinds = [k for k in ("center", "polygon", "line", "file") if getattr(keys, k) is not None]
     if len(kinds) != 1:
         given = " and ".join(kinds) or "none"
@@ -178,23 +184,28 @@ def make_zones(
         problems.append(Problem(where, f"{wanted}, given {given}"))
         return []
     if keys.file is not None:
-        return _zones_of_file(keys, keys.file, where, folder, problems, notes)
+        return _zones_of_file(keys, keys.file, where, folder, problems, notes, hours)
+    for key in sorted(OF_FILES & keys.given.keys()):
+        problems.append(Problem(f"{where}.{key}", "belongs to a file of an authority"))
     return _own_zone(keys, where, fallback, problems, notes, local=local)
 
 
 def _zones_of_file(
-    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[str]
+    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[str], hours: Hours | None
 ) -> list[ZoneDraft]:
-    others = sorted(keys.given.keys() - {"file", "layer", *SIZES})
+    others = sorted(keys.given.keys() - {"file", "layer", *SIZES, *OF_FILES})
     problems += [Problem(f"{where}.{k}", "stands in the file itself, in a feature's properties") for k in others]
     sizes = [(getattr(keys, size), f"{where}.{size}") for size in SIZES if getattr(keys, size) is not None]
     good = [check_size(size_m, at, problems) for size_m, at in sizes]
     if not all(good):
         return []
+    wanted = None if keys.kinds is None else tuple(keys.kinds)
     try:
+        policy = Policy(wanted, tuple(keys.authorised), hours, keys.flight_level_error_m, where)
         found = read_zones(
-            folder / file, where=f"{where}.file", radius_m=keys.radius_m, buffer_m=keys.buffer_m, layer=keys.layer
-        )
+            folder / file, where=f"{where}.file", radius_m=keys.radius_m, buffer_m=keys.buffer_m, layer=keys.layer,
+            policy=policy,
+        )  # fmt: skip
     except InputError as why:
         problems += why.problems
         return []
@@ -242,8 +253,16 @@ def settle_zones(placed: Sequence[tuple[ZoneDraft, Zone]], surface: Surface, pro
     A zone wholly under ground goes to ``problems``. A floor nowhere above ground is removed (nothing passes below).
     """
     zones = []
+    rows, cols = surface.ground_m.shape
+    corners = surface.grid.to_plane([-1, cols, cols, -1], [-1, -1, rows, rows])
+    spare_m = 0.1 * np.ptp(corners, axis=0)  # a grid in degrees has bent edges
+    (west_m, south_m), (east_m, north_m) = corners.min(axis=0) - spare_m, corners.max(axis=0) + spare_m
     for draft, zone in placed:
         floor, ceiling = zone.floor, zone.ceiling
+        west, south, east, north = zone.bounds
+        if west > east_m or east < west_m or south > north_m or north < south_m:
+            zones.append(zone)  # beside the terrain that is loaded, as most zones of a country are
+            continue
         amsl = [level for level in (floor, ceiling) if level is not None and level.datum == "amsl"]
         ground = _ground_under(zone, surface) if amsl else None
         if ground is not None:
@@ -311,6 +330,12 @@ def _ground_under(zone: Zone, surface: Surface) -> tuple[float, float] | None:
     """
     shape = zone.shape
     west, south, east, north = zone.bounds
+    at = surface.grid([west, east, east, west], [south, south, north, north])
+    rows, cols = surface.ground_m.shape
+    c0, r0 = np.maximum(np.floor(at.min(axis=0)).astype(int), 0)
+    c1, r1 = np.minimum(np.ceil(at.max(axis=0)).astype(int) + 1, (cols, rows))
+    if c1 <= c0 or r1 <= r0:
+        return None
     if isinstance(shape, Circle):
         turn = np.linspace(0.0, 2.0 * math.pi, 257)
         border = np.stack(
@@ -321,24 +346,18 @@ def _ground_under(zone: Zone, surface: Surface) -> tuple[float, float] | None:
         pieces = max(1, 512 // len(ring))
         f = (np.arange(pieces) / pieces)[:, None, None]
         border = (ring + f * (following - ring)).reshape(-1, 2)
-    at = surface.grid([west, east, east, west], [south, south, north, north])
-    rows, cols = surface.ground_m.shape
-    c0, r0 = np.maximum(np.floor(at.min(axis=0)).astype(int), 0)
-    c1, r1 = np.minimum(np.ceil(at.max(axis=0)).astype(int) + 1, (cols, rows))
     heights = surface.ground_at(border[:, 0], border[:, 1])
-    if c1 > c0 and r1 > r0:
-        block = surface.ground_m[r0:r1, c0:c1]
-        if block.size <= _MANY_NODES:
-            plane = surface.grid.to_plane(*np.meshgrid(np.arange(c0, c1), np.arange(r0, r1)))
-            if isinstance(shape, Circle):
-                inside = np.hypot(plane[..., 0] - shape.east_m, plane[..., 1] - shape.north_m) < shape.radius_m
-            else:
-                import shapely
+    block = surface.ground_m[r0:r1, c0:c1]
+    if block.size <= _MANY_NODES:
+        plane = surface.grid.to_plane(*np.meshgrid(np.arange(c0, c1), np.arange(r0, r1)))
+        if isinstance(shape, Circle):
+            inside = np.hypot(plane[..., 0] - shape.east_m, plane[..., 1] - shape.north_m) < shape.radius_m
+        else:
+            import shapely
 
-                inside = shapely.contains_xy(shapely.Polygon(shape.vertices), plane[..., 0], plane[..., 1])
-            block = block[inside]
-        # With more nodes the whole rectangle is used: its extremes enclose the true ones, so no zone is refused
-        # wrongly.
-        heights = np.concatenate([heights, block.ravel()])
+            inside = shapely.contains_xy(shapely.Polygon(shape.vertices), plane[..., 0], plane[..., 1])
+        block = block[inside]
+    # With more nodes the whole rectangle is used: its extremes enclose the true ones, so no zone is refused wrongly.
+    heights = np.concatenate([heights, block.ravel()])
     heights = heights[np.isfinite(heights)]
     return (float(heights.min()), float(heights.max())) if heights.size else None

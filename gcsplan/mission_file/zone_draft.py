@@ -39,7 +39,8 @@ class ZoneDraft:
 
     ``points`` is the centre alone (with ``radius_m``), a line (with ``buffer_m``, the half-width of its corridor), or a
     polygon's vertices, not closed: (latitude, longitude) in degrees, or (east_m, north_m) if ``local``. ``where`` is
-    its place in the user's file.
+    its place in the user's file. ``unused`` is why a zone of an authority's file is not used; ``faults`` are what is
+    not understood of it, which refuses a mission near it.
     """
 
     name: str
@@ -51,6 +52,8 @@ class ZoneDraft:
     ceiling: Level | None = None
     remarks: tuple[Remark, ...] = ()
     buffer_m: float | None = None
+    unused: str = ""
+    faults: tuple[Problem, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -98,7 +98,7 @@ class ZoneFile:
         for size_m, words in ((said.radius_m, RADIUS_OF_POLYGON), (said.buffer_m, BUFFER_OF_POLYGON)):
             if size_m is not None:
                 remarks.append((words, f"{size_m:g} m"))
-        self._add(polygon(part[:200], where, ring, bounds, self.problems, key=key), where, remarks)
+        self.add(polygon(part[:200], where, ring, bounds, self.problems, key=key), remarks)
 
     def add_circle(self, said: Said, part: str, where: str, centre: Point, remarks: Sequence[Remark] = ()) -> None:
         """Add a circle called ``part`` by its centre, (latitude, longitude); its radius may come from the mission."""
@@ -117,14 +117,15 @@ class ZoneFile:
         where: str, remarks: Sequence[Remark],
     ) -> None:  # fmt: skip
         if size_m is not None:
-            self._add(make(size_m), where, remarks)
+            self.add(make(size_m), remarks)
             return
         self._require_room(where)
         self.unsized.append(Unsized(kind, len(self.zones), where, make, tuple(remarks)))
 
-    def _add(self, draft: ZoneDraft | None, where: str, remarks: Sequence[Remark]) -> None:
+    def add(self, draft: ZoneDraft | None, remarks: Sequence[Remark]) -> None:
+        """Add a zone that is right."""
         if draft is not None:
-            self._require_room(where)
+            self._require_room(draft.where)
             self.zones.append(self._remarked(draft, remarks))
 
     def _require_room(self, where: str) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +13,9 @@ from gcsplan.mission_file.zone_file import Drawn, ZoneFile
 ALTITUDES = "the altitudes of corners are not read as limits"
 
 
-def read_geojson(path: Path, data: bytes) -> ZoneFile:
-    """The zones of GeoJSON text. Raises InputError if it is not GeoJSON."""
+def read_geojson(path: Path, whole: Any) -> ZoneFile:
+    """The zones of GeoJSON, as `zone_json.load_json` returns it. Raises InputError if it is not GeoJSON."""
     found = ZoneFile(path)
-    try:
-        whole = json.loads(
-            data.decode("utf-8-sig"), object_pairs_hook=_unique, parse_constant=_no_constant, parse_int=_bounded_int
-        )
-    except RecursionError:
-        raise InputError("the file is nested too deeply to be GeoJSON", where=str(path)) from None
-    except ValueError as why:  # bad UTF-8, bad JSON, and the refusals below
-        raise InputError(f"this is not GeoJSON: {str(why)[:200]}", where=str(path)) from None
     if not isinstance(whole, dict):
         raise InputError("a GeoJSON file holds one object, for example a FeatureCollection", where=str(path))
     _require_wgs84(whole, path)
@@ -165,23 +155,3 @@ def _position(found: ZoneFile, position: Any, where: str) -> tuple[float, float]
         )
         return None
     return lat, lon
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    whole = dict(pairs)
-    if len(whole) < len(pairs):
-        seen: set[str] = set()
-        for key, _ in pairs:
-            if key in seen:
-                raise ValueError(f"the key {key[:60]!r} stands twice")
-            seen.add(key)
-    return whole
-
-
-def _no_constant(name: str) -> Iterator[None]:
-    raise ValueError(f"{name} is no number")
-
-
-def _bounded_int(digits: str) -> float:
-    # int() refuses thousands of digits with a message about its own limits; as inf the number is refused by gcsplan.
-    return int(digits) if len(digits) <= 300 else math.inf

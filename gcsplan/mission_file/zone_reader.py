@@ -1,47 +1,66 @@
-"""Zones from a file of any format, chosen by its name."""
+"""Zones from a file of any format, chosen by its name, and in JSON by its members."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from gcsplan.errors import InputError
+from gcsplan.mission_file.airspace.formats import read_published
+from gcsplan.mission_file.airspace.openair import SUFFIXES
+from gcsplan.mission_file.airspace.policy import Policy
 from gcsplan.mission_file.zone_csv import read_csv
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_geojson import read_geojson
+from gcsplan.mission_file.zone_json import load_json
 from gcsplan.mission_file.zone_kml import read_kml
 from gcsplan.mission_file.zone_zip import unpack
 
 MAX_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""
 
+JSON = (".geojson", ".json")
 VECTOR = (".gpkg", ".shp", ".fgb", ".zip")
-KINDS = (".geojson", ".json", ".kml", ".kmz", ".csv", *VECTOR)
+KINDS = (*JSON, ".kml", ".kmz", ".csv", *VECTOR)
 
 
 def read_zones(
-    path: Path, *, where: str, radius_m: float | None = None, buffer_m: float | None = None, layer: str | None = None
+    path: Path,
+    *,
+    where: str,
+    radius_m: float | None = None,
+    buffer_m: float | None = None,
+    layer: str | None = None,
+    policy: Policy | None = None,
 ) -> ZoneFile:
     """The zones of a file in any of the formats.
 
     ``where`` is the key that the zones belong to, ``radius_m`` the radius of points and ``buffer_m`` the half-width
-    around lines that have none of their own, ``layer`` the only layer to read.
+    around lines that have none of their own, ``layer`` the only layer to read, and ``policy`` says which published
+    zones are no-fly.
 
     Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
-    if kind not in KINDS:
-        known = ", ".join(KINDS[:-1])
-        raise InputError(f"zones are read from {known} and {KINDS[-1]} files, given {path.name}", where=where)
+    if kind not in (*KINDS, *SUFFIXES):
+        known = f"{', '.join(KINDS)} and OpenAir ({', '.join(SUFFIXES)}) files"
+        raise InputError(f"zones are read from {known}, given {path.name}", where=where)
     if layer is not None and kind not in VECTOR:
         raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
-    found = _read(path, kind, _bytes(path, where), layer)
+    policy = policy or Policy()
+    data = _bytes(path, where)
+    whole = load_json(path, data) if kind in JSON else None
+    published = read_published(path, data, whole, policy)
+    if published is not None:
+        return published
+    for key in policy.keys:
+        words = f"{path.name} is no file of an authority (OpenAir, ED-269, ED-318, openAIP), and has no {key}"
+        raise InputError(words, where=f"{policy.where}.{key}")
+    found = read_geojson(path, whole) if kind in JSON else _read(path, kind, data, layer)
     found.give_sizes(radius_m, buffer_m)
     return found
 
 
 def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
-    if kind == ".kml":
-        return read_kml(path, data)
     if kind == ".kmz":
         return read_kml(path, unpack(path, data, [".kml"], MAX_BYTES)[".kml"])
     if kind == ".csv":
@@ -50,7 +69,7 @@ def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
         from gcsplan.mission_file.zone_vector import read_vector  # most missions need neither it nor PROJ's database
 
         return read_vector(path, data, layer=layer, most_bytes=MAX_BYTES)
-    return read_geojson(path, data)
+    return read_kml(path, data)
 
 
 def _bytes(path: Path, where: str) -> bytes:

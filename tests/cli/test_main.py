@@ -238,7 +238,7 @@ def test_a_bug_of_ours_is_exit_70_with_one_message(run: Any, monkeypatch: pytest
 def test_ctrl_c_is_exit_130(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from gcsplan.app import pipeline
 
-    def interrupted(*_: object) -> None:
+    def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(pipeline, "load_mission", interrupted)

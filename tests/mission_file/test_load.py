@@ -323,7 +323,7 @@ def test_a_start_may_touch_a_zone() -> None:
         ({"line": [[36.6, -84.3], [36.61, -84.29]], "buffer_m": 5, "layer": "a"}, ".layer", "belongs to a file"),
         ({"file": "none.kml", "radius_m": -5}, ".radius_m", "above 0"),
         ({"file": "none.geojson"}, ".file", "is not there"),
-        ({"file": "zones.txt"}, ".file", ".geojson, .json, .kml"),
+        ({"file": "zones.doc"}, ".file", ".geojson, .json, .kml"),
         ("village", "", "must be a mapping"),
         ({"center": [36.61, -84.31], "radius_m": 9, "name": 5}, ".name", "must be text"),
     ],

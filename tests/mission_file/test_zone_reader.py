@@ -217,7 +217,7 @@ def test_every_mistake_of_a_file_is_told_at_once(tmp_path: Path) -> None:
     assert len(found.zones) == 1
 
 
-@pytest.mark.parametrize("name", ["zones.dxf", "zones.txt", "zones"])
+@pytest.mark.parametrize("name", ["zones.dxf", "zones.doc", "zones"])
 def test_other_formats_are_refused(tmp_path: Path, name: str) -> None:
     assert ".geojson, .json, .kml, .kmz, .csv" in messages(tmp_path, collection(square()), name)
 

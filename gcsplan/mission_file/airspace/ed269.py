@@ -1,0 +1,112 @@
+"""Zones from ED-269 JSON (EUROCAE, 2020): features with a restriction, times, authorities, and a list of volumes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from gcsplan.mission_file.airspace.members import (
+    MemberError,
+    authority_of,
+    number_or_none,
+    outer_ring,
+    position,
+    text_of,
+    word,
+)
+from gcsplan.mission_file.airspace.policy import ASKED, UNREAD_TIMES, Policy, Published
+from gcsplan.mission_file.airspace.times import read_periods
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.zone_attributes import is_number, shown
+from gcsplan.mission_file.zone_draft import Remark
+from gcsplan.mission_file.zone_file import ZoneFile
+
+KINDS = ("PROHIBITED", "REQ_AUTHORISATION", "CONDITIONAL", "NO_RESTRICTION")
+FREE = frozenset({"NO_RESTRICTION"})
+CONDITIONS = "these zones may be entered under conditions, which are not judged: they are no-fly"
+
+
+def is_ed269(whole: Any) -> bool:
+    """Whether the value is an ED-269 document: its features' geometry is a list of volumes."""
+    features = whole.get("features") if isinstance(whole, dict) else whole
+    return isinstance(features, list) and any(_volumes_of(f) for f in features)
+
+
+def _volumes_of(feature: Any) -> bool:
+    volumes = feature.get("geometry") if isinstance(feature, dict) else None
+    return isinstance(volumes, list) and any(isinstance(v, dict) and "horizontalProjection" in v for v in volumes)
+
+
+def read_ed269(path: Path, whole: Any, policy: Policy) -> ZoneFile:
+    """The zones of an ED-269 document; what is wrong is in their problems and faults."""
+    file = AirspaceFile(path, policy, KINDS)
+    features = whole["features"] if isinstance(whole, dict) else whole
+    for i, feature in enumerate(features):
+        where = f"{path}: features[{i}]"
+        try:
+            _feature(file, feature, where, f"{path.stem}[{i}]")
+        except MemberError as why:
+            file.fault(where, str(why))
+    return file.finished()
+
+
+def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:
+    if not isinstance(feature, dict):
+        raise MemberError(f"must be an object, given {shown(feature)}")
+    zone = published(feature, feature.get("restriction"), "restriction", feature.get("applicability"), fallback)
+    volumes = feature.get("geometry")
+    if not isinstance(volumes, list) or not volumes:
+        raise MemberError(f"zone {zone.name[:60]!r}: geometry must be a list of volumes, given {shown(volumes)}")
+    for i, volume in enumerate(volumes):
+        part = zone.name if len(volumes) == 1 else f"{zone.name}/{i + 1}"
+        at = f"{where}.geometry[{i}]"
+        try:
+            _volume(file, zone, part, volume, at)
+        except MemberError as why:
+            file.fault(at, f"zone {zone.name[:60]!r}: {why}")
+
+
+def published(feature: dict[str, Any], kind: Any, key: str, times: Any, fallback: str) -> Published:
+    """What the members say that ED-269 and ED-318 share. Raises MemberError."""
+    identifier = text_of(feature.get("identifier"))
+    name = text_of(feature.get("name")) or identifier or fallback
+    restriction = word(kind, f"zone {name[:60]!r}: {key}").upper()
+    periods, unread = read_periods(times)
+    remarks: list[Remark] = [(UNREAD_TIMES, unread)] if unread else []
+    if restriction in ("REQ_AUTHORISATION", "REQ_AUTHORIZATION"):
+        remarks.append((ASKED, authority_of(feature.get("zoneAuthority"))))
+    elif restriction == "CONDITIONAL":
+        conditions = feature.get("restrictionConditions")
+        joined = ", ".join(str(c) for c in conditions) if isinstance(conditions, list) else text_of(conditions)
+        remarks.append((CONDITIONS, joined[:60]))
+    return Published(name, (restriction,), restriction not in FREE, identifier, periods, tuple(remarks))
+
+
+def _volume(file: AirspaceFile, zone: Published, part: str, volume: Any, where: str) -> None:
+    shape = volume.get("horizontalProjection") if isinstance(volume, dict) else None
+    if not isinstance(shape, dict):
+        raise MemberError(f"a volume has a horizontalProjection, given {shown(volume)}")
+    unit = volume.get("uomDimensions") or ""
+    limits = Limits.read(_limit(volume, "lower", unit), _limit(volume, "upper", unit), where, policy=file.policy)
+    kind = shape.get("type")
+    if kind == "Circle":
+        radius: Any = shape.get("radius")
+        if not is_number(radius):
+            raise MemberError(f"a Circle has a radius in metres, given {shown(radius)}")
+        # Published circles have metres beside limits in feet; a radius in feet would be smaller.
+        file.add_circle(zone, part, where, position(shape.get("center")), float(radius), limits)
+    elif kind == "Polygon":
+        ring, holes = outer_ring(shape.get("coordinates"))
+        file.found.holes += holes
+        file.add_ring(zone, part, where, ring, limits)
+    else:
+        raise MemberError(f"horizontalProjection must be a Polygon or a Circle, given {shown(kind)}")
+
+
+def _limit(volume: dict[str, Any], side: str, unit: Any) -> Given | None:
+    """The limit of one side; without a number there is none."""
+    value = number_or_none(volume.get(f"{side}Limit"), f"{side}Limit")
+    if value is None:
+        return None
+    reference = volume.get(f"{side}VerticalReference") or ""
+    return Given(value, (str(unit)[:40], str(reference)[:40]), (), f"{side}Limit")

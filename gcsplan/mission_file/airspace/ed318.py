@@ -1,0 +1,101 @@
+"""Zones from ED-318 JSON (EUROCAE, 2023): GeoJSON whose geometries have a ``layer`` of limits, and Points an extent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from gcsplan.mission_file.airspace.ed269 import published
+from gcsplan.mission_file.airspace.members import MemberError, number_or_none, outer_ring, position
+from gcsplan.mission_file.airspace.policy import Policy, Published
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.zone_attributes import is_number, shown
+from gcsplan.mission_file.zone_file import ZoneFile
+
+KINDS = ("USPACE", "PROHIBITED", "REQ_AUTHORIZATION", "CONDITIONAL", "NO_RESTRICTION")
+REQUIRED = frozenset({"identifier", "country", "type", "variant"})
+MOST_GEOMETRIES = 1000
+
+
+def is_ed318(whole: Any) -> bool:
+    """Whether the value is an ED-318 collection: features with the members that the standard requires."""
+    features = whole.get("features") if isinstance(whole, dict) and whole.get("type") == "FeatureCollection" else None
+    return isinstance(features, list) and any(
+        isinstance(f, dict) and isinstance(f.get("properties"), dict) and f["properties"].keys() >= REQUIRED
+        for f in features
+    )
+
+
+def read_ed318(path: Path, whole: Any, policy: Policy) -> ZoneFile:
+    """The zones of an ED-318 collection; what is wrong is in their problems and faults."""
+    file = AirspaceFile(path, policy, KINDS)
+    for i, feature in enumerate(whole["features"]):
+        where = f"{path}: features[{i}]"
+        try:
+            _feature(file, feature, where, f"{path.stem}[{i}]")
+        except MemberError as why:
+            file.fault(where, str(why))
+    return file.finished()
+
+
+def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:
+    properties = feature.get("properties") if isinstance(feature, dict) else None
+    if not isinstance(properties, dict):
+        raise MemberError(f"must be a Feature with properties, given {shown(feature)}")
+    times = properties.get("limitedApplicability")
+    zone = published(properties, properties.get("type"), "type", times, fallback)
+    geometry = feature.get("geometry")
+    whole: Any = [geometry]
+    if isinstance(geometry, dict) and geometry.get("type") == "GeometryCollection":
+        whole = geometry.get("geometries")
+        if not isinstance(whole, list) or not 0 < len(whole) <= MOST_GEOMETRIES:
+            raise MemberError(f"zone {zone.name[:60]!r}: a GeometryCollection has geometries, given {shown(whole)}")
+    for i, one in enumerate(whole):
+        part = zone.name if len(whole) == 1 else f"{zone.name}/{i + 1}"
+        at = f"{where}.geometry" if one is geometry else f"{where}.geometry.geometries[{i}]"
+        # The layer of a collection holds for those of its geometries that have none.
+        layer = geometry.get("layer") if isinstance(geometry, dict) else None
+        try:
+            _geometry(file, zone, part, one, layer, at)
+        except MemberError as why:
+            file.fault(at, f"zone {zone.name[:60]!r}: {why}")
+
+
+def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, shared: Any, where: str) -> None:
+    if not isinstance(geometry, dict):
+        raise MemberError(f"the zone has no geometry, given {shown(geometry)}")
+    limits = _limits(geometry.get("layer", shared), where, file.policy)
+    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    if kind == "Point":
+        extent = geometry.get("extent")
+        radius: Any = None
+        if isinstance(extent, dict) and extent.get("subType") == "Circle":
+            radius = extent.get("radius")
+        if not is_number(radius):
+            raise MemberError(f"a Point has an extent with subType Circle and radius, given {shown(extent)}")
+        file.add_circle(zone, part, where, position(coordinates), float(radius), limits)
+    elif kind in ("Polygon", "MultiPolygon"):
+        polygons = [coordinates] if kind == "Polygon" else coordinates
+        if not isinstance(polygons, list) or not polygons:
+            raise MemberError(f"a {kind} has a list of coordinates, given {shown(polygons)}")
+        for i, rings in enumerate(polygons):
+            ring, holes = outer_ring(rings)
+            file.found.holes += holes
+            file.add_ring(zone, part if len(polygons) == 1 else f"{part}/{i + 1}", where, ring, limits)
+    else:
+        raise MemberError(f"the geometry must be a Polygon, a MultiPolygon or a Point with extent, given {shown(kind)}")
+
+
+def _limits(layer: Any, where: str, policy: Policy) -> Limits:
+    """The limits of a layer; without one there are none, and without a unit they are metres, as the standard says."""
+    if layer is None:
+        return Limits()
+    if not isinstance(layer, dict):
+        raise MemberError(f"layer must be an object, given {shown(layer)}")
+    unit = layer.get("uom") or "m"
+    given: list[Given | None] = []
+    for side in ("lower", "upper"):
+        value = number_or_none(layer.get(side), f"layer.{side}")
+        words = (str(unit)[:40], str(layer.get(f"{side}Reference") or "")[:40])
+        given.append(None if value is None else Given(value, words, (), side))
+    return Limits.read(given[0], given[1], where, policy=policy)

@@ -1,0 +1,81 @@
+"""What of published zones is not used near a mission, by name; and zones near it that are not understood."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import PurePath
+
+from gcsplan.errors import Problem
+from gcsplan.figures import counted
+from gcsplan.mission_file.zone_draft import ZoneDraft, one_line
+from gcsplan.world.frame import Frame
+from gcsplan.world.zones import Zone
+
+Box = tuple[float, float, float, float]
+"""West, south, east, north, m."""
+
+NEAR_M = 5000.0
+"""Zones this near to the mission's surroundings are named at least, m."""
+
+
+def faults_near(placed: Sequence[tuple[ZoneDraft, Zone]], box: Box) -> list[Problem]:
+    """What is not understood of zones that reach into the mission's surroundings."""
+    found: dict[Problem, None] = {}
+    for draft, zone in placed:
+        if draft.faults and _meets(zone, box):
+            found |= dict.fromkeys(draft.faults)
+    return list(found)
+
+
+def used(drafts: Sequence[ZoneDraft]) -> list[ZoneDraft]:
+    """The zones that are no-fly."""
+    return [d for d in drafts if not d.unused]
+
+
+def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[str]:
+    """A note for each reason, with the name of every zone near the mission that is not used for it.
+
+    Near is as far around the mission's surroundings as they extend, and at least `NEAR_M`; zones beyond are counted.
+    """
+    unused = [d for d in drafts if d.unused]
+    if not unused:
+        return []
+    reach_m = max(box[2] - box[0], box[3] - box[1], NEAR_M)
+    wider = (box[0] - reach_m, box[1] - reach_m, box[2] + reach_m, box[3] + reach_m)
+    edges = frame.to_degrees(*zip(*_border(wider), strict=True))
+    turned = (edges[:, 1] - frame.lon_deg + 180.0) % 360.0 - 180.0
+    window = (turned.min(), edges[:, 0].min(), turned.max(), edges[:, 0].max())
+    near = {id(draft) for draft in unused if _is_near(draft, frame, window)}
+    about: dict[tuple[str, str], list[str]] = {}
+    for draft in unused:
+        if id(draft) in near:
+            file = PurePath(draft.where.split(": ", 1)[0]).name
+            about.setdefault((file, draft.unused), []).append(one_line(draft.name))
+    notes = [f"{file}: not used, because {why}: {', '.join(names)}" for (file, why), names in about.items()]
+    if len(near) < len(unused):
+        notes.append(f"not used: {counted(len(unused) - len(near), 'further zone')} far from the mission")
+    return notes
+
+
+def _border(box: Box) -> list[tuple[float, float]]:
+    """Points of the box's border, near enough to each other to tell how far north it bows."""
+    west, south, east, north = box
+    along = [i / 16 for i in range(17)]
+    level = [(west + part * (east - west), n) for part in along for n in (south, north)]
+    return level + [(e, south + part * (north - south)) for part in along for e in (west, east)]
+
+
+def _is_near(draft: ZoneDraft, frame: Frame, window: Box) -> bool:
+    """Whether the rectangle of degrees around the zone meets the window, whose longitudes count from the frame's."""
+    tall = 0.0 if draft.radius_m is None else math.degrees(draft.radius_m / 6_300_000.0)
+    lat = [p[0] for p in draft.points]
+    wide = tall / math.cos(math.radians(min(max(map(abs, lat)) + tall, 89.0)))
+    lon = [(p[1] - frame.lon_deg + 180.0) % 360.0 - 180.0 for p in draft.points]
+    box = (min(lon) - wide, min(lat) - tall, max(lon) + wide, max(lat) + tall)
+    return box[0] <= window[2] and box[2] >= window[0] and box[1] <= window[3] and box[3] >= window[1]
+
+
+def _meets(zone: Zone, box: Box) -> bool:
+    west, south, east, north = zone.bounds
+    return bool(west <= box[2] and east >= box[0] and south <= box[3] and north >= box[1])

@@ -1,0 +1,79 @@
+"""Members of JSON objects that the readers of published zones share: texts, positions, rings, and who authorises."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from gcsplan.mission_file.airspace.volumes import Corner
+from gcsplan.mission_file.zone_attributes import is_number, shown
+
+
+class MemberError(ValueError):
+    """A member of an object cannot be read; the text says why."""
+
+
+def text_of(given: Any) -> str:
+    """A text, or the English (or else first) text of ED-318's ``[{"text": …, "lang": …}]``; empty if there is none."""
+    if isinstance(given, str):
+        return given.strip()
+    if not isinstance(given, list):
+        return ""
+    texts = [t for t in given if isinstance(t, dict) and isinstance(t.get("text"), str) and t["text"].strip()]
+    best = min(texts, key=lambda t: not str(t.get("lang", "")).lower().startswith("en"), default=None)
+    return "" if best is None else str(best["text"]).strip()
+
+
+def authority_of(given: Any) -> str:
+    """Who gives an authorisation, of ``zoneAuthority``: names, addresses, and how long before; empty if unknown."""
+    found = []
+    for one in given if isinstance(given, list) else []:
+        if not isinstance(one, dict) or one.get("purpose") not in (None, "AUTHORIZATION", "AUTHORISATION"):
+            continue
+        parts = [text_of(one.get(key)) for key in ("name", "service", "email", "phone", "siteURL")]
+        before = one.get("intervalBefore")
+        parts.append(f"{before[:20]} before" if isinstance(before, str) and before.strip() else "")
+        found.append(" ".join(dict.fromkeys(p[:60] for p in parts if p)))
+    return "; ".join(f for f in found[:2] if f)
+
+
+def position(given: Any) -> Corner:
+    """(latitude, longitude) of ``[lon, lat]``. Raises MemberError."""
+    if not isinstance(given, list) or len(given) < 2 or not all(is_number(x) for x in given[:2]):
+        raise MemberError(f"a position is [longitude, latitude], given {shown(given)}")
+    lon, lat = float(given[0]), float(given[1])
+    if abs(lat) > 90.0 and abs(lon) <= 90.0 and abs(lat) <= 180.0:
+        raise MemberError(f"longitude and latitude look swapped: they are [lon, lat], given [{lon:g}, {lat:g}]")
+    return lat, lon
+
+
+def outer_ring(given: Any) -> tuple[list[Corner], int]:
+    """The outline of a polygon's rings, and the number of its holes. Raises MemberError."""
+    if not isinstance(given, list) or not given or not isinstance(given[0], list):
+        raise MemberError(f"a polygon is a list of rings, given {shown(given)}")
+    return _many(given[0]) or [position(p) for p in given[0]], len(given) - 1
+
+
+def _many(given: list[Any]) -> list[Corner]:
+    """Positions that are right, all at once; none if one of them is wrong, or not plainly right."""
+    if not all(type(p) is list and len(p) >= 2 and type(p[0]) is float and type(p[1]) is float for p in given):
+        return []
+    ring = [(p[1], p[0]) for p in given]
+    return ring if all(-90.0 <= lat <= 90.0 and -180.0 <= lon <= 180.0 for lat, lon in ring) else []
+
+
+def number_or_none(given: Any, name: str) -> float | int | None:
+    """A finite number, or None. Raises MemberError."""
+    if given is None or is_number(given):
+        return given  # type: ignore[no-any-return]
+    raise MemberError(f"{name} must be a number, given {shown(given)}")
+
+
+def word(given: Any, name: str, *, known: Sequence[str] = ()) -> str:
+    """A text that must not be missing, one of the ``known`` if there are any. Raises MemberError."""
+    if not isinstance(given, str) or not given.strip():
+        raise MemberError(f"{name} must be text, given {shown(given)}")
+    plain = given.strip()
+    if known and plain.upper() not in known:
+        raise MemberError(f"{name} must be one of {', '.join(known)}, given {plain[:60]!r}")
+    return plain

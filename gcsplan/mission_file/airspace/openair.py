@@ -1,0 +1,321 @@
+"""Zones from OpenAir text: WinPilot's format of 1998, and the records that SeeYou has added to it since.
+
+One record stands on a line; a zone begins with AC and ends with the next. A comment begins with ``*``. Distances are
+nautical miles, bearings count from true north.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gcsplan.errors import Problem
+from gcsplan.mission_file.airspace.arcs import Arc, ArcError, Corner, outline
+from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
+from gcsplan.mission_file.airspace.times import Period, TimeError, read_instant
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark
+from gcsplan.mission_file.zone_file import ZoneFile
+
+SUFFIXES = (".openair", ".air", ".txt")
+
+NAUTICAL_MILE_M = 1852.0
+
+SILENT = frozenset({"UNC", "NONE"})
+"""A class and a type that say nothing; a zone with nothing else is no-fly."""
+
+FREE = frozenset({"G", "FIR", "UIR", "FIS", "ACCSEC", "VFRSEC", "TRZ"})
+"""Classes and types in which no rule keeps anybody out: class G, regions of information, hints."""
+
+KINDS = (
+    "A", "B", "C", "D", "E", "F", "G", "UNC", "R", "Q", "P", "GP", "CTR", "W", "ADIZ", "ALERT", "ASRA", "ATZ", "AWY",
+    "CTA", "CUSTOM", "FIR", "FIS", "ACCSEC", "GSEC", "HTZ", "LTA", "MATZ", "MTA", "MTR", "MTMA", "N", "NONE", "OFR",
+    "RMZ", "TFR", "TIA", "TIZ", "TMA", "TMZ", "TRA", "TRAFR", "TRZ", "TSA", "UIR", "UTA", "VFRR", "VFRSEC", "WARNING",
+)  # fmt: skip
+"""The classes (AC) of both editions and the types (AY) of the second."""
+
+IGNORED = frozenset({"AF", "AG", "AX", "AI", "AT", "SP", "SB"})
+"""Frequency, station, transponder code, number, place of a label, pen and brush: they limit nothing."""
+
+DRAWN = frozenset({"DP", "DA", "DB", "DC", "DY"})
+
+SPARED = "limits without a unit or a reference are read as OpenAir's programs do, in feet above sea level"
+UNPLACED = "text behind the height is not read"
+
+_RECORD = re.compile(r"(V|[A-Z]{2})\s+(\S.*)", re.IGNORECASE)
+_VARIABLE = re.compile(r"([A-Z])\s*=\s*(.*)", re.IGNORECASE)
+_PLACE = re.compile(
+    r"\s*(\d{1,3}(?:\.\d{1,20})?)(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?\s*([NS])[\s,]*"
+    r"(\d{1,3}(?:\.\d{1,20})?)(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?\s*([EW])",
+    re.ASCII | re.IGNORECASE,
+)
+_LONGEST_LINE = 2000
+
+MOST_MISTAKES = 5
+"""Mistakes of one zone, or before the first, that are reported."""
+
+
+class _RecordError(ValueError):
+    """A record cannot be read; the text says why."""
+
+
+@dataclass
+class _Block:
+    """The records of one zone."""
+
+    line: int
+    kinds: list[str]
+    name: str = ""
+    lower: str | None = None
+    upper: str | None = None
+    pieces: list[Corner | Arc] = field(default_factory=list)
+    circles: list[tuple[Corner, float]] = field(default_factory=list)
+    times: list[str] = field(default_factory=list)
+    mistakes: list[tuple[int, str]] = field(default_factory=list)
+    clockwise: bool = True
+
+    @property
+    def where(self) -> str:
+        """Line and name, for messages."""
+        return f"line {self.line}" + (f" ({self.name[:60]})" if self.name else "")
+
+
+def read_openair(path: Path, data: bytes, policy: Policy) -> ZoneFile:
+    """The zones of OpenAir text; what is wrong is in their problems and faults."""
+    return _Reading(AirspaceFile(path, policy, KINDS)).read(_text(data))
+
+
+def _text(data: bytes) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")  # names alone have other letters, and older programs write them so
+
+
+@dataclass
+class _Reading:
+    """One pass over one file. A centre holds until the next, in the next zone too: the format's own sample does so."""
+
+    file: AirspaceFile
+    block: _Block | None = None
+    centre: Corner | None = None
+    passed: bool = False
+    zones: int = 0
+
+    def read(self, text: str) -> ZoneFile:
+        for number, line in enumerate(text.splitlines(), start=1):
+            record = line.split("*", 1)[0].strip()
+            if not record:
+                continue
+            if not self.zones and self.block is None and len(self.file.found.problems) >= MOST_MISTAKES:
+                break  # it is another format
+            match = None if len(record) > _LONGEST_LINE else _RECORD.fullmatch(record)
+            if match is None:
+                self._odd(number, record)
+                continue
+            try:
+                self._record(number, match[1].upper(), match[2].strip())
+            except (_RecordError, ArcError, TimeError) as why:
+                words = f"{record[:60]!r}: {why}"
+                if self.block is None:
+                    self._fault(number, words)
+                else:
+                    self.block.mistakes.append((number, words))
+        self._end()
+        if not self.zones and not self.file.found.problems:
+            self._fault(1, "the file holds no zone: an OpenAir zone begins with a line such as `AC R`")
+        return self.file.finished()
+
+    def _fault(self, number: int, words: str) -> None:
+        self.file.fault(f"{self.file.path}: line {number}", words)
+
+    def _odd(self, number: int, record: str) -> None:
+        if record[:2].upper() in ("AN", "AY", "AF", "AG", "AX", "AI", "AT") and len(record) == 2:  # an empty record
+            return
+        words = f"{record[:60]!r} is no record of OpenAir; write a comment with * before it"
+        if self.block is not None:
+            self.block.mistakes.append((number, words))
+        else:
+            self._fault(number, words)
+
+    def _record(self, number: int, code: str, value: str) -> None:
+        if code == "AC":
+            self._end()
+            self.block, self.passed = _Block(number, [_kind(value)]), False
+        elif code in ("TO", "TC"):  # terrain, which other records draw as they draw zones
+            self._end()
+            self.passed = True
+        elif self.passed or code in IGNORED:
+            pass
+        elif code == "V":
+            self._variable(value)
+        elif self.block is None:
+            raise _RecordError("stands before the first AC, with which a zone begins")
+        elif code in DRAWN:
+            self._draw(self.block, code, value)
+        elif code == "AN":
+            self.block.name = value
+        elif code == "AY":
+            self.block.kinds.append(_kind(value))
+        elif code in ("AL", "AH"):
+            self._limit(self.block, code, value)
+        elif code == "AA":
+            self.block.times.append(value)
+        else:
+            raise _RecordError(f"the record {code} is not known")
+
+    def _limit(self, block: _Block, code: str, value: str) -> None:
+        if (block.lower if code == "AL" else block.upper) is not None:
+            raise _RecordError(f"the zone has two {code}; leave one out")
+        if code == "AL":
+            block.lower = value
+        else:
+            block.upper = value
+
+    def _variable(self, value: str) -> None:
+        match = _VARIABLE.fullmatch(value)
+        if match is None:
+            raise _RecordError("a variable is written as V X=39:29.9 N 119:46.1 W or V D=-")
+        name, given = match[1].upper(), match[2].strip()
+        if name == "X":
+            self.centre = None  # an arc around the centre before would be elsewhere
+            self.centre = _places(given, 1)[0]
+        elif name == "D":
+            if given[:1] not in ("+", "-"):
+                raise _RecordError("the direction is + (clockwise) or -")
+            if self.block is not None:
+                self.block.clockwise = given[0] == "+"
+        elif name not in ("W", "Z"):  # width of airways, which DY refuses, and zoom
+            raise _RecordError(f"the variable {name} is not known")
+
+    def _draw(self, block: _Block, code: str, value: str) -> None:
+        if code == "DY":
+            raise _RecordError("airways are not read; draw the outline with DP")
+        if len(block.pieces) > MAX_VERTICES:
+            raise _RecordError(f"the zone has more than {MAX_VERTICES} points")
+        if code == "DP":
+            block.pieces.append(_places(value, 1)[0])
+            return
+        if self.centre is None:
+            raise _RecordError("has no centre: a line such as V X=39:29.9 N 119:46.1 W must stand before it")
+        if code == "DC":
+            block.circles.append((self.centre, _numbers(value, 1)[0] * NAUTICAL_MILE_M))
+        elif code == "DA":
+            radius, start, end = _numbers(value, 3)
+            radius_m = radius * NAUTICAL_MILE_M
+            block.pieces.append(Arc.by_bearings(self.centre, radius_m, start, end, block.clockwise))
+        else:
+            first, last = _places(value, 2)
+            block.pieces.append(Arc.by_ends(self.centre, first, last, block.clockwise))
+
+    def _end(self) -> None:
+        """Add the zone that ends here."""
+        block, self.block = self.block, None
+        if block is None:
+            return
+        self.zones += 1
+        file = self.file
+        where = f"{file.path}: {block.where}"
+        periods, unread = _times(block.times)
+        remarks: tuple[Remark, ...] = ((UNREAD_TIMES, unread),) if unread else ()
+        name = block.name or f"{file.path.stem}[{self.zones - 1}]"
+        kinds = tuple(dict.fromkeys(block.kinds))
+        restricts = any(k not in FREE | SILENT for k in kinds) or not any(k in FREE for k in kinds)
+        zone = Published(name, kinds, restricts, "", periods, remarks)
+        limits = _limits(block, where, file.policy)
+        limits.faults += [
+            Problem(f"{file.path}: line {number}", words) for number, words in block.mistakes[:MOST_MISTAKES]
+        ]
+        ring = outline(block.pieces)
+        shapes = len(block.circles) + bool(ring)
+        if not shapes:
+            place = "" if not block.mistakes else f": {block.mistakes[0][1]}"
+            file.fault(where, f"the zone has no outline (DP, DA, DB) and no circle (DC){place}")
+        for i, (centre, radius_m) in enumerate(block.circles):
+            part = name if shapes == 1 else f"{name}/{i + 1}"
+            file.add_circle(zone, part, where, centre, radius_m, limits)
+        if ring:
+            file.add_ring(zone, name if shapes == 1 else f"{name}/{shapes}", where, ring, limits)
+
+
+def _limits(block: _Block, where: str, policy: Policy) -> Limits:
+    said: list[Remark] = []
+    given: list[Given | None] = []
+    for key, text in (("AL", block.lower), ("AH", block.upper)):
+        plain = text
+        if text is not None and (match := re.fullmatch(r"([^()]*\S)\s*\([^()]*\)", text)):
+            plain = match[1]
+            said.append((UNPLACED, f"{key} {text[:60]}"))
+        given.append(None if plain is None else Given(plain, (), ("FT", "AMSL"), key))
+    limits = Limits.read(given[0], given[1], where, SPARED, policy=policy)
+    limits.remarks += said
+    return limits
+
+
+def _kind(value: str) -> str:
+    return value.upper()[:60]
+
+
+def _times(texts: list[str]) -> tuple[tuple[Period, ...], str]:
+    """The periods of AA records, and what is not understood. AA NONE waits for a NOTAM, so that it counts as always."""
+    periods = []
+    for text in texts:
+        plain = text.split(";", 1)[0].strip()
+        if plain.upper() == "NONE":
+            return (), "AA NONE: they are activated at times that the file does not have"
+        ends = [end.strip() for end in plain.split("/")]
+        if len(ends) != 2:
+            return (), f"AA {plain[:60]}"
+        try:
+            start, end = (None if e.upper() == "NONE" else read_instant(e) for e in ends)
+        except TimeError as why:
+            return (), str(why)
+        periods.append(Period(start, end))
+    return tuple(periods), ""
+
+
+def _places(text: str, count: int) -> list[Corner]:
+    """The first places of a text; what follows them is a comment."""
+    places, at = [], 0
+    for match in _matches(text):
+        if text[at : match.start()].strip(" \t,"):
+            break
+        places.append((_degrees(match.group(1, 2, 3), match[4]), _degrees(match.group(5, 6, 7), match[8])))
+        at = match.end()
+        if len(places) == count:
+            return places
+    wanted = "a place such as 39:29.9 N 119:46.1 W" if count == 1 else "two places with a comma between them"
+    raise _RecordError(f"it needs {wanted}")
+
+
+def _matches(text: str) -> Iterator[re.Match[str]]:
+    return _PLACE.finditer(text)
+
+
+def _degrees(parts: tuple[str | None, ...], side: str) -> float:
+    whole, minutes, seconds = (None if p is None else float(p) for p in parts)
+    assert whole is not None
+    broken = (minutes is not None and whole != math.floor(whole)) or (
+        seconds is not None and minutes is not None and minutes != math.floor(minutes)
+    )
+    if broken or max(minutes or 0.0, seconds or 0.0) > 60.0:  # 60 is what some programs write for a whole one
+        raise _RecordError("degrees and minutes are whole numbers where others follow, minutes and seconds at most 60")
+    value = whole + (minutes or 0.0) / 60.0 + (seconds or 0.0) / 3600.0
+    if value > (90.0 if side.upper() in "NS" else 180.0):
+        raise _RecordError(f"{value:g} {side.upper()} is no place on Earth")
+    return -value if side.upper() in "SW" else value
+
+
+def _numbers(text: str, count: int) -> list[float]:
+    found = text.split(",")
+    try:
+        numbers = [float(t) for t in found]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(math.isfinite(n) for n in numbers):
+        wanted = "a radius in nautical miles" if count == 1 else "a radius in nautical miles and two bearings"
+        raise _RecordError(f"it needs {wanted}")
+    return numbers

@@ -1,0 +1,223 @@
+"""When a zone applies, and for which hours the mission is planned.
+
+A zone is left out only if it certainly does not apply at any moment of the mission's hours. What is not understood, and
+sunrise and sunset, count as always.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, time, timedelta
+from typing import Any
+
+from gcsplan.errors import Problem
+
+ALONE = timedelta(hours=2)
+"""How long the hours last if their beginning alone is stated."""
+
+BEFORE = timedelta(minutes=30)
+"""How long before a common start vehicles may leave the ground: they wait for it in the air."""
+
+LONGEST = timedelta(days=31)
+_DAY = timedelta(days=1)
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}", re.ASCII)
+_MOST_CHARACTERS = 40
+
+WEEK = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
+WANTED = "2026-11-23T10:00Z, a day such as 2026-11-23 (UTC), or [from, to]"
+
+
+class TimeError(ValueError):
+    """A time cannot be read; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hours:
+    """The hours for which a mission is planned, both ends included."""
+
+    start: datetime
+    end: datetime
+
+    def __str__(self) -> str:
+        last = f"{self.end:%H:%M}Z" if self.end.date() == self.start.date() else f"{self.end:%Y-%m-%d %H:%M}Z"
+        return f"{self.start:%Y-%m-%d %H:%M}Z to {last}"
+
+    @classmethod
+    def read(cls, given: Any) -> Hours:
+        """The hours of a mission's ``at``. Raises TimeError."""
+        texts = given if isinstance(given, list) else [given]
+        if not 1 <= len(texts) <= 2 or not all(isinstance(t, str) for t in texts):
+            raise TimeError(f"must be {WANTED}")
+        start, end = read_instant(texts[0]), read_instant(texts[-1])
+        if _DATE.fullmatch(texts[-1].strip()):
+            end += _DAY
+        elif len(texts) == 1:
+            end += ALONE
+        if not timedelta(0) < end - start <= LONGEST:
+            words = "the end must lie behind the start" if end <= start else f"{LONGEST.days} days at most are wanted"
+            raise TimeError(f"{words}, given {' to '.join(t.strip()[:_MOST_CHARACTERS] for t in texts)}")
+        return cls(start, end)
+
+    @classmethod
+    def around(cls, departure: datetime) -> Hours:
+        """The hours of a mission with a common start at ``departure``."""
+        return cls(departure - BEFORE, departure + ALONE)
+
+
+def read_instant(text: str) -> datetime:
+    """A moment in UTC: a day (its first moment), or a day and a time with ``Z`` or an offset. Raises TimeError."""
+    plain = text.strip()
+    shown = repr(plain[:_MOST_CHARACTERS])
+    if len(plain) > _MOST_CHARACTERS:
+        raise TimeError(f"{shown}… is no time")
+    last = re.fullmatch(r"(\d{4}-\d{2}-\d{2})T24:00(?::00(?:\.0+)?)?(Z|[+-]\d{2}:?\d{2})", plain, re.ASCII)
+    try:
+        moment = datetime.fromisoformat(f"{last[1]}T00:00{last[2]}" if last else plain)
+        if last:
+            moment += _DAY
+        if moment.tzinfo is None:
+            if not _DATE.fullmatch(plain):
+                raise TimeError(f"{shown} has no time zone; write Z behind it for UTC")
+            moment = moment.replace(tzinfo=UTC)
+        moment = moment.astimezone(UTC)
+    except TimeError:
+        raise
+    except (ValueError, OverflowError):
+        raise TimeError(f"{shown} is no time; write {WANTED}") from None
+    if not 1900 <= moment.year <= 2999:  # far from where a day more or less does not exist
+        raise TimeError(f"{shown} lies outside the years 1900 to 2999")
+    return moment
+
+
+@dataclass(frozen=True, slots=True)
+class Daily:
+    """Hours of some days of the week (0 is Monday): the beginning and the end as time from that day's midnight UTC."""
+
+    days: frozenset[int]
+    start: timedelta
+    end: timedelta
+
+
+@dataclass(frozen=True, slots=True)
+class Period:
+    """A time in which a zone applies; an end that is None is open, and without a schedule it applies throughout."""
+
+    start: datetime | None = None
+    end: datetime | None = None
+    schedule: tuple[Daily, ...] = ()
+
+    def meets(self, hours: Hours) -> bool:
+        """Whether the zone may apply at some moment of the hours."""
+        first = hours.start if self.start is None else max(self.start, hours.start)
+        last = hours.end if self.end is None else min(self.end, hours.end)
+        if first > last:
+            return False
+        if not self.schedule:
+            return True
+        midnight = first.replace(hour=0, minute=0, second=0, microsecond=0) - 2 * _DAY  # times have offsets, and nights
+        while midnight <= last + _DAY:
+            for daily in self.schedule:
+                if midnight.weekday() not in daily.days:
+                    continue
+                end = daily.end if daily.end > daily.start else daily.end + _DAY
+                if midnight + daily.start <= last and midnight + end >= first:
+                    return True
+            midnight += _DAY
+        return False
+
+
+ALWAYS = Period()
+
+
+def read_periods(given: Any) -> tuple[tuple[Period, ...], str]:
+    """The periods of ED-269's ``applicability`` and ED-318's ``limitedApplicability``, and what is not understood.
+
+    No periods mean always, which is also what anything that is not understood means.
+    """
+    if given is None or given == []:
+        return (), ""
+    try:
+        if not isinstance(given, list) or len(given) > 1000:
+            raise TimeError("it is no list of periods")
+        periods = tuple(_period(one) for one in given)
+    except TimeError as why:
+        return (), str(why)
+    return (() if ALWAYS in periods else periods), ""
+
+
+def _period(given: Any) -> Period:
+    if not isinstance(given, dict):
+        raise TimeError("a period is no object")
+    unknown = sorted(str(k)[:40] for k in given if k not in ("permanent", "startDateTime", "endDateTime", "schedule"))
+    if unknown:
+        raise TimeError(f"{unknown[0]!r} of a period is not known")
+    permanent = given.get("permanent")
+    if permanent not in (None, "YES", "NO"):
+        raise TimeError(f"permanent {str(permanent)[:20]!r} is neither YES nor NO")
+    if permanent == "YES":
+        return ALWAYS
+    start, end = (_moment(given.get(key)) for key in ("startDateTime", "endDateTime"))
+    schedule = given.get("schedule")
+    if schedule is None or schedule == []:
+        return Period(start, end)
+    if not isinstance(schedule, list) or len(schedule) > 1000:
+        raise TimeError("the schedule is no list")
+    daily = [_daily(one) for one in schedule]
+    return Period(start, end, () if None in daily else tuple(d for d in daily if d is not None))
+
+
+def _moment(given: Any) -> datetime | None:
+    if given is None or given == "":
+        return None
+    if not isinstance(given, str):
+        raise TimeError(f"{str(given)[:40]!r} is no time")
+    return read_instant(given)
+
+
+def _daily(given: Any) -> Daily | None:
+    """One line of a schedule; None if it depends on the sun, whose times are not computed."""
+    if not isinstance(given, dict) or not isinstance(given.get("day"), list) or not given["day"]:
+        raise TimeError("a line of a schedule has no days")
+    if given.get("startEvent") is not None or given.get("endEvent") is not None:
+        return None
+    days: set[int] = set()
+    for day in given["day"]:
+        if day not in (*WEEK, "ANY"):
+            raise TimeError(f"{str(day)[:20]!r} is no day of the week")
+        days |= set(range(7)) if day == "ANY" else {WEEK.index(day)}
+    return Daily(frozenset(days), _of_day(given.get("startTime"), "00:00Z"), _of_day(given.get("endTime"), "24:00Z"))
+
+
+def _of_day(given: Any, otherwise: str) -> timedelta:
+    """The time from midnight UTC of a text such as ``06:00Z``, ``00:00:00.00Z`` or ``08:00+02:00``."""
+    text = otherwise if given is None else given
+    if not isinstance(text, str) or len(text) > _MOST_CHARACTERS:
+        raise TimeError(f"{str(text)[:40]!r} is no time of day")
+    last = re.fullmatch(r"24:00(?::00(?:\.0+)?)?(Z|[+-]\d{2}:?\d{2})", text.strip(), re.ASCII)
+    try:
+        at = time.fromisoformat(f"00:00{last[1]}" if last else text.strip())
+    except ValueError:
+        raise TimeError(f"{text[:40]!r} is no time of day") from None
+    offset = at.utcoffset()
+    if offset is None:
+        raise TimeError(f"{text[:40]!r} has no time zone")
+    whole = timedelta(hours=at.hour, minutes=at.minute, seconds=at.second, microseconds=at.microsecond) - offset
+    return whole + _DAY if last else whole
+
+
+def apply_in(periods: Sequence[Period], hours: Hours | None) -> bool:
+    """Whether a zone with these periods may apply in the hours; without hours, or without periods, it does."""
+    return hours is None or not periods or any(p.meets(hours) for p in periods)
+
+
+def hours_of(given: Any, departure: datetime | None, where: str, problems: list[Problem]) -> Hours | None:
+    """When a mission is flown: its ``at`` as given, if it has one, or else the departure that the caller states."""
+    if given is None:
+        return None if departure is None else Hours.around(departure)
+    try:
+        return Hours.read(given)
+    except TimeError as why:
+        problems.append(Problem(where, str(why)))
+        return None

@@ -1,0 +1,233 @@
+"""One volume of a published zone, from what its format says to the drafts that all zone files share.
+
+What is not understood never makes a zone smaller: it is kept as a fault of the draft, which refuses the mission if the
+zone lies near it (`left_out.faults_near`); farther away the zone counts from the ground up without end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from gcsplan.errors import Problem
+from gcsplan.mission_file.airspace.policy import Judge, Policy, Published
+from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE
+from gcsplan.mission_file.zone_draft import MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees
+from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
+from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, outline_of, unwrapped
+from gcsplan.world.zones import Level
+
+Corner = tuple[float, float]
+"""(latitude, longitude), degrees."""
+
+ELLIPSOID = "WGS84"
+LEAST_GEOID_M, GREATEST_GEOID_M = -110.0, 90.0
+"""Bounds of the geoid's height above the ellipsoid, m (EGM96: -107 to 86)."""
+
+_read = lru_cache(maxsize=4096)(read_level)  # zones repeat their limits
+
+AROUND_DEG = 0.01
+"""Degrees by which a zone without an outline is taken to reach beyond its points."""
+
+CURE = "complete its outline, or delete it from the file if it is no zone"
+
+WIDENED = (
+    "limits above the ellipsoid are no heights above sea level: these zones are larger by the most that the two differ "
+    "anywhere"
+)
+OFF_LEVEL = "flight levels lie as far from their heights above sea level as the mission says (flight_level_error_m)"
+CROSSES = "the outlines of these zones cross or touch themselves: all that they enclose is no-fly"
+FAULTY = "the limits of these zones are not understood: they count from the ground up without end"
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """One limit as it is written: the value, words that belong to it, and words that hold where it says nothing."""
+
+    value: str | int | float
+    words: tuple[str, ...] = ()
+    spare: tuple[str, ...] = ()
+    key: str = ""
+
+    def __str__(self) -> str:
+        words = " ".join(w for w in self.words if w)
+        return f"{self.key} {str(self.value)[:60]}{f' {words[:40]}' if words else ''}".strip()
+
+
+@dataclass
+class Limits:
+    """Floor and ceiling of one volume, what a user has to know of them, and why they cannot be read."""
+
+    bounds: Bounds = field(default_factory=Bounds)
+    remarks: list[Remark] = field(default_factory=list)
+    faults: list[Problem] = field(default_factory=list)
+
+    @classmethod
+    def read(cls, lower: Given | None, upper: Given | None, where: str, spared: str = "", *, policy: Policy) -> Limits:
+        """The limits; a missing one is no limit. ``spared`` is the remark on a limit that needs its spare words."""
+        found = cls()
+        error_m = policy.flight_level_error_m
+        levels: dict[str, float] = {}
+        for bound, given in (("floor", lower), ("ceiling", upper)):
+            if given is None:
+                continue
+            try:
+                level = found._level(bound, given, spared, error_m)
+            except LevelError as why:
+                cure = f"{given} cannot be read as a level: {why}. Write for example {EXAMPLES}"
+                found.faults.append(Problem(where, cure))
+                continue
+            if level is not None:
+                levels[f"{bound}_{level.datum}_m"] = level.value_m
+        found.bounds = Bounds(**levels)
+        if not found.faults:
+            found.bounds.levels(where, found.faults)
+        return found
+
+    def _level(self, bound: str, given: Given, spared: str, error_m: float | None) -> Level | None:
+        words = tuple("AMSL" if w.upper() == ELLIPSOID else w for w in given.words)
+        try:
+            level = _read(given.value, words)
+        except LevelError:
+            if not given.spare:
+                raise
+            level = read_level(given.value, words, given.spare)
+            self.remarks.append((spared, str(given)))
+        if level is Limit.PRESSURE and error_m is not None:
+            return self._off(bound, given, _of_flight_level(given), error_m, OFF_LEVEL)
+        if level is Limit.PRESSURE:
+            self.remarks.append((UNDER_PRESSURE if bound == "floor" else OVER_PRESSURE, str(given)))
+            return None
+        if level is Limit.UNLIMITED:
+            if bound == "floor":
+                raise LevelError("a floor needs a height")
+            return None
+        assert isinstance(level, Level)
+        if words != given.words:
+            error_m = GREATEST_GEOID_M if bound == "floor" else -LEAST_GEOID_M
+            return self._off(bound, given, level.value_m, error_m, WIDENED)
+        return level
+
+    def _off(self, bound: str, given: Given, amsl_m: float, error_m: float, sentence: str) -> Level:
+        """A level that may lie ``error_m`` lower or higher: the one with which the zone is larger."""
+        level = Level(amsl_m - error_m if bound == "floor" else amsl_m + error_m, "amsl")
+        self.remarks.append((sentence, f"{given}: {bound} at {level}"))
+        return level
+
+
+def _of_flight_level(given: Given) -> float:
+    """The height of a pressure altitude in the standard atmosphere, m."""
+    text = " ".join([str(given.value), *given.words]).upper()
+    level = read_level(text.replace("FL", " ").replace("STD", " "), (), ("FT", "AMSL"))
+    if not isinstance(level, Level):
+        raise LevelError("it has no height")
+    return level.value_m * (100.0 if "FL" in text else 1.0)
+
+
+@dataclass
+class AirspaceFile:
+    """The zones of one published file while it is read. ``seen`` counts the zones, used or not."""
+
+    path: Path
+    policy: Policy
+    vocabulary: Sequence[str]
+    found: ZoneFile = field(init=False)
+    judge: Judge = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.found = ZoneFile(self.path)
+        self.judge = Judge(self.policy, self.vocabulary)
+
+    def finished(self) -> ZoneFile:
+        """The zones, after what the policy names and no zone has is reported."""
+        self.found.problems += self.judge.slips()
+        return self.found
+
+    def fault(self, where: str, message: str) -> None:
+        """Refuse the file for a zone of which not even the place is known."""
+        self.found.problems.append(Problem(where, message))
+
+    def add_circle(
+        self, zone: Published, part: str, where: str, centre: Corner, radius_m: float, limits: Limits
+    ) -> None:
+        """Add a cylinder called ``part``."""
+        if not check_degrees(centre, where, self.found.problems):
+            return
+        words = f"the radius must be above 0 and at most {LARGEST_RADIUS_M:g} m, given {radius_m:g} m"
+        if not radius_m <= LARGEST_RADIUS_M:  # a larger zone may reach the mission from anywhere
+            self.fault(where, words)
+        elif radius_m > 0.0:
+            self._add(zone, part, where, (centre,), radius_m, limits, [])
+        else:
+            self._add(zone, part, where, around([centre]), None, limits, [Problem(where, words)])
+
+    def add_ring(self, zone: Published, part: str, where: str, ring: Sequence[Corner], limits: Limits) -> None:
+        """Add a prism called ``part`` by its outline."""
+        if len(ring) > MAX_VERTICES:
+            self.fault(where, f"has {len(ring)} points, more than {MAX_VERTICES}; simplify it")
+            return
+        for lat, lon in ring:
+            right = -90.0 <= lat <= 90.0 and -180.0 <= lon <= 180.0  # most are: no call for each of 100,000
+            if not right and not check_degrees((lat, lon), where, self.found.problems):
+                return
+        outline, why = outline_of(ring)
+        if not why:
+            self._add(zone, part, where, tuple(outline), None, limits, [])
+            return
+        parts = enclosed(outline) if len(set(outline)) > 2 else []
+        if not parts:
+            if ring:
+                self._add(zone, part, where, around(ring), None, limits, [Problem(where, f"{why}; {CURE}")])
+            else:
+                self.fault(where, "the polygon has no points")
+            return
+        limits = Limits(limits.bounds, [*limits.remarks, (CROSSES, "")], limits.faults)
+        for i, piece in enumerate(parts):
+            name = part if len(parts) == 1 else f"{part}/{i + 1}"
+            self._add(zone, name, where, tuple(piece), None, limits, [])
+
+    def _add(
+        self, zone: Published, part: str, where: str, points: tuple[Corner, ...], radius_m: float | None,
+        limits: Limits, faults: list[Problem],
+    ) -> None:  # fmt: skip
+        faults = [Problem(p.where, f"zone {zone.name[:60]!r}: {p.message}") for p in (*limits.faults, *faults)]
+        floor, ceiling = (None, None) if faults else limits.bounds.levels(where, [])
+        remarks = [*zone.remarks, *limits.remarks]
+        if faults:
+            remarks.append((FAULTY, ""))
+        draft = ZoneDraft(
+            part[:200], where, points, False, radius_m, floor, ceiling,
+            unused=self.judge.reason(zone), faults=tuple(faults),
+        )  # fmt: skip
+        self.found.add(draft, remarks)
+
+
+def around(points: Sequence[Corner]) -> tuple[Corner, ...]:
+    """A rectangle with all points well inside, to tell whether a zone without an outline lies near."""
+    at = unwrapped(points, points[0][1])
+    (west, south), (east, north) = at.min(axis=0) - AROUND_DEG, at.max(axis=0) + AROUND_DEG
+    south, north = max(south, -90.0), min(north, 90.0)
+    corners = ((south, west), (south, east), (north, east), (north, west))
+    return tuple((float(lat), float((lon + 180.0) % 360.0 - 180.0)) for lat, lon in corners)
+
+
+def enclosed(outline: Sequence[Corner]) -> list[list[Corner]]:
+    """The outlines of all that a line which crosses itself encloses, whichever way it runs around it."""
+    import shapely
+
+    line = unwrapped([*outline, outline[0]], outline[0][1])
+    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(shapely.LineString(line))]))
+    whole = shapely.union_all(faces)
+    outer = [shapely.Polygon(p.exterior) for p in shapely.get_parts(whole) if p.geom_type == "Polygon"]
+    rings = []
+    for face in shapely.get_parts(shapely.union_all(outer)):
+        points = np.asarray(face.exterior.coords)[:-1]
+        ring = [(float(lat), float((lon + 180.0) % 360.0 - 180.0)) for lon, lat in points]
+        if not outline_of(ring)[1]:
+            rings.append(ring)
+    return rings

@@ -1,0 +1,239 @@
+"""ED-269, ED-318 and openAIP: limits, shapes, several volumes, who authorises, and that nothing is left out unnamed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.mission_file.airspace.made import (
+    HOLE,
+    RING,
+    collection,
+    ed269,
+    ed318,
+    limits,
+    openaip,
+    read,
+    remarks,
+    said,
+    volume,
+)
+from tests.support.effort import draws
+
+DATA = Path(__file__).parents[2] / "data" / "airspace"
+LAYER = {"upper": 150, "upperReference": "AGL", "lower": 50, "lowerReference": "AGL", "uom": "m"}
+
+
+def of(*zones: Any) -> dict[str, Any]:
+    return {"title": "made", "features": list(zones)}
+
+
+# -- ED-269
+
+
+def test_ed269_volumes_circles_and_holes(tmp_path: Path) -> None:
+    circle = volume(
+        uomDimensions="FT", lowerLimit=500, lowerVerticalReference="AMSL", upperLimit=...,
+        horizontalProjection={"type": "Circle", "center": [8.2, 47.2], "radius": 1500},
+    )  # fmt: skip
+    hole = volume(horizontalProjection={"type": "Polygon", "coordinates": [RING, HOLE]})
+    found = read(tmp_path, of(ed269(circle, hole)))
+    assert not found.problems
+    first, second = found.zones
+    assert [z.name for z in found.zones] == ["Made zone/1", "Made zone/2"]
+    assert (first.points, first.radius_m, limits(first)) == (((47.2, 8.2),), 1500.0, ("152.4 m AMSL", "unlimited"))
+    assert limits(second) == ("ground", "120 m AGL")
+    assert found.notes == ("zones.json: 1 hole in polygons counted as no-fly",)
+
+
+def test_heights_above_the_ellipsoid_make_a_zone_larger_never_smaller(tmp_path: Path) -> None:
+    given = volume(lowerLimit=300, lowerVerticalReference="WGS84", upperLimit=500, upperVerticalReference="WGS84")
+    found = read(tmp_path, of(ed269(given)))
+    assert limits(found.zones[0]) == ("210 m AMSL", "610 m AMSL")  # by 90 m and 110 m, more than any geoid
+    assert "above the ellipsoid are no heights above sea level" in remarks(found)
+
+
+def test_an_authorisation_is_named_with_who_gives_it(tmp_path: Path) -> None:
+    found = read(tmp_path, of(ed269(restriction="REQ_AUTHORISATION")))
+    assert "may be entered with an authorisation" in remarks(found)
+    assert "Office a@b.example P3D before" in remarks(found)
+    found = read(tmp_path, of(ed269(restriction="CONDITIONAL", restrictionConditions=["below 50 m"])))
+    assert "under conditions, which are not judged: they are no-fly: below 50 m" in remarks(found)
+
+
+@pytest.mark.parametrize(
+    ("zone", "words"),
+    [
+        (ed269(volume(lowerVerticalReference=...)), ""),  # 0 of whatever is the ground
+        (ed269(volume(upperVerticalReference=...)), "upperLimit 120 M cannot be read as a level: it has no reference"),
+        (ed269(volume(uomDimensions=...)), "upperLimit 120 AGL cannot be read as a level: it has no unit"),
+        (ed269(volume(uomDimensions="YD")), "'YD' is not known"),
+        (ed269(volume(upperVerticalReference="QNH")), "'QNH' is not known"),
+        (ed269(volume(upperLimit="high")), "upperLimit must be a number, given 'high'"),
+        (ed269(volume(upperLimit=0)), "the zone would lie wholly under ground"),
+        (ed269(volume(lowerLimit=200)), "the floor must be below the ceiling"),
+        (ed269(volume(horizontalProjection={"type": "Circle", "center": [8, 47]})), "a Circle has a radius in metres"),
+        (ed269(volume(horizontalProjection={"type": "Circle", "center": [8, 47], "radius": -1})), "above 0"),
+        (ed269(volume(horizontalProjection={"type": "Line"})), "must be a Polygon or a Circle, given 'Line'"),
+        (ed269(volume(horizontalProjection={"type": "Polygon", "coordinates": [[[47, 98], [1, 2]]]})), "look swapped"),
+        (ed269(volume(horizontalProjection={"type": "Polygon", "coordinates": [[[8, 47], [8, 48]]]})), "at least 3"),
+        (ed269({"uomDimensions": "M"}), "a volume has a horizontalProjection"),
+        (ed269(restriction=None), "zone 'Made zone': restriction must be text, given None"),
+        (ed269(geometry=[]), "geometry must be a list of volumes"),
+        (7, "features[1]: must be an object, given 7"),
+    ],
+)
+def test_what_ed269_cannot_say_is_named_with_its_feature(tmp_path: Path, zone: Any, words: str) -> None:
+    found = said(tmp_path, of(ed269(), zone))
+    assert (words in found and "features[1]" in found) if words else not found
+
+
+# -- ED-318
+
+
+def test_the_standard_s_own_sample_is_read(tmp_path: Path) -> None:
+    found = read(tmp_path, (DATA / "ed318_collection.json").read_bytes())
+    assert not found.problems
+    assert not any(z.faults for z in found.zones)
+    assert [(z.name, limits(z), z.radius_m) for z in found.zones] == [
+        ("LFPG-2/1", ("50 m AGL", "150 m AGL"), None),
+        ("LFPG-2/2", ("ground", "50 m AGL"), None),
+        ("Fictitious circle", ("50 m AGL", "150 m AGL"), 3500.0),
+    ]
+    assert "LFPG-UASZoneManager" in remarks(found)
+
+
+def test_ed318_layers_collections_and_units(tmp_path: Path) -> None:
+    shape = {"type": "Polygon", "coordinates": [RING]}
+    feet = LAYER | {"uom": "ft", "upper": 1500, "upperReference": "AMSL", "lower": 0}
+    found = read(tmp_path, collection(
+        ed318({"type": "GeometryCollection", "layer": feet, "geometries": [shape, shape | {"layer": LAYER}]}),
+        ed318({"type": "MultiPolygon", "coordinates": [[RING, HOLE], [RING]]}),
+    ))  # fmt: skip
+    assert not found.problems
+    assert [limits(z) for z in found.zones] == [
+        ("ground", "457.2 m AMSL"), ("50 m AGL", "150 m AGL"), ("ground", "unlimited"), ("ground", "unlimited"),
+    ]  # fmt: skip
+    assert [z.name for z in found.zones] == ["Made/1", "Made/2", "Made/1", "Made/2"]
+
+
+@pytest.mark.parametrize(
+    ("feature", "words"),
+    [
+        (ed318({"type": "Point", "coordinates": [8, 47]}), "a Point has an extent with subType Circle and radius"),
+        (ed318({"type": "LineString", "coordinates": RING}), "must be a Polygon, a MultiPolygon or a Point"),
+        (ed318({"type": "GeometryCollection", "geometries": []}), "a GeometryCollection has geometries"),
+        (ed318({"type": "Polygon", "coordinates": 5}), "a polygon is a list of rings"),
+        (ed318(layer=LAYER | {"upperReference": "QNE"}), "upper 150 m QNE cannot be read as a level"),
+        (ed318(layer=[1]), "layer must be an object"),
+        (ed318(7), "the zone has no geometry, given 7"),
+        (ed318(type=""), "type must be text"),
+        ({"type": "Feature"}, "must be a Feature with properties"),
+    ],
+)
+def test_what_ed318_cannot_say_is_named_with_its_feature(tmp_path: Path, feature: Any, words: str) -> None:
+    found = said(tmp_path, collection(ed318(), feature))
+    assert words in found
+    assert "features[1]" in found
+
+
+# -- openAIP
+
+
+@pytest.mark.parametrize("wrap", [lambda a: {"items": a, "totalPages": 1}, lambda a: a, lambda a: collection(
+    *({"type": "Feature", "properties": {k: v for k, v in one.items() if k != "geometry"}, "geometry": one["geometry"]}
+      for one in a))])  # fmt: skip
+def test_openaip_is_read_in_its_three_wrappings(tmp_path: Path, wrap: Any) -> None:
+    level = {"value": 95, "unit": 6, "referenceDatum": 2}
+    metres = {"value": 120, "unit": 0, "referenceDatum": 0}
+    ones = [openaip(), openaip(upperLimit=level), openaip(lowerLimit=metres), openaip(type=10, icaoClass=8)]
+    found = read(tmp_path, wrap(ones), flight_level_error_m=100.0)
+    assert not found.problems
+    assert [limits(z) for z in found.zones[:3]] == [
+        ("ground", "1066.8 m AMSL"), ("ground", "2995.6 m AMSL"), ("120 m AGL", "1066.8 m AMSL"),
+    ]  # fmt: skip
+    assert [bool(z.unused) for z in found.zones] == [False, False, False, True]  # an information region
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"upperLimit": {"value": 100, "unit": 9, "referenceDatum": 1}}, "cannot be read as a level"),
+        ({"upperLimit": {"value": "x", "unit": 1, "referenceDatum": 1}}, "upperLimit.value must be a number"),
+        ({"type": 99}, "type must be one of openAIP's numbers, given 99"),
+        ({"icaoClass": 7}, "icaoClass must be one of openAIP's numbers, given 7"),
+        ({"geometry": {"type": "Point", "coordinates": [8, 47]}}, "the geometry must be a Polygon, given 'Point'"),
+    ],
+)
+def test_what_openaip_cannot_say_is_named(tmp_path: Path, changes: Any, words: str) -> None:
+    assert words in said(tmp_path, [openaip(), openaip(**changes)])
+
+
+def test_a_page_of_several_is_refused(tmp_path: Path) -> None:
+    words = said(tmp_path, {"items": [openaip()], "page": 1, "totalPages": 3})
+    assert "the file is page 1 of 3" in words
+
+
+def test_limits_that_move_and_hours_of_a_week_make_no_zone_smaller(tmp_path: Path) -> None:
+    low = {"value": 500, "unit": 1, "referenceDatum": 0}
+    hours = {"operatingHours": [{"dayOfWeek": 0, "startTime": "08:00", "endTime": "16:00"}]}
+    found = read(tmp_path, [openaip(lowerLimit=low, lowerLimitMin=low, hoursOfOperation=hours)])
+    assert limits(found.zones[0])[0] == "ground"
+    assert "limits of these zones move" in remarks(found)
+    assert "hours of operation are not read" in remarks(found)
+
+
+# -- attacks
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"features": [{"geometry": [{"horizontalProjection": None}]}]},
+        {"items": [openaip(), None, [], {"geometry": 5}]},
+        collection(ed318(), None),
+        [ed269(), None],
+        "[" * 100_000,
+        b"\xff\xfe",
+    ],
+)
+def test_broken_files_end_in_a_message(tmp_path: Path, content: Any) -> None:
+    assert said(tmp_path, content)
+
+
+JUNK = st.recursive(
+    st.none() | st.booleans() | st.integers(-(10**30), 10**30) | st.floats() | st.text(max_size=8)
+    | st.sampled_from([RING, "YES", "2026-01-01T00:00Z", "MON", "Polygon", "Circle", "AMSL", "WGS84", "FT", "FL"]),
+    lambda inner: st.lists(inner, max_size=4)
+    | st.dictionaries(st.sampled_from(["type", "coordinates", "radius", "value", "unit", "day"]), inner, max_size=4),
+    max_leaves=8,
+)  # fmt: skip
+SAMPLES = [
+    of(ed269(volume(), applicability=[{"permanent": "NO", "schedule": [{"day": ["MON"], "startTime": "06:00Z"}]}])),
+    collection(ed318(), ed318({"type": "Point", "coordinates": [8, 47], "extent": {"subType": "Circle", "radius": 9}})),
+    {"items": [openaip(hoursOfOperation={"operatingHours": []}, activeFrom="2026-01-01T00:00Z")]},
+]
+
+
+def spoilt(draw: Any, value: Any) -> Any:
+    """A copy with one random member of it replaced by junk."""
+    if isinstance(value, dict | list) and value and draw(st.integers(0, 5)):
+        copy: Any = value.copy()
+        key = draw(st.sampled_from(sorted(copy) if isinstance(copy, dict) else range(len(copy))))
+        copy[key] = spoilt(draw, copy[key])
+        return copy
+    return draw(JUNK)
+
+
+@given(st.data())
+@settings(max_examples=draws(400), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_spoilt_file_ends_in_a_traceback(tmp_path: Path, data: st.DataObject) -> None:
+    value = data.draw(st.sampled_from(SAMPLES))
+    for _ in range(data.draw(st.integers(1, 3))):
+        value = spoilt(data.draw, value)
+    said(tmp_path, json.dumps(value).encode("utf-8", "surrogatepass"))
