@@ -38,7 +38,9 @@ def check(
             "files; NAME=FILE says for which vehicle of the mission a file is.",
         ),
     ],
-    dem: Annotated[list[str] | None, typer.Option(metavar="FILE", help="Terrain; may be repeated.")] = None,
+    dem: Annotated[
+        list[str] | None, typer.Option(metavar="FILE", help="Terrain; may be repeated. Or a source of dem fetch.")
+    ] = None,
     vertical_datum: Annotated[
         str | None, typer.Option(metavar="NAME", help="Of the terrain: EGM96, EGM2008, …")
     ] = None,

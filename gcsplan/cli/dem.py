@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcsplan.cli.ending import emit
+from gcsplan.cli.ending import emit, interrupted
 from gcsplan.cli.options import JsonOption
 from gcsplan.errors import InputError, UsageError
 
@@ -89,8 +89,11 @@ def fetch(
     if offline:
         done = Fetch(cache).look(cells)
     else:
-        with _progress() as progress:
-            done = Fetch(cache, mirror=mirror, progress=progress).run(cells)
+        try:
+            with _progress() as progress:
+                done = Fetch(cache, mirror=mirror, progress=progress).run(cells)
+        except KeyboardInterrupt:
+            raise interrupted("interrupted: what came is kept, and the same command goes on from here") from None
     _tell(chosen, cache.root, done, as_json)
 
 
@@ -201,7 +204,7 @@ def _tell(source: Source, root: Path, done: Sequence[Fetched], as_json: bool) ->
         say(f"{f.cell.name}  {_words(f)}")
     what = "surface model (trees and buildings are in it)" if source.kind == "surface" else "bare-earth model"
     remark(f"{source.title}, {what}, heights above {source.vertical_datum}; cache {root}")
-    remark(f"data: {source.licence}")
+    remark(source.notice)
 
 
 def _words(f: Fetched) -> str:

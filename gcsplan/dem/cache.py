@@ -59,7 +59,7 @@ def cache_folder() -> Path:
     """``$GCSPLAN_DEM_CACHE``, else ``$XDG_CACHE_HOME/gcsplan/dem``, else the platform's folder for caches."""
     own = os.environ.get(CACHE_VARIABLE, "")
     if own:
-        return Path(own).absolute()
+        return Path(os.path.expanduser(own)).absolute()
     xdg = os.environ.get("XDG_CACHE_HOME", "")
     if xdg and Path(xdg).is_absolute():  # its specification says to ignore others
         return Path(xdg) / "gcsplan" / "dem"

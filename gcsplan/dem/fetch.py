@@ -108,18 +108,30 @@ class Fetch:
             self.cache.folder.mkdir(parents=True, exist_ok=True)
             with self._alone(f"{self.source.name}-{cell.name}"):
                 record = self.cache.find(cell) if self._is_good(cell) else None
-                if record is not None:
+                if record is not None and (record.state == "tile" or self._is_new(cell)):
                     return Fetched(cell, record, True)
-                published, told = self._list(self.source)
-                if cell.name in published:
-                    return Fetched(cell, self._tile(cell), False)
-                fuller, more = self._list(WITNESS)
-                return Fetched(cell, self._none(cell, "absent" if cell.name in fuller else "sea", (told, more)), False)
+                try:
+                    return Fetched(cell, self._bring(cell), False)
+                except LinkError:
+                    if record is None:
+                        raise
+                    return Fetched(cell, record, True)  # an old record that there is no tile still counts
         except OSError as why:
             if isinstance(why, GcsplanError):
                 raise
             words = f"the cache cannot be written: {why.strerror or why}"
             raise InputError(words, where=str(self.cache.folder)) from why
+
+    def _is_new(self, cell: Cell) -> bool:
+        """Whether a record is so new that the lists need not be asked again."""
+        return _age_days(self.cache.record_path(cell)) < LIST_DAYS
+
+    def _bring(self, cell: Cell) -> Record:
+        published, told = self._list(self.source)
+        if cell.name in published:
+            return self._tile(cell)
+        fuller, more = self._list(WITNESS)
+        return self._none(cell, "absent" if cell.name in fuller else "sea", (told, more))
 
     # -- one tile ------------------------------------------------------------------------------------------------
 

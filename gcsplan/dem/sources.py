@@ -24,6 +24,7 @@ class Source:
     bucket, and ``bucket`` its name, the folder that a mirror has for it. ``object_of`` names the object of a tile,
     ``listing`` the one that lists all tiles; each match of ``listed`` in it is a tile (groups: N36, W085), and a list
     is whole if it holds ``least_tiles`` and ends with ``last``. ``columns_of`` counts a tile's columns for 3,600 rows.
+    ``notice`` is what the licence wants beside everything that is made of the data.
     """
 
     name: str
@@ -40,7 +41,7 @@ class Source:
     columns_of: Callable[[Cell], int]
     shares_edges: bool
     most_tile_bytes: int
-    licence: str
+    notice: str
 
     def tiles_in(self, text: str) -> frozenset[str] | None:
         """The names of the tiles in a list; None if it is not the whole list."""
@@ -78,8 +79,8 @@ GLO30 = Source(
     columns_of=_copernicus_columns,
     shares_edges=False,
     most_tile_bytes=128 * 2**20,
-    licence="© DLR e.V. 2010-2014 and © Airbus Defence and Space GmbH 2014-2018, provided under COPERNICUS by the "
-    "European Union and ESA",
+    notice="produced using Copernicus WorldDEM-30 © DLR e.V. 2010-2014 and © Airbus Defence and Space GmbH 2014-2018 "
+    "provided under COPERNICUS by the European Union and ESA; all rights reserved",
 )
 
 GLO90 = Source(
@@ -97,7 +98,7 @@ GLO90 = Source(
     columns_of=_copernicus_columns,
     shares_edges=False,
     most_tile_bytes=128 * 2**20,
-    licence=GLO30.licence,
+    notice=GLO30.notice.replace("-30", "-90"),
 )
 """It holds every tile of land, so its list tells the sea from tiles that another source merely lacks."""
 
@@ -116,7 +117,8 @@ SRTM = Source(
     columns_of=lambda _: 3600,
     shares_edges=True,
     most_tile_bytes=128 * 2**20,
-    licence="NASA JPL, distributed by OpenTopography (doi.org/10.5069/G9445JDF)",
+    notice="NASA Shuttle Radar Topography Mission Global 1 arc second, distributed by OpenTopography, "
+    "https://doi.org/10.5069/G9445JDF",
 )
 
 SOURCES: dict[str, Source] = {source.name: source for source in (GLO30, SRTM)}

@@ -110,6 +110,7 @@ def _told(
         "dem_source": source.name,
         "dem_kind": source.kind,
         "dem_tiles": names_of(records),
+        "dem_notice": source.notice,
         "source": source.title,
     }
     notes = []

@@ -257,7 +257,8 @@ def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]],
     names = {
         "dem_sha256": "terrain model, SHA-256", "vertical_datum": "vertical datum", "resolution_m": "resolution",
         "bare_dem": "terrain model", "zones_sha256": "zones, SHA-256",
-        "dem_source": "terrain from", "dem_tiles": "tiles", "sea_tiles": "tiles taken as sea, 0 m",
+        "dem_source": "terrain from", "dem_notice": "terrain data", "dem_tiles": "tiles",
+        "sea_tiles": "tiles taken as sea, 0 m",
     }  # fmt: skip
     rows = []
     for key, value in inputs.items():

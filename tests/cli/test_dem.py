@@ -78,7 +78,9 @@ def test_from_nothing_to_a_plan_by_the_commands_that_are_told(run: Any, served: 
 
 
 def test_a_mission_is_fetched_by_its_file(run: Any, served: Served) -> None:
-    assert run("dem", "fetch", "ridge.yaml", "--offline")[0] == 2
+    code, out, _ = run("dem", "fetch", "ridge.yaml", "--offline", "--json")
+    assert code == 2
+    assert set(json.loads(out)["error"]["problems"][0]) == {"where", "message"}
     assert served.asked == []
     assert run("dem", "fetch", "ridge.yaml")[0] == 0
     code, out, _ = run("dem", "fetch", "ridge.yaml", "--offline", "--json")
@@ -127,6 +129,16 @@ def test_a_mistake_is_one_message(run: Any, served: Served, tmp_path: Path, argu
     assert out == ""
     assert words in err
     assert served.asked == []
+
+
+def test_an_interruption_says_that_nothing_is_lost(run: Any, served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gcsplan.dem.fetch.download", stop)
+    code, _, err = run("dem", "fetch", "ridge.yaml")
+    assert code == 130
+    assert err == "gcsplan: interrupted: what came is kept, and the same command goes on from here\n"
 
 
 def test_what_cannot_be_had_is_exit_code_6_and_the_rest_stays(run: Any, served: Served) -> None:

@@ -253,6 +253,21 @@ def test_lists_are_kept_and_asked_for_anew_when_they_are_old(served: Served, tmp
     assert len(served.paths(".txt")) == 4
 
 
+@pytest.mark.slow
+def test_a_tile_that_was_not_there_is_asked_for_again_after_a_while(served: Served, tmp_path: Path) -> None:
+    state(served, tmp_path, LACKING)
+    served.put_lists(land=[LACKING])
+    served.put_tile(LACKING)
+    assert state(served, tmp_path, LACKING) == "absent"
+    lists, record = list((tmp_path / "lists").iterdir()), Cache(GLO30, tmp_path).record_path(LACKING)
+    for path in (*lists, record):
+        os.utime(path, (0, 0))
+    trouble, served.trouble = served.trouble, lambda request, path, number: request.send_error(404) is None
+    assert state(served, tmp_path, LACKING) == "absent"
+    served.trouble = trouble
+    assert state(served, tmp_path, LACKING) == "tile"
+
+
 # -- processes and the disk --------------------------------------------------------------------------------------------
 
 
