@@ -265,7 +265,11 @@ def _checked(part: _Part, length: int) -> Arrived:
     if count != length or (whole and not agrees):
         etag = part.etag
         part.drop()
-        raise _Again(f"its checksum is wrong (the server says {etag})" if count == length else "the file is cut off")
+        raise _Again(
+            f"its checksum is wrong (the server says {etag})"
+            if count == length
+            else "it has another length on the disk"
+        )
     return Arrived(count, sha256.hexdigest(), part.etag, agrees)
 
 

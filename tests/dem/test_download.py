@@ -134,6 +134,22 @@ def test_a_wrong_checksum_is_never_kept(served: Served, tmp_path: Path) -> None:
     assert bring(served, tmp_path).etag == right
 
 
+def test_a_file_that_somebody_else_writes_to_is_not_believed(served: Served, tmp_path: Path) -> None:
+    def trouble(request: BaseHTTPRequestHandler, path: str, number: int) -> bool:
+        send(request, DATA, etag="")  # so that its length alone can tell
+        return True
+
+    def meddle(have: int, whole: int | None) -> None:
+        if have == whole:
+            with (tmp_path / "object.part").open("ab") as file:
+                file.write(b"more")
+
+    served.trouble = trouble
+    with pytest.raises(LinkError, match="another length on the disk"):
+        download(served.url + PATH, tmp_path / "object.part", most_bytes=MOST, patience=QUICK, report=meddle)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.first_quick
 @pytest.mark.parametrize("code", [404, 403, 410])
 def test_what_is_not_there_is_asked_for_once(served: Served, tmp_path: Path, code: int) -> None:

@@ -218,7 +218,7 @@ def test_srtm_has_a_list_and_a_datum_of_its_own(served: Served, tmp_path: Path) 
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("which", [GLO90, GLO30], ids=lambda s: s.name)
-@pytest.mark.parametrize("how", ["short", "gone", "cut off", "another page", "silent"])
+@pytest.mark.parametrize("how", ["short", "gone", "cut off", "cut in its last line", "another page", "silent"])
 def test_without_both_whole_lists_nothing_is_sea(served: Served, tmp_path: Path, which: Source, how: str) -> None:
     path = f"/{which.bucket}/{which.listing}"
     data = served.objects[path]
@@ -231,7 +231,12 @@ def test_without_both_whole_lists_nothing_is_sea(served: Served, tmp_path: Path,
         elif how == "silent":
             request.connection.close()
         else:
-            bad = {"cut off": data[: len(data) // 2], "short": data[:-100_000], "another page": b"<html></html>"}
+            bad = {
+                "cut off": data[: len(data) // 2],
+                "cut in its last line": data[:-10],
+                "short": data[:-100_000],
+                "another page": b"<html></html>",
+            }
             send(request, bad[how] + (b"_DEM\r\n" if how == "short" else b""))
         return True
 
