@@ -22,7 +22,8 @@ from gcsplan.report.subject import Compared, Rehearsed
 from gcsplan.sim.wind import Weather
 from gcsplan.units import duration
 from tests.app.test_fleet_planning import CROSS
-from tests.cli.test_fleet import ARRIVAL, LIMITS, run, write
+from tests.cli.conftest import run
+from tests.cli.test_fleet import ARRIVAL, LIMITS, write
 from tests.report.test_page import Reader
 
 __all__ = ["run"]
