@@ -18,34 +18,14 @@ from typing import Any, NamedTuple, get_args
 import gcsplan
 from gcsplan import errors
 from gcsplan.cli import ending
-from gcsplan.mission_file import load, point_keys, schema, units, vehicles
+from gcsplan.mission_file import json_schema, schema, units
 from gcsplan.planners import registry
 
 TOP = Path(__file__).resolve().parents[1]
 PACKAGE = Path(gcsplan.__file__).parent
 MARK = re.compile(r"^<!-- made: ([a-z-]+) -->$", re.MULTILINE)
 
-ELSEWHERE: Mapping[str, float] = {
-    **vehicles.ERRORS,
-    "separation_m": vehicles.SEPARATION_M,
-    "terrain_error_m": load.TERRAIN_ERROR_M,
-}
-"""Defaults that the reader of the mission file puts in, since they depend on other keys."""
-
-
 # -- the mission file -------------------------------------------------------------------------------------------------
-
-
-@cache
-def _said() -> dict[tuple[str, str], str]:
-    """Class and key to the line below the key, in the modules of the keys."""
-    found = {}
-    for kind in [*ast.parse(inspect.getsource(schema)).body, *ast.parse(inspect.getsource(point_keys)).body]:
-        if isinstance(kind, ast.ClassDef):
-            for field, text in zip(kind.body, kind.body[1:], strict=False):
-                if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
-                    found[kind.name, ast.unparse(field.target)] = ast.literal_eval(text.value)
-    return found
 
 
 def sections() -> list[tuple[str, type[schema.Keys]]]:
@@ -87,7 +67,7 @@ def mission_file() -> str:
             if key not in kind.__annotations__:
                 continue
             value = _value(key, whole["properties"][key], whole.get("$defs", {}))
-            meaning = _said().get((kind.__name__, key), "")
+            meaning = json_schema.descriptions().get((kind.__name__, key), "")
             lines.append(f"| `{key}` | {value} | {_default(key, field)} | {meaning} |")
         lines.append("")
         if issubclass(kind, schema.LimitKeys) and kind is not schema.LimitKeys:
@@ -101,8 +81,8 @@ def mission_file() -> str:
 def _default(key: str, field: Any) -> str:
     if field.is_required():
         return "**wanted**"
-    if key in ELSEWHERE:
-        return f"`{ELSEWHERE[key]:g}`"
+    if key in json_schema.LATE_DEFAULTS:
+        return f"`{json_schema.LATE_DEFAULTS[key]:g}`"
     value = field.default
     if value is None or value == [] or isinstance(value, schema.Keys):
         return "–"

@@ -10,7 +10,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from gcsplan.cli import check, energy, fly, links, plan, rehearse
+from gcsplan.cli import check, energy, fly, links, plan, rehearse, schema
 from gcsplan.cli.bench import bench_app
 from gcsplan.cli.dem import dem_app
 from gcsplan.cli.ending import Interrupted, end_in_good_order, explained, fail, interrupted, put, speak_plainly
@@ -39,6 +39,7 @@ app.command(short_help="Remove the mission, fence or rally points.")(links.clear
 app.command(short_help="Loopback vehicles that take missions.")(fly.sim)
 app.command("fit-energy", short_help="The energy model out of flight logs.")(energy.fit_energy)
 app.command()(plan.planners)
+app.command(short_help="The JSON Schema of a mission file, for editors.")(schema.schema)
 
 
 @app.callback(invoke_without_command=True)
