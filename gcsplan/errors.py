@@ -16,7 +16,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, Literal
+
+MOST_NAMES = 2000
+"""Most files of a folder that are looked at for a name."""
 
 NoMissionReason = Literal["infeasible", "not_found", "time", "separation", "battery", "too_many_items"]
 
@@ -121,6 +125,20 @@ class ReadBackDiffers(GcsplanError, RuntimeError):
 
     exit_code = 7
     default_reason = "differs"
+
+
+def absent(path: Path) -> str:
+    """The words for a file that is not there, with the nearest name in its folder."""
+    from difflib import get_close_matches
+    from itertools import islice
+
+    try:
+        names = [p.name for p in islice(path.parent.iterdir(), MOST_NAMES)]
+    except (OSError, ValueError):
+        names = []
+    near = get_close_matches(path.name, names, n=1, cutoff=0.75)
+    hint = f"; did you mean {path.with_name(near[0])}?" if near else ""
+    return f"{path} is not there (paths are relative to the mission file){hint}"
 
 
 def unknown_name(sentence: str, name: str, known: Iterable[str]) -> InputError:

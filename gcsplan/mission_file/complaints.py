@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from typing import Any, TypeVar, get_args
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import ValidationError
 
@@ -12,11 +13,23 @@ from gcsplan.errors import Problem
 from gcsplan.mission_file.keys import Keys
 from gcsplan.mission_file.places import EXAMPLES
 from gcsplan.mission_file.point_keys import POINT_FORMS
-from gcsplan.mission_file.schema import FORMS, nearest, shown
-from gcsplan.mission_file.units import nearest_key
+from gcsplan.mission_file.schema import FORMS, PlannerKeys, TerrainKeys, ZoneKeys, nearest, shown
+from gcsplan.mission_file.strict_yaml import lines_of
+from gcsplan.mission_file.units import UNITS, nearest_key, other_names, unit_end
 from gcsplan.mission_file.yaml_slips import missing_space
 
 Section = TypeVar("Section", bound=Keys)
+
+UNKNOWN = "unknown key"
+SWAPPED = "latitude and longitude look swapped"
+MOST_SWAPPED = 6
+
+SHORT = {TerrainKeys: "dem", PlannerKeys: "name", ZoneKeys: "file"}
+"""The key for which a text may be meant that stands where a whole section is wanted."""
+
+MOST_OF_NUMBER = 40
+_RANGE = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(?:-|–|\.\.|to)\s*(\d+(?:\.\d+)?)\s*")
+_NUMBER = re.compile(r"\s*[±+]?(-?\d+(?:[.,]\d+)?)\s*([a-zA-Z/²°%]*)\s*")
 
 
 def read_section(kind: type[Section], value: Any, where: str, problems: list[Problem]) -> Section | None:
@@ -27,7 +40,11 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Pro
     """
     if not isinstance(value, dict):
         keys = ", ".join(list(kind.model_fields)[:6])
-        tight = missing_space(value) if isinstance(value, str) else ""
+        tight = ""
+        if isinstance(value, str) and (kind not in SHORT or value.partition(":")[0].strip(" -") in kind.model_fields):
+            tight = missing_space(value)
+        elif isinstance(value, str):
+            tight = f"did you mean `{{{SHORT[kind]}: {value[:60]}}}`?"
         hint = f"; {tight}" if tight else ""
         problems.append(Problem(where, f"must be a mapping of keys ({keys}, …), given {shown(value)}{hint}"))
         return None
@@ -41,6 +58,57 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Pro
             return None
     # Only unknown keys are wrong: the other keys are read too, so that their mistakes are reported together.
     return kind.model_validate({k: v for k, v in value.items() if k not in unknown})
+
+
+def with_lines(problems: Sequence[Problem], text: str, where: str) -> list[Problem]:
+    """The problems with their lines in a mission's ``text``, whose keys begin with ``where``; others unchanged."""
+    lines = lines_of(text, [p.where.removeprefix(where) if p.where.startswith(where) else "" for p in problems])
+    return [p if n is None else replace(p, message=f"{p.message} (line {n})")
+            for p, n in zip(problems, lines, strict=True)]  # fmt: skip
+
+
+def told_once(problems: Iterable[Problem]) -> list[Problem]:
+    """The problems without those that end with another one's cure.
+
+    A key is not missing if an unknown one beside it stands for it, and one message is enough for places that are all
+    swapped.
+    """
+    found = list(problems)
+    unknown = [p for p in found if p.message.startswith(UNKNOWN)]
+    missing = [p for p in found if p.message.startswith("is missing")]
+    meant: dict[int, Problem] = {}  # the unknown key that stands for a missing one, by the id of that one's problem
+    for gap in missing:
+        section, key = _section_and_key(gap.where)
+        beside = [u for u in unknown if _section_and_key(u.where)[0] == section]
+        named = [u for u in beside if re.search(rf"did you mean .*\b{re.escape(key)}\b", u.message)]
+        if "or in limits" in gap.message:
+            named += [u for u in unknown if u.message.endswith("did you mean limits?")]
+        alone = [g for g in missing if _section_and_key(g.where)[0] == section] == [gap]
+        if not named and len(beside) == 1 and alone and "did you mean" not in beside[0].message:
+            named = beside
+        if named:
+            meant[id(gap)] = named[0]
+    instead = {}
+    for gap in missing:
+        u = meant.get(id(gap))
+        if u is not None and "did you mean" not in u.message:
+            key = _section_and_key(gap.where)[1]
+            instead[id(u)] = Problem(u.where, f"{UNKNOWN}; did you mean {key}, which is missing?")
+    told = [instead.get(id(p), p) for p in found if id(p) not in meant]
+    swapped = [p for p in told if p.message.startswith(SWAPPED)]
+    if len(swapped) < 2:
+        return told
+    others = ", ".join(p.where.rpartition(": ")[2] for p in swapped[1:MOST_SWAPPED])
+    more = f" and {len(swapped) - MOST_SWAPPED} more" if len(swapped) > MOST_SWAPPED else ""
+    first = Problem(swapped[0].where, f"{swapped[0].message} (the same at {others}{more})")
+    return [first if p is swapped[0] else p for p in told if p is swapped[0] or p not in swapped]
+
+
+def _section_and_key(where: str) -> tuple[str, str]:
+    """The place of the section, and the key in it."""
+    file, _, path = where.rpartition(": ")
+    section, _, key = path.rpartition(".")
+    return f"{file}: {section}", key
 
 
 def unknown_keys(given: Iterable[str], known: Iterable[str], where: str) -> list[Problem]:
@@ -63,7 +131,7 @@ def key_path(where: str, loc: Iterable[int | str]) -> str:
 
 def _unknown(key: str, known: list[str]) -> str:
     near = nearest_key(key, known)
-    return "unknown key" + (near or f"; known are {', '.join(known)}")
+    return UNKNOWN + (near or f"; known are {', '.join(known)}")
 
 
 def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
@@ -72,29 +140,33 @@ def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
     context = error.get("ctx", {})
     match error["type"]:
         case "missing":
-            return Problem(path, "is missing")
+            field = _model_at(kind, loc[:-1]).model_fields.get(str(loc[-1]))
+            choices = [] if field is None or get_origin(field.annotation) is not Literal else get_args(field.annotation)
+            return Problem(path, "is missing" + (f"; it is one of {', '.join(choices)}" if choices else ""))
         case "extra_forbidden":
             return Problem(path, _unknown(str(loc[-1]), list(_model_at(kind, loc[:-1]).model_fields)))
         case "value_error":
             return Problem(path, str(context["error"]))
         case "literal_error":
             choices = re.findall(r"'([^']*)'", context["expected"])
-            near = nearest(error["input"], choices) if isinstance(error["input"], str) else ""
+            near = nearest(error["input"], choices, most=2) if isinstance(error["input"], str) else ""
             return Problem(path, f"must be one of {', '.join(choices)}, given {given}{near}")
         case "string_pattern_mismatch":
             return Problem(path, f"must be made of letters, digits, _ and -, given {given}")
         case "string_type":
             return Problem(path, f"must be text (in quotes, if it looks like a number), given {given}")
         case "float_type":
-            return Problem(path, f"must be a number, given {given}")
+            return Problem(path, f"must be a number, given {given}{_as_number(loc, error['input'])}")
         case "int_type" | "int_from_float" | "int_parsing_size":
-            return Problem(path, f"must be a whole number, given {given}")
+            return Problem(path, f"must be a whole number, given {given}{_as_number(loc, error['input'])}")
         case "finite_number":
             return Problem(path, f"must be a finite number, given {given}")
         case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
             word = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
             bound = next(k for k in ("gt", "ge", "lt", "le") if k in context)
-            return Problem(path, f"must be {word[bound]} {context[bound]:g}, given {given}")
+            part = bound == "lt" and context[bound] == 1.0 and 1.0 <= error["input"] < 100.0
+            hint = f"; {error['input']:g} % is {error['input'] / 100.0:g}" if part else ""
+            return Problem(path, f"must be {word[bound]} {context[bound]:g}, given {given}{hint}")
         case "too_short" | "too_long":
             least, most = context.get("min_length"), context.get("max_length")
             bound = f"at least {least}" if least is not None else f"at most {most}"
@@ -110,6 +182,25 @@ def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
         case "model_type" | "dict_type" | "model_attributes_type":
             return Problem(path, f"must be a mapping of keys, given {given}")
     return Problem(path, f"{error['msg'][:1].lower()}{error['msg'][1:]}, given {given}")
+
+
+def _as_number(loc: tuple[int | str, ...], given: Any) -> str:
+    """``; write …`` for a text that is a number in quotes, with a decimal comma or with its unit; or an empty text."""
+    if not isinstance(given, str) or len(given) > MOST_OF_NUMBER:
+        return ""
+    if "one" in loc and (several := _RANGE.fullmatch(given)):
+        return f"; write [{several[1]}, {several[2]}]"
+    match = _NUMBER.fullmatch(given)
+    key = next((part for part in reversed(loc) if isinstance(part, str) and part not in FORMS), "")
+    if match is None or not key:
+        return ""
+    number, unit, end = match[1].replace(",", "."), match[2], unit_end(key)
+    if not unit:  # the key is not named, since it may be written in another unit
+        return f"; write the number alone, without quotes: {number}"
+    if unit.lower() == UNITS.get(end, "").lower():
+        return f"; write the number alone: `{key}: {number}`"
+    other = key.removesuffix(end) + "_" + unit.lower().replace("km/h", "kmh")
+    return f"; write `{other}: {number}`" if other in other_names([key]) else ""
 
 
 def _form_of(loc: tuple[int | str, ...]) -> str:

@@ -22,7 +22,7 @@ from gcsplan.figures import counted
 from gcsplan.mission_file.airspace.left_out import faults_near, unused_notes, used
 from gcsplan.mission_file.airspace.policy import OUT_OF_HOURS
 from gcsplan.mission_file.airspace.times import Hours, hours_of
-from gcsplan.mission_file.complaints import read_section, unknown_keys
+from gcsplan.mission_file.complaints import read_section, told_once, unknown_keys, with_lines
 from gcsplan.mission_file.content import read_content
 from gcsplan.mission_file.ground import Ground, Site
 from gcsplan.mission_file.request import (
@@ -45,7 +45,6 @@ from gcsplan.mission_file.schema import (
     nearest,
     shown,
 )  # fmt: skip
-from gcsplan.mission_file.strict_yaml import lines_of
 from gcsplan.mission_file.terminals import Terminals
 from gcsplan.mission_file.units import in_own_units
 from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle, within_lean
@@ -63,6 +62,13 @@ from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.terrain import OpenTerrain, Terrain, TerrainSpec
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
+
+WANTED = {
+    "version": "write `version: 1`",
+    "terrain": "write `terrain: {dem: FILE}`, or for flat ground its altitude: `terrain: {flat_m: 300}`",
+    "vehicles": "write a list with name, sysid, autopilot, start and goal of each",
+}
+"""The keys that every mission has, and what to write where one is absent."""
 
 TERRAIN_ERROR_M = 30.0
 """Metres by which a vehicle's own terrain may be shifted to its altitude at arming (ArduPilot's TERRAIN_OFS_MAX)."""
@@ -105,7 +111,8 @@ def load_mission(
     """
     file, where, raw, written = read_content(source, text)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
-        raise InputError(f"this gcsplan reads version 1, given {shown(raw['version'])}", where=f"{where}: version")
+        words = f"this gcsplan reads version 1, given {shown(raw['version'])}; write `version: 1`, or update gcsplan"
+        raise InputError(words, where=f"{where}: version")
     return _Reading(file, where, raw, written, planner_names, around, departure).mission()
 
 
@@ -141,9 +148,7 @@ class _Reading:
         raw, problems = self.raw, self.problems
         problems += unknown_keys(raw, TOP_KEYS, self.where)
         problems += [
-            Problem(self.where + key, "is missing" + ("; write `version: 1`" if key == "version" else ""))
-            for key in ("version", "terrain", "vehicles")
-            if raw.get(key) is None
+            Problem(self.where + key, f"is missing; {cure}") for key, cure in WANTED.items() if raw.get(key) is None
         ]
         name = self._name()
         altitude_frame: AltitudeFrame = self._choice("altitude_frame", get_args(AltitudeFrame), "relative")
@@ -186,7 +191,7 @@ class _Reading:
                 site = Site(here, frame, box, placed, terminals, set(places), self.local)
                 ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
-            raise InputError.of(self._with_lines([self.units.as_written(p) for p in problems]))
+            raise self._refusal(problems)
         info = ground.surface.info
         notes = info.get("notes", ())
         self.notes += [str(n) for n in notes] if isinstance(notes, tuple) else []
@@ -209,7 +214,7 @@ class _Reading:
         self.notes = []
         published = self._zones(hours)
         if self.problems:
-            raise InputError.of(self._with_lines([self.units.as_written(p) for p in self.problems]))
+            raise self._refusal(self.problems)
         self.notes += [f"{draft.name} is not used: {draft.unused}" for draft in published if draft.unused]
         self.notes += [f"{fault.where}: {fault.message}" for draft in published for fault in draft.faults]
         return used(published), list(dict.fromkeys(self.notes))
@@ -219,14 +224,10 @@ class _Reading:
         names = self.planner_names
         return _Reading(self.file, where, self.given, self.text, names, places, self.departure).mission()
 
-    def _with_lines(self, problems: list[Problem]) -> list[Problem]:
-        """The problems with their lines, if the mission was a text; those of other files stay as they are."""
-        if self.text is None:
-            return problems
-        own = [p.where.removeprefix(self.where) if p.where.startswith(self.where) else "" for p in problems]
-        lines = lines_of(self.text, own)
-        return [p if n is None else replace(p, message=f"{p.message} (line {n})")
-                for p, n in zip(problems, lines, strict=True)]  # fmt: skip
+    def _refusal(self, problems: list[Problem]) -> InputError:
+        """All problems as the user wrote the keys, with their lines if the mission was a text."""
+        told = [self.units.as_written(p) for p in told_once(problems)]
+        return InputError.of(told if self.text is None else with_lines(told, self.text, self.where))
 
     # -- the plain keys ------------------------------------------------------------------------------------------
 
@@ -293,7 +294,8 @@ class _Reading:
         where = f"{self.where}vehicles"
         value = self.raw.get("vehicles")
         if value is not None and (not isinstance(value, list) or not value or len(value) > 255):
-            self.problems.append(Problem(where, f"must be a list of 1 to 255 vehicles, given {shown(value)}"))
+            dash = "; begin each vehicle with a dash: `- name: …`" if isinstance(value, dict) else ""
+            self.problems.append(Problem(where, f"must be a list of 1 to 255 vehicles, given {shown(value)}{dash}"))
             return []
         shared = self._section(LimitKeys, "limits") or LimitKeys()
         # If the shared limits are broken, a vehicle's complaint about a missing limit would only repeat that.
@@ -331,7 +333,8 @@ class _Reading:
         where = f"{self.where}no_fly"
         value = self.raw.get("no_fly")
         if value is not None and not isinstance(value, list):
-            self.problems.append(Problem(where, f"must be a list of zones, given {shown(value)}"))
+            dash = "; begin each zone with a dash: `- name: …`" if isinstance(value, dict) else ""
+            self.problems.append(Problem(where, f"must be a list of zones, given {shown(value)}{dash}"))
         drafts: list[ZoneDraft] = []
         inline: dict[str, int] = {}
         for i, one in enumerate(self._list("no_fly")):
@@ -342,7 +345,7 @@ class _Reading:
             if keys.name is not None and inline.setdefault(keys.name, i) != i:
                 first = inline[keys.name]
                 self.problems.append(
-                    Problem(f"{at}.name", f"{keys.name[:64]!r} is the name of no_fly[{first}] already")
+                    Problem(f"{at}.name", f"{keys.name[:64]!r} is the name of no_fly[{first}] already; change one")
                 )
             drafts += make_zones(
                 keys, at, self.file.parent, f"no_fly[{i}]", self.problems, self.notes, local=self.local, hours=hours

@@ -162,6 +162,9 @@ def _read_degrees(plain: str) -> tuple[float, float]:
             raise grids.Refused("one angle has minutes and the other one has not")
         return first.deg, second.deg
     before, after = _BEFORE.fullmatch(text), _AFTER.fullmatch(text)
+    if len(found) == 1 and (_ONE_BEFORE.fullmatch(text) or _ONE_AFTER.fullmatch(text)) and "," not in text:
+        missing, there = ("longitude", "latitude") if found[0] in LAT_LETTERS else ("latitude", "longitude")
+        raise grids.Refused(f"it is a {there} alone; the {missing} is missing")
     if len(found) != 2 or (before is None and after is None):
         raise grids.Refused("both angles have a letter (N or S, E or W), before them or after them, or neither has one")
     if sum(letter in LAT_LETTERS for letter in found) != 1:

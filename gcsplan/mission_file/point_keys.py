@@ -117,6 +117,19 @@ class TextPoint(Keys):
     """Height above ground; if absent, the planner chooses it."""
 
 
+def in_own_brackets(value: Any) -> Any:
+    """A list of places as it is. Raises ValueError for one that is all numbers: each place has its own brackets."""
+    if not isinstance(value, list) or not value or not all(type(v) in (int, float) for v in value):
+        return value
+    if len(value) % 2:
+        raise ValueError(
+            f"must be a list of places, each in brackets of its own: [[lat, lon], …], given {len(value)} numbers"
+        )
+    pairs = [f"[{value[i]}, {value[i + 1]}]" for i in range(0, min(len(value), 6), 2)]
+    more = ", …" if len(value) > 6 else ""
+    raise ValueError(f"must be a list of places, each in brackets of its own: [{', '.join(pairs)}{more}]")
+
+
 def _form(value: Any) -> str:
     """The form of a place, by which it is judged."""
     if isinstance(value, str) or (isinstance(value, list) and len(value) == 2 and _all_text(value)):

@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from gcsplan.mission_file.keys import FAR_M, Keys, Length, Metres
-from gcsplan.mission_file.point_keys import POINT_FORMS, LatLon, Point, ViaPoint
+from gcsplan.mission_file.point_keys import POINT_FORMS, LatLon, Point, ViaPoint, in_own_brackets
 
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
 
@@ -37,6 +37,7 @@ def _no_trifle(value: float) -> float:
     return value
 
 
+Points = Annotated[list[Point], BeforeValidator(in_own_brackets)]
 Positive = Annotated[float, Field(gt=0.0, le=FAR_M)]
 Angle = Annotated[float, Field(gt=0.0, le=90.0)]
 Speed = Annotated[float, Field(gt=0.0, le=300.0), AfterValidator(_no_trifle)]
@@ -152,9 +153,9 @@ class ZoneKeys(Keys):
     """Centre of a circle; needs `radius_m`."""
     radius_m: float | None = None
     """Radius of a circle, at most 100 000; with `file` that of its points that have none of their own."""
-    polygon: list[Point] | None = None
+    polygon: Points | None = None
     """Corners of a polygon, in order; it is closed automatically."""
-    line: list[Point] | None = None
+    line: Points | None = None
     """Points of a line, such as a power line; needs `buffer_m`."""
     buffer_m: float | None = None
     """Half the width of a corridor around a line, at most 20 000; with `file` that of its lines that have none."""
@@ -212,7 +213,7 @@ class VehicleKeys(LimitKeys):
     """Top of the vertical take-off, where the path begins; if absent, the lowest legal height."""
     approach_agl_m: Positive | None = None
     """End of the path above the goal; if absent, the lowest legal height."""
-    via: Annotated[list[ViaPoint], Field(max_length=500)] = []
+    via: Annotated[list[ViaPoint], Field(max_length=500), BeforeValidator(in_own_brackets)] = []
     """Points to pass, in order: a place, with or without its height above ground."""
     end: Literal["land", "loiter", "rtl", "none"] = "land"
     """What follows the path: a landing, a hold or circle, the autopilot's return, or nothing."""
@@ -369,7 +370,7 @@ def shown(value: Any) -> str:
     return f"{value}"[:60]
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """``; did you mean …?`` with the nearest known word, or an empty text."""
-    close = difflib.get_close_matches(word[:80], list(known), n=1, cutoff=0.6)
-    return f"; did you mean {close[0]}?" if close else ""
+def nearest(word: str, known: Iterable[str], most: int = 1) -> str:
+    """``; did you mean …?`` with the nearest known words, ``most`` of them, or an empty text."""
+    close = difflib.get_close_matches(word[:80], list(known), n=most, cutoff=0.6)
+    return f"; did you mean {' or '.join(close)}?" if close else ""

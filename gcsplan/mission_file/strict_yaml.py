@@ -55,7 +55,9 @@ def read_yaml(text: str, *, where: str) -> Any:
         _measure(text, where)
         node = yaml.compose(text, Loader=_Loader)
         if node is None:
-            raise InputError("the file is empty", where=where)
+            raise InputError(
+                "the file is empty: a mission has at least version, terrain, limits, vehicles", where=where
+            )
         _count(node, {}, where)
         return _value(node, where)
     except yaml.MarkedYAMLError as why:
@@ -148,7 +150,11 @@ def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
         key = _scalar(key_node, where) if isinstance(key_node, yaml.ScalarNode) else None
         if not isinstance(key, str):
             number = isinstance(key, int | float) and not isinstance(key, bool)
-            hint = f"; a place within braces has brackets: `[{EXAMPLES[0]}]`" if number else ""
+            hint = (
+                f"; decimals begin with a point, and a place within braces has brackets: `[{EXAMPLES[0]}]`"
+                if number
+                else ""
+            )
             raise InputError(
                 f"a key must be a word, given {_shown(key_node)}{hint}", where=_place(where, key_node.start_mark)
             )

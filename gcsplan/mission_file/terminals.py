@@ -18,6 +18,8 @@ from gcsplan.world.zones import Zone
 ON_GROUND_M = 0.5
 """An ``up_m`` within this distance of the ground, m, counts as on the ground."""
 
+ELSEWHERE = "; move it, or make the zone smaller"
+
 
 @dataclass(frozen=True, slots=True)
 class Terminals:
@@ -120,7 +122,7 @@ def _end(
         problems.append(Problem(place.where, f"hangs {above_m:g} m above ground: leave {key} out"))
     zone = zone_around(zones, east, north, ground_m + above_m, ground_m)
     if zone is not None:
-        problems.append(Problem(place.where, f"the {what} lies inside the no-fly zone {zone.name!r}"))
+        problems.append(Problem(place.where, f"the {what} lies inside the no-fly zone {zone.name!r}{ELSEWHERE}"))
     return _End(at, ground_m + above_m if above_m > 0.0 else None)
 
 
@@ -139,5 +141,5 @@ def _via(
     else:
         zone = zone_around(zones, east, north, ground_m + agl_m, ground_m)
     if zone is not None:
-        problems.append(Problem(place.where, f"lies inside the no-fly zone {zone.name!r}"))
+        problems.append(Problem(place.where, f"lies inside the no-fly zone {zone.name!r}{ELSEWHERE}"))
     return east, north, agl_m

@@ -106,6 +106,9 @@ def nearest_key(key: str, known: Iterable[str]) -> str:
     canonical = others[found].key if found in others else found
     unit = unit_end(canonical)
     end = others[found].end if found in others else unit
+    if key == canonical.removesuffix(unit):  # the value may be in any of the units
+        end = unit
+        found = canonical
     if not unit or key.endswith(end) or key.rsplit("_", 1)[-1] in canonical.removesuffix(unit).split("_"):
         return f"; did you mean {found}?"
     names = [f"{canonical} (in {UNITS[unit]})", *(name for name, written in others.items() if written.key == canonical)]

@@ -37,6 +37,9 @@ GRAVITY_M_S2 = 9.80665
 
 SEPARATION_M = 30.0
 
+ROUNDING_M = 0.05
+"""At least what planners keep beyond the errors, since altitudes are stored in centimetres; for advice alone."""
+
 MOTION = (
     "climb_m_s", "descent_m_s", "land_m_s", "accel_m_s2", "corner_accel_m_s2", "vertical_accel_m_s2", "leg_jerk_m_s3",
 )  # fmt: skip
@@ -57,11 +60,13 @@ def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -
             first = names.setdefault(name.lower(), i)
             if first != i:
                 problems.append(
-                    Problem(f"{where}[{i}].name", f"{name[:64]!r} is the name of vehicles[{first}] already")
+                    Problem(f"{where}[{i}].name", f"{name[:64]!r} is the name of vehicles[{first}] already; change one")
                 )
         if isinstance(sysid, int) and not isinstance(sysid, bool) and sysids.setdefault(sysid, i) != i:
             problems.append(
-                Problem(f"{where}[{i}].sysid", f"{sysid} is the system id of vehicles[{sysids[sysid]}] already")
+                Problem(
+                    f"{where}[{i}].sysid", f"{sysid} is the system id of vehicles[{sysids[sysid]}] already; change one"
+                )
             )
     return tuple(k["name"] for k in vehicles if isinstance(k, dict) and isinstance(k.get("name"), str))
 
@@ -227,7 +232,8 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
             problems.append(
                 Problem(
                     f"{where}.max_agl_m",
-                    f"leaves no room: {words} is above max_agl_m {limits.max_agl_m:g} - altitude_error_m {error_m:g}",
+                    f"leaves no room: {words} is above max_agl_m {limits.max_agl_m:g} - altitude_error_m {error_m:g}; "
+                    f"write {math.ceil(low + error_m + ROUNDING_M)} or more",
                 )
             )
             return
@@ -241,6 +247,7 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
             problems.append(Problem(f"{where}.{key}", f"must be at least {low:g} m AGL ({words}), given {agl_m:g}"))
         elif agl_m > high + 1e-9:
             most = f"must be at most {high:g} m AGL (max_agl_m - altitude_error_m), given {agl_m:g}"
+            most += f"; write {math.floor(high - ROUNDING_M)} or less"
             problems.append(Problem(f"{where}.{key}", most))
 
 
@@ -257,7 +264,7 @@ def make_arrival(
         elif name in order[:i]:
             problems.append(Problem(f"{where}.order[{i}]", f"{name!r} stands twice"))
     missing = [n for n in names if n not in order]
-    if missing:
+    if missing and all(name in names for name in order):  # a name that is wrong stands for one that is missing
         problems.append(Problem(f"{where}.order", f"must name every vehicle, missing: {', '.join(missing)[:200]}"))
     if keys.mode == "sequence" and keys.interval_s is None:
         problems.append(Problem(f"{where}.interval_s", "is missing: seconds between one arrival and the next"))

@@ -145,8 +145,38 @@ def make_frame(places: Sequence[Place], keys: FrameKeys | None, problems: list[P
     distance, place = max(away, key=lambda x: math.inf if math.isnan(x[0]) else x[0])
     what = "from the frame's origin" if keys is not None else "from the middle of the mission's points"
     far = f"lies {distance / 1000:.0f} km" if math.isfinite(distance) else "lies too far"
-    problems.append(Problem(place.where, f"{far} {what}, more than {FARTHEST_M / 1000:.0f} km; is it the right place?"))
+    words = f"{far} {what}, more than {FARTHEST_M / 1000:.0f} km; {_slip(place, places) or 'is it the right place?'}"
+    problems.append(Problem(place.where, words))
     return None
+
+
+def _slip(place: Place, places: Sequence[Place]) -> str:
+    """The slip of the pen that sets one place far from the others, or an empty text."""
+    others = [p.degrees for p in places if p is not place and p.degrees is not None]
+    if place.degrees is None or not others:
+        return ""
+
+    def near(one: tuple[float, float], rest: Sequence[tuple[float, float]]) -> bool:
+        lat, lon = np.array([one, *rest]).T
+        if np.abs(lat).max() > 85.0:
+            return False
+        middle = Frame(*centre_of(lat, lon))
+        return bool((np.linalg.norm(middle.to_plane(lat, lon), axis=-1) <= FARTHEST_M).all())
+
+    lat, lon = place.degrees
+    if near((lon, lat), others):
+        return f"are latitude and longitude swapped? [{lon:.10g}, {lat:.10g}] lies near the others"
+    # A minus is more easily forgotten than written without need, so that the positive number is the wrong one.
+    for k, p in enumerate(places):
+        if p.degrees is None:
+            continue
+        rest = [q.degrees for i, q in enumerate(places) if i != k and q.degrees is not None]
+        own_lat, own_lon = p.degrees
+        for mended, wrong in (((own_lat, -own_lon), own_lon), ((-own_lat, own_lon), own_lat)):
+            if wrong > 0.0 and near(mended, rest):
+                key = "it" if p is place else p.where.rpartition(": ")[2]
+                return f"is a minus missing? With {-wrong:.10g} {key} lies near the others"
+    return ""
 
 
 def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, local: bool) -> Box:
@@ -194,7 +224,8 @@ def _zones_of_file(
     keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[str], hours: Hours | None
 ) -> list[ZoneDraft]:
     others = sorted(keys.given.keys() - {"file", "layer", *SIZES, *OF_FILES})
-    problems += [Problem(f"{where}.{k}", "stands in the file itself, in a feature's properties") for k in others]
+    words = "stands in the file itself, in a feature's properties; leave it out here"
+    problems += [Problem(f"{where}.{k}", words) for k in others]
     sizes = [(getattr(keys, size), f"{where}.{size}") for size in SIZES if getattr(keys, size) is not None]
     good = [check_size(size_m, at, problems) for size_m, at in sizes]
     if not all(good):
@@ -227,9 +258,9 @@ def _own_zone(
     places = [make_place(p, a, problems, notes, local=local) for p, a in zip(points, at, strict=True)]
     if len(problems) == before and len({isinstance(p, LocalPoint) for p in points}) > 1:
         problems.append(Problem(f"{where}.{kind}", "give all corners in degrees, or all in local metres"))
-    for size, owner in zip(SIZES, ("center", "line"), strict=True):
+    for size, owner, words in zip(SIZES, ("center", "line"), ("the radius", "half the corridor's width"), strict=True):
         if kind == owner and getattr(keys, size) is None:
-            problems.append(Problem(f"{where}.{size}", "is missing"))
+            problems.append(Problem(f"{where}.{size}", f"is missing: {words}, m"))
         if kind != owner and getattr(keys, size) is not None:
             problems.append(Problem(f"{where}.{size}", f"belongs to a {owner}, not to a {kind}"))
     if keys.layer is not None:

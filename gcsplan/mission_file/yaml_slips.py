@@ -11,6 +11,9 @@ _TIGHT = re.compile(r"(\s*(?:-\s+)?)([A-Za-z_]\w*):(?![\s/])(.+)")
 _TIGHT_DASH = re.compile(r"(\s*)-([A-Za-z_]\w*:(?:\s.*)?)")
 _COLON_IN_VALUE = re.compile(r"\s*(?:-\s+)?([A-Za-z_]\w*):\s+([^\"'\[{|>#&*!].*:(?:\s.*)?)")
 _QUOTED = re.compile(r"""\s*(?:-\s+)?([A-Za-z_]\w*):\s+(["'])(.*)""")
+_JOINED = re.compile(r"[^\s,]\s+([A-Za-z_]\w*):\s")
+_NO_COLON = re.compile(r"\s*(?:-\s+)?([A-Za-z_]\w*)\s+([^\s:#][^:#]*)")
+_KEY = re.compile(r"(\s*(?:-\s+)?)([A-Za-z_]\w*):(?:\s.*)?")
 _RESERVED = re.compile(r"\s*(?:-\s+)?([A-Za-z_]\w*):\s+([@`%].*)")
 
 
@@ -27,6 +30,13 @@ def cure(text: str, line: int, begun: int | None) -> str:
             found = _of_line(lines[number], own=number == line)
             if found:
                 return f"; line {number + 1}: {found}"
+    stopped = line >= len(lines) or _KEY.fullmatch(lines[line])
+    if begun is not None and stopped and (found := _not_closed(lines[begun : begun + 1])):
+        return f"; line {begun + 1}: {found}"
+    if begun is not None and line > begun and begun < len(lines) and (match := _NO_COLON.fullmatch(lines[begun])):
+        return f"; line {begun + 1}: a colon is missing after the key: `{match[1]}: {_short(match[2].strip())}`"
+    if before is not None and line < len(lines) and (found := _indented(lines[before], lines[line])):
+        return f"; line {line + 1}: {found}"
     return ""
 
 
@@ -36,6 +46,25 @@ def missing_space(text: str) -> str:
     return f"a space is missing after the colon: `{match[2]}: {_short(match[3].strip())}`" if match else ""
 
 
+def _not_closed(lines: list[str]) -> str:
+    """Which bracket or brace of a line has no end, without regard to those within quotes."""
+    for line in lines:
+        plain = re.sub(r"\"[^\"]*\"|'[^']*'", "", line)
+        for opening, closing in ("[]", "{}"):
+            if plain.count(opening) > plain.count(closing):
+                return f"a closing {closing} is missing: `{_short(line.strip())}{closing}`"
+    return ""
+
+
+def _indented(before: str, line: str) -> str:
+    """What is wrong with the indent of a key after another key, or an empty text."""
+    above, own = _KEY.fullmatch(before), _KEY.fullmatch(line)
+    if above is None or own is None or len(above[1]) == len(own[1]) or "-" in own[1]:
+        return ""
+    columns = f"in column {len(own[1]) + 1}, the key above it in column {len(above[1]) + 1}"
+    return f"`{own[2]}` begins {columns}: let both begin alike"
+
+
 def _of_line(line: str, *, own: bool) -> str:
     """What is wrong with a line; ``own`` if the parser stopped in it."""
     if "\t" in line[: len(line) - len(line.lstrip())]:
@@ -43,7 +72,9 @@ def _of_line(line: str, *, own: bool) -> str:
     if "\u00a0" in line:
         return "a no-break space is no space in YAML; type the space anew"
     if own and (match := _COLON_IN_VALUE.fullmatch(line)):
-        return f"a colon within a text needs quotes: `{match[1]}: {_in_quotes(match[2])}`"
+        joined = _JOINED.search(match[2])
+        other = f"; or `{joined[1]}:` begins a line of its own" if joined else ""
+        return f"a colon within a text needs quotes: `{match[1]}: {_in_quotes(match[2])}`{other}"
     if own and (match := _QUOTED.fullmatch(line)) and (inner := _inner_quotes(match[2], match[3])):
         return f"a text that has quotes in it is written without quotes around it: `{match[1]}: {_short(inner)}`"
     if own and (match := _RESERVED.fullmatch(line)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, absent
 from gcsplan.mission_file.airspace.formats import read_published
 from gcsplan.mission_file.airspace.openair import SUFFIXES
 from gcsplan.mission_file.airspace.policy import Policy
@@ -75,7 +75,7 @@ def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
 def _bytes(path: Path, where: str) -> bytes:
     try:
         if not path.is_file():
-            raise InputError(f"{path} is not there (paths are relative to the mission file)", where=where)
+            raise InputError(absent(path), where=where)
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise InputError(f"{path} has {size} bytes, more than {MAX_BYTES}; simplify or split it", where=where)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, absent
 from gcsplan.units import FOOT
 from gcsplan.world.datum import RasterCRS, VerticalDatum, take_apart
 
@@ -105,7 +105,7 @@ def require_file(path: Path, *, where: str) -> None:
         if path.is_dir():
             raise InputError(f"{path} is a folder; give a file", where=where)
         if not path.is_file():
-            raise InputError(f"{path} is not there (paths are relative to the mission file)", where=where)
+            raise InputError(absent(path), where=where)
         with path.open("rb") as file:
             if not file.read(1):
                 raise InputError(f"{path} is empty", where=where)
@@ -207,7 +207,7 @@ def _unreadable(path: Path, why: Exception) -> str:
     elif path.suffix.lower() == ".zip":
         hint = "; unpack it first"
     cause = why.__cause__ or why  # rasterio says "see previous exception"
-    reason = (str(cause).strip() or type(cause).__name__).splitlines()[0][:200]
+    reason = (str(cause).strip() or type(cause).__name__).splitlines()[0].replace(str(path.absolute()), path.name)[:200]
     return (
         f"{path} cannot be read as a GeoTIFF, an SRTM .hgt or an ESRI .asc grid ({reason}){hint}; "
         "gdal_translate makes a GeoTIFF of other formats"

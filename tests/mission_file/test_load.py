@@ -655,7 +655,8 @@ def test_the_message_names_file_key_given_and_wanted(tmp_path: Path) -> None:
     path.write_text(yaml.safe_dump(base(no_fly=[{"center": [36.6, -84.3], "radius_m": "400"}])))
     with pytest.raises(InputError) as caught:
         load_mission(path, planner_names=PLANNERS)
-    assert str(caught.value) == f"{path}: no_fly[0].radius_m: must be a number, given the text '400' (line 10)"
+    words = "must be a number, given the text '400'; write the number alone, without quotes: 400 (line 10)"
+    assert str(caught.value) == f"{path}: no_fly[0].radius_m: {words}"
 
 
 # -- files --------------------------------------------------------------------------------------------------------

@@ -110,6 +110,10 @@ SLIPS = [
     ("v: {center: 47.39708, 8.34403, radius_m: 4}\n", "a place within braces has brackets", None),
     ("at: \"47°23'49.5\"N 8°20'38.5\"E\"\n", "written without quotes", "at: 47°23'49.5\"N 8°20'38.5\"E\n"),
     ("name: 'it's here'\n", "written without quotes", "name: it's here\n"),
+    ("a:\n  - b: 1\n     c: 2\n", "line 3: `c` begins in column 6, the key above it in column 5", None),
+    ("a: 1\nb 2\nc: 3\n", "line 2: a colon is missing after the key", "a: 1\nb: 2\nc: 3\n"),
+    ("a: [1, 2\nb: 3\n", "line 1: a closing ] is missing", "a: [1, 2]\nb: 3\n"),
+    ("a: {b: 2\nb: 3\n", "line 1: a closing } is missing", "a: {b: 2}\nb: 3\n"),
     ("name: @home\n", "begins with @ needs quotes", 'name: "@home"\n'),
 ]  # fmt: skip
 
@@ -124,7 +128,7 @@ def test_a_slip_of_the_pen_is_told_with_its_cure(text: str, words: str, cured: s
         read_yaml(cured, where="m.yaml")
 
 
-@pytest.mark.parametrize("text", ['a: "x" y\n', "a: [1, 2\nb: 3\n", "a: 1\n b: 2\n", 'a: "b\nc: 1\n'])
+@pytest.mark.parametrize("text", ['a: "x" y\n', "a: [1, 2\n  3]\n  4: 5\n", 'a: "b\nc: 1\n'])
 def test_no_cure_is_guessed(text: str) -> None:
     assert "`" not in refusal(text)
 

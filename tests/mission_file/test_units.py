@@ -159,7 +159,11 @@ def test_a_key_in_two_units_is_an_error(limits: dict, key: str, also: str):
             "min_agl_ft",
             "must be at least 0, given -49.9872 (-164 ft, read as min_agl_m: -49.9872)",
         ),
-        ({"min_agl_ft": "164"}, "min_agl_ft", "must be a number, given the text '164' (read as min_agl_m)"),
+        (
+            {"min_agl_ft": "164"},
+            "min_agl_ft",
+            "given the text '164'; write the number alone, without quotes: 164 (read as min_agl_m)",
+        ),
         ({"min_agl_ft": True}, "min_agl_ft", "must be a number, given true (read as min_agl_m)"),
         ({"min_agl_ft": 10**400}, "min_agl_ft", "(read as min_agl_m)"),
         ({"min_agl_ft": math.nan}, "min_agl_ft", "must be a finite number"),
