@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any
 
 from gcsplan.mission_file.airspace.volumes import Corner
@@ -56,10 +57,12 @@ def outer_ring(given: Any) -> tuple[list[Corner], int]:
 
 def _many(given: list[Any]) -> list[Corner]:
     """Positions that are right, all at once; none if one of them is wrong, or not plainly right."""
-    if not all(type(p) is list and len(p) >= 2 and type(p[0]) is float and type(p[1]) is float for p in given):
+    plain = set(map(type, given)) == {list} and set(map(len, given)) <= {2, 3}
+    if not plain or set(map(type, chain.from_iterable(given))) != {float}:
         return []
-    ring = [(p[1], p[0]) for p in given]
-    return ring if all(-90.0 <= lat <= 90.0 and -180.0 <= lon <= 180.0 for lat, lon in ring) else []
+    lon, lat = [p[0] for p in given], [p[1] for p in given]
+    right = min(lat) >= -90.0 and max(lat) <= 90.0 and min(lon) >= -180.0 and max(lon) <= 180.0
+    return list(zip(lat, lon, strict=True)) if right else []
 
 
 def number_or_none(given: Any, name: str) -> float | int | None:

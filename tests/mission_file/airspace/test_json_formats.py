@@ -231,7 +231,7 @@ def spoilt(draw: Any, value: Any) -> Any:
 
 
 @given(st.data())
-@settings(max_examples=draws(400), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=draws(240), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_spoilt_file_ends_in_a_traceback(tmp_path: Path, data: st.DataObject) -> None:
     value = data.draw(st.sampled_from(SAMPLES))
     for _ in range(data.draw(st.integers(1, 3))):
