@@ -7,7 +7,7 @@ from typing import Any
 
 from gcsplan.mission_file.airspace.members import MemberError, number_or_none, outer_ring, text_of
 from gcsplan.mission_file.airspace.policy import Policy, Published
-from gcsplan.mission_file.airspace.times import Period, TimeError, read_instant
+from gcsplan.mission_file.airspace.times import ALWAYS, Period, TimeError, read_instant
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_draft import Remark
@@ -137,13 +137,13 @@ def _code(limit: dict[str, Any], key: str, names: dict[int, str]) -> str:
 def _times(members: dict[str, Any]) -> tuple[tuple[Period, ...], tuple[Remark, ...]]:
     """The span of a temporary activation; the hours of a week are local, and are not read."""
     try:
-        span = [_moment(members.get(key)) for key in ("activeFrom", "activeUntil")]
+        span = Period(*(_moment(members.get(key)) for key in ("activeFrom", "activeUntil")))
     except TimeError as why:
         return (), ((UNREAD_SPAN, str(why)),)
     hours = members.get("hoursOfOperation")
     unread = any(_is_limited(h) for h in _hours(hours))
     remarks: tuple[Remark, ...] = ((NOT_CLAIMED, ""),) if unread else ()
-    return ((Period(span[0], span[1]),) if any(span) else ()), remarks
+    return (() if span == ALWAYS else (span,)), remarks
 
 
 def _hours(given: Any) -> list[Any]:

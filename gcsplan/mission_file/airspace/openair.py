@@ -64,7 +64,7 @@ class _RecordError(ValueError):
 
 @dataclass
 class _Block:
-    """The records of one zone."""
+    """The records of one zone: ``mistakes`` in its limits, and in its outline, so that its place is ``lost``."""
 
     line: int
     kinds: list[str]
@@ -75,6 +75,7 @@ class _Block:
     circles: list[tuple[Corner, float]] = field(default_factory=list)
     times: list[str] = field(default_factory=list)
     mistakes: list[tuple[int, str]] = field(default_factory=list)
+    lost: list[tuple[int, str]] = field(default_factory=list)
     clockwise: bool = True
 
     @property
@@ -123,7 +124,8 @@ class _Reading:
                 if self.block is None:
                     self._fault(number, words)
                 else:
-                    self.block.mistakes.append((number, words))
+                    of_limits = match[1].upper() in ("AL", "AH")
+                    (self.block.mistakes if of_limits else self.block.lost).append((number, words))
         self._end()
         if not self.zones and not self.file.found.problems:
             self._fault(1, "the file holds no zone: an OpenAir zone begins with a line such as `AC R`")
@@ -137,7 +139,7 @@ class _Reading:
             return
         words = f"{record[:60]!r} is no record of OpenAir; write a comment with * before it"
         if self.block is not None:
-            self.block.mistakes.append((number, words))
+            self.block.lost.append((number, words))
         else:
             self._fault(number, words)
 
@@ -229,11 +231,14 @@ class _Reading:
         limits.faults += [
             Problem(f"{file.path}: line {number}", words) for number, words in block.mistakes[:MOST_MISTAKES]
         ]
+        if block.lost and not file.judge.reason(zone):  # it may reach farther than what is understood of it
+            for number, words in block.lost[:MOST_MISTAKES]:
+                file.fault(f"{file.path}: line {number}", f"zone {name[:60]!r}: {words}")
+            return
         ring = outline(block.pieces)
         shapes = len(block.circles) + bool(ring)
-        if not shapes:
-            place = "" if not block.mistakes else f": {block.mistakes[0][1]}"
-            file.fault(where, f"the zone has no outline (DP, DA, DB) and no circle (DC){place}")
+        if not shapes and not block.lost:
+            file.fault(where, "the zone has no outline (DP, DA, DB) and no circle (DC)")
         for i, (centre, radius_m) in enumerate(block.circles):
             part = name if shapes == 1 else f"{name}/{i + 1}"
             file.add_circle(zone, part, where, centre, radius_m, limits)
@@ -271,9 +276,9 @@ def _times(texts: list[str]) -> tuple[tuple[Period, ...], str]:
             return (), f"AA {plain[:60]}"
         try:
             start, end = (None if e.upper() == "NONE" else read_instant(e) for e in ends)
+            periods.append(Period(start, end))
         except TimeError as why:
             return (), str(why)
-        periods.append(Period(start, end))
     return tuple(periods), ""
 
 

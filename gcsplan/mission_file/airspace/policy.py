@@ -73,14 +73,14 @@ class Judge:
     def reason(self, zone: Published) -> str:
         """Why the zone is not used; empty if it is."""
         self.kinds |= set(zone.kinds)
+        own = {name for name in self.policy.authorised if name in (zone.identifier, zone.name)}
+        self.entered |= own
         wanted = self.policy.kinds
         if wanted is not None and not {_plain(k) for k in wanted} & {_plain(k) for k in zone.kinds}:
             return f"their kinds are not among those of the mission ({', '.join(wanted[:_SHOWN])})"
         if wanted is None and not zone.restricts:
             return "they restrict nothing"
-        own = {name for name in self.policy.authorised if name in (zone.identifier, zone.name) and name}
         if own:
-            self.entered |= own
             return "the mission says that it is authorised to enter them"
         if not apply_in(zone.periods, self.policy.hours):
             return f"{OUT_OF_HOURS} ({self.policy.hours})"

@@ -102,11 +102,18 @@ class Daily:
 
 @dataclass(frozen=True, slots=True)
 class Period:
-    """A time in which a zone applies; an end that is None is open, and without a schedule it applies throughout."""
+    """A time in which a zone applies; an end that is None is open, and without a schedule it applies throughout.
+
+    Raises TimeError if it ends before it begins: such a zone would never apply.
+    """
 
     start: datetime | None = None
     end: datetime | None = None
     schedule: tuple[Daily, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.start is not None and self.end is not None and self.start > self.end:
+            raise TimeError(f"it ends at {self.end:%Y-%m-%d %H:%M}Z, before it begins")
 
     def meets(self, hours: Hours) -> bool:
         """Whether the zone may apply at some moment of the hours."""

@@ -158,13 +158,11 @@ class AirspaceFile:
         """Add a cylinder called ``part``."""
         if not check_degrees(centre, where, self.found.problems):
             return
-        words = f"the radius must be above 0 and at most {LARGEST_RADIUS_M:g} m, given {radius_m:g} m"
-        if not radius_m <= LARGEST_RADIUS_M:  # a larger zone may reach the mission from anywhere
-            self.fault(where, words)
-        elif radius_m > 0.0:
+        if 0.0 < radius_m <= LARGEST_RADIUS_M:
             self._add(zone, part, where, (centre,), radius_m, limits, [])
-        else:
-            self._add(zone, part, where, around([centre]), None, limits, [Problem(where, words)])
+        else:  # it may reach the mission from anywhere
+            words = f"the radius must be above 0 and at most {LARGEST_RADIUS_M:g} m, given {radius_m:g} m"
+            self.fault(where, f"zone {zone.name[:60]!r}: {words}")
 
     def add_ring(self, zone: Published, part: str, where: str, ring: Sequence[Corner], limits: Limits) -> None:
         """Add a prism called ``part`` by its outline."""

@@ -163,7 +163,7 @@ def test_published_pieces_of_seven_states_are_read(tmp_path: Path) -> None:
 
 def test_an_airway_is_refused_by_its_line(tmp_path: Path) -> None:
     words = said(tmp_path, (DATA / "openair_airway.txt").read_bytes(), "a.txt")
-    assert "a.txt: line 3 (Axe 1): the zone has no outline" in words
+    assert "a.txt: line 8: zone 'Axe 1': 'DY 44:17:00 N" in words
     assert "airways are not read" in words
 
 
@@ -258,6 +258,18 @@ def test_a_file_without_zones_is_refused_in_few_words(tmp_path: Path, text: str,
     found = said(tmp_path, text, "a.txt")
     assert words in found
     assert len(found) < 2000
+
+
+@pytest.mark.parametrize("line", ["DP 50:00:00 N 008:99:00 E", "DP 47:03:00 N", "V X=here", "lost words", "DC 400"])
+def test_a_zone_whose_outline_is_not_understood_is_refused_wherever_the_rest_of_it_lies(
+    tmp_path: Path, line: str
+) -> None:
+    text = f"AC R\nAN far\nV X=47:00:00 N 008:00:00 E\n{SQUARE}{line}\nAC R\nAN whole\n{SQUARE}"
+    found = read(tmp_path, text, "a.txt")
+    assert len(found.problems) == 1
+    assert "far" in str(found.problems[0])
+    assert "whole" in [z.name for z in found.zones]
+    assert not read(tmp_path, text.replace("AC R", "AC G", 1), "a.txt").problems or line == "DC 400"
 
 
 def test_older_letters_are_read(tmp_path: Path) -> None:

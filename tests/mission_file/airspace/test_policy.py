@@ -72,6 +72,10 @@ def test_kinds_and_authorisations_are_the_mission_s(tmp_path: Path) -> None:
     assert "authorised to enter them: ask, shut" in notes(found)
 
 
+def test_an_authorisation_for_a_zone_that_is_not_used_is_no_slip(tmp_path: Path) -> None:
+    assert names(mission(tmp_path, FREE, SHUT, entry={"authorised": ["F1"]})) == {"shut"}
+
+
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
