@@ -124,13 +124,17 @@ def test_a_flight_that_outlasts_the_hours_is_refused(tmp_path: Path) -> None:
     assert plan(mission(tmp_path, SHUT, at=["2026-11-23T18:01Z", "2026-11-23T18:03Z"])).vehicles  # nothing is left out
     with pytest.raises(InputError, match="zones were left out"):
         plan(mission(tmp_path, WEEKLY, at="2026-11-24"), gate_utc=datetime(2026, 11, 25, 0, 30, tzinfo=UTC))
+    with pytest.raises(InputError, match="zones were left out"):
+        plan(mission(tmp_path, WEEKLY, at="2026-11-24"), gate_utc=datetime(2026, 11, 23, 22, 0, tzinfo=UTC))
 
 
 def test_what_is_not_understood_refuses_a_mission_near_it_alone(tmp_path: Path) -> None:
     odd = {"upperVerticalReference": "QNE"}
     with pytest.raises(InputError, match="zone 'near': upperLimit 120 M QNE cannot be read as a level"):
         mission(tmp_path, SHUT, ed269(box(8.02, 47.0, **odd), name="near"))
-    found = mission(tmp_path, SHUT, ed269(box(9.5, 47.0, **odd), name="distant"), ed269(box(40.0, 47.0, **odd)))
+    found = mission(
+        tmp_path, SHUT, ed269(box(9.5, 47.0, lowerLimit=50, **odd), name="distant"), ed269(box(40.0, 47.0, **odd))
+    )
     [distant] = [z for z in found.zones if z.name == "distant"]
     assert (distant.floor, distant.ceiling) == (None, None)
     assert "they count from the ground up without end: distant" in notes(found)
@@ -144,6 +148,11 @@ def test_the_options_of_check_judge_as_a_mission_file_does(tmp_path: Path) -> No
     world, inputs = OpenWorld(options).around([(47.0, 8.0), (47.02, 8.0)])
     assert [z.name for z in world.airspace.zones] == ["shut"]
     assert "zones.json: not used, because they restrict nothing: free" in inputs["notes"]  # type: ignore[operator]
+    mission(tmp_path, FREE, ed269(box(9.5, 47.0, upperVerticalReference="QNE")))
+    OpenWorld(options).around([(47.0, 8.0), (47.02, 8.0)])
+    (tmp_path / "zones.json").write_text(json.dumps([ed269(box(8.0, 47.0, upperVerticalReference="QNE"))]))
+    with pytest.raises(InputError, match="QNE cannot be read as a level"):
+        OpenWorld(options).around([(47.0, 8.0), (47.02, 8.0)])
 
 
 def many(count: int, corners: int) -> list[Any]:

@@ -87,6 +87,17 @@ def test_offsets_and_the_end_of_a_day() -> None:
     assert read_instant("2026-11-23T24:00Z") == read_instant("2026-11-24") == MONDAY + timedelta(days=1)
 
 
+def test_a_night_belongs_to_the_day_on_which_it_begins_and_ends_count() -> None:
+    night, _ = read_periods([{"schedule": [{"day": ["SUN"], "startTime": "22:00Z", "endTime": "06:00Z"}]}])
+    assert apply_in(night, Hours.read(["2026-11-23T01:00Z", "2026-11-23T02:00Z"]))
+    assert not apply_in(night, Hours.read(["2026-11-24T01:00Z", "2026-11-24T02:00Z"]))
+    west, _ = read_periods([{"schedule": [{"day": ["SUN"], "startTime": "21:00-10:00", "endTime": "05:00-10:00"}]}])
+    assert apply_in(west, Hours.read(["2026-11-23T14:30Z", "2026-11-23T14:40Z"]))
+    until, _ = read_periods([{"endDateTime": "2026-11-23T10:00Z"}])
+    assert apply_in(until, Hours.read("2026-11-23T10:00Z"))
+    assert not apply_in(until, Hours.read("2026-11-23T10:01Z"))
+
+
 @pytest.mark.parametrize(
     ("given_", "start", "end"),
     [
