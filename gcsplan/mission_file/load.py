@@ -208,9 +208,8 @@ class _Reading:
 
     def zones_alone(self) -> tuple[list[ZoneDraft], list[str]]:
         """The zones that are used, far ones too, and the notes on them and the others. Raises InputError."""
-        start = f"{self.where}no_fly"
         hours = hours_of(self.raw.get("at"), self.departure, f"{self.where}at", self.problems)
-        self.problems = [p for p in self.problems if p.where.startswith(start)]
+        self.problems = [p for p in self.problems if p.where.startswith(f"{self.where}no_fly")]
         self.notes = []
         published = self._zones(hours)
         if self.problems:
@@ -220,9 +219,8 @@ class _Reading:
         return used(published), list(dict.fromkeys(self.notes))
 
     def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
-        where = self.where.removesuffix(": ")
-        names = self.planner_names
-        return _Reading(self.file, where, self.given, self.text, names, places, self.departure).mission()
+        known = self.file, self.where.removesuffix(": "), self.given, self.text, self.planner_names
+        return _Reading(*known, places, self.departure).mission()
 
     def _refusal(self, problems: list[Problem]) -> InputError:
         """All problems as the user wrote the keys, with their lines if the mission was a text."""
