@@ -114,6 +114,11 @@ def _told(
         "source": source.title,
     }
     notes = []
+    if source.kind == "surface":
+        notes.append(
+            f"{source.name} is a surface model: where trees or buildings stand at the start, its ground is too high, "
+            "and altitudes relative to home are flown lower by that; start in the open, or let altitude_error_m hold it"
+        )
     if sea:
         info["sea_tiles"] = names_of(sea)
         said = [c for c in sea if records[c].state == "absent"]
