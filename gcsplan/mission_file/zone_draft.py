@@ -24,7 +24,10 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
 MAX_VERTICES = 100_000
-"""Most vertices of one polygon or line."""
+"""Most vertices of one polygon."""
+
+MAX_LINE_POINTS = 20_000
+"""Most points of one line: its corridor takes a second for some thousand points."""
 
 Remark = tuple[str, str]
 """What a user has to know about how a zone of a file was read: a sentence for all such zones, and what this one has."""
@@ -146,7 +149,9 @@ def corridor(
     at = f"{where}.{key}" if key else where
     check_size(buffer_m, f"{where}.buffer_m", problems)
     _check_points(points, at, problems, local=local)
-    if len(set(points)) < 2:
+    if len(points) > MAX_LINE_POINTS:
+        problems.append(Problem(at, f"has {len(points)} points, more than {MAX_LINE_POINTS}; simplify or split it"))
+    elif len(set(points)) < 2:
         problems.append(Problem(at, f"a line needs at least 2 different points, given {len(set(points))}"))
     floor, ceiling = bounds.levels(where, problems)
     if len(problems) > before:

@@ -43,6 +43,9 @@ WIDER_PART, MOST_WIDENINGS = 0.005, 8
 METRES_OF_DEGREE = 111_700.0
 """A degree of a meridian or of the equator is shorter, m."""
 
+MOST_POINTS = 1000
+"""A longer line becomes several corridors, since the time for one grows faster than its points."""
+
 FAR_M = 1.6 * FARTHEST_M
 """No mission goes farther than this from the frame's origin, m."""
 
@@ -92,19 +95,23 @@ def _rings_around(points: Floats, buffer_m: float) -> list[Floats]:
     """The outlines, not closed, of polygons without holes that hold every point within ``buffer_m`` of a line."""
     import shapely
 
-    line = shapely.LineString(points)
+    half = len(points) // 2
+    if len(points) > MOST_POINTS:
+        return _rings_around(points[: half + 1], buffer_m) + _rings_around(points[half:], buffer_m)
+    line, begin = shapely.LineString(points), shapely.Point(points[0])
+    shapely.prepare(line)  # distances from all corners to all legs would take minutes
     # Corners closer to their neighbours' line than this are left out; the buffer that follows is measured from all.
     plain = line.simplify(min(SIMPLER_M, SIMPLER_PART * buffer_m))
     for more in range(1, MOST_WIDENINGS + 1):
         # A polygon of chords lies inside the round outline, so it is drawn wider until no point of it is too near.
         shape = shapely.buffer(plain, buffer_m * (1.0 + WIDER_PART * more), quad_segs=12)
         # GEOS loses a part of some lines that are closed and cross themselves.
-        if shape.geom_type != "Polygon" or shape.interiors or not shape.contains(line):
+        if shape.geom_type != "Polygon" or shape.interiors or not shape.contains(begin):
             break
-        if shape.exterior.distance(line) >= buffer_m:
+        # The line begins inside, and stays so if the outline keeps away from it.
+        if not line.dwithin(shape.exterior, buffer_m):
             return [np.asarray(shape.exterior.coords)[:-1]]
     if len(points) > 2:
-        half = len(points) // 2
         return _rings_around(points[: half + 1], buffer_m) + _rings_around(points[half:], buffer_m)
     raise InputError(
         f"no corridor of {buffer_m:g} m was found around a line of {len(points)} points; simplify the line"

@@ -6,6 +6,7 @@ import io
 import os
 import shutil
 import sqlite3
+import struct
 import sys
 import zipfile
 from pathlib import Path
@@ -38,12 +39,14 @@ KML = (
 
 def write(
     file: Path, shapes: list[Any], crs: str | None = "EPSG:4326", *, layer: str | None = None, kind: str = "Unknown",
-    append: bool = False, **columns: list[Any],
+    append: bool = False, **columns: Any,
 ) -> Path:  # fmt: skip
     """Write shapes and columns by pyogrio."""
     pyogrio = pytest.importorskip("pyogrio")
+    index = columns.pop("SPATIAL_INDEX", "")
     data = [np.array(c, dtype=object if isinstance(c[0], str) else None) for c in columns.values()]
     more = {} if layer is None else {"layer": layer}
+    more |= {"SPATIAL_INDEX": index} if index else {}
     pyogrio.raw.write(
         file, shapely.to_wkb(np.array(shapes, dtype=object)), data, list(columns), geometry_type=kind, crs=crs,
         append=append, **more,
@@ -145,6 +148,22 @@ def test_holes_heights_and_collections_are_as_in_geojson(tmp_path: Path) -> None
     assert found.notes == ("z.gpkg: 1 hole in polygons counted as no-fly",)
     (note,) = zone_notes([(draft, None) for draft in found.zones])
     assert note == "z.gpkg: the altitudes of corners are not read as limits: a/2 (up to 500 m)"
+
+
+def test_an_arc_is_drawn_so_finely_that_its_chords_are_the_arc(tmp_path: Path) -> None:
+    file = write(tmp_path / "z.gpkg", [SQUARE], "EPSG:32632", SPATIAL_INDEX="NO")
+    x, y, r = 500_000.0, 5_200_000.0, 40_000.0
+    corners = [(x - r, y), (x, y + r), (x + r, y), (x, y - r), (x - r, y)]
+    arcs = struct.pack("<BIIBII", 1, 10, 1, 1, 8, 5) + b"".join(struct.pack("<dd", *c) for c in corners)
+    with sqlite3.connect(file) as base:  # a CurvePolygon of one CircularString, which pyogrio cannot write
+        for (name,) in base.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
+            base.execute(f'DROP TRIGGER "{name}"')
+        base.execute("UPDATE z SET geom = ?", (b"GP\0\x01" + struct.pack("<i", 32632) + arcs,))
+    base.close()
+    (zone,) = read(file).zones
+    east, north = Transformer.from_crs(4326, 32632).transform(*np.array(zone.points).T)
+    ring = shapely.LinearRing(np.stack([east, north], axis=-1))
+    assert ring.distance(shapely.Point(x, y)) > r - 0.03
 
 
 def test_every_layer_of_a_geopackage_is_read_unless_one_is_named(tmp_path: Path) -> None:

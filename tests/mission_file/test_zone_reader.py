@@ -182,6 +182,8 @@ def test_a_polygon_across_the_antimeridian_is_one_zone(tmp_path: Path, lon_deg: 
         (collection(feature(None)), "no geometry"),
         (collection(feature({"type": "LineString", "coordinates": SQUARE})), "a line needs a corridor's half-width"),
         (collection(feature({"type": "LineString", "coordinates": SQUARE[:1]}, buffer_m=5)), "at least 2 different"),
+        (collection(feature({"type": "LineString", "coordinates": SQUARE * 5000}, buffer_m=5)),
+         "has 25000 points, more than 20000; simplify or split it"),
         (collection(feature({"type": "LineString", "coordinates": 5}, buffer_m=5)), "a line is a list of positions"),
         (collection(feature({"type": "LineString", "coordinates": SQUARE}, buffer_m=0)), "buffer_m: must be above 0"),
         (collection(feature({"type": "MultiPoint", "coordinates": []}, radius_m=5)), "needs a list of coordinates"),

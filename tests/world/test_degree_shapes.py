@@ -95,3 +95,11 @@ def test_the_cuts_are_those_of_edges_that_are_all_measured() -> None:
             pieces = np.maximum(1, np.ceil(np.sqrt(bow / degree_shapes.EDGE_BOW_M))).astype(int)
             whole = [a + (b - a) * (np.arange(n) / n)[:, None] for a, b, n in zip(ring, following, pieces, strict=True)]
             assert np.array_equal(degree_shapes._cut_edges(ring, following, frame), np.concatenate(whole))
+
+
+def test_a_line_of_many_points_becomes_several_corridors_that_hold_all_of_it() -> None:
+    along = np.linspace(0.0, 100_000.0, 5001)
+    points = np.stack([along, 300.0 * np.sin(along / 500.0)], axis=-1)
+    corridors = [shapely.Polygon(p.vertices) for p in near_corridors(points.tolist(), 50.0, FRAME, local=True)]
+    assert 4 < len(corridors) < 12
+    assert shapely.union_all(corridors).buffer(1e-6).contains(shapely.LineString(points).buffer(50.0))
