@@ -29,7 +29,7 @@ from gcsplan.export.outdir import write_whole
 from gcsplan.figures import counted
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan, write_waypoints
 from gcsplan.mavlink.link.url import parse_url
-from gcsplan.mavlink.mission.autopilots import profile_of
+from gcsplan.mavlink.mission.autopilots import autopilot_of
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Mission
 from gcsplan.mission_file import MissionFile
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -126,13 +126,13 @@ def unchecked_job(argument: str, url: str, sysid: int) -> UploadJob:
     require_file(file)
     autopilot = None
     if file.suffix.lower() != ".plan":
-        with _open(url) as link:
+        with open_link(url) as link:
             autopilot = _autopilot_of(link, sysid)
     read = read_mission_file(file, autopilot=autopilot)
     return UploadJob(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
 
 
-def _open(url: str) -> Link:
+def open_link(url: str) -> Link:
     """The link at ``url``, signed if the environment holds a key."""
     from gcsplan.mavlink.link.frames import signing_key
     from gcsplan.mavlink.link.link import Link
@@ -144,10 +144,9 @@ def _autopilot_of(link: Link, sysid: int) -> Autopilot:
     from gcsplan.mavlink.link import session
 
     state = session.discover(link, sysid, listen_s=LISTEN_S)
-    for autopilot in Autopilot:
-        table = profile_of(autopilot)
-        if state.mav_autopilot == table.mav_autopilot and state.mav_type in table.mav_types:
-            return autopilot
+    autopilot = autopilot_of(state.mav_autopilot, state.mav_type)
+    if autopilot is not None:
+        return autopilot
     raise VehicleRefused(
         f"vehicle {sysid} calls itself {state.what}, and gcsplan knows {', '.join(Autopilot)}: give a .plan file, "
         f"which names its autopilot"
@@ -176,7 +175,7 @@ def run_jobs(
         failed: dict[str, LinkError] = {}
         for url in dict.fromkeys(job.url for job in jobs if job.url != SIM):
             try:
-                links[url] = stack.enter_context(_open(url))
+                links[url] = stack.enter_context(open_link(url))
             except LinkError as error:  # the other vehicles' links may work
                 failed[url] = error
         if failed and options.atomic:  # nothing has been sent yet, so every vehicle can keep its old mission
@@ -305,7 +304,7 @@ def verify_file(
     file = Path(argument) if source is None else split_name(argument)[1]
     require_file(file)
     checked = None if source is None else check_files(source, [argument])[0]
-    with _open(url) as link:
+    with open_link(url) as link:
         if checked is not None:
             job, notes = _job(checked, link.url), checked.notes
         else:
@@ -334,7 +333,7 @@ def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) ->
         raise UsageError(f"-o {file}: a file in a directory that is there is wanted")
     from gcsplan.mavlink.link import session
 
-    with _open(url) as link:
+    with open_link(url) as link:
         autopilot = _autopilot_of(link, sysid)
         mission = session.download_mission(
             link, sysid, autopilot, name=file.stem, options=session.SessionOptions(listen_s=0.0, timeout_s=timeout_s)
@@ -350,6 +349,6 @@ def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False, timeout
 
     if kind not in KINDS:
         raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
-    with _open(url) as link:
+    with open_link(url) as link:
         options = session.SessionOptions(listen_s=LISTEN_S, allow_armed=allow_armed, timeout_s=timeout_s)
         session.clear_mission(link, sysid, KINDS[kind], options=options).raise_for_outcome()

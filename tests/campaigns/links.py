@@ -372,16 +372,16 @@ class Run:
 
     @contextlib.contextmanager
     def _links(self) -> Iterator[None]:
-        opened = uploads._open
+        opened = uploads.open_link
 
         def link(url: str) -> Link:
             return self.air.link(self._signing())
 
-        uploads._open = link
+        uploads.open_link = link
         try:
             yield
         finally:
-            uploads._open = opened
+            uploads.open_link = opened
 
     def _play_again(self) -> None:
         """Record a first, good upload; then empty the vehicle, remove it or not, and replay the recording."""

@@ -83,6 +83,12 @@ def parameter_name(message: Any) -> str:
     return name if isinstance(name, str) else bytes(name).split(b"\0")[0].decode(errors="replace")
 
 
+def lean_on_board_deg(values: Values) -> float | None:
+    """Return the largest lean angle of parameters that were read, degrees; None if it was not read."""
+    name = next((n for n in _LEAN_ANGLE if math.isfinite(values.get(n, math.nan))), None)
+    return None if name is None else values[name] * _LEAN_ANGLE[name]
+
+
 def lean_shortage(values: Values, speed_m_s: float) -> str:
     """Return in words by how much the lean angle on board is too small for a speed, and the cure; empty if it is not.
 

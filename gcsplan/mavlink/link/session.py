@@ -16,8 +16,9 @@ from typing import Protocol, TypeVar
 
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
 from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump, run
+from gcsplan.mavlink.link.parameters import GROUPS
 from gcsplan.mavlink.link.results import UploadResult
-from gcsplan.mavlink.link.steps import discover_steps
+from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.tasks import (
     Judge,
     ProgressCall,
@@ -30,6 +31,7 @@ from gcsplan.mavlink.link.tasks import (
     verifying,
 )
 from gcsplan.mavlink.link.watch import VehicleState, Watch
+from gcsplan.mavlink.mission.autopilots import autopilot_of
 from gcsplan.mavlink.mission.mission import ALL, FENCE, MISSION, RALLY, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot
 
@@ -47,6 +49,7 @@ __all__ = [
     "discover",
     "download_items",
     "download_mission",
+    "read_vehicle",
     "require_verdict",
     "upload_fleet",
     "upload_items",
@@ -95,6 +98,26 @@ def discover(
     return _run(
         link, sysid, lambda c: discover_steps(c, watch, timeout_s=timeout_s, listen_s=listen_s, standby_s=standby_s)
     )
+
+
+def read_vehicle(
+    link: Link, sysid: int, *, options: SessionOptions | None = None
+) -> tuple[VehicleState, Autopilot | None, dict[str, float]]:
+    """Return what a vehicle reports, its autopilot if gcsplan knows it, and the parameters that missions are judged by.
+
+    Nothing is written. Raises LinkError if nobody answers, VehicleRefused if two vehicles have its system id.
+    """
+    settings = options or SessionOptions()
+
+    def steps(channel: Channel) -> Steps[tuple[VehicleState, Autopilot | None, dict[str, float]]]:
+        state, recheck = yield from looking_at(channel, settings)
+        autopilot = autopilot_of(state.mav_autopilot, state.mav_type)
+        values: dict[str, float] = {}
+        if autopilot is not None:
+            values = yield from parameter_steps(channel, state, GROUPS[autopilot], recheck.watch, recheck)
+        return state, autopilot, values
+
+    return _run(link, sysid, steps)
 
 
 def upload_mission(

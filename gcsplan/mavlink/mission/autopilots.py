@@ -106,6 +106,13 @@ def profile_of(autopilot: Autopilot) -> AutopilotProfile:
     return _TABLE[autopilot]
 
 
+def autopilot_of(mav_autopilot: int, mav_type: int) -> Autopilot | None:
+    """Return the autopilot with these ids of a heartbeat; None if gcsplan does not know it."""
+    return next(
+        (a for a, row in _TABLE.items() if row.mav_autopilot == mav_autopilot and mav_type in row.mav_types), None
+    )
+
+
 def stored(item: Item, autopilot: Autopilot) -> Item:
     """Return ``item`` as it reads back from ``autopilot``."""
     return _TABLE[autopilot].stored(item)

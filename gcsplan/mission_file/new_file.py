@@ -1,0 +1,184 @@
+"""The text of a new mission file: every key with what it is, its unit and default, and the choices that are left."""
+
+from __future__ import annotations
+
+import json
+import re
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, get_args, get_origin
+
+from gcsplan.mission_file.json_schema import LATE_DEFAULTS, MODELINE, describe
+from gcsplan.mission_file.keys import Keys
+from gcsplan.mission_file.places import read_place
+from gcsplan.mission_file.schema import (
+    EnergyKeys,
+    LimitKeys,
+    MissionKeys,
+    PlannerKeys,
+    TerrainKeys,
+    VehicleKeys,
+)  # fmt: skip
+from gcsplan.mission_file.units import UNITS, unit_end
+from gcsplan.vehicle import Autopilot
+
+WIDTH = 100
+MIN_AGL_M = 60.0
+WING_RADIUS_M = 100.0
+
+_DECIMAL_PAIR = re.compile(r"\s*([-+]?\d+(?:\.\d+)?)\s*,\s*([-+]?\d+(?:\.\d+)?)\s*")
+_RESERVED = {"yes", "no", "on", "off", "true", "false", "null"}
+_HEAD = """{modeline}
+# A mission of gcsplan. Plan it:  gcsplan plan {file}
+# Keys carry their unit in the name. A line such as `#max_agl_m: 120` is a choice that is not made: remove its #.
+# Places are [latitude, longitude] in degrees, or text in quotes: degrees with minutes and seconds, UTM, MGRS.
+version: 1
+name: {name}
+"""
+_ZONES = """
+# {said} For example:
+#no_fly:
+#  - {{name: village, center: [36.61, -84.31], radius_m: 400}}
+#  - {{name: mast, center: [36.585, -84.29], radius_m: 60, ceiling_agl_m: 110}}
+#  - {{file: zones.geojson}}
+"""
+
+
+@dataclass(frozen=True)
+class Draft:
+    """What a new mission is made of; places and files as text, as they are to stand in the file.
+
+    ``dem`` are rasters, relative to the mission file; without them the ground is flat at ``flat_m`` above sea level.
+    ``rtl_rel_home_m`` (m above home) and ``lean_deg`` are a vehicle's own settings, if they were read.
+    """
+
+    start: str
+    goal: str
+    dem: tuple[str, ...] = ()
+    vertical_datum: str | None = None
+    flat_m: float | None = None
+    autopilot: Autopilot = Autopilot.ARDUCOPTER
+    sysid: int = 1
+    min_agl_m: float = MIN_AGL_M
+    rtl_rel_home_m: float | None = None
+    lean_deg: float | None = None
+    link: str | None = None
+
+
+def place_text(text: str) -> str:
+    """A place as it stands in the file: a list for two decimal numbers, else the text in quotes. Raises ValueError."""
+    read_place(text)
+    pair = _DECIMAL_PAIR.fullmatch(text)
+    return f"[{pair[1]}, {pair[2]}]" if pair else json.dumps(text, ensure_ascii=False)
+
+
+def text_of(draft: Draft, file: str, name: str) -> str:
+    """The commented mission file of ``draft``; ``file`` is the name that it will have."""
+    parts = [_HEAD.format(modeline=MODELINE, file=file, name=json.dumps(name, ensure_ascii=False))]
+    parts += _section("terrain", _terrain(draft))
+    parts += _section("limits", _limits(draft))
+    parts.append(_ZONES.format(said=describe(MissionKeys, "no_fly")))
+    parts += _section("vehicles", _vehicle(draft), dash=True)
+    parts += _section("planner", _planner())
+    parts.append("")
+    for key, value in (("altitude_frame", "relative"), ("way_home", "reported")):
+        parts += _key(MissionKeys, key, value, "")
+    return "\n".join(part.rstrip("\n") if part else part for part in parts) + "\n"
+
+
+Row = tuple[type[Keys], str, str, bool]
+"""Section, key, value, and whether the choice is made."""
+
+
+def _terrain(draft: Draft) -> Iterator[Row]:
+    dem = ", ".join(_word(d) for d in draft.dem)
+    if draft.dem:
+        yield TerrainKeys, "dem", dem if len(draft.dem) == 1 else f"[{dem}]", True
+        datum = draft.vertical_datum
+        yield TerrainKeys, "vertical_datum", "EGM96" if datum is None else _word(datum), datum is not None
+    else:
+        yield TerrainKeys, "flat_m", f"{draft.flat_m:g}", True
+    yield TerrainKeys, "obstacle_height_m", "0", True
+
+
+def _limits(draft: Draft) -> Iterator[Row]:
+    wing = draft.autopilot is Autopilot.ARDUPLANE
+    yield LimitKeys, "min_agl_m", f"{draft.min_agl_m:g}", True
+    yield LimitKeys, "max_agl_m", f"{2.0 * draft.min_agl_m:g}", False
+    yield LimitKeys, "max_amsl_m", "1500", False
+    yield LimitKeys, "horizontal_clearance_m", "30", True
+    yield LimitKeys, "track_error_m", "10" if wing else "3", True
+    yield LimitKeys, "altitude_error_m", "8" if wing else "5", True
+    yield LimitKeys, "max_climb_deg", "8" if wing else "15", True
+
+
+def _vehicle(draft: Draft) -> Iterator[Row]:
+    wing = draft.autopilot is Autopilot.ARDUPLANE
+    yield VehicleKeys, "name", f"uav{draft.sysid}", True
+    yield VehicleKeys, "sysid", str(draft.sysid), True
+    yield VehicleKeys, "autopilot", draft.autopilot.value, True
+    yield VehicleKeys, "start", draft.start, True
+    yield VehicleKeys, "goal", draft.goal, True
+    yield VehicleKeys, "via", "[]", True
+    yield VehicleKeys, "end", "loiter" if wing else "land", True
+    height_m = draft.rtl_rel_home_m
+    yield VehicleKeys, "rtl_rel_home_m", "100" if height_m is None else f"{height_m:.10g}", height_m is not None
+    yield VehicleKeys, "speed_m_s", "[14, 20]" if wing else "[3, 10]", True
+    if draft.autopilot is Autopilot.ARDUCOPTER:
+        lean = draft.lean_deg
+        yield VehicleKeys, "lean_angle_deg", "30" if lean is None else f"{lean:.10g}", lean is not None
+    yield VehicleKeys, "climb_m_s", "2.5", True
+    yield VehicleKeys, "descent_m_s", "1.5", True
+    if wing:
+        yield VehicleKeys, "turn_radius_m", f"{WING_RADIUS_M:g}", True
+    yield VehicleKeys, "link", _word(draft.link or "udpout:127.0.0.1:14560"), draft.link is not None
+    battery = {key: EnergyKeys.model_fields[key].default for key in ("vertical_j_per_m", "horizontal_j_per_m")}
+    values = ", ".join(f"{key}: {value:g}" for key, value in battery.items())
+    yield VehicleKeys, "energy", f"{{{values}, battery_wh: 400, reserve: 0.2}}", False
+
+
+def _planner() -> Iterator[Row]:
+    for key, value in (("name", "optimal"), ("objective", "length"), ("seed", "1"), ("budget_s", "10")):
+        yield PlannerKeys, key, value, True
+
+
+def _section(key: str, rows: Iterator[Row], *, dash: bool = False) -> Iterator[str]:
+    """A section with its keys; with ``dash`` it is the one entry of a list."""
+    yield ""
+    yield f"# {describe(MissionKeys, key)}"
+    yield f"{key}:"
+    for i, (kind, name, value, made) in enumerate(rows):
+        indent = "    " if dash else "  "
+        lines = list(_key(kind, name, value, indent, made=made))
+        if dash and i == 0:
+            lines[-1] = f"  - {lines[-1].lstrip()}"
+        yield from lines
+
+
+def _key(kind: type[Keys], key: str, value: str, indent: str, *, made: bool = True) -> Iterator[str]:
+    """The comment of a key and its line."""
+    field = kind.model_fields[key]
+    unit = UNITS.get(unit_end(key), "")
+    default = LATE_DEFAULTS.get(key, field.default)
+    words = [describe(kind, key)]
+    if get_origin(field.annotation) is Literal:
+        words.append(f"One of {', '.join(get_args(field.annotation))}.")
+    if unit:
+        words.append(f"In {unit}.")
+    if field.is_required():
+        words.append("Required.")
+    elif isinstance(default, str | int | float):
+        words.append(f"Default: {default:g}." if isinstance(default, float) else f"Default: {default}.")
+    elif isinstance(default, list):
+        words.append(f"Default: [{', '.join(f'{x:g}' for x in default)}].")
+    yield from textwrap.wrap(
+        " ".join(words), WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# ", break_on_hyphens=False
+    )
+    yield f"{indent}{'' if made else '#'}{key}: {value}"
+
+
+def _word(text: str) -> str:
+    """A text as a YAML value, in quotes unless it cannot be taken for anything else."""
+    plain = re.fullmatch(r"[A-Za-z/][A-Za-z0-9_./:-]*[A-Za-z0-9_]", text) and text.lower() not in _RESERVED
+    return text if plain else json.dumps(text, ensure_ascii=False)
