@@ -434,7 +434,7 @@ def test_any_table_gives_zones_or_problems(tmp_path: Path) -> None:
         assert all(p.where and p.message for p in found.problems)
 
 
-def test_a_whole_mission_with_every_format(tmp_path: Path) -> None:
+def test_a_whole_mission_with_every_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The keys of the mission reach the readers, and the copy that GDAL reads is not named."""
     from gcsplan.mission_file.load import load_mission
 
@@ -450,7 +450,7 @@ def test_a_whole_mission_with_every_format(tmp_path: Path) -> None:
             {"name": "rail", "line": [[46.53, 8.0], "46.54, 8.1"], "buffer_m": 25},
         ],
     }  # fmt: skip
-    os.chdir(tmp_path)
+    monkeypatch.chdir(tmp_path)
     assert [z.name for z in load_mission(mission).zones] == ["wire", "a", "mast", "rail"]
     mission["no_fly"] = [{"file": "masts.csv", "buffer_m": 80}]
     with pytest.raises(InputError, match="a point needs a radius") as caught:
