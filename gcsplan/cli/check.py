@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gcsplan.cli import completion
 from gcsplan.cli.ending import complain, emit, printable
 from gcsplan.cli.options import (
     JsonOption,
@@ -34,12 +35,18 @@ def check(
         list[str],
         typer.Argument(
             metavar="[MISSION.yaml] FILE",
+            autocompletion=completion.missions,
             help="A mission file, in whose world they are checked (or --dem and --min-agl), and .waypoints or .plan "
             "files; NAME=FILE says for which vehicle of the mission a file is.",
         ),
     ],
     dem: Annotated[
-        list[str] | None, typer.Option(metavar="FILE", help="Terrain; may be repeated. Or a source of dem fetch.")
+        list[str] | None,
+        typer.Option(
+            metavar="FILE",
+            autocompletion=completion.dems,
+            help="Terrain; may be repeated. Or a source of dem fetch.",
+        ),
     ] = None,
     vertical_datum: Annotated[
         str | None, typer.Option(metavar="NAME", help="Of the terrain: EGM96, EGM2008, …")
@@ -63,7 +70,12 @@ def check(
     max_climb: Annotated[Number, typer.Option(metavar="DEG", help="Steepest climb.")] = None,
     max_descent: Annotated[Number, typer.Option(metavar="DEG", help="Steepest descent [default: --max-climb]")] = None,
     autopilot: Annotated[
-        str | None, typer.Option(metavar="NAME", help="arducopter, arduplane or px4, where the file does not say.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            autocompletion=completion.autopilots,
+            help="arducopter, arduplane or px4, where the file does not say.",
+        ),
     ] = None,
     home: Annotated[
         str | None,

@@ -7,13 +7,17 @@ from typing import Annotated
 
 import typer
 
+from gcsplan.cli import completion
 from gcsplan.cli.options import AutopilotOption, ListenOption, MisbehaveOption, SimSysidOption
 from gcsplan.errors import UsageError
 
 
 def sim(
     mission: Annotated[
-        Path | None, typer.Argument(metavar="MISSION.yaml", help="One vehicle for each of the mission's.")
+        Path | None,
+        typer.Argument(
+            metavar="MISSION.yaml", autocompletion=completion.missions, help="One vehicle for each of the mission's."
+        ),
     ] = None,
     listen: ListenOption = "udpin:127.0.0.1:14560",
     autopilot: AutopilotOption = None,

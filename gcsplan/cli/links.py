@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from gcsplan.cli import completion
 from gcsplan.cli.ending import emit, talking
 from gcsplan.cli.options import (
     LINKS,
@@ -44,7 +45,12 @@ def upload(
         ),
     ],
     mission: Annotated[
-        Path | None, typer.Option(metavar="MISSION.yaml", help="Mission file whose world the files are checked in.")
+        Path | None,
+        typer.Option(
+            metavar="MISSION.yaml",
+            autocompletion=completion.missions,
+            help="Mission file whose world the files are checked in.",
+        ),
     ] = None,
     unchecked: Annotated[bool, typer.Option("--unchecked", help="Send without any check of safety.")] = False,
     sysid: UncheckedSysidOption = None,
@@ -134,7 +140,11 @@ def verify(
     to: ToOption,
     mission: Annotated[
         Path | None,
-        typer.Option(metavar="MISSION.yaml", help="Mission file in whose world what is on board is judged again."),
+        typer.Option(
+            metavar="MISSION.yaml",
+            autocompletion=completion.missions,
+            help="Mission file in whose world what is on board is judged again.",
+        ),
     ] = None,
     tolerance_m: Annotated[
         float | None,

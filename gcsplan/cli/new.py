@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
+from gcsplan.cli import completion
 from gcsplan.cli.ending import emit, printable
 from gcsplan.cli.options import LINKS, JsonOption, SysidOption
 from gcsplan.errors import InputError, UsageError
@@ -32,7 +33,11 @@ def new(
     goal: Annotated[str | None, typer.Option(metavar="LAT,LON", help="Where it flies to, in the same forms.")] = None,
     dem: Annotated[
         list[str] | None,
-        typer.Option(metavar="FILE", help="The ground: a raster (.tif, .hgt, .asc) or sample:jacksboro; repeatable."),
+        typer.Option(
+            metavar="FILE",
+            autocompletion=completion.dems,
+            help="The ground: a raster (.tif, .hgt, .asc) or sample:jacksboro; repeatable.",
+        ),
     ] = None,
     vertical_datum: Annotated[
         str | None, typer.Option(metavar="NAME", help="Of a raster that does not state it: EGM96 for SRTM, EGM2008, …")
@@ -44,7 +49,12 @@ def new(
         float, typer.Option(metavar="M", help="Lowest height above the ground and what stands on it.")
     ] = 60.0,
     autopilot: Annotated[
-        str | None, typer.Option(metavar="NAME", help="arducopter, arduplane or px4 [default: arducopter]")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            autocompletion=completion.autopilots,
+            help="arducopter, arduplane or px4 [default: arducopter]",
+        ),
     ] = None,
     source: Annotated[
         str | None,

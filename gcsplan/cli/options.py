@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from gcsplan.cli import completion
 from gcsplan.errors import UsageError
 from gcsplan.units import AVIATION, IMPERIAL, METRIC
 
@@ -37,7 +38,12 @@ UnitsOption = Annotated[
         "JSON and notes stay in SI.",
     ),
 ]
-MissionArgument = Annotated[Path, typer.Argument(metavar="MISSION.yaml", help="The mission file, or sample:NAME.")]
+MissionArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MISSION.yaml", autocompletion=completion.missions, help="The mission file, or sample:NAME."
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
 ListZonesOption = Annotated[
     bool,
@@ -66,7 +72,15 @@ ToOption = Annotated[str, typer.Option("--to", metavar="URL", help=f"Where the v
 FilesArgument = Annotated[
     list[str], typer.Argument(metavar="FILE...", help="FILE or NAME=FILE (the vehicle's name); .waypoints or .plan.")
 ]
-TypeOption = Annotated[str, typer.Option("--type", metavar="KIND", help="mission, fence or rally.")]
+TypeOption = Annotated[
+    str,
+    typer.Option(
+        "--type",
+        metavar="KIND",
+        autocompletion=completion.words("mission", "fence", "rally"),
+        help="mission, fence or rally.",
+    ),
+]
 ArmedOption = Annotated[bool, typer.Option("--allow-armed", help="Send to an armed vehicle.")]
 AtomicOption = Annotated[
     bool, typer.Option("--atomic", help="All or nothing: if one upload fails, clear what the other vehicles took.")
@@ -99,7 +113,11 @@ ListenOption = Annotated[
 ]
 AutopilotOption = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="Without a mission file: arducopter, arduplane or px4 [default: arducopter]"),
+    typer.Option(
+        metavar="NAME",
+        autocompletion=completion.autopilots,
+        help="Without a mission file: arducopter, arduplane or px4 [default: arducopter]",
+    ),
 ]
 SimSysidOption = Annotated[
     int | None,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gcsplan.cli import completion
 from gcsplan.cli.ending import emit, talking
 from gcsplan.cli.options import (
     LINKS,
@@ -43,19 +44,34 @@ def plan(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="DIR", help="Output directory [default: ./<mission stem>]")
     ] = None,
-    planner: Annotated[str | None, typer.Option(metavar="NAME", help="A name from `gcsplan planners`.")] = None,
-    objective: Annotated[str | None, typer.Option(metavar="WHAT", help="length or energy.")] = None,
+    planner: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", autocompletion=completion.planners, help="A name from `gcsplan planners`."),
+    ] = None,
+    objective: Annotated[
+        str | None,
+        typer.Option(metavar="WHAT", autocompletion=completion.words("length", "energy"), help="length or energy."),
+    ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of everything random.")] = None,
     encoding: Annotated[
-        str | None, typer.Option(metavar="NAME", help="A swarm's encoding: box, sections, polar, bspline, offsets.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            autocompletion=completion.encodings,
+            help="A swarm's encoding: box, sections, polar, bspline, offsets.",
+        ),
     ] = None,
     cost: Annotated[
-        str | None, typer.Option(metavar="NAME", help="A swarm's cost: krill, ssgwo, msfoa, abo, ib-abc.")
+        str | None,
+        typer.Option(
+            metavar="NAME", autocompletion=completion.costs, help="A swarm's cost: krill, ssgwo, msfoa, abo, ib-abc."
+        ),
     ] = None,
     upload: Annotated[
         list[str] | None,
         typer.Option(
             metavar="WHERE",
+            autocompletion=completion.words("sim", "link"),
             help="A URL for all vehicles, NAME=URL for one, `link` (the mission file's links) or `sim` (simulated "
             f"vehicles). May be repeated. URLs: {LINKS}",
         ),
