@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.mission.autopilots import altitude_of_cm, max_items, profile_of, stored
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm, autopilot_of, max_items, profile_of, stored
 from gcsplan.mavlink.mission.mission import FENCE, FRAME_SYNONYMS, GLOBAL, RALLY, MissionItem, float32
 from gcsplan.mavlink.mission.stored_ardupilot import RULES, read_back_altitudes, stored_cm
 from gcsplan.mavlink.mission.stored_px4 import LOCATED, yaw
@@ -279,3 +279,17 @@ def test_what_is_refused_is_just_what_the_simulated_vehicle_refuses(autopilot: A
     assert {(True, True), (False, False)} <= seen
     assert "above terrain" in profile_of(PX4).refuses(item(16, frame=10))
     assert profile_of(COPTER).refuses(item(16, frame=11)) == ""
+
+
+@pytest.mark.parametrize(
+    ("ids", "found"),
+    [
+        ((3, 2), Autopilot.ARDUCOPTER),
+        ((3, 1), Autopilot.ARDUPLANE),
+        ((12, 2), Autopilot.PX4),
+        ((3, 10), None),  # a rover
+        ((0, 2), None),  # a generic autopilot
+    ],
+)
+def test_an_autopilot_is_known_by_the_ids_of_its_heartbeat(ids: tuple[int, int], found: Autopilot | None) -> None:
+    assert autopilot_of(*ids) is found
