@@ -687,6 +687,7 @@ def test_the_files_it_exports_pass_the_check(circling: Plan, tmp_path: FilePath)
         assert checked.verdict.safe is True, checked.verdict.describe()
 
 
+@pytest.mark.slow
 def test_a_landing_glides_from_the_approach_and_a_wanted_heading_is_kept(landing: Plan) -> None:
     (v,) = landing.vehicles
     assert v.verdict.safe is True
@@ -706,6 +707,7 @@ def test_the_example_can_land_where_the_ground_beside_the_pad_is_higher() -> Non
     assert v.mission.items[-1].command == cmd.LAND
 
 
+@pytest.mark.slow
 def test_it_flies_at_one_speed_from_the_ground_to_the_goal_and_arrives_flying(landing: Plan) -> None:
     (v,) = landing.vehicles
     craft = v.request.vehicle
@@ -720,6 +722,7 @@ def test_it_flies_at_one_speed_from_the_ground_to_the_goal_and_arrives_flying(la
     assert motion.arrive_s < motion.times_s[-1] - 10.0
 
 
+@pytest.mark.slow
 def test_the_simulated_aircraft_takes_as_long_as_planned(landing: Plan) -> None:
     (v,) = landing.vehicles
     craft = v.request.vehicle

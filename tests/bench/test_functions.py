@@ -129,6 +129,7 @@ def test_rankings_among_values_that_doubles_cannot_tell_apart_are_left_open() ->
     assert _claims(costs, ["f1"], ["gwo", "ssgwo"], 40, 30)[0]["reproduced"] is True
 
 
+@pytest.mark.slow
 def test_the_benchmark_gives_the_same_numbers_over_processes_as_in_one(tmp_path: Path) -> None:
     asked = {"runs": 12, "seed": 3, "algorithms": ("gwo", "de"), "functions": ("f1", "f6"), "dim": 4, "iterations": 12}
     parts: list[tuple[int, int]] = []

@@ -10,6 +10,7 @@ from gcsplan.mavlink.protocol.outcome import Changed
 from tests.campaigns.links import Run, campaign, main
 
 
+@pytest.mark.slow
 def test_nothing_is_found_among_adversaries() -> None:
     counts, found = campaign(range(1, 26))
     assert found == []
