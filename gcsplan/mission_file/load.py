@@ -214,7 +214,7 @@ class _Reading:
         published = self._zones(hours)
         if self.problems:
             raise self._refusal(self.problems)
-        self.notes += [f"{draft.name} is not used: {draft.unused}" for draft in published if draft.unused]
+        self.notes += [f"not used, because {d.unused}: {one_line(d.name)}" for d in published if d.unused]
         self.notes += [f"{fault.where}: {fault.message}" for draft in published for fault in draft.faults]
         return used(published), list(dict.fromkeys(self.notes))
 
