@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gcsplan.cli import main as cli
 from gcsplan.dem.cells import Cell
 from gcsplan.world.model_words import SURFACE_DEM
 from tests.support.tiles import Served, serving
@@ -38,21 +36,10 @@ def served(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Served]:
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
-    """Call ``gcsplan ARGUMENTS`` in a directory with a mission; gives (exit code, standard output, standard error)."""
-    monkeypatch.chdir(tmp_path)
+def run(run: Any, tmp_path: Path) -> Any:
+    """`run` of the folder, in a directory with a mission."""
     (tmp_path / "ridge.yaml").write_text(MISSION)
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        out, err = capfd.readouterr()
-        code = ended.value.code
-        assert isinstance(code, int)
-        return code, out, err
-
-    return call
+    return run
 
 
 def test_from_nothing_to_a_plan_by_the_commands_that_are_told(run: Any, served: Served, tmp_path: Path) -> None:

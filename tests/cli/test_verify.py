@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gcsplan.cli import main as cli
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
-from tests.support.impatient import be_impatient
 from tests.support.paths import DATA
 
 CROSSING = DATA / "crossing.yaml"
@@ -23,17 +20,12 @@ Change = Callable[[list[str]], None]
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
-    monkeypatch.chdir(tmp_path)
-    be_impatient(monkeypatch)
+def run(run: Any) -> Any:
+    """`run` of the folder after a plan; gives (exit code, all text in one line)."""
 
     def call(*arguments: object) -> tuple[int, str]:
-        monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        out, err = capfd.readouterr()
-        assert isinstance(ended.value.code, int)
-        return ended.value.code, " ".join((out + err).split())
+        code, out, err = run(*arguments)
+        return code, " ".join((out + err).split())
 
     assert call("plan", CROSSING, "-o", "out")[0] == 0
     return call

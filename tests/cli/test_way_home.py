@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +11,11 @@ import pytest
 import yaml
 
 import gcsplan
-from gcsplan.cli import main as cli
 from gcsplan.errors import CheckFailed
 from gcsplan.sim import parameters
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
-from tests.support.impatient import be_impatient
 
 HEADLINE = "path safe; no safe return from "
 HILL = {
@@ -34,18 +31,12 @@ UAV1 = {
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
-    """Call ``gcsplan ARGUMENTS`` in an empty directory; gives (exit code, all text, standard output)."""
-    monkeypatch.chdir(tmp_path)
-    be_impatient(monkeypatch)
+def run(run: Any) -> Any:
+    """`run` of the folder; gives (exit code, all text, standard output)."""
 
     def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        out, err = capfd.readouterr()
-        assert isinstance(ended.value.code, int)
-        return ended.value.code, out + err, out
+        code, out, err = run(*arguments)
+        return code, out + err, out
 
     return call
 
