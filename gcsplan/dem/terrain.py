@@ -20,9 +20,7 @@ from gcsplan.dem.sources import SOURCES, Source
 from gcsplan.errors import InputError
 from gcsplan.world.datum import VerticalDatum, take_apart
 from gcsplan.world.frame import Frame
-from gcsplan.world.geoid import GeoidGrid
 from gcsplan.world.raster import Raster, open_raster, sha256_of
-from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Box, OpenTerrain, Terrain, TerrainSpec, open_terrain, place, terrain_of
 
 ROWS = 3600
@@ -67,38 +65,9 @@ class _SourceTerrain:
             raise InputError(f"{_not_published(self._source, absent)}; give another DEM", where=at)
         sample = next(iter(tiles.values()), None)
         found = [tiles[c] if c in tiles else _sea(self._source, c, sample) for c in records if c in tiles or c in sea]
-        terrain = terrain_of(found, replace(self._spec, dem=(self._source.name,)), where=self._where)
-        return _Told(terrain, *_told(self._source, records, sea, absent))
-
-
-class _Told:
-    """A terrain whose surfaces say which source they are from."""
-
-    def __init__(self, terrain: Terrain, info: dict[str, object], notes: tuple[str, ...]) -> None:
-        self._terrain, self._info, self._notes = terrain, info, notes
-
-    def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        return self._terrain.covers(lat_deg, lon_deg)
-
-    def around(self, frame: Frame, box: Box) -> Terrain:
-        return self
-
-    @property
-    def is_flat(self) -> bool:
-        return False
-
-    @property
-    def geoid(self) -> GeoidGrid | None:
-        return self._terrain.geoid
-
-    def extent(self, frame: Frame, box: Box) -> Box:
-        return self._terrain.extent(frame, box)
-
-    def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
-        surface = self._terrain.load(frame, box, most_cells=most_cells)
-        notes = surface.info["notes"]
-        assert isinstance(notes, tuple)
-        return replace(surface, info=surface.info | self._info | {"notes": (*notes, *self._notes)})
+        spec = replace(self._spec, dem=(self._source.name,))
+        info, notes = _told(self._source, records, sea, absent)
+        return terrain_of(found, spec, where=self._where, info=info, notes=notes)
 
 
 def _told(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal, Protocol
@@ -110,9 +110,19 @@ def open_terrain(spec: TerrainSpec, *, where: str) -> Terrain:
     return terrain_of(_rasters(spec, place(where, "dem")), spec, where=where)
 
 
-def terrain_of(rasters: Sequence[Raster], spec: TerrainSpec, *, where: str) -> Terrain:
-    """Terrain of tiles that are open; ``spec`` says the rest. Raises InputError."""
-    return _RasterTerrain(rasters, spec, where)
+def terrain_of(
+    rasters: Sequence[Raster],
+    spec: TerrainSpec,
+    *,
+    where: str,
+    info: Mapping[str, object] | None = None,
+    notes: Sequence[str] = (),
+) -> Terrain:
+    """Terrain of tiles that are open; ``spec`` says the rest, ``info`` and ``notes`` go with its surfaces too.
+
+    Raises InputError.
+    """
+    return _RasterTerrain(rasters, spec, where, info or {}, notes)
 
 
 def place(where: str, key: str) -> str:
@@ -121,9 +131,16 @@ def place(where: str, key: str) -> str:
 
 
 class _RasterTerrain:
-    def __init__(self, rasters: Sequence[Raster], spec: TerrainSpec, where: str) -> None:
-        self._spec = spec
-        self._where = where
+    def __init__(
+        self,
+        rasters: Sequence[Raster],
+        spec: TerrainSpec,
+        where: str,
+        info: Mapping[str, object],
+        notes: Sequence[str],
+    ) -> None:
+        self._spec, self._where = spec, where
+        self._info, self._notes = info, notes
         self._mosaic = Mosaic(rasters, where=place(where, "dem"))
         self._datum = vertical_datum(spec.vertical_datum, rasters[0].vertical, where=place(where, "vertical_datum"))
         self._geoid = _geoid(spec, self._datum, where)
@@ -193,7 +210,7 @@ class _RasterTerrain:
                     "canopy_nodata_m gives them a height"
                 )
             info["canopy_sha256"] = self._canopy.rasters[0].sha256()
-        info["notes"] = tuple(notes)
+        info |= {**self._info, "notes": (*notes, *self._notes)}
         return Surface(ground, top, window.grid, info, window.goes_on)
 
 
