@@ -290,10 +290,10 @@ def test_a_standard_output_that_takes_nothing_is_an_error_of_its_own(
 
 
 def test_ctrl_c_says_so_in_words_and_in_json(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def plainly(*_: object) -> None:
+    def plainly(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    def in_compiled_code(*_: object) -> None:
+    def in_compiled_code(*_: object, **__: object) -> None:
         raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
 
     for interrupted in (plainly, in_compiled_code):
@@ -316,7 +316,7 @@ def test_ctrl_c_during_an_upload_says_what_is_unknown_now(run: Run, monkeypatch:
 
 
 def test_no_memory_is_an_error_that_can_be_cured(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def hungry(*_: object) -> None:
+    def hungry(*_: object, **__: object) -> None:
         raise MemoryError
 
     monkeypatch.setattr(pipeline, "load_mission", hungry)
@@ -403,10 +403,10 @@ def test_upload_needs_one_file_and_one_number_for_each_vehicle(run: Run, tmp_pat
 
 
 def test_a_missing_file_is_told_before_a_vehicle_is_looked_for(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def opened(*_: object) -> None:
+    def opened(*_: object, **__: object) -> None:
         raise AssertionError("the link was opened")
 
-    monkeypatch.setattr(uploads, "_open", opened)
+    monkeypatch.setattr(uploads, "open_link", opened)
     for command in ("verify", "upload"):
         more = ["--unchecked"] if command == "upload" else []
         code, _, err = run(command, "nowhere.waypoints", "--to", "udpout:127.0.0.1:9", *more)
